@@ -1,0 +1,1 @@
+"""raychan: a ray-traced radar channel simulator on Embree."""
