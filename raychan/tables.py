@@ -131,18 +131,22 @@ class Routes(Record):
     others are mirrors or layers. A route without footprint (`scatter` = -1) is an exact specular path.
     """
 
-    tx: Floats = column("3", unit="m")
-    rx: Floats = column("3", unit="m")
+    tx: Floats = column("3", unit="m", doc="or the unit direction of a far transmitter")
+    rx: Floats = column("3", unit="m", doc="or the unit direction of a far receiver")
+    far: bool
     vertices: Floats = column("n d 3", unit="m", doc="vertices in order; unused slots repeat rx")
     normals: Floats = column("n d 3", doc="unit normals on the lit side; 0 in unused slots")
     facet: Ints = column("n d", np.int32)
+    body: Ints = column("n d", np.int16)
     kind: Ints = column("n d", np.int8)
     scatter: Ints = column("n", np.int8)
-    lengths: Floats = column("n 3", unit="m", doc="total lengths tx to rx through the footprint's corners")
+    lengths: Floats = column("n 6", unit="m", doc="total lengths through the footprint's corners and edge middles")
     length: Floats = column("n", unit="m", doc="total length through the vertices")
+    taper: Floats = column("n 3", doc="how strongly each corner is lit and seen, relative to the centre")
     area: Floats = column("n", unit="m2", doc="footprint area seen; 0 without footprint")
     spread_in: Floats = column("n", unit="1/m", doc="field spreading tx to scatterer (1/L in free space)")
     spread_out: Floats = column("n", unit="1/m", doc="field spreading rx to scatterer")
+    caustics: Ints = column("n", np.int8, doc="caustics passed on the way in; each advances the phase by pi/2")
     sigma: Floats = column("n", unit="m2", doc="RCS of a POINT vertex; 0 else")
 
 

@@ -1,0 +1,73 @@
+"""Collect: tubes on their last surface, and their way out, become Routes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.legs import Leg
+from raychan.channel.surface import Surface
+from raychan.channel.tubes import CENTRE, Tubes, middles, vector_area
+from raychan.tables import REFLECT, SCATTER, TRANSMIT, Routes
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, corners: Floats, passed: Ints) -> Routes:
+    """Return the routes of tubes that scatter on their present footprint and leave over `out`.
+
+    Args: first whether this is their first surface; corners (n, m, 3) mirror points of the way out, receiver's side first; passed (n, l) layers on its last stretch.
+    """
+    n = len(tubes)
+    end = np.asarray(out.end, float)
+    back_k, back = out.rays(tubes.points)
+    middle, half_way = middles(surface, leg, tubes, first)
+    lengths = np.concatenate([tubes.length[:, :3] + back[:, :3], half_way + out.rays(middle)[1]], axis=1)
+    every = np.arange(n)
+    scatter = tubes.slots.copy()
+    tubes.append(every, tubes.points[:, CENTRE], tubes.normals[:, CENTRE], tubes.facet, SCATTER)
+    for j in range(passed.shape[1] - 1, -1, -1):
+        rows = np.flatnonzero(passed[:, j] >= 0)
+        facet = passed[rows, j]
+        p, k = tubes.points[rows, CENTRE], -back_k[rows, CENTRE]
+        t = surface.distance(facet, p, k)
+        tubes.append(rows, p + t[:, None] * k, surface.normal[facet], facet, TRANSMIT)
+    for i in range(len(out.mirrors) - 1, -1, -1):
+        m = out.mirrors[i]
+        tubes.append(every, corners[:, i], m.normal, np.full(n, m.facet, np.int32), REFLECT)
+    unused = tubes.kinds == 0
+    vertices = np.where(unused[..., None], 0.0 if out.far else end, tubes.vertices)
+    body = surface.facets.body[np.maximum(tubes.facets, 0)] if n else np.zeros_like(tubes.facets)
+    return Routes(
+        tx=np.asarray(leg.end, float),
+        rx=end,
+        far=out.far,
+        vertices=vertices,
+        normals=tubes.vertex_normals,
+        facet=tubes.facets,
+        body=np.where(tubes.facets >= 0, body, -1).astype(np.int16),
+        kind=tubes.kinds,
+        scatter=scatter,
+        lengths=lengths,
+        length=tubes.length[:, CENTRE] + back[:, CENTRE],
+        taper=_taper(tubes, back_k, back, out.far),
+        area=np.linalg.norm(vector_area(tubes.points), axis=1),
+        spread_in=tubes.spread,
+        spread_out=out.spread(back[:, CENTRE]),
+        caustics=tubes.caustics,
+        sigma=np.zeros(n),
+    )
+
+
+
+
+def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
+    """Return the mean obliquity times spreading at the corners over that at the centre (n, 3); zero beyond the terminator."""
+    cosine = -0.5 * np.einsum("nij,nij->ni", tubes.normals, tubes.k + back_k)
+    strength = np.maximum(cosine, 0.0)
+    if not far:
+        strength = strength / (tubes.length * back)
+    centre = strength[:, CENTRE:]
+    ratio = strength[:, :3] / np.where(centre > 0.0, centre, 1.0)
+    return np.clip(np.where(centre > 0.0, ratio, 0.0), 0.0, 4.0)

@@ -1,0 +1,172 @@
+"""Fields: the replay of routes through the kernels. Materials, antennas and polarisations change here, never the routes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from raychan.kernels.fresnel import coefficients
+from raychan.kernels.po import huygens, triangle_terms
+from raychan.kernels.polar import dot, reflect, transmit
+from raychan.tables import POINT, TRANSMIT, Facets, Materials, Routes
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+_LINEAR = 0.01  # rad: how far the phase of a piece of the footprint may bend in the integral
+
+FieldOf = Callable[[Floats], Complexes]
+"""Directions (n, 3) that an antenna looks to -> its vector fields (n, p, 3), one for each of p polarisations."""
+
+
+def departures(routes: Routes) -> tuple[Floats, Floats]:
+    """Return unit directions (n, 3) in which the transmitter sends and to which the receiver looks."""
+    n, d = routes.kind.shape
+    row = np.arange(n)
+    if routes.far:
+        return np.broadcast_to(-routes.tx, (n, 3)), np.broadcast_to(-routes.rx, (n, 3))
+    count = (routes.kind > 0).sum(axis=1)
+    any_vertex = (count > 0)[:, None]
+    first = np.where(any_vertex, routes.vertices[:, 0] if d else routes.rx, routes.rx)
+    last = np.where(any_vertex, routes.vertices[row, count - 1] if d else routes.tx, routes.tx)
+    out, back = first - routes.tx, last - routes.rx
+    return out / np.linalg.norm(out, axis=1)[:, None], back / np.linalg.norm(back, axis=1)[:, None]
+
+
+def transfer(
+    routes: Routes, facets: Facets, frequency: float, tx_field: FieldOf, rx_field: FieldOf, corners: bool = False
+) -> Complexes:
+    """Return what each route carries (n, q, p): received over transmitted wave, lambda/4 pi and carrier phase in.
+
+    Args: tx_field, rx_field vector fields of p and q polarisations; corners: give (n, q, p, 3), the parts
+    belonging to the three footprint corners, whose sum is the whole.
+    """
+    away, look = departures(routes)
+    e_tx = np.ascontiguousarray(tx_field(away), dtype=np.complex128)
+    e_rx = np.ascontiguousarray(rx_field(look), dtype=np.complex128)
+    m: Materials = facets.materials
+    material = facets.material[np.maximum(routes.facet, 0)].astype(np.int64) if len(facets.material) else routes.facet
+    k = 2.0 * np.pi * frequency / C0
+    out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3), np.complex128)
+    _transfer(
+        routes.tx, routes.rx, routes.far, routes.vertices, routes.normals, routes.kind, material, routes.scatter,
+        routes.lengths, routes.length, routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics,
+        routes.sigma, m.kind, m.eps, m.thickness, m.roughness, e_tx, e_rx, k, out,
+    )  # fmt: skip
+    return out if corners else out.sum(axis=3)
+
+
+@njit(cache=True)
+def _vec(a):  # type: ignore[no-untyped-def]
+    return a[0], a[1], a[2]
+
+
+@njit(cache=True)
+def _heading(a, b):  # type: ignore[no-untyped-def]
+    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    s = (x * x + y * y + z * z) ** 0.5
+    if s == 0.0:
+        return 1.0, 0.0, 0.0
+    return x / s, y / s, z / s
+
+
+@njit(cache=True)
+def _cosine(k, n):  # type: ignore[no-untyped-def]
+    return abs(k[0] * n[0] + k[1] * n[1] + k[2] * n[2])
+
+
+@njit(cache=True, nogil=True)
+def _transfer(  # type: ignore[no-untyped-def]
+    tx, rx, far, vertices, normals, kind, material, scatter, lengths, length, taper, area, spread_in, spread_out, caustics,
+    sigma, m_kind, m_eps, m_thickness, m_rough, e_tx, e_rx, k, out,
+):  # fmt: skip
+    n, d = kind.shape
+    terms = np.empty(3, np.complex128)
+    phases = np.empty(6)
+    wavelength_4pi = 0.5 / k
+    for i in range(n):
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        at = scatter[i] if scatter[i] >= 0 else used
+        for p in range(e_tx.shape[1]):
+            for q in range(e_rx.shape[1]):
+                e = _vec(e_tx[i, p])
+                g = _vec(e_rx[i, q])
+                # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
+                k_in = (-tx[0], -tx[1], -tx[2])
+                if not far:
+                    k_in = _heading(tx, vertices[i, 0]) if used > 0 else _heading(tx, rx)
+                for j in range(at):
+                    normal = _vec(normals[i, j])
+                    mat = material[i, j]
+                    c = coefficients(
+                        m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k
+                    )  # fmt: skip
+                    if kind[i, j] == TRANSMIT:
+                        e = transmit(e, k_in, normal, c[2], c[3])
+                    else:
+                        e = reflect(e, k_in, normal, c[0], c[1])
+                    k_in = _heading(vertices[i, j], vertices[i, j + 1] if j + 1 < used else rx)
+                if at == used:
+                    whole = wavelength_4pi * spread_in[i] * dot(g, e) * np.exp(-1j * k * length[i])
+                    out[i, q, p, 0], out[i, q, p, 1], out[i, q, p, 2] = whole, 0j, 0j
+                    continue
+                # Out: the receiver's field by reciprocity, over the rest of the chain backwards.
+                k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
+                for j in range(used - 1, at, -1):
+                    normal = _vec(normals[i, j])
+                    mat = material[i, j]
+                    c = coefficients(
+                        m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k
+                    )  # fmt: skip
+                    if kind[i, j] == TRANSMIT:
+                        g = transmit(g, k_out, normal, c[2], c[3])
+                    else:
+                        g = reflect(g, k_out, normal, c[0], c[1])
+                    k_out = _heading(vertices[i, j], vertices[i, j - 1])
+                if kind[i, at] == POINT:
+                    whole = (
+                        wavelength_4pi
+                        * (sigma[i] / (4.0 * np.pi)) ** 0.5
+                        * spread_in[i]
+                        * spread_out[i]
+                        * dot(g, e)
+                        * np.exp(-1j * k * length[i])
+                    )
+                    out[i, q, p, 0], out[i, q, p, 1], out[i, q, p, 2] = whole, 0j, 0j
+                    continue
+                normal = _vec(normals[i, at])
+                mat = material[i, at]
+                ci = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k)
+                co = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k)
+                couple = huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
+                scale = wavelength_4pi * (-0.25j * k / np.pi) * couple * area[i] * spread_in[i] * spread_out[i]
+                for _ in range(caustics[i]):
+                    scale *= 1j
+                for c6 in range(6):
+                    phases[c6] = k * lengths[i, c6]
+                triangle_terms(phases, _LINEAR, terms)
+                for c3 in range(3):
+                    out[i, q, p, c3] = scale * taper[i, c3] * terms[c3]
+
+
+def rates(routes: Routes, facets: Facets, tx_velocity: Floats, rx_velocity: Floats) -> Floats:
+    """Return range rates (n,) [m/s]: half the rate of each route's length, from the velocities of all its vertices.
+
+    Mirrors may slide in their plane without effect: the length is stationary there (Fermat).
+    """
+    n = len(routes.kind)
+    body = np.maximum(routes.body, 0)
+    v = facets.velocity[body] + np.cross(facets.spin[body], routes.vertices - facets.origin[body])
+    used = routes.kind > 0
+    x = np.concatenate([np.broadcast_to(routes.tx, (n, 1, 3)), routes.vertices], axis=1)
+    v = np.concatenate([np.broadcast_to(tx_velocity, (n, 1, 3)), np.where(used[..., None], v, rx_velocity)], axis=1)
+    x = np.concatenate([x, np.broadcast_to(routes.rx, (n, 1, 3))], axis=1)
+    v = np.concatenate([v, np.broadcast_to(rx_velocity, (n, 1, 3))], axis=1)
+    step = np.diff(x, axis=1)
+    size = np.linalg.norm(step, axis=2, keepdims=True)
+    return 0.5 * np.einsum("nij,nij->n", np.diff(v, axis=1), step / np.where(size > 0, size, 1.0))

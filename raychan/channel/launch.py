@@ -1,0 +1,111 @@
+"""Launch: tubes seeded from the facets that face the transmitter, cut until phase and sight are simple on each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.legs import Leg
+from raychan.channel.surface import Surface
+from raychan.channel.tubes import CENTRE, Refinement, Tubes, edge_lengths, halves, phases_of, stand, too_rough
+from raychan.tables import REFLECT, SCATTERER, TRANSMIT
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+
+def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement) -> Tubes:
+    """Return the tubes of first bounces seen over `leg`, fine enough for a return over `out`.
+
+    Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do.
+    """
+    tubes = _seeds(surface, leg, bodies, rule)
+    tubes = _cut_for_phase(surface, leg, out, tubes, rule)
+    return _cut_for_sight(surface, leg, out, tubes, rule)
+
+
+def _seeds(surface: Surface, leg: Leg, bodies: Bools, rule: Refinement) -> Tubes:
+    f = surface.facets
+    allowed = bodies & (f.role == SCATTERER)
+    allowed[list(leg.bodies)] = False
+    rows = np.flatnonzero(allowed[f.body] & (surface.area > 0.0)).astype(np.int32)
+    k, _ = leg.rays(f.vertices[rows])
+    towards = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
+    towards &= (np.einsum("nij,nj->ni", k, surface.normal[rows]) < 0.0).any(axis=1)
+    rows = rows[towards | ~surface.closed[f.body[rows]]]
+    bary = np.broadcast_to(np.eye(3), (len(rows), 3, 3)).copy()
+    return stand(surface, leg, rows, bary, rule.slots)
+
+
+def _cut_for_phase(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
+    """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts."""
+    done, spent = [], 0
+    while len(tubes):
+        ph = phases_of(surface, leg, out, tubes, True, rule)
+        edges = edge_lengths(tubes)
+        rough = too_rough(ph, tubes, rule)
+        split = rough | (edges.max(axis=1) > rule.max_edge)
+        edge = np.where(rough, np.argmax(np.abs(ph.bend), axis=1), np.argmax(edges, axis=1))
+        spent += len(tubes)
+        if spent > rule.max_tubes:
+            split[:] = False
+        done.append(tubes.take(~split))
+        tubes = halves(surface, leg, tubes.take(split), edge[split], first=True, jitter=rule.jitter)
+    return Tubes.join(done) if done else tubes
+
+
+def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
+    """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
+    kept, total = [], 0j
+    for level in range(rule.levels + 1):
+        seen, corners, passed = _sight(surface, leg, tubes, rule)
+        mixed = seen.any(axis=1) & ~seen.all(axis=1)
+        bound = phases_of(surface, leg, out, tubes, True, rule).bound
+        sure = tubes.take(seen[:, CENTRE] & ~mixed)
+        total += phases_of(surface, leg, out, sure, True, rule).total()
+        least = max(rule.floor, rule.relative * abs(total)) / np.sqrt(max(1, mixed.sum()))
+        split = mixed & (bound > least) & (level < rule.levels)
+        ready = ~split & seen[:, CENTRE]
+        kept.append(tubes.take(ready))
+        _write_leg(surface, kept[-1], leg, corners[ready], passed[ready])
+        if not split.any():
+            break
+        tubes = tubes.take(split)
+        longest = np.argmax(edge_lengths(tubes), axis=1)
+        tubes = halves(surface, leg, tubes, longest, first=True, jitter=rule.jitter)
+    return Tubes.join(kept)
+
+
+def _sight(surface: Surface, leg: Leg, tubes: Tubes, rule: Refinement) -> tuple[Bools, Floats, Ints]:
+    """Return which rays of each tube (n, 4) are seen, and the mirror points and layers of the centre ray."""
+    n, m = len(tubes), len(leg.mirrors)
+    # Corners lie on edges that other facets share: draw them in a little.
+    centre = tubes.points[:, CENTRE:]
+    aim = centre + 0.98 * (tubes.points - centre)
+    # On a curved patch points hover over their facet: a hit a little before them is their own surface.
+    rise = tubes.points - surface.first[tubes.facet][:, None]
+    hover = np.abs(np.einsum("nij,nj->ni", rise, surface.normal[tubes.facet])).max(axis=1)
+    slope = np.abs(np.einsum("ij,ij->i", tubes.k[:, CENTRE], surface.normal[tubes.facet]))
+    slack = 1e-5 + 3.0 * hover / np.maximum(slope, 0.05)
+    facet4, slack4 = np.repeat(tubes.facet, 4), np.repeat(slack, 4)
+    seen, corners, passed = leg.visible(surface, aim.reshape(-1, 3), facet4, slack4, rule.layers)
+    shape = (n, 4, m, 3)
+    return (seen.reshape(n, 4), corners.reshape(shape)[:, CENTRE], passed.reshape(n, 4, rule.layers)[:, CENTRE])
+
+
+def _write_leg(surface: Surface, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints) -> None:
+    """Write the leg's mirrors and the layers passed into the tubes' history."""
+    every = np.arange(len(tubes))
+    for i, m in enumerate(leg.mirrors):
+        tubes.append(every, corners[:, i], m.normal, np.full(len(tubes), m.facet, np.int32), REFLECT)
+    write_layers(surface, tubes, tubes.points[:, CENTRE], tubes.k[:, CENTRE], passed)
+
+
+def write_layers(surface: Surface, tubes: Tubes, point: Floats, k: Floats, passed: Ints) -> None:
+    """Write the layers (n, l) that the rays through `point` (n, 3) along k (n, 3) passed into the history."""
+    for j in range(passed.shape[1]):
+        rows = np.flatnonzero(passed[:, j] >= 0)
+        facet = passed[rows, j]
+        t = surface.distance(facet, point[rows], k[rows])
+        tubes.append(rows, point[rows] + t[:, None] * k[rows], surface.normal[facet], facet, TRANSMIT)

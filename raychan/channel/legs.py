@@ -1,0 +1,126 @@
+"""Legs: from an end of the link to points of a surface, straight or over plane mirrors (image method)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.surface import Surface
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """A plane that reflects: a point on it, its unit normal towards the lit side, one of its facets, its body."""
+
+    point: Floats
+    normal: Floats
+    facet: int
+    body: int
+
+    def image(self, x: Floats) -> Floats:
+        """Return x mirrored at the plane."""
+        return x - 2.0 * np.dot(x - self.point, self.normal) * self.normal
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The way between an end (a point, or a direction when `far`) and the surface over mirrors, end's side first."""
+
+    end: Floats
+    far: bool = False
+    mirrors: tuple[Mirror, ...] = ()
+    image: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        x = np.asarray(self.end, float)
+        for m in self.mirrors:
+            x = m.image(x)
+        object.__setattr__(self, "image", x)
+
+    @property
+    def bodies(self) -> set[int]:
+        """Bodies of the mirrors."""
+        return {m.body for m in self.mirrors}
+
+    def rays(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return unit directions (..., 3) at the points, travelling from the end, and lengths [m]."""
+        if self.far:
+            return np.broadcast_to(-self.image, points.shape), -points @ self.image
+        d = points - self.image
+        length = np.linalg.norm(d, axis=-1)
+        return d / length[..., None], length
+
+    def spread(self, length: Floats) -> Floats:
+        """Return the field's spreading [1/m] (1 for a plane wave)."""
+        return np.ones_like(length) if self.far else 1.0 / length
+
+    def bounces(self, points: Floats) -> Floats:
+        """Return the mirror points (n, m, 3) [m] of the way to each point, end's side first."""
+        images = [np.asarray(self.end, float)]
+        for m in self.mirrors:
+            images.append(m.image(images[-1]))
+        out = np.empty((len(points), len(self.mirrors), 3))
+        towards = points
+        for i in range(len(self.mirrors) - 1, -1, -1):
+            m, source = self.mirrors[i], images[i + 1]
+            d = source - towards
+            with np.errstate(divide="ignore", invalid="ignore"):
+                t = np.dot(m.point, m.normal) - towards @ m.normal
+                t = t / (d @ m.normal)
+            towards = towards + np.where(np.isfinite(t), t, 0.0)[:, None] * d
+            out[:, i] = towards
+        return out
+
+    def visible(
+        self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int
+    ) -> tuple[Bools, Floats, Ints]:
+        """Tell which points the end sees by this leg, through which layers.
+
+        Args: points (n, 3) [m] on facets (n,), slack (n,) [m] by which the true surface may lie behind its facet.
+        Returns: seen (n,), mirror points (n, m, 3), layers passed on the last stretch (n, layers), end's side first.
+        """
+        n = len(points)
+        corners = self.bounces(points)
+        seen = np.ones(n, bool)
+        none = np.full(n, -1, np.int32)
+        start = np.broadcast_to(np.asarray(self.end, float), (n, 3))
+        skip = none
+        for i, m in enumerate(self.mirrors):
+            stop = corners[:, i]
+            d, length = _towards(start, stop)
+            # Both ends of each stretch lie on the lit side of the mirror, and the mirror itself is hit first.
+            lit = (start - m.point) @ m.normal > 0.0
+            rows = np.flatnonzero(seen & lit & (length > 0.0))
+            hit, _ = surface.cast(start[rows], d[rows], skip[rows])
+            ok = (hit >= 0) & (surface.plane[hit] == surface.plane[m.facet])
+            seen[:] = False
+            seen[rows[ok]] = True
+            skip = none.copy()
+            skip[rows[ok]] = hit[ok]
+            start = stop
+        if self.mirrors:
+            seen &= (points - self.mirrors[-1].point) @ self.mirrors[-1].normal > 0.0
+        if self.far:
+            reach = 2.0 * surface.extent + 1.0
+            d = np.broadcast_to(-self.image, points.shape)
+            start, length = points - reach * d, np.full(n, reach)
+        else:
+            d, length = _towards(start, points)
+        rows = np.flatnonzero(seen)
+        passed = np.full((n, layers), -1, np.int32)
+        reached, through = surface.walk(start[rows], d[rows], length[rows], slack[rows], skip[rows], facet[rows], layers)
+        seen[rows[~reached]] = False
+        passed[rows] = through
+        return seen, corners, passed
+
+
+def _towards(start: Floats, stop: Floats) -> tuple[Floats, Floats]:
+    d = stop - start
+    length = np.linalg.norm(d, axis=1)
+    return d / np.where(length > 0, length, 1.0)[:, None], length

@@ -1,0 +1,110 @@
+"""What a tube must know of the surfaces: planes, smooth patches, closed bodies, and the true surface behind facets."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from raychan.tables import Facets
+from raychan.world.embree import Tracer
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+_WELD = 1e-6  # m
+
+
+class Surface(Tracer):
+    """A tracer that also knows which facets share a plane or a smooth patch, and the curved surface through corner normals."""
+
+    def __init__(self, facets: Facets) -> None:
+        super().__init__(facets)
+        n = len(facets.vertices)
+        self.plane = np.arange(n, dtype=np.int32)
+        self.smooth = np.arange(n, dtype=np.int32)
+        self.closed = np.zeros(len(facets.role), bool)
+        self.curved = np.zeros(n, bool)
+        self.bulge = np.zeros((n, 3, 3))
+        if n:
+            self._join()
+            self._bend()
+
+    def _join(self) -> None:
+        """Number planes (adjacent coplanar facets of one body, part and material) and smooth patches."""
+        f = self.facets
+        n = len(f.vertices)
+        corner = (f.vertices - self._centre).reshape(-1, 3)
+        keyed = np.column_stack([np.round(corner / _WELD), np.repeat(f.body, 3)]).astype(np.int64)
+        _, vertex = np.unique(keyed, axis=0, return_inverse=True)
+        vertex = vertex.reshape(n, 3)
+        start, end = vertex, np.roll(vertex, -1, axis=1)
+        low, high = np.minimum(start, end).ravel(), np.maximum(start, end).ravel()
+        order = np.lexsort((high, low))
+        same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
+        runs = np.concatenate([[0], np.cumsum(~same)])
+        use = np.bincount(runs)
+        odd = use[runs] != 2
+        open_bodies = np.unique(f.body[order[odd] // 3])
+        self.closed[:] = True
+        self.closed[open_bodies] = False
+        a, b = order[:-1][same] // 3, order[1:][same] // 3
+        kin = (f.part[a] == f.part[b]) & (f.material[a] == f.material[b])
+        a, b, ea, eb = a[kin], b[kin], order[:-1][same][kin], order[1:][same][kin]
+        flat = np.abs(np.einsum("ij,ij->i", self.normal[a], self.normal[b])) > 1.0 - 1e-10
+        self.plane = _components(a[flat], b[flat], n)
+        # Smooth where the corner normals agree along the shared edge (which two facets walk in opposite ways).
+        own, nxt = np.arange(3), np.roll(np.arange(3), -1)
+        na0, na1 = f.normals[a, own[ea % 3]], f.normals[a, nxt[ea % 3]]
+        nb0, nb1 = f.normals[b, nxt[eb % 3]], f.normals[b, own[eb % 3]]
+        soft = (np.einsum("ij,ij->i", na0, nb0) > 1 - 1e-6) & (np.einsum("ij,ij->i", na1, nb1) > 1 - 1e-6)
+        self.smooth = _components(a[soft], b[soft], n)
+
+    def _bend(self) -> None:
+        """Quadratic patch through corners and corner normals: x = sum l_i x_i - sum c_ij l_i l_j (Nagata 2005, eq. 10)."""
+        f = self.facets
+        for e, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
+            d = f.vertices[:, j] - f.vertices[:, i]
+            ni, nj = f.normals[:, i], f.normals[:, j]
+            a = np.einsum("ij,ij->i", ni, nj)
+            p, q = np.einsum("ij,ij->i", d, ni), -np.einsum("ij,ij->i", d, nj)
+            det = 1.0 - a * a
+            ok = det > 1e-12
+            safe = np.where(ok, det, 1.0)
+            c = ((p - a * q) / safe)[:, None] * ni + ((q - a * p) / safe)[:, None] * nj
+            # An edge of normals that contradict each other (S-shape, or broken) stays straight.
+            ok &= np.linalg.norm(c, axis=1) < 0.5 * np.linalg.norm(d, axis=1)
+            self.bulge[:, e] = np.where(ok[:, None], c, 0.0)
+        self.curved = (np.abs(self.bulge) > 1e-9).any(axis=(1, 2))
+
+    def point(self, facet: Ints, bary: Floats) -> Floats:
+        """Return points (n, ..., 3) of the true surface at barycentric coordinates (n, ..., 3)."""
+        flat = np.einsum("n...i,nij->n...j", bary, self.facets.vertices[facet])
+        pairs = bary * np.roll(bary, -1, axis=-1)
+        return flat - np.einsum("n...e,nej->n...j", pairs, self.bulge[facet])
+
+    def normal_at(self, facet: Ints, bary: Floats) -> Floats:
+        """Return unit normals (n, ..., 3) of the true surface at barycentric coordinates."""
+        v = np.einsum("n...i,nij->n...j", bary, self.facets.normals[facet])
+        return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+    def barycentric(self, facet: Ints, point: Floats) -> Floats:
+        """Return barycentric coordinates (n, ..., 3) of points in the planes of their facets."""
+        v = self.facets.vertices[facet]
+        e1, e2 = v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]
+        n = np.cross(e1, e2)
+        twice = np.einsum("ij,ij->i", n, n)
+        r = point - v[:, 0].reshape(len(v), *([1] * (point.ndim - 2)), 3)
+        b1 = np.einsum("n...j,nj->n...", r, np.cross(e2, n)) / _column(twice, r)
+        b2 = np.einsum("n...j,nj->n...", r, np.cross(n, e1)) / _column(twice, r)
+        return np.stack([1.0 - b1 - b2, b1, b2], axis=-1)
+
+
+def _column(x: Floats, like: Floats) -> Floats:
+    return x.reshape(len(x), *([1] * (like.ndim - 2)))
+
+
+def _components(a: Ints, b: Ints, n: int) -> Ints:
+    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
+    return connected_components(graph, directed=False)[1].astype(np.int32)

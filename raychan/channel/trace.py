@@ -1,0 +1,172 @@
+"""Trace: from bounce to bounce; tubes that would straddle two surfaces are cut while they matter."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.launch import write_layers
+from raychan.channel.legs import Leg
+from raychan.channel.surface import Surface
+from raychan.channel.tubes import (
+    CENTRE,
+    Refinement,
+    Tubes,
+    edge_lengths,
+    halves,
+    phases_of,
+    too_rough,
+    vector_area,
+)
+from raychan.tables import REFLECT
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+_ALIKE = 0.98  # cosine within which normals of one smooth patch may differ over a tube
+
+
+def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, total: float, rule: Refinement) -> Tubes:
+    """Return the tubes after one more reflection, standing where they land.
+
+    Args: out the way back used to weigh tubes; first whether `tubes` stand on their first surface; total [1/m] the
+    scattered field found so far, against which `rule.relative` counts.
+    """
+    landed: list[Tubes] = []
+    room = tubes.slots < rule.slots - 2
+    start = np.zeros((int(room.sum()), 4))
+    through = np.full((int(room.sum()), rule.layers), -1, np.int32)
+    _fly(surface, leg, out, tubes.take(room), start, through, 0, first, total, rule, landed)
+    return Tubes.join(landed) if landed else tubes.take(np.zeros(len(tubes), bool))
+
+
+def _fly(
+    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, start: Floats, through: Ints, layer: int,
+    first: bool, total: float, rule: Refinement, landed: list[Tubes],
+) -> None:  # fmt: skip
+    """Cast, land what agrees, cut what does not; then go on behind the thin layers that were hit."""
+    for level in range(rule.levels + 1):
+        if not len(tubes):
+            return
+        k = mirrored(tubes)
+        hit, t = _cast(surface, tubes, k, start)
+        mid = hit[:, CENTRE]
+        agree = _agree(surface, hit)
+        bound = phases_of(surface, leg, out, tubes, first, rule).bound
+        mixed = ~agree & (hit >= 0).any(axis=1)
+        least = max(rule.floor, rule.relative * total) / np.sqrt(max(1, mixed.sum()))
+        split = mixed & (bound > least) & (level < rule.levels)
+        ready = np.flatnonzero(~split & (mid >= 0))
+        whole = np.where(agree[ready, None], hit[ready], mid[ready, None])
+        landed.append(_land(surface, leg, tubes.take(ready), k[ready], whole, through[ready]))
+        behind = ready[surface.is_layer[mid[ready]]] if layer < rule.layers else ready[:0]
+        if len(behind):
+            beyond, passed = t[behind].copy(), through[behind].copy()
+            centre = beyond[:, CENTRE :].repeat(4, axis=1)
+            beyond = np.where(np.isfinite(beyond), beyond, centre) + 1e-6
+            passed[:, layer] = mid[behind]
+            _fly(surface, leg, out, tubes.take(behind), beyond, passed, layer + 1, first, total, rule, landed)
+        if not split.any():
+            return
+        twice = np.concatenate([np.flatnonzero(split)] * 2)
+        start, through = start[twice], through[twice]
+        start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
+        tubes = tubes.take(split)
+        tubes = halves(surface, leg, tubes, np.argmax(edge_lengths(tubes), axis=1), first, rule.jitter)
+
+
+def mirrored(tubes: Tubes) -> Floats:
+    """Return the directions (n, 4, 3) after reflection at the true surface."""
+    dot = np.einsum("nij,nij->ni", tubes.k, tubes.normals)
+    return tubes.k - 2.0 * dot[..., None] * tubes.normals
+
+
+def _cast(surface: Surface, tubes: Tubes, k: Floats, start: Floats) -> tuple[Ints, Floats]:
+    n = len(tubes)
+    centre = tubes.points[:, CENTRE:]
+    origin = centre + 0.98 * (tubes.points - centre)
+    skip = np.repeat(tubes.facet, 4)
+    hit, t = surface.cast(origin.reshape(-1, 3), k.reshape(-1, 3), skip, start.ravel())
+    return hit.reshape(n, 4), t.reshape(n, 4)
+
+
+def _agree(surface: Surface, hit: Ints) -> Bools:
+    """Tell whether all rays of a tube land on one plane, or on one smooth patch within a small turn."""
+    safe = np.maximum(hit, 0)
+    all_hit = (hit >= 0).all(axis=1)
+    plane, smooth = surface.plane[safe], surface.smooth[safe]
+    turn = np.einsum("nij,nj->ni", surface.normal[safe], surface.normal[safe[:, CENTRE]])
+    one_plane = (plane == plane[:, CENTRE :]).all(axis=1)
+    one_patch = (smooth == smooth[:, CENTRE :]).all(axis=1) & (turn > _ALIKE).all(axis=1)
+    return all_hit & (one_plane | one_patch)
+
+
+def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, through: Ints) -> Tubes:
+    """Return tubes put down on the planes of the facets `hit` (n, 4), their reflection written into the history."""
+    n = len(tubes)
+    flat_k, flat_p, flat_hit = k.reshape(-1, 3), tubes.points.reshape(-1, 3), hit.ravel()
+    t = surface.distance(flat_hit, flat_p, flat_k).reshape(n, 4)
+    # Rays that run beside the centre's plane cannot be put down on it: such a sliver is dropped.
+    sound = (t > 0.0).all(axis=1) & (t < 10.0 * t[:, CENTRE:] + 1.0).all(axis=1)
+    tubes, k, hit, through, t = tubes.take(sound), k[sound], hit[sound], through[sound], t[sound]
+    n = len(tubes)
+    before = vector_area(tubes.points)
+    facet = hit[:, CENTRE].copy()
+    every = np.arange(n)
+    tubes.append(every, tubes.points[:, CENTRE], tubes.normals[:, CENTRE], tubes.facet, REFLECT)
+    write_layers(surface, tubes, tubes.points[:, CENTRE], k[:, CENTRE], through)
+    points = tubes.points + t[..., None] * k
+    after = vector_area(points)
+    across_before = np.einsum("ij,ij->i", before, k[:, CENTRE])
+    across_after = np.einsum("ij,ij->i", after, k[:, CENTRE])
+    flat = tubes.flat & ~surface.curved[tubes.facet]
+    length = tubes.length + t
+    with np.errstate(divide="ignore", invalid="ignore"):
+        thinned = tubes.spread * np.sqrt(np.abs(across_before / across_after))
+    thinned = np.where(np.isfinite(thinned), thinned, 0.0)
+    tubes.spread = np.where(flat, leg.spread(length[:, CENTRE]), thinned)
+    tubes.caustics = tubes.caustics + (across_before * across_after < 0.0)
+    bary = surface.barycentric(hit.reshape(-1), points.reshape(-1, 3))
+    normals = surface.normal_at(hit.reshape(-1), np.clip(bary, -0.5, 1.5)).reshape(n, 4, 3)
+    side = -np.sign(np.einsum("nij,nij->ni", normals, k))
+    tubes.normals = normals * np.where(side == 0.0, 1.0, side)[..., None]
+    tubes.points, tubes.k, tubes.length, tubes.flat, tubes.facet = points, k, length, flat, facet
+    tubes.bounces = tubes.bounces + np.int8(1)
+    return tubes
+
+
+def settle(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, total: float, rule: Refinement) -> tuple[Tubes, Floats, Ints]:
+    """Cut landed tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
+
+    Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
+    """
+    kept, ways, layers = [], [], []
+    for level in range(rule.levels + 1):
+        ph = phases_of(surface, leg, out, tubes, False, rule)
+        seen, corners, passed = _watch(surface, out, tubes, rule)
+        mixed = seen.any(axis=1) & ~seen.all(axis=1)
+        rough = seen.any(axis=1) & too_rough(ph, tubes, rule)
+        least = max(rule.floor, rule.relative * total) / np.sqrt(max(1, (mixed | rough).sum()))
+        split = (mixed | rough) & (ph.bound > least) & (level < rule.levels)
+        ready = ~split & seen[:, CENTRE]
+        kept.append(tubes.take(ready))
+        ways.append(corners[ready])
+        layers.append(passed[ready])
+        if not split.any():
+            break
+        edge = np.where(rough, np.argmax(np.abs(ph.bend), axis=1), np.argmax(edge_lengths(tubes), axis=1))[split]
+        tubes = halves(surface, leg, tubes.take(split), edge, first=False, jitter=rule.jitter)
+    return Tubes.join(kept), np.concatenate(ways), np.concatenate(layers)
+
+
+def _watch(surface: Surface, out: Leg, tubes: Tubes, rule: Refinement) -> tuple[Bools, Floats, Ints]:
+    n, m = len(tubes), len(out.mirrors)
+    centre = tubes.points[:, CENTRE:]
+    aim = centre + 0.98 * (tubes.points - centre)
+    to_end, _ = out.rays(tubes.points)
+    lit = np.einsum("nij,nij->ni", to_end, tubes.normals) < 0.0
+    slack = np.full(4 * n, 1e-5)
+    seen, corners, passed = out.visible(surface, aim.reshape(-1, 3), np.repeat(tubes.facet, 4), slack, rule.layers)
+    shape = (n, 4, m, 3)
+    return seen.reshape(n, 4) & lit, corners.reshape(shape)[:, CENTRE], passed.reshape(n, 4, rule.layers)[:, CENTRE]

@@ -1,0 +1,238 @@
+"""Tubes of rays: their state between bounces, how they are cut in two, and how much they can matter.
+
+A tube is a triangle of three corner rays about a centre ray. Lengths and directions are known at all four, so a
+tube may be cut without tracing it again from the start: between corners the length follows from its values and gradients
+(the directions) by a Hermite rule that is exact to third order; on the first surface it is computed anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.legs import Leg
+from raychan.channel.surface import Surface
+from raychan.kernels.po import quadratic_means
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+CENTRE = 3
+_MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
+_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How finely tubes are cut.
+
+    `wavenumber` [rad/m]; `phase` [rad] deviation from quadratic that a tube may have where its phase stands still;
+    `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the same
+    as a fraction of what was found so far; `max_edge` [m] of first tubes; `levels` of cutting for sight and bounces; `slots`
+    of history; `layers` that a stretch may pass; `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
+    """
+
+    wavenumber: float
+    phase: float = 0.05
+    turn: float = 0.15
+    floor: float = 0.0
+    relative: float = 0.01
+    max_edge: float = 0.3
+    levels: int = 12
+    slots: int = 8
+    layers: int = 2
+    max_tubes: int = 2_000_000
+    jitter: float = 0.0
+
+
+@dataclass
+class Tubes:
+    """Tubes standing on their present footprint; n tubes, 4 rays each (corners, centre), d slots of history.
+
+    `points` [m], `k` unit directions of arrival, `length` [m] from the transmitter, `normals` of the true surface on
+    the lit side, `spread` [1/m] field at the footprint, `flat` all mirrors so far were planes, `bary` corners on
+    the first facet, `slots` of history in use, `bounces` counted with this one, `caustics` passed; then the history.
+    """
+
+    points: Floats
+    k: Floats
+    length: Floats
+    normals: Floats
+    facet: Ints
+    spread: Floats
+    flat: Bools
+    bary: Floats
+    slots: Ints
+    bounces: Ints
+    caustics: Ints
+    vertices: Floats
+    vertex_normals: Floats
+    facets: Ints
+    kinds: Ints
+
+    def __len__(self) -> int:
+        return len(self.facet)
+
+    def take(self, index: NDArray[np.generic]) -> Tubes:
+        """Return the tubes at `index` (mask or numbers)."""
+        return Tubes(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    @staticmethod
+    def join(parts: list[Tubes]) -> Tubes:
+        """Return all tubes of several sets as one."""
+        return Tubes(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Tubes)})
+
+    def append(self, rows: NDArray[np.generic], vertex: Floats, normal: Floats, facet: Ints, kind: int) -> None:
+        """Write one more vertex into the history of the tubes `rows`."""
+        slot = self.slots[rows]
+        self.vertices[rows, slot] = vertex
+        self.vertex_normals[rows, slot] = normal
+        self.facets[rows, slot] = facet
+        self.kinds[rows, slot] = kind
+        self.slots[rows] = slot + 1
+
+
+def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> Tubes:
+    """Return first-bounce tubes on the true surface at barycentric corners (n, 3, 3), seen from the end of `leg`."""
+    n = len(facet)
+    points, k, length, normals = _first_rays(surface, leg, facet, bary)
+    return Tubes(
+        points=points,
+        k=k,
+        length=length,
+        normals=normals,
+        facet=facet,
+        spread=leg.spread(length[:, CENTRE]),
+        flat=np.ones(n, bool),
+        bary=bary,
+        slots=np.zeros(n, np.int8),
+        bounces=np.full(n, len(leg.mirrors) + 1, np.int8),
+        caustics=np.zeros(n, np.int8),
+        vertices=np.zeros((n, slots, 3)),
+        vertex_normals=np.zeros((n, slots, 3)),
+        facets=np.full((n, slots), -1, np.int32),
+        kinds=np.zeros((n, slots), np.int8),
+    )
+
+
+def _first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    full = np.concatenate([bary, bary.mean(axis=1, keepdims=True)], axis=1)
+    points = surface.point(facet, full)
+    k, length = leg.rays(points)
+    normals = surface.normal_at(facet, full)
+    # The back of an open sheet is lit from behind; a closed body keeps its outward normals.
+    open_sheet = ~surface.closed[surface.facets.body[facet]]
+    behind = open_sheet & (np.einsum("ij,ij->i", normals[:, CENTRE], k[:, CENTRE]) > 0.0)
+    return points, np.array(k), length, np.where(behind[:, None, None], -normals, normals)
+
+
+def halves(surface: Surface, leg: Leg, tubes: Tubes, edge: Ints, first: bool, jitter: float = 0.0) -> Tubes:
+    """Return both halves of tubes cut at the middle of edge 0, 1 or 2 (all the one, then all the other).
+
+    On the first surface (`first`) the new rays are computed anew on the true surface; later ones are means along
+    the plane footprint, with the length by the Hermite rule.
+    """
+    row = np.arange(len(tubes))
+    i, j = _EDGES[edge].T
+    share = 0.5 if jitter == 0.0 else 0.5 + jitter * np.where(row % 2, 1.0, -1.0)[:, None]
+    middle = share * tubes.bary[row, i] + (1.0 - share) * tubes.bary[row, j]
+    both = []
+    for moved in (j, i):
+        child = tubes.take(row)
+        child.bary[row, moved] = middle
+        if first:
+            rays = _first_rays(surface, leg, child.facet, child.bary)
+            child.points, child.k, child.length, child.normals = rays
+            child.spread = leg.spread(child.length[:, CENTRE])
+        else:
+            d = tubes.points[row, j] - tubes.points[row, i]
+            bend = np.einsum("ij,ij->i", tubes.k[row, i] - tubes.k[row, j], d)
+            child.points[row, moved] = tubes.points[row, i] + 0.5 * d
+            child.length[row, moved] = 0.5 * (tubes.length[row, i] + tubes.length[row, j]) + 0.125 * bend
+            child.k[row, moved] = unit(tubes.k[row, i] + tubes.k[row, j])
+            child.normals[row, moved] = unit(tubes.normals[row, i] + tubes.normals[row, j])
+            _centre(child)
+        both.append(child)
+    return Tubes.join(both)
+
+
+def _centre(tubes: Tubes) -> None:
+    """Set the centre ray of each tube from its corners; its length as the mean of parabolas along the three medians."""
+    p, k = tubes.points[:, :3], tubes.k[:, :3]
+    c = p.mean(axis=1)
+    kc = unit(k.sum(axis=1))
+    reach = np.einsum("nij,nij->ni", k + kc[:, None], c[:, None] - p)
+    tubes.points[:, CENTRE], tubes.k[:, CENTRE] = c, kc
+    tubes.length[:, CENTRE] = (tubes.length[:, :3] + 0.5 * reach).mean(axis=1)
+    tubes.normals[:, CENTRE] = unit(tubes.normals[:, :3].sum(axis=1))
+
+
+def vector_area(points: Floats) -> Floats:
+    """Return half the cross product of two edges of triangles (n, 3 or 4, 3) [m^2]."""
+    return 0.5 * np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+
+
+def edge_lengths(tubes: Tubes) -> Floats:
+    """Return the three edges (n, 3) [m] of each footprint."""
+    p = tubes.points[:, :3]
+    return np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2)
+
+
+def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
+    """Return the middles of the three edges (n, 3, 3) [m] and the lengths there (n, 3) [m]."""
+    if first:
+        points = surface.point(tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1)))
+        return points, leg.rays(points)[1]
+    p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
+    d = np.roll(p, -1, axis=1) - p
+    bend = np.einsum("nij,nij->ni", k - np.roll(k, -1, axis=1), d)
+    return p + 0.5 * d, 0.5 * (length + np.roll(length, -1, axis=1)) + 0.125 * bend
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Phases of tubes over a way out [rad]: `six` (n, 6) at corners and edge middles, `bend` (n, 3) of the edges from
+    straight, `miss` (n,) of the quadratic through the six at the centre, `bound` (n,) [1/m] on what a tube can scatter."""
+
+    six: Floats
+    bend: Floats
+    miss: Floats
+    bound: Floats
+    area: Floats
+
+    def total(self) -> complex:
+        """Return the scalar sum of all tubes [1/m]."""
+        return complex(np.sum(self.area * quadratic_means(self.six, 0.5))) if len(self.six) else 0j
+
+
+def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
+    """Return the phases of tubes over the way out, and what each can scatter back at most."""
+    k = rule.wavenumber
+    points, length = middles(surface, leg, tubes, first)
+    back = out.rays(tubes.points)[1]
+    corner = k * (tubes.length[:, :3] + back[:, :3])
+    middle = k * (length + out.rays(points)[1])
+    bend = middle - 0.5 * (corner + np.roll(corner, -1, axis=1))
+    centre = k * (tubes.length[:, CENTRE] + back[:, CENTRE])
+    miss = centre - corner.mean(axis=1) - bend.sum(axis=1) * (4.0 / 9.0)
+    across = np.abs(np.einsum("ij,ij->i", vector_area(tubes.points), tubes.k[:, CENTRE]))
+    area = k / (2.0 * np.pi) * across * tubes.spread * out.spread(back[:, CENTRE])
+    span = corner.max(axis=1) - corner.min(axis=1)
+    bound = area / (1.0 + 0.5 * span)
+    return Phases(np.concatenate([corner, middle], axis=1), bend, miss, bound, area)
+
+
+def too_rough(ph: Phases, tubes: Tubes, rule: Refinement) -> Bools:
+    """Tell which tubes bend more than a quadratic phase and one direction of the surface can follow."""
+    span = ph.six.max(axis=1) - ph.six.min(axis=1)
+    turn = np.linalg.norm(tubes.normals[:, :3] - tubes.normals[:, CENTRE :], axis=2).max(axis=1)
+    off = np.maximum(np.abs(ph.miss), np.abs(ph.bend).max(axis=1) * (rule.phase / _MOST_BEND))
+    return (np.maximum(off / rule.phase, turn / rule.turn) / (1.0 + 0.5 * span)) > 1.0
+
+
+def unit(v: Floats) -> Floats:
+    """Return vectors (..., 3) scaled to length one."""
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
