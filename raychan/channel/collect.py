@@ -24,6 +24,8 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
     back_k, back = out.rays(tubes.points)
     middle, half_way = middles(surface, leg, tubes, first)
     lengths = np.concatenate([tubes.length[:, :3] + back[:, :3], half_way + out.rays(middle)[1]], axis=1)
+    if not first:
+        _retrace(surface, tubes)
     every = np.arange(n)
     scatter = tubes.slots.copy()
     tubes.append(every, tubes.points[:, CENTRE], tubes.normals[:, CENTRE], tubes.facet, SCATTER)
@@ -60,8 +62,6 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
     )
 
 
-
-
 def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
     """Return the mean obliquity times spreading at the corners over that at the centre (n, 3); zero beyond the terminator."""
     cosine = -0.5 * np.einsum("nij,nij->ni", tubes.normals, tubes.k + back_k)
@@ -71,3 +71,18 @@ def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
     centre = strength[:, CENTRE:]
     ratio = strength[:, :3] / np.where(centre > 0.0, centre, 1.0)
     return np.clip(np.where(centre > 0.0, ratio, 0.0), 0.0, 4.0)
+
+
+def _retrace(surface: Surface, tubes: Tubes) -> None:
+    """Put the history's vertices under the centre ray as it is now, after cuts: backwards over the plane mirrors."""
+    point, k = tubes.points[:, CENTRE].copy(), tubes.k[:, CENTRE].copy()
+    for back in range(int(tubes.slots.max(initial=0))):
+        slot = tubes.slots - 1 - back
+        rows = np.flatnonzero((slot >= 0) & tubes.flat)
+        at = slot[rows]
+        facet, normal = tubes.facets[rows, at], tubes.vertex_normals[rows, at]
+        t = surface.distance(facet, point[rows], -k[rows])
+        point[rows] -= np.where(np.isfinite(t), t, 0.0)[:, None] * k[rows]
+        tubes.vertices[rows, at] = point[rows]
+        turn = 2.0 * np.einsum("ij,ij->i", k[rows], normal) * (tubes.kinds[rows, at] == REFLECT)
+        k[rows] -= turn[:, None] * normal

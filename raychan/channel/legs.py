@@ -114,7 +114,9 @@ class Leg:
             d, length = _towards(start, points)
         rows = np.flatnonzero(seen)
         passed = np.full((n, layers), -1, np.int32)
-        reached, through = surface.walk(start[rows], d[rows], length[rows], slack[rows], skip[rows], facet[rows], layers)
+        reached, through = surface.walk(
+            start[rows], d[rows], length[rows], slack[rows], skip[rows], facet[rows], layers
+        )
         seen[rows[~reached]] = False
         passed[rows] = through
         return seen, corners, passed

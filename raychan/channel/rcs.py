@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +12,7 @@ from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce, settle
 from raychan.channel.tubes import Refinement
-from raychan.frames import direction, theta_phi
+from raychan.frames import theta_phi
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -49,6 +47,8 @@ def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: 
         per.append(a.sum(axis=0))
         total = total + per[-1]
         if b < bounces:
-            tubes = bounce(surface, leg, out, tubes, first, float(np.abs(total).max()) * 4 * np.pi * frequency / C0 / 1.0, rule)
+            tubes = bounce(
+                surface, leg, out, tubes, first, float(np.abs(total).max()) * 4 * np.pi * frequency / C0 / 1.0, rule
+            )
         first = False
     return total, per, n

@@ -27,6 +27,8 @@ class Surface(Tracer):
         self.closed = np.zeros(len(facets.role), bool)
         self.curved = np.zeros(n, bool)
         self.bulge = np.zeros((n, 3, 3))
+        self.outline = np.zeros((0, 2, 3))
+        self.first_edge = np.zeros(1, np.int64)
         if n:
             self._join()
             self._bend()
@@ -60,6 +62,21 @@ class Surface(Tracer):
         nb0, nb1 = f.normals[b, nxt[eb % 3]], f.normals[b, own[eb % 3]]
         soft = (np.einsum("ij,ij->i", na0, nb0) > 1 - 1e-6) & (np.einsum("ij,ij->i", na1, nb1) > 1 - 1e-6)
         self.smooth = _components(a[soft], b[soft], n)
+        inner = flat | soft
+        self._outline(np.concatenate([ea[inner], eb[inner]]))
+
+    def _outline(self, inner: Ints) -> None:
+        """List the edges around each plane (those not shared within it or a smooth patch): `outline[first_edge[p] : first_edge[p + 1]]`."""
+        n = len(self.plane)
+        outer = np.ones(3 * n, bool)
+        outer[inner] = False
+        edges = np.flatnonzero(outer)
+        plane = self.plane[edges // 3]
+        order = np.argsort(plane, kind="stable")
+        v = self.facets.vertices
+        a, b = v[edges // 3, edges % 3], v[edges // 3, (edges + 1) % 3]
+        self.outline = np.stack([a, b], axis=1)[order]
+        self.first_edge = np.searchsorted(plane[order], np.arange(n + 1))
 
     def _bend(self) -> None:
         """Quadratic patch through corners and corner normals: x = sum l_i x_i - sum c_ij l_i l_j (Nagata 2005, eq. 10)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.edges import edge_within
 from raychan.channel.launch import write_layers
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
@@ -12,6 +13,7 @@ from raychan.channel.tubes import (
     CENTRE,
     Refinement,
     Tubes,
+    along_line,
     edge_lengths,
     halves,
     phases_of,
@@ -54,7 +56,8 @@ def _fly(
         mid = hit[:, CENTRE]
         agree = _agree(surface, hit)
         bound = phases_of(surface, leg, out, tubes, first, rule).bound
-        mixed = ~agree & (hit >= 0).any(axis=1)
+        side = _edges(surface, leg, tubes, k, hit)
+        mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
         least = max(rule.floor, rule.relative * total) / np.sqrt(max(1, mixed.sum()))
         split = mixed & (bound > least) & (level < rule.levels)
         ready = np.flatnonzero(~split & (mid >= 0))
@@ -63,17 +66,37 @@ def _fly(
         behind = ready[surface.is_layer[mid[ready]]] if layer < rule.layers else ready[:0]
         if len(behind):
             beyond, passed = t[behind].copy(), through[behind].copy()
-            centre = beyond[:, CENTRE :].repeat(4, axis=1)
+            centre = beyond[:, CENTRE:].repeat(4, axis=1)
             beyond = np.where(np.isfinite(beyond), beyond, centre) + 1e-6
             passed[:, layer] = mid[behind]
             _fly(surface, leg, out, tubes.take(behind), beyond, passed, layer + 1, first, total, rule, landed)
         if not split.any():
             return
-        twice = np.concatenate([np.flatnonzero(split)] * 2)
-        start, through = start[twice], through[twice]
+        rows = np.flatnonzero(split)
+        tubes, rows = _divide(surface, leg, tubes.take(rows), rows, side[rows], first, rule)
+        start, through = start[rows], through[rows]
         start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
-        tubes = tubes.take(split)
-        tubes = halves(surface, leg, tubes, np.argmax(edge_lengths(tubes), axis=1), first, rule.jitter)
+
+
+def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints) -> Floats:
+    """Return the sides (n, 3) of an edge that runs through each tube; zeros where none does or mirrors were curved."""
+    plane = np.where(hit >= 0, surface.plane[np.maximum(hit, 0)], -1)
+    centre = k[:, CENTRE]
+    source = tubes.points[:, CENTRE] - tubes.length[:, CENTRE, None] * centre
+    side = edge_within(tubes.points, source, centre, leg.far, plane, surface.first_edge, surface.outline)
+    flat = tubes.flat & ~surface.curved[tubes.facet]
+    return np.where(flat[:, None], side, 0.0)
+
+
+def _divide(
+    surface: Surface, leg: Leg, tubes: Tubes, rows: Ints, side: Floats, first: bool, rule: Refinement
+) -> tuple[Tubes, Ints]:
+    """Cut tubes along the edge that runs through them, or in half; return the parts and the entry of `rows` of each."""
+    sharp = (side != 0.0).any(axis=1)
+    blunt = tubes.take(~sharp)
+    half = halves(surface, leg, blunt, np.argmax(edge_lengths(blunt), axis=1), first, rule.jitter)
+    third, real = along_line(surface, leg, tubes.take(sharp), side[sharp], first)
+    return Tubes.join([half, third]), np.concatenate([np.tile(rows[~sharp], 2), np.tile(rows[sharp], 3)[real]])
 
 
 def mirrored(tubes: Tubes) -> Floats:
@@ -97,8 +120,8 @@ def _agree(surface: Surface, hit: Ints) -> Bools:
     all_hit = (hit >= 0).all(axis=1)
     plane, smooth = surface.plane[safe], surface.smooth[safe]
     turn = np.einsum("nij,nj->ni", surface.normal[safe], surface.normal[safe[:, CENTRE]])
-    one_plane = (plane == plane[:, CENTRE :]).all(axis=1)
-    one_patch = (smooth == smooth[:, CENTRE :]).all(axis=1) & (turn > _ALIKE).all(axis=1)
+    one_plane = (plane == plane[:, CENTRE:]).all(axis=1)
+    one_patch = (smooth == smooth[:, CENTRE:]).all(axis=1) & (turn > _ALIKE).all(axis=1)
     return all_hit & (one_plane | one_patch)
 
 
@@ -108,7 +131,7 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
     flat_k, flat_p, flat_hit = k.reshape(-1, 3), tubes.points.reshape(-1, 3), hit.ravel()
     t = surface.distance(flat_hit, flat_p, flat_k).reshape(n, 4)
     # Rays that run beside the centre's plane cannot be put down on it: such a sliver is dropped.
-    sound = (t > 0.0).all(axis=1) & (t < 10.0 * t[:, CENTRE:] + 1.0).all(axis=1)
+    sound = (t > -1e-6).all(axis=1) & (t < 10.0 * t[:, CENTRE:] + 1.0).all(axis=1)
     tubes, k, hit, through, t = tubes.take(sound), k[sound], hit[sound], through[sound], t[sound]
     n = len(tubes)
     before = vector_area(tubes.points)
@@ -136,7 +159,9 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
     return tubes
 
 
-def settle(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, total: float, rule: Refinement) -> tuple[Tubes, Floats, Ints]:
+def settle(
+    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, total: float, rule: Refinement
+) -> tuple[Tubes, Floats, Ints]:
     """Cut landed tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
 
     Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.

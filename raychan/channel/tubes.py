@@ -130,33 +130,69 @@ def _first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[
 
 
 def halves(surface: Surface, leg: Leg, tubes: Tubes, edge: Ints, first: bool, jitter: float = 0.0) -> Tubes:
-    """Return both halves of tubes cut at the middle of edge 0, 1 or 2 (all the one, then all the other).
+    """Return both halves of tubes cut from the middle of edge 0, 1 or 2 to the corner opposite."""
+    row = np.arange(len(tubes))
+    share = 0.5 + jitter * np.where(row % 2, 1.0, -1.0)
+    i, j = _EDGES[edge].T
+    parts = []
+    for moved in (j, i):
+        w = np.broadcast_to(np.eye(3), (len(tubes), 3, 3)).copy()
+        w[row, moved, i], w[row, moved, j] = share, 1.0 - share
+        parts.append(parts_of(surface, leg, tubes, w, first))
+    return Tubes.join(parts)
 
-    On the first surface (`first`) the new rays are computed anew on the true surface; later ones are means along
-    the plane footprint, with the length by the Hermite rule.
+
+def along_line(surface: Surface, leg: Leg, tubes: Tubes, side: Floats, first: bool) -> tuple[Tubes, Bools]:
+    """Return the three parts of tubes cut along a straight line of their footprint, and which of 3 n have an area.
+
+    Args: side (n, 3) signed distances of the corners from the line; one corner has a sign of its own.
     """
     row = np.arange(len(tubes))
-    i, j = _EDGES[edge].T
-    share = 0.5 if jitter == 0.0 else 0.5 + jitter * np.where(row % 2, 1.0, -1.0)[:, None]
-    middle = share * tubes.bary[row, i] + (1.0 - share) * tubes.bary[row, j]
-    both = []
-    for moved in (j, i):
-        child = tubes.take(row)
-        child.bary[row, moved] = middle
-        if first:
-            rays = _first_rays(surface, leg, child.facet, child.bary)
-            child.points, child.k, child.length, child.normals = rays
-            child.spread = leg.spread(child.length[:, CENTRE])
-        else:
-            d = tubes.points[row, j] - tubes.points[row, i]
-            bend = np.einsum("ij,ij->i", tubes.k[row, i] - tubes.k[row, j], d)
-            child.points[row, moved] = tubes.points[row, i] + 0.5 * d
-            child.length[row, moved] = 0.5 * (tubes.length[row, i] + tubes.length[row, j]) + 0.125 * bend
-            child.k[row, moved] = unit(tubes.k[row, i] + tubes.k[row, j])
-            child.normals[row, moved] = unit(tubes.normals[row, i] + tubes.normals[row, j])
-            _centre(child)
-        both.append(child)
-    return Tubes.join(both)
+    positive = side > 0.0
+    lone = np.argmax(positive == (positive.sum(axis=1) == 1)[:, None], axis=1)
+    b, c = (lone + 1) % 3, (lone + 2) % 3
+    to_b = side[row, lone] / (side[row, lone] - side[row, b])
+    to_c = side[row, lone] / (side[row, lone] - side[row, c])
+    corner = np.eye(3)
+    u = corner[lone] * (1.0 - to_b)[:, None] + corner[b] * to_b[:, None]
+    v = corner[lone] * (1.0 - to_c)[:, None] + corner[c] * to_c[:, None]
+    triples = ((corner[lone], u, v), (u, corner[b], corner[c]), (u, corner[c], v))
+    out = Tubes.join([parts_of(surface, leg, tubes, np.stack(t, axis=1), first) for t in triples])
+    real = np.linalg.norm(vector_area(out.points), axis=1) > 1e-14
+    return out.take(real), real
+
+
+def parts_of(surface: Surface, leg: Leg, tubes: Tubes, weights: Floats, first: bool) -> Tubes:
+    """Return part tubes whose corner i is the mean of the parent's corners by weights[:, i] (n, 3, 3).
+
+    New corners lie on edges of the parent. On the first surface (`first`) their rays are computed anew on the
+    true surface; later ones are means along the plane footprint, with the length by the cubic Hermite rule.
+    """
+    child = tubes.take(np.arange(len(tubes)))
+    child.bary = weights @ tubes.bary
+    if first:
+        child.points, child.k, child.length, child.normals = _first_rays(surface, leg, child.facet, child.bary)
+        child.spread = leg.spread(child.length[:, CENTRE])
+        return child
+    p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
+    child.points[:, :3] = weights @ p
+    child.k[:, :3] = unit(weights @ k)
+    child.normals[:, :3] = unit(weights @ tubes.normals[:, :3])
+    for i, j in _EDGES:
+        d = p[:, j] - p[:, i]
+        gi, gj = np.einsum("nj,nj->n", k[:, i], d), np.einsum("nj,nj->n", k[:, j], d)
+        for corner in range(3):
+            t = weights[:, corner, j]
+            on = (t > 0.0) & (weights[:, corner, i] > 0.0)
+            h = length[:, i] + t * (length[:, j] - length[:, i])
+            slope = length[:, j] - length[:, i]
+            h = h + t * (1 - t) * ((1 - t) * (gi - slope) - t * (gj - slope))
+            child.length[on, corner] = h[on]
+    whole = np.argmax(weights, axis=2)
+    pure = weights.max(axis=2) == 1.0
+    child.length[:, :3] = np.where(pure, np.take_along_axis(length, whole, axis=1), child.length[:, :3])
+    _centre(child)
+    return child
 
 
 def _centre(tubes: Tubes) -> None:
@@ -228,7 +264,7 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
 def too_rough(ph: Phases, tubes: Tubes, rule: Refinement) -> Bools:
     """Tell which tubes bend more than a quadratic phase and one direction of the surface can follow."""
     span = ph.six.max(axis=1) - ph.six.min(axis=1)
-    turn = np.linalg.norm(tubes.normals[:, :3] - tubes.normals[:, CENTRE :], axis=2).max(axis=1)
+    turn = np.linalg.norm(tubes.normals[:, :3] - tubes.normals[:, CENTRE:], axis=2).max(axis=1)
     off = np.maximum(np.abs(ph.miss), np.abs(ph.bend).max(axis=1) * (rule.phase / _MOST_BEND))
     return (np.maximum(off / rule.phase, turn / rule.turn) / (1.0 + 0.5 * span)) > 1.0
 

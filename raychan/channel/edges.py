@@ -1,0 +1,79 @@
+"""Edges: which edge of the surfaces runs through a tube, so that the tube can be cut exactly there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+_MANY = 64  # edges around a plane beyond which halving is cheaper than looking at each
+_INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
+
+
+@njit(cache=True)
+def _cross(a, b, out):  # type: ignore[no-untyped-def]
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def _inside(a, b, corners, centre, source, k, far, n):  # type: ignore[no-untyped-def]
+    """Return how much of segment ab (0 to 1) lies inside the pyramid of rays."""
+    low, high = 0.0, 1.0
+    depth = np.dot(0.5 * (a + b) - centre, k)
+    if depth <= 0.0:
+        return 0.0
+    # The centre ray at the edge's depth scales distances from the three sides.
+    middle = centre + depth * k
+    for e in range(3):
+        p, q = corners[e], corners[(e + 1) % 3]
+        if far:
+            _cross(q - p, k, n)
+        else:
+            _cross(p - source, q - source, n)
+        whole = np.dot(middle - p, n)
+        if whole == 0.0:
+            return 0.0
+        fa, fb = np.dot(a - p, n) / whole - _INSIDE, np.dot(b - p, n) / whole - _INSIDE
+        if fa < 0.0 and fb < 0.0:
+            return 0.0
+        if fa < 0.0:
+            low = max(low, fa / (fa - fb))
+        elif fb < 0.0:
+            high = min(high, fa / (fa - fb))
+    return max(high - low, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def edge_within(points, source, k, far, plane, first_edge, outline):  # type: ignore[no-untyped-def]
+    """Return signed distances (n, 3) [m] of each tube's corners from the plane through its source and an edge inside it.
+
+    Args: points (n, 4, 3) [m] corners and centre; source (n, 3) [m] where the rays come from, or k (n, 3) their
+    direction when far; plane (n, 4) where each ray lands (-1: nowhere); first_edge, outline: the edges around planes.
+    Of the edges around the planes that were hit, the one of which the longest part lies inside; zeros when none does.
+    """
+    n = points.shape[0]
+    best_side = np.zeros((n, 3))
+    side, m, work = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(n):
+        best = 0.0
+        for r in range(4):
+            g = plane[i, r]
+            if g < 0 or (r > 0 and g == plane[i, r - 1]) or first_edge[g + 1] - first_edge[g] > _MANY:
+                continue
+            for e in range(first_edge[g], first_edge[g + 1]):
+                a, b = outline[e, 0], outline[e, 1]
+                share = _inside(a, b, points[i], points[i, 3].copy(), source[i], k[i], far, work)
+                length = share * np.sqrt(np.sum((b - a) ** 2))
+                if length <= best:
+                    continue
+                _cross(b - a, k[i] if far else source[i] - a, m)
+                size = np.sqrt(np.dot(m, m))
+                if size == 0.0:
+                    continue
+                for q in range(3):
+                    side[q] = np.dot(points[i, q] - a, m) / size
+                if side.min() < 0.0 and side.max() > 0.0:
+                    best = length
+                    best_side[i] = side
+    return best_side
