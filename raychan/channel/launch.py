@@ -22,7 +22,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement
     """
     tubes = _seeds(surface, leg, bodies, rule)
     tubes = _cut_for_phase(surface, leg, out, tubes, rule)
-    return _cut_for_sight(surface, leg, out, tubes, rule)
+    return _cut_forsight(surface, leg, out, tubes, rule)
 
 
 def _seeds(surface: Surface, leg: Leg, bodies: Bools, rule: Refinement) -> Tubes:
@@ -55,11 +55,11 @@ def _cut_for_phase(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
     return Tubes.join(done) if done else tubes
 
 
-def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
+def _cut_forsight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
     """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
     kept, total = [], 0j
     for level in range(rule.levels + 1):
-        seen, corners, passed = _sight(surface, leg, tubes, rule)
+        seen, corners, passed = sight(surface, leg, tubes, rule)
         mixed = seen.any(axis=1) & ~seen.all(axis=1)
         bound = phases_of(surface, leg, out, tubes, True, rule).bound
         sure = tubes.take(seen[:, CENTRE] & ~mixed)
@@ -77,7 +77,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
     return Tubes.join(kept)
 
 
-def _sight(surface: Surface, leg: Leg, tubes: Tubes, rule: Refinement) -> tuple[Bools, Floats, Ints]:
+def sight(surface: Surface, leg: Leg, tubes: Tubes, rule: Refinement) -> tuple[Bools, Floats, Ints]:
     """Return which rays of each tube (n, 4) are seen, and the mirror points and layers of the centre ray."""
     n, m = len(tubes), len(leg.mirrors)
     # Corners lie on edges that other facets share: draw them in a little.

@@ -78,11 +78,12 @@ class Leg:
         return out
 
     def visible(
-        self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int
+        self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None
     ) -> tuple[Bools, Floats, Ints]:
         """Tell which points the end sees by this leg, through which layers.
 
-        Args: points (n, 3) [m] on facets (n,), slack (n,) [m] by which the true surface may lie behind its facet.
+        Args: points (n, 3) [m] on facets (n,), slack (n,) [m] by which the true surface may lie behind its facet;
+        inside (n,) bodies that the points stand in, which do not hide them.
         Returns: seen (n,), mirror points (n, m, 3), layers passed on the last stretch (n, layers), end's side first.
         """
         n = len(points)

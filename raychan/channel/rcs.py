@@ -1,54 +1,38 @@
-"""Radar cross-section of a body by itself: the same tubes, fields and errors as in a scene."""
+"""Radar cross-section of a body by itself: the same tubes and fields as in a scene."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.collect import routes_of
 from raychan.channel.fields import transfer
-from raychan.channel.launch import launch
 from raychan.channel.legs import Leg
+from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
-from raychan.channel.trace import bounce, settle
 from raychan.channel.tubes import Refinement
 from raychan.frames import theta_phi
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 
-def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement):
-    f = surface.facets
-    every = np.ones(len(f.role), bool)
+def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:
+    """Return the scattering amplitudes (bounces, 2, 2) [m] by number of bounces; sigma = 4 pi |sum|^2.
 
-    def basis(look):
-        t, p = theta_phi(look)
-        return np.stack([t, p], axis=1).astype(complex)
+    Rows are the receiver's V, H and columns the transmitter's; V, H are theta-hat, phi-hat of the direction of travel.
+    Point ends are scaled to their distances from the origin.
+    """
+    bodies = np.ones(len(surface.facets.role), bool)
+    total = np.zeros((bounces, 2, 2), complex)
+    for routes in tube_routes(surface, leg, [out], bodies, rule, bounces):
+        count = int((routes.kind[0] > 0).sum()) - 1
+        parts = transfer(routes, surface.facets, frequency, lambda d: _basis(d), lambda d: _basis(-d))
+        total[min(count, bounces - 1)] += parts.sum(axis=0)
+    wavelength = C0 / frequency
+    reach = 1.0 if leg.far else float(np.linalg.norm(leg.end) * np.linalg.norm(out.end))
+    return total * (4.0 * np.pi / wavelength) * reach
 
-    tubes = launch(surface, leg, out, every, rule)
-    n = len(tubes)
-    total = np.zeros((2, 2), complex)
-    per = []
-    none = np.full((n, rule.layers), -1, np.int32)
-    first = True
-    for b in range(1, bounces + 1):
-        if not len(tubes):
-            break
-        if first and out == leg:
-            seen, corners, passed = tubes, np.zeros((n, 0, 3)), none
-            # layers passed on the way in are passed on the way out
-            for j in range(rule.layers):
-                passed[:, j] = np.where(tubes.kinds[:, j] == 2, tubes.facets[:, j], -1)
-        else:
-            seen, corners, passed = settle(surface, leg, out, tubes, float(np.abs(total).max()), rule)
-        r = routes_of(surface, leg, out, seen.take(np.arange(len(seen))), first, corners, passed)
-        a = transfer(r, f, frequency, basis, basis)
-        per.append(a.sum(axis=0))
-        total = total + per[-1]
-        if b < bounces:
-            tubes = bounce(
-                surface, leg, out, tubes, first, float(np.abs(total).max()) * 4 * np.pi * frequency / C0 / 1.0, rule
-            )
-        first = False
-    return total, per, n
+
+def _basis(travel: Floats) -> Complexes:
+    return np.stack(theta_phi(travel), axis=1).astype(complex)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.edges import edge_within
-from raychan.channel.launch import write_layers
+from raychan.channel.launch import sight, write_layers
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
@@ -160,16 +160,18 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
 
 
 def settle(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, total: float, rule: Refinement
+    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, total: float, rule: Refinement, first: bool = False
 ) -> tuple[Tubes, Floats, Ints]:
-    """Cut landed tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
+    """Cut tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
 
     Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
     """
     kept, ways, layers = [], [], []
     for level in range(rule.levels + 1):
-        ph = phases_of(surface, leg, out, tubes, False, rule)
-        seen, corners, passed = _watch(surface, out, tubes, rule)
+        ph = phases_of(surface, leg, out, tubes, first, rule)
+        seen, corners, passed = sight(surface, out, tubes, rule)
+        back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
+        seen &= (back < 0.0)[:, None]
         mixed = seen.any(axis=1) & ~seen.all(axis=1)
         rough = seen.any(axis=1) & too_rough(ph, tubes, rule)
         least = max(rule.floor, rule.relative * total) / np.sqrt(max(1, (mixed | rough).sum()))
@@ -181,17 +183,5 @@ def settle(
         if not split.any():
             break
         edge = np.where(rough, np.argmax(np.abs(ph.bend), axis=1), np.argmax(edge_lengths(tubes), axis=1))[split]
-        tubes = halves(surface, leg, tubes.take(split), edge, first=False, jitter=rule.jitter)
+        tubes = halves(surface, leg, tubes.take(split), edge, first, rule.jitter)
     return Tubes.join(kept), np.concatenate(ways), np.concatenate(layers)
-
-
-def _watch(surface: Surface, out: Leg, tubes: Tubes, rule: Refinement) -> tuple[Bools, Floats, Ints]:
-    n, m = len(tubes), len(out.mirrors)
-    centre = tubes.points[:, CENTRE:]
-    aim = centre + 0.98 * (tubes.points - centre)
-    to_end, _ = out.rays(tubes.points)
-    lit = np.einsum("nij,nij->ni", to_end, tubes.normals) < 0.0
-    slack = np.full(4 * n, 1e-5)
-    seen, corners, passed = out.visible(surface, aim.reshape(-1, 3), np.repeat(tubes.facet, 4), slack, rule.layers)
-    shape = (n, 4, m, 3)
-    return seen.reshape(n, 4) & lit, corners.reshape(shape)[:, CENTRE], passed.reshape(n, 4, rule.layers)[:, CENTRE]

@@ -103,12 +103,21 @@ class Tracer:
         return facet, distance
 
     def walk(
-        self, origin: Floats, direction: Floats, limit: Floats, slack: Floats, skip: Ints, target: Ints, layers: int
+        self,
+        origin: Floats,
+        direction: Floats,
+        limit: Floats,
+        slack: Floats,
+        skip: Ints,
+        target: Ints,
+        layers: int,
+        inside: Ints | None = None,
     ) -> tuple[NDArray[np.bool_], Ints]:
         """Tell which rays reach `limit` [m] and through which thin layers.
 
         Args: slack (n,) [m] how far before the limit a hit still counts as the target's own surface;
-        skip (n,) facet left; target (n,) facet aimed at (hits on it never block); layers: how many may be passed.
+        skip (n,) facet left; target (n,) facet aimed at (hits on it never block);
+        layers: how many may be passed; inside (n,) body that the target stands in, which never blocks.
         Returns: reached (n,) bool, passed (n, layers) facet ids in order, -1 unused.
         """
         n = len(origin)
@@ -119,6 +128,8 @@ class Tracer:
         while len(todo):
             facet, t = self.cast(origin[todo], direction[todo], skip[todo], start[todo])
             clear = (facet < 0) | (t >= limit[todo] - slack[todo]) | (facet == target[todo])
+            if inside is not None:
+                clear |= self.facets.body[np.maximum(facet, 0)] == inside[todo]
             reached[todo[clear]] = True
             if not self._any_layer or layers == 0:
                 break

@@ -1,0 +1,106 @@
+"""Mirrors: the planes of a scene large enough to send a wave on, and the legs over them that can reach something."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.legs import Leg, Mirror
+from raychan.channel.surface import Surface
+from raychan.tables import BLOCKER, MIRROR
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_LEAST_AREA = 0.5  # m^2
+_MOST = 24
+
+
+def planes_that_mirror(surface: Surface, end: Floats) -> list[Mirror]:
+    """Return the mirrors that `end` (3,) [m] could use: ground planes, and plane faces of at least half a square metre.
+
+    Smaller faces count as scatterers only: at street distances they lie within a few Fresnel zones.
+    The largest 24 as seen from `end` are kept.
+    """
+    f = surface.facets
+    if not len(f.vertices):
+        return []
+    usable = ~surface.curved & (f.role[f.body] != BLOCKER)
+    area = np.bincount(surface.plane, weights=np.where(usable, surface.area, 0.0))
+    largest = np.full(len(area), -1, np.int64)
+    order = np.argsort(surface.area, kind="stable")
+    largest[surface.plane[order]] = order
+    found: list[tuple[float, Mirror]] = []
+    for plane in np.flatnonzero(area >= _LEAST_AREA):
+        facet = int(largest[plane])
+        body = int(f.body[facet])
+        normal, point = surface.normal[facet], surface.first[facet]
+        height = float((end - point) @ normal)
+        if height < 0.0 and surface.closed[body]:
+            continue
+        mirror = Mirror(point, normal if height >= 0.0 else -normal, facet, body)
+        centre = f.vertices[facet].mean(axis=0)
+        view = area[plane] * abs(height) / np.linalg.norm(end - centre) ** 3
+        found.append((np.inf if f.role[body] == MIRROR else view, mirror))
+    found.sort(key=lambda pair: -pair[0])
+    return [m for _, m in found[:_MOST]]
+
+
+def legs_over(surface: Surface, end: Floats, bounces: int) -> list[Leg]:
+    """Return the legs from `end` (3,) [m] with at most `bounces` mirrors, the direct one first."""
+    direct = Leg(end=np.asarray(end, float))
+    legs = [direct]
+    if bounces < 1:
+        return legs
+    mirrors = planes_that_mirror(surface, direct.end)
+    everything = planes_that_mirror(surface, direct.end) if bounces < 2 else _both_sides(surface, mirrors)
+    for count in range(1, bounces + 1):
+        for chain in permutations(everything, count):
+            if _possible(direct.end, chain):
+                legs.append(Leg(end=direct.end, mirrors=chain))
+    return legs
+
+
+def _both_sides(surface: Surface, mirrors: list[Mirror]) -> list[Mirror]:
+    """Add the back of each open sheet: a second mirror may be met from behind as seen from the end."""
+    backs = [Mirror(m.point, -m.normal, m.facet, m.body) for m in mirrors if not surface.closed[m.body]]
+    return mirrors + [m for m in backs if surface.facets.role[m.body] != MIRROR]
+
+
+def _possible(end: Floats, chain: tuple[Mirror, ...]) -> bool:
+    """Tell whether every image lies in front of the mirror it is mirrored at."""
+    x = end
+    for m in chain:
+        if (x - m.point) @ m.normal <= 1e-9:
+            return False
+        x = m.image(x)
+    return True
+
+
+def reachable(surface: Surface, leg: Leg) -> Bools:
+    """Return which bodies (b,) can be met over a leg: in front of its last mirror and through its outline's sphere."""
+    f = surface.facets
+    n = len(f.role)
+    if not leg.mirrors:
+        return np.ones(n, bool)
+    corner = f.vertices.reshape(-1, 3)
+    body = np.repeat(f.body, 3)
+    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
+    np.minimum.at(low, body, corner)
+    np.maximum.at(high, body, corner)
+    empty = ~np.isfinite(low).all(axis=1)
+    centre = np.where(empty[:, None], 0.0, 0.5 * (low + high))
+    radius = np.where(empty, 0.0, 0.5 * np.linalg.norm(np.where(empty[:, None], 0.0, high - low), axis=1))
+    last = leg.mirrors[-1]
+    front = (centre - last.point) @ last.normal > -radius
+    own = surface.plane == surface.plane[last.facet]
+    v = f.vertices[own].reshape(-1, 3)
+    middle = 0.5 * (v.min(axis=0) + v.max(axis=0))
+    reach = np.linalg.norm(v - middle, axis=1).max()
+    spot = leg.bounces(centre)[:, -1]
+    # The ray to the sphere's rim meets the mirror within the sphere's radius of the ray to its centre.
+    ok = ~empty & front & (np.linalg.norm(spot - middle, axis=1) < reach + radius)
+    ok[last.body] = False
+    return ok

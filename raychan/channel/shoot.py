@@ -1,0 +1,86 @@
+"""Shoot: tubes from launch to last bounce, over every way in and out, as Routes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.collect import routes_of
+from raychan.channel.launch import launch
+from raychan.channel.legs import Leg
+from raychan.channel.surface import Surface
+from raychan.channel.trace import bounce, settle
+from raychan.channel.tubes import Refinement, Tubes, phases_of
+from raychan.tables import MIRROR, REFLECT, TRANSMIT, Routes
+
+Floats = NDArray[np.float64]
+
+
+def tube_routes(
+    surface: Surface, leg: Leg, outs: list[Leg], bodies: NDArray[np.bool_], rule: Refinement, bounces: int
+) -> Iterator[Routes]:
+    """Yield the routes of tubes launched over `leg`, bounce by bounce and way out by way out."""
+    f = surface.facets
+    direct = outs[0]
+    tubes = launch(surface, leg, direct, bodies, rule)
+    mirror_planes = _planes_in(surface, outs)
+    first, total = True, 0.0
+    while len(tubes):
+        counts = tubes.bounces
+        for out in outs:
+            fits = counts + len(out.mirrors) <= bounces
+            fits &= ~np.isin(f.body[tubes.facet], list(out.bodies))
+            # Ground has no return of its own here; a plane mirror lit from another body returns by its image, not twice.
+            fits &= f.role[f.body[tubes.facet]] != MIRROR
+            if not first:
+                fits &= ~(mirror_planes[tubes.facet] & _other_body(surface, tubes))
+            some = tubes.take(fits)
+            if not len(some):
+                continue
+            if first and out == leg:
+                corners, passed = _same_way_back(some, leg, rule)
+            else:
+                some, corners, passed = settle(surface, leg, out, some, total, rule, first)
+            if len(some):
+                total = max(total, abs(phases_of(surface, leg, out, some, first, rule).total()))
+                yield routes_of(surface, leg, out, some, first, corners, passed)
+        tubes = tubes.take(counts < bounces)
+        if not len(tubes):
+            return
+        before = tubes
+        tubes = bounce(surface, leg, direct, before, first, total, rule)
+        if first and len(tubes):
+            # From a plane mirror to another body: the legs over mirrors have these.
+            previous = tubes.facets[np.arange(len(tubes)), _last_bounce(tubes)]
+            moved = f.body[previous] != f.body[tubes.facet]
+            tubes = tubes.take(~(mirror_planes[previous] & moved))
+        first = False
+
+
+def _last_bounce(tubes: Tubes) -> NDArray[np.int64]:
+    kinds = np.where(tubes.kinds == REFLECT, np.arange(tubes.kinds.shape[1]), -1)
+    return kinds.max(axis=1)
+
+
+def _other_body(surface: Surface, tubes: Tubes) -> NDArray[np.bool_]:
+    f = surface.facets
+    previous = tubes.facets[np.arange(len(tubes)), _last_bounce(tubes)]
+    return f.body[previous] != f.body[tubes.facet]
+
+
+def _planes_in(surface: Surface, legs: list[Leg]) -> NDArray[np.bool_]:
+    used = {int(surface.plane[m.facet]) for leg in legs for m in leg.mirrors}
+    return np.isin(surface.plane, list(used))
+
+
+def _same_way_back(tubes: Tubes, leg: Leg, rule: Refinement) -> tuple[Floats, NDArray[np.int32]]:
+    """Return the way out of first-bounce tubes over the leg they came by, from their history."""
+    n, m = len(tubes), len(leg.mirrors)
+    corners = tubes.vertices[:, :m]
+    passed = np.full((n, rule.layers), -1, np.int32)
+    for j in range(rule.layers):
+        slot = m + j
+        passed[:, j] = np.where(tubes.kinds[:, slot] == TRANSMIT, tubes.facets[:, slot], -1)
+    return corners, passed

@@ -1,0 +1,202 @@
+"""Solve: a scene's facets and a radar become Paths."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.fields import departures, rates, transfer
+from raychan.channel.legs import Leg
+from raychan.channel.mirrors import legs_over, reachable
+from raychan.channel.scatterers import point_routes
+from raychan.channel.shoot import tube_routes
+from raychan.channel.surface import Surface
+from raychan.channel.tubes import Refinement
+from raychan.tables import MIRROR, REFLECT, SCATTER, Facets, Paths, Points, Routes
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+
+class Radar(Protocol):
+    """What the solver asks of a radar (see radar.sensor.Sensor)."""
+
+    position: Floats
+    velocity: Floats
+    tx_field: Any
+    rx_field: Any
+
+
+@dataclass
+class Stats:
+    """What a solution cost and what it left out."""
+
+    rays: int = 0
+    tubes: int = 0
+    legs: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def add(self, stage: str, since: float) -> None:
+        """Add the time since `since` to a stage."""
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - since
+
+
+def solve(
+    facets: Facets,
+    points: Points,
+    radar: Radar,
+    frequency: float,
+    rule: Refinement,
+    bounces: int,
+    progress: Progress | None = None,
+) -> tuple[Paths, Stats]:
+    """Return the paths of a scene seen by a monostatic radar, and what they cost.
+
+    Args: frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
+    both ways counted; progress is told (stage, share done).
+    """
+    stats = Stats()
+    since = perf_counter()
+    surface = Surface(facets)
+    stats.add("build", since)
+    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1)
+    stats.legs = len(legs)
+    parts: list[Paths] = []
+    since = perf_counter()
+    found = point_routes(surface, points, legs, legs, bounces, rule.slots, rule.layers)
+    if found is not None:
+        parts.append(paths_of(found, facets, radar, frequency))
+    found = _foot_points(surface, legs, rule)
+    if found is not None:
+        parts.append(paths_of(found, facets, radar, frequency))
+    stats.add("points", since)
+    for i, leg in enumerate(legs):
+        if progress:
+            progress("trace", i / len(legs))
+        bodies = reachable(surface, leg)
+        if not bodies.any():
+            continue
+        since = perf_counter()
+        for routes in tube_routes(surface, leg, legs, bodies, rule, bounces):
+            stats.add("trace", since)
+            since = perf_counter()
+            stats.tubes += len(routes.kind)
+            parts.append(paths_of(routes, facets, radar, frequency))
+            stats.add("fields", since)
+            since = perf_counter()
+        stats.add("trace", since)
+    stats.rays = surface.rays
+    if progress:
+        progress("trace", 1.0)
+    return join(parts, facets, radar, rule.slots), stats
+
+
+def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes | None:
+    """Return the exact routes to the ground's foot points and back: a plane mirror too large for tubes."""
+    f = surface.facets
+    rows = []
+    for leg in legs:
+        if len(leg.mirrors) != 1 or f.role[leg.mirrors[0].body] != MIRROR:
+            continue
+        m = leg.mirrors[0]
+        height = float((leg.end - m.point) @ m.normal)
+        foot = leg.end - height * m.normal
+        hit, _ = surface.cast(leg.end[None], -m.normal[None], np.array([-1], np.int32))
+        if hit[0] >= 0 and surface.plane[hit[0]] == surface.plane[m.facet]:
+            rows.append((foot, m, height))
+    if not rows:
+        return None
+    n, d = len(rows), rule.slots
+    vertices = np.broadcast_to(legs[0].end, (n, d, 3)).copy()
+    normals, facet = np.zeros((n, d, 3)), np.full((n, d), -1, np.int32)
+    kind, body = np.zeros((n, d), np.int8), np.full((n, d), -1, np.int16)
+    for i, (foot, m, _) in enumerate(rows):
+        vertices[i, 0], normals[i, 0], facet[i, 0], kind[i, 0], body[i, 0] = foot, m.normal, m.facet, REFLECT, m.body
+    length = np.array([2.0 * h for _, _, h in rows])
+    return Routes(
+        tx=legs[0].end,
+        rx=legs[0].end,
+        far=False,
+        vertices=vertices,
+        normals=normals,
+        facet=facet,
+        body=body,
+        kind=kind,
+        scatter=np.full(n, -1, np.int8),
+        lengths=np.repeat(length[:, None], 6, axis=1),
+        length=length,
+        taper=np.ones((n, 3)),
+        area=np.zeros(n),
+        spread_in=1.0 / length,
+        spread_out=np.ones(n),
+        caustics=np.zeros(n, np.int8),
+        sigma=np.zeros(n),
+    )
+
+
+_APART = 2e-3  # m of path: footprints longer than this in range give each corner its own delay
+
+
+def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> Paths:
+    """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
+    a = transfer(
+        routes,
+        facets,
+        frequency,
+        lambda d: np.asarray(radar.tx_field(d))[:, None],
+        lambda d: np.asarray(radar.rx_field(d))[:, None],
+        corners=True,
+    )[:, 0, 0]
+    v = np.asarray(radar.velocity, float)
+    rate = rates(routes, facets, v, v)
+    away, look = departures(routes)
+    spans = routes.lengths[:, :3].max(axis=1) - routes.lengths[:, :3].min(axis=1)
+    long = (routes.kind == SCATTER).any(axis=1) & (spans > _APART)
+    whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
+    index = np.concatenate([whole, np.repeat(rows, 3)])
+    amplitude = np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])
+    length = np.concatenate([routes.length[whole], routes.lengths[rows, :3].ravel()])
+    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
+    part = np.where(routes.facet >= 0, part, -1).astype(np.int16)
+    return Paths(
+        delay=length / C0,
+        amplitude=amplitude,
+        rate=rate[index],
+        departure=away[index],
+        arrival=look[index],
+        body=routes.body[index],
+        part=part[index],
+        kind=routes.kind[index],
+        vertices=routes.vertices[index].astype(np.float32),
+        error=np.zeros(len(index)),
+        body_names=facets.body_names,
+        part_names=facets.part_names,
+        tx=routes.tx,
+        rx=routes.rx,
+    )
+
+
+def join(parts: list[Paths], facets: Facets, radar: Radar, slots: int) -> Paths:
+    """Return all paths of several sets as one record, empty if there are none."""
+    end = np.asarray(radar.position, float)
+    if not parts:
+        none = np.zeros((0, slots))
+        return Paths(
+            delay=np.zeros(0), amplitude=np.zeros(0, complex), rate=np.zeros(0), departure=np.zeros((0, 3)),
+            arrival=np.zeros((0, 3)), body=none.astype(np.int16), part=none.astype(np.int16), kind=none.astype(np.int8),
+            vertices=np.zeros((0, slots, 3), np.float32), error=np.zeros(0), body_names=facets.body_names,
+            part_names=facets.part_names, tx=end, rx=end,
+        )  # fmt: skip
+    rows = {
+        f.name: np.concatenate([getattr(p, f.name) for p in parts])
+        for f in dataclasses.fields(Paths)
+        if f.metadata.get("axes", [""])[0] == "n"
+    }
+    return dataclasses.replace(parts[0], **rows)
