@@ -9,6 +9,11 @@ _MANY = 64  # edges around a plane beyond which halving is cheaper than looking 
 _INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
 
 
+@njit(cache=True, inline="always")
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 @njit(cache=True)
 def _cross(a, b, out):  # type: ignore[no-untyped-def]
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -20,7 +25,7 @@ def _cross(a, b, out):  # type: ignore[no-untyped-def]
 def _inside(a, b, corners, centre, source, k, far, n):  # type: ignore[no-untyped-def]
     """Return how much of segment ab (0 to 1) lies inside the pyramid of rays."""
     low, high = 0.0, 1.0
-    depth = np.dot(0.5 * (a + b) - centre, k)
+    depth = _dot(0.5 * (a + b) - centre, k)
     if depth <= 0.0:
         return 0.0
     # The centre ray at the edge's depth scales distances from the three sides.
@@ -31,10 +36,10 @@ def _inside(a, b, corners, centre, source, k, far, n):  # type: ignore[no-untype
             _cross(q - p, k, n)
         else:
             _cross(p - source, q - source, n)
-        whole = np.dot(middle - p, n)
+        whole = _dot(middle - p, n)
         if whole == 0.0:
             return 0.0
-        fa, fb = np.dot(a - p, n) / whole - _INSIDE, np.dot(b - p, n) / whole - _INSIDE
+        fa, fb = _dot(a - p, n) / whole - _INSIDE, _dot(b - p, n) / whole - _INSIDE
         if fa < 0.0 and fb < 0.0:
             return 0.0
         if fa < 0.0:
@@ -42,6 +47,56 @@ def _inside(a, b, corners, centre, source, k, far, n):  # type: ignore[no-untype
         elif fb < 0.0:
             high = min(high, fa / (fa - fb))
     return max(high - low, 0.0)
+
+
+@njit(cache=True)
+def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances from the plane through the source and the line where two planes meet.
+
+    Returns whether it parts the rays that land on plane a from those that land on plane b (bodies that
+    run into each other have no edge there).
+    """
+    c1 = _dot(k, n1) if far else _dot(source - p1, n1)
+    c2 = _dot(k, n2) if far else _dot(source - p2, n2)
+    m = c2 * n1 - c1 * n2
+    size = np.sqrt(_dot(m, m))
+    if size < 1e-12:
+        return False
+    offset = c2 * _dot(p1, n1) - c1 * _dot(p2, n2)
+    sign = 0.0
+    for q in range(4):
+        f = (_dot(points[q], m) - offset) / size
+        if q < 3:
+            side[q] = f
+        if plane[q] == a or plane[q] == b:
+            wanted = f if plane[q] == a else -f
+            if sign == 0.0:
+                sign = wanted
+            elif sign * wanted <= 0.0:
+                return False
+    return side.min() < 0.0 and side.max() > 0.0
+
+
+@njit(cache=True, nogil=True)
+def meeting_lines(points, source, k, far, plane, facet, first, normal, side):  # type: ignore[no-untyped-def]
+    """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into each other.
+
+    Args as for `edge_within`; facet (n, 4) met by each ray; first, normal (m, 3): a point and the normal of each facet.
+    """
+    work = np.empty(3)
+    for i in range(points.shape[0]):
+        if side[i].any():
+            continue
+        for r in range(3):
+            a, b = plane[i, r], plane[i, r + 1]
+            if a < 0 or b < 0 or a == b:
+                continue
+            fa, fb = facet[i, r], facet[i, r + 1]
+            if _between(
+                points[i], source[i], k[i], far, plane[i], first[fa], normal[fa], first[fb], normal[fb], a, b, work
+            ):
+                side[i] = work
+                break
 
 
 @njit(cache=True, nogil=True)
@@ -63,16 +118,16 @@ def edge_within(points, source, k, far, plane, first_edge, outline):  # type: ig
                 continue
             for e in range(first_edge[g], first_edge[g + 1]):
                 a, b = outline[e, 0], outline[e, 1]
-                share = _inside(a, b, points[i], points[i, 3].copy(), source[i], k[i], far, work)
+                share = _inside(a, b, points[i], points[i, 3], source[i], k[i], far, work)
                 length = share * np.sqrt(np.sum((b - a) ** 2))
                 if length <= best:
                     continue
                 _cross(b - a, k[i] if far else source[i] - a, m)
-                size = np.sqrt(np.dot(m, m))
+                size = np.sqrt(_dot(m, m))
                 if size == 0.0:
                     continue
                 for q in range(3):
-                    side[q] = np.dot(points[i, q] - a, m) / size
+                    side[q] = _dot(points[i, q] - a, m) / size
                 if side.min() < 0.0 and side.max() > 0.0:
                     best = length
                     best_side[i] = side

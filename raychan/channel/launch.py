@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.edges import edge_within
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
-from raychan.channel.tubes import CENTRE, Refinement, Tubes, edge_lengths, halves, phases_of, stand, too_rough
+from raychan.channel.tubes import (
+    CENTRE,
+    Refinement,
+    Tubes,
+    along_line,
+    edge_lengths,
+    halves,
+    phases_of,
+    stand,
+    too_rough,
+)
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
 Floats = NDArray[np.float64]
@@ -22,7 +35,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement
     """
     tubes = _seeds(surface, leg, bodies, rule)
     tubes = _cut_for_phase(surface, leg, out, tubes, rule)
-    return _cut_forsight(surface, leg, out, tubes, rule)
+    return _cut_for_sight(surface, leg, out, tubes, rule)
 
 
 def _seeds(surface: Surface, leg: Leg, bodies: Bools, rule: Refinement) -> Tubes:
@@ -55,43 +68,75 @@ def _cut_for_phase(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
     return Tubes.join(done) if done else tubes
 
 
-def _cut_forsight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
+def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
     """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
     kept, total = [], 0j
     for level in range(rule.levels + 1):
-        seen, corners, passed = sight(surface, leg, tubes, rule)
-        mixed = seen.any(axis=1) & ~seen.all(axis=1)
+        view = sight(surface, leg, tubes, rule)
+        mixed = view.mixed
         bound = phases_of(surface, leg, out, tubes, True, rule).bound
-        sure = tubes.take(seen[:, CENTRE] & ~mixed)
+        sure = tubes.take(view.seen[:, CENTRE] & ~mixed)
         total += phases_of(surface, leg, out, sure, True, rule).total()
         least = max(rule.floor, rule.relative * abs(total)) / np.sqrt(max(1, mixed.sum()))
         split = mixed & (bound > least) & (level < rule.levels)
-        ready = ~split & seen[:, CENTRE]
+        ready = ~split & view.seen[:, CENTRE]
         kept.append(tubes.take(ready))
-        _write_leg(surface, kept[-1], leg, corners[ready], passed[ready])
+        _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready])
         if not split.any():
             break
-        tubes = tubes.take(split)
-        longest = np.argmax(edge_lengths(tubes), axis=1)
-        tubes = halves(surface, leg, tubes, longest, first=True, jitter=rule.jitter)
+        rows = np.flatnonzero(split)
+        tubes, _ = divide(surface, leg, tubes.take(rows), rows, view.side[rows], True, rule)
     return Tubes.join(kept)
 
 
-def sight(surface: Surface, leg: Leg, tubes: Tubes, rule: Refinement) -> tuple[Bools, Floats, Ints]:
-    """Return which rays of each tube (n, 4) are seen, and the mirror points and layers of the centre ray."""
+@dataclass(frozen=True)
+class Sight:
+    """How tubes are seen over a leg: `seen` (n, 4) rays, way of the centre ray (`corners`, `passed`), and `side` (n, 3): where a
+    shadow's edge runs through a tube, zeros where none is known."""
+
+    seen: Bools
+    corners: Floats
+    passed: Ints
+    side: Floats
+
+    @property
+    def mixed(self) -> Bools:
+        """Tubes that are seen in part."""
+        some, whole = self.seen.any(axis=1), self.seen.all(axis=1)
+        return (some & ~whole) | (some & (self.side != 0.0).any(axis=1))
+
+
+def sight(surface: Surface, leg: Leg, tubes: Tubes, rule: Refinement) -> Sight:
+    """Return how tubes are seen over a leg."""
     n, m = len(tubes), len(leg.mirrors)
     # Corners lie on edges that other facets share: draw them in a little.
     centre = tubes.points[:, CENTRE:]
     aim = centre + 0.98 * (tubes.points - centre)
     # On a curved patch points hover over their facet: a hit a little before them is their own surface.
+    k, _ = leg.rays(tubes.points[:, CENTRE])
     rise = tubes.points - surface.first[tubes.facet][:, None]
     hover = np.abs(np.einsum("nij,nj->ni", rise, surface.normal[tubes.facet])).max(axis=1)
-    slope = np.abs(np.einsum("ij,ij->i", tubes.k[:, CENTRE], surface.normal[tubes.facet]))
+    slope = np.abs(np.einsum("ij,ij->i", k, surface.normal[tubes.facet]))
     slack = 1e-5 + 3.0 * hover / np.maximum(slope, 0.05)
     facet4, slack4 = np.repeat(tubes.facet, 4), np.repeat(slack, 4)
-    seen, corners, passed = leg.visible(surface, aim.reshape(-1, 3), facet4, slack4, rule.layers)
-    shape = (n, 4, m, 3)
-    return (seen.reshape(n, 4), corners.reshape(shape)[:, CENTRE], passed.reshape(n, 4, rule.layers)[:, CENTRE])
+    view = leg.visible(surface, aim.reshape(-1, 3), facet4, slack4, rule.layers)
+    block = view.blocker.reshape(n, 4)
+    plane = np.where(block >= 0, surface.plane[np.maximum(block, 0)], -1)
+    source = np.broadcast_to(leg.image, (n, 3))
+    side = edge_within(tubes.points, source, -k, leg.far, plane, surface.first_edge, surface.outline)
+    corners = view.corners.reshape(n, 4, m, 3)[:, CENTRE]
+    return Sight(view.seen.reshape(n, 4), corners, view.passed.reshape(n, 4, rule.layers)[:, CENTRE], side)
+
+
+def divide(
+    surface: Surface, leg: Leg, tubes: Tubes, rows: Ints, side: Floats, first: bool, rule: Refinement
+) -> tuple[Tubes, Ints]:
+    """Cut tubes along the edge that runs through them, or in half; return the parts and the entry of `rows` of each."""
+    sharp = (side != 0.0).any(axis=1)
+    blunt = tubes.take(~sharp)
+    half = halves(surface, leg, blunt, np.argmax(edge_lengths(blunt), axis=1), first, rule.jitter)
+    third, real = along_line(surface, leg, tubes.take(sharp), side[sharp], first)
+    return Tubes.join([half, third]), np.concatenate([np.tile(rows[~sharp], 2), np.tile(rows[sharp], 3)[real]])
 
 
 def _write_leg(surface: Surface, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints) -> None:

@@ -29,6 +29,17 @@ class Mirror:
 
 
 @dataclass(frozen=True)
+class View:
+    """How points are seen over a leg: `seen` (n,), mirror points `corners` (n, m, 3) [m], `passed` (n, l) layers on the
+    last stretch, end's side first, and the facet that blocks it (n,), -1 for none."""
+
+    seen: Bools
+    corners: Floats
+    passed: Ints
+    blocker: Ints
+
+
+@dataclass(frozen=True)
 class Leg:
     """The way between an end (a point, or a direction when `far`) and the surface over mirrors, end's side first."""
 
@@ -79,12 +90,11 @@ class Leg:
 
     def visible(
         self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None
-    ) -> tuple[Bools, Floats, Ints]:
+    ) -> View:
         """Tell which points the end sees by this leg, through which layers.
 
         Args: points (n, 3) [m] on facets (n,), slack (n,) [m] by which the true surface may lie behind its facet;
         inside (n,) bodies that the points stand in, which do not hide them.
-        Returns: seen (n,), mirror points (n, m, 3), layers passed on the last stretch (n, layers), end's side first.
         """
         n = len(points)
         corners = self.bounces(points)
@@ -115,12 +125,14 @@ class Leg:
             d, length = _towards(start, points)
         rows = np.flatnonzero(seen)
         passed = np.full((n, layers), -1, np.int32)
-        reached, through = surface.walk(
-            start[rows], d[rows], length[rows], slack[rows], skip[rows], facet[rows], layers
+        within = None if inside is None else inside[rows]
+        reached, passed[rows], in_way = surface.walk(
+            start[rows], d[rows], length[rows], slack[rows], skip[rows], facet[rows], layers, within
         )
         seen[rows[~reached]] = False
-        passed[rows] = through
-        return seen, corners, passed
+        blocker = none.copy()
+        blocker[rows] = in_way
+        return View(seen, corners, passed, blocker)
 
 
 def _towards(start: Floats, stop: Floats) -> tuple[Floats, Floats]:

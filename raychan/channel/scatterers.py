@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.legs import Leg
+from raychan.channel.legs import Leg, View
 from raychan.channel.surface import Surface
 from raychan.tables import POINT, REFLECT, TRANSMIT, Points, Routes
 
@@ -25,7 +25,7 @@ def point_routes(
         for j, out in enumerate(ways_out):
             if len(leg.mirrors) + len(out.mirrors) + 1 > bounces:
                 continue
-            for p in np.flatnonzero(seen_in[i][0] & seen_out[j][0]):
+            for p in np.flatnonzero(seen_in[i].seen & seen_out[j].seen):
                 rows.append(_route(surface, points, int(p), leg, out, seen_in[i], seen_out[j], slots))
     if not rows:
         return None
@@ -34,7 +34,7 @@ def point_routes(
     return Routes(tx=tx, rx=rx, far=False, **columns)
 
 
-def _see(surface: Surface, points: Points, leg: Leg, layers: int) -> tuple[Floats, Floats, Floats]:
+def _see(surface: Surface, points: Points, leg: Leg, layers: int) -> View:
     n = len(points.body)
     none = np.full(n, -1, np.int32)
     return leg.visible(surface, points.position, none, np.full(n, 1e-6), layers, points.body)
@@ -52,9 +52,9 @@ def _route(surface, points, p, leg, out, seen_in, seen_out, slots):  # type: ign
         kinds.append(kind)
 
     def add_way(way, seen, k):  # type: ignore[no-untyped-def]
-        for m, spot in zip(way.mirrors, seen[1][p], strict=True):
+        for m, spot in zip(way.mirrors, seen.corners[p], strict=True):
             add(spot, m.normal, m.facet, REFLECT)
-        for facet in seen[2][p]:
+        for facet in seen.passed[p]:
             if facet >= 0:
                 t = surface.distance(np.array([facet]), at[None], k)
                 add(at + t[0] * k[0], surface.normal[facet], facet, TRANSMIT)

@@ -20,9 +20,7 @@ _ALL_PAIRS = 2_000_000  # image tests that are cheaper than looking for candidat
 _SEARCH_RAYS = 200_000
 
 
-def specular_routes(
-    surface: Surface, tx: Floats, rx: Floats, bounces: int, layers: int = 2, seed: int = 0
-) -> Routes:
+def specular_routes(surface: Surface, tx: Floats, rx: Floats, bounces: int, layers: int = 2, seed: int = 0) -> Routes:
     """Return every specular route from tx to rx with at most `bounces` reflections, line of sight included.
 
     All chains of planes are tried where that is affordable; else those that rays from both ends find.
@@ -153,7 +151,7 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
             return None
         near = np.array([max(gap * 1e-7, 1e-6)])
         aim = np.array([-1], np.int32)
-        reached, passed = surface.walk(a[None], d, np.array([gap]), near, skip, aim, layers - _passes(kinds))
+        reached, passed, _ = surface.walk(a[None], d, np.array([gap]), near, skip, aim, layers - _passes(kinds))
         if not reached[0]:
             return None
         for f in passed[0][passed[0] >= 0]:

@@ -5,16 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.edges import edge_within
-from raychan.channel.launch import sight, write_layers
+from raychan.channel.edges import edge_within, meeting_lines
+from raychan.channel.launch import divide, sight, write_layers
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
     CENTRE,
     Refinement,
     Tubes,
-    along_line,
-    edge_lengths,
     halves,
     phases_of,
     too_rough,
@@ -73,7 +71,7 @@ def _fly(
         if not split.any():
             return
         rows = np.flatnonzero(split)
-        tubes, rows = _divide(surface, leg, tubes.take(rows), rows, side[rows], first, rule)
+        tubes, rows = divide(surface, leg, tubes.take(rows), rows, side[rows], first, rule)
         start, through = start[rows], through[rows]
         start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
 
@@ -84,19 +82,9 @@ def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints) -> Fl
     centre = k[:, CENTRE]
     source = tubes.points[:, CENTRE] - tubes.length[:, CENTRE, None] * centre
     side = edge_within(tubes.points, source, centre, leg.far, plane, surface.first_edge, surface.outline)
+    meeting_lines(tubes.points, source, centre, leg.far, plane, hit, surface.first, surface.normal, side)
     flat = tubes.flat & ~surface.curved[tubes.facet]
     return np.where(flat[:, None], side, 0.0)
-
-
-def _divide(
-    surface: Surface, leg: Leg, tubes: Tubes, rows: Ints, side: Floats, first: bool, rule: Refinement
-) -> tuple[Tubes, Ints]:
-    """Cut tubes along the edge that runs through them, or in half; return the parts and the entry of `rows` of each."""
-    sharp = (side != 0.0).any(axis=1)
-    blunt = tubes.take(~sharp)
-    half = halves(surface, leg, blunt, np.argmax(edge_lengths(blunt), axis=1), first, rule.jitter)
-    third, real = along_line(surface, leg, tubes.take(sharp), side[sharp], first)
-    return Tubes.join([half, third]), np.concatenate([np.tile(rows[~sharp], 2), np.tile(rows[sharp], 3)[real]])
 
 
 def mirrored(tubes: Tubes) -> Floats:
@@ -169,19 +157,23 @@ def settle(
     kept, ways, layers = [], [], []
     for level in range(rule.levels + 1):
         ph = phases_of(surface, leg, out, tubes, first, rule)
-        seen, corners, passed = sight(surface, out, tubes, rule)
+        view = sight(surface, out, tubes, rule)
         back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
-        seen &= (back < 0.0)[:, None]
-        mixed = seen.any(axis=1) & ~seen.all(axis=1)
-        rough = seen.any(axis=1) & too_rough(ph, tubes, rule)
+        lit = back < 0.0
+        rough = lit & view.seen.any(axis=1) & too_rough(ph, tubes, rule)
+        mixed = lit & view.mixed
         least = max(rule.floor, rule.relative * total) / np.sqrt(max(1, (mixed | rough).sum()))
         split = (mixed | rough) & (ph.bound > least) & (level < rule.levels)
-        ready = ~split & seen[:, CENTRE]
+        ready = ~split & lit & view.seen[:, CENTRE]
         kept.append(tubes.take(ready))
-        ways.append(corners[ready])
-        layers.append(passed[ready])
+        ways.append(view.corners[ready])
+        layers.append(view.passed[ready])
         if not split.any():
             break
-        edge = np.where(rough, np.argmax(np.abs(ph.bend), axis=1), np.argmax(edge_lengths(tubes), axis=1))[split]
-        tubes = halves(surface, leg, tubes.take(split), edge, first, rule.jitter)
+        # Bends come first: they need an edge of their own.
+        bent, shaded = np.flatnonzero(split & rough), np.flatnonzero(split & ~rough)
+        edge = np.argmax(np.abs(ph.bend[bent]), axis=1)
+        halved = halves(surface, leg, tubes.take(bent), edge, first, rule.jitter)
+        parted, _ = divide(surface, leg, tubes.take(shaded), shaded, view.side[shaded], first, rule)
+        tubes = Tubes.join([halved, parted])
     return Tubes.join(kept), np.concatenate(ways), np.concatenate(layers)

@@ -112,17 +112,19 @@ class Tracer:
         target: Ints,
         layers: int,
         inside: Ints | None = None,
-    ) -> tuple[NDArray[np.bool_], Ints]:
+    ) -> tuple[NDArray[np.bool_], Ints, Ints]:
         """Tell which rays reach `limit` [m] and through which thin layers.
 
         Args: slack (n,) [m] how far before the limit a hit still counts as the target's own surface;
         skip (n,) facet left; target (n,) facet aimed at (hits on it never block);
         layers: how many may be passed; inside (n,) body that the target stands in, which never blocks.
-        Returns: reached (n,) bool, passed (n, layers) facet ids in order, -1 unused.
+        Returns: reached (n,) bool, passed (n, layers) facet ids in order (-1 unused), blocker (n,) the opaque facet in
+        the way (-1: none).
         """
         n = len(origin)
         reached = np.zeros(n, bool)
         passed = np.full((n, layers), _MISS, np.int32)
+        blocker = np.full(n, _MISS, np.int32)
         count = np.zeros(n, np.int64)
         todo, start = np.arange(n), np.zeros(n)
         while len(todo):
@@ -131,6 +133,7 @@ class Tracer:
             if inside is not None:
                 clear |= self.facets.body[np.maximum(facet, 0)] == inside[todo]
             reached[todo[clear]] = True
+            blocker[todo] = np.where(clear, _MISS, facet)
             if not self._any_layer or layers == 0:
                 break
             more = ~clear & self.is_layer[facet] & (count[todo] < layers)
@@ -138,4 +141,4 @@ class Tracer:
             passed[todo, count[todo]] = facet
             count[todo] += 1
             start[todo] = t + _NEAREST
-        return reached, passed
+        return reached, passed, blocker
