@@ -17,6 +17,7 @@ from raychan.channel.tubes import (
     along_line,
     edge_lengths,
     halves,
+    least,
     phases_of,
     stand,
     too_rough,
@@ -70,15 +71,12 @@ def _cut_for_phase(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
 
 def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
     """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
-    kept, total = [], 0j
+    kept: list[Tubes] = []
+    doubt = least(rule, phases_of(surface, leg, out, tubes, True, rule).scale())
     for level in range(rule.levels + 1):
-        view = sight(surface, leg, tubes, rule)
-        mixed = view.mixed
-        bound = phases_of(surface, leg, out, tubes, True, rule).bound
-        sure = tubes.take(view.seen[:, CENTRE] & ~mixed)
-        total += phases_of(surface, leg, out, sure, True, rule).total()
-        least = max(rule.floor, rule.relative * abs(total)) / np.sqrt(max(1, mixed.sum()))
-        split = mixed & (bound > least) & (level < rule.levels)
+        matters = phases_of(surface, leg, out, tubes, True, rule).bound > doubt
+        view = sight(surface, leg, tubes, matters, rule)
+        split = view.mixed & matters & (level < rule.levels)
         ready = ~split & view.seen[:, CENTRE]
         kept.append(tubes.take(ready))
         _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready])
@@ -106,9 +104,9 @@ class Sight:
         return (some & ~whole) | (some & (self.side != 0.0).any(axis=1))
 
 
-def sight(surface: Surface, leg: Leg, tubes: Tubes, rule: Refinement) -> Sight:
-    """Return how tubes are seen over a leg."""
-    n, m = len(tubes), len(leg.mirrors)
+def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refinement) -> Sight:
+    """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter."""
+    n = len(tubes)
     # Corners lie on edges that other facets share: draw them in a little.
     centre = tubes.points[:, CENTRE:]
     aim = centre + 0.98 * (tubes.points - centre)
@@ -118,14 +116,15 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, rule: Refinement) -> Sight:
     hover = np.abs(np.einsum("nij,nj->ni", rise, surface.normal[tubes.facet])).max(axis=1)
     slope = np.abs(np.einsum("ij,ij->i", k, surface.normal[tubes.facet]))
     slack = 1e-5 + 3.0 * hover / np.maximum(slope, 0.05)
-    facet4, slack4 = np.repeat(tubes.facet, 4), np.repeat(slack, 4)
-    view = leg.visible(surface, aim.reshape(-1, 3), facet4, slack4, rule.layers)
-    block = view.blocker.reshape(n, 4)
+    whole = np.flatnonzero(matters)
+    ray = np.concatenate([4 * np.arange(n) + CENTRE, (4 * whole[:, None] + np.arange(3)).ravel()])
+    view = leg.visible(surface, aim.reshape(-1, 3)[ray], tubes.facet[ray // 4], slack[ray // 4], rule.layers)
+    seen, block = np.repeat(view.seen[:n], 4).reshape(n, 4), np.full((n, 4), -1, np.int32)
+    seen.reshape(-1)[ray], block.reshape(-1)[ray] = view.seen, view.blocker
     plane = np.where(block >= 0, surface.plane[np.maximum(block, 0)], -1)
     source = np.broadcast_to(leg.image, (n, 3))
     side = edge_within(tubes.points, source, -k, leg.far, plane, surface.first_edge, surface.outline)
-    corners = view.corners.reshape(n, 4, m, 3)[:, CENTRE]
-    return Sight(view.seen.reshape(n, 4), corners, view.passed.reshape(n, 4, rule.layers)[:, CENTRE], side)
+    return Sight(seen, view.corners[:n], view.passed[:n], side)
 
 
 def divide(

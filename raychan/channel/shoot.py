@@ -44,7 +44,7 @@ def tube_routes(
             else:
                 some, corners, passed = settle(surface, leg, out, some, total, rule, first)
             if len(some):
-                total = max(total, abs(phases_of(surface, leg, out, some, first, rule).total()))
+                total = max(total, phases_of(surface, leg, out, some, first, rule).scale())
                 yield routes_of(surface, leg, out, some, first, corners, passed)
         tubes = tubes.take(counts < bounces)
         if not len(tubes):

@@ -14,6 +14,7 @@ from raychan.channel.tubes import (
     Refinement,
     Tubes,
     halves,
+    least,
     phases_of,
     too_rough,
     vector_area,
@@ -50,14 +51,13 @@ def _fly(
         if not len(tubes):
             return
         k = mirrored(tubes)
-        hit, t = _cast(surface, tubes, k, start)
+        matters = phases_of(surface, leg, out, tubes, first, rule).bound > least(rule, total)
+        hit, t = _cast(surface, tubes, k, start, matters)
         mid = hit[:, CENTRE]
         agree = _agree(surface, hit)
-        bound = phases_of(surface, leg, out, tubes, first, rule).bound
         side = _edges(surface, leg, tubes, k, hit)
         mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
-        least = max(rule.floor, rule.relative * total) / np.sqrt(max(1, mixed.sum()))
-        split = mixed & (bound > least) & (level < rule.levels)
+        split = mixed & matters & (level < rule.levels)
         ready = np.flatnonzero(~split & (mid >= 0))
         whole = np.where(agree[ready, None], hit[ready], mid[ready, None])
         landed.append(_land(surface, leg, tubes.take(ready), k[ready], whole, through[ready]))
@@ -93,12 +93,16 @@ def mirrored(tubes: Tubes) -> Floats:
     return tubes.k - 2.0 * dot[..., None] * tubes.normals
 
 
-def _cast(surface: Surface, tubes: Tubes, k: Floats, start: Floats) -> tuple[Ints, Floats]:
+def _cast(surface: Surface, tubes: Tubes, k: Floats, start: Floats, matters: Bools) -> tuple[Ints, Floats]:
+    """Return the facets met and distances (n, 4); of tubes that matter little the centre ray speaks for all."""
     n = len(tubes)
     centre = tubes.points[:, CENTRE:]
-    origin = centre + 0.98 * (tubes.points - centre)
-    skip = np.repeat(tubes.facet, 4)
-    hit, t = surface.cast(origin.reshape(-1, 3), k.reshape(-1, 3), skip, start.ravel())
+    origin = (centre + 0.98 * (tubes.points - centre)).reshape(-1, 3)
+    whole = np.flatnonzero(matters)
+    ray = np.concatenate([4 * np.arange(n) + CENTRE, (4 * whole[:, None] + np.arange(3)).ravel()])
+    found, distance = surface.cast(origin[ray], k.reshape(-1, 3)[ray], tubes.facet[ray // 4], start.ravel()[ray])
+    hit, t = np.repeat(found[:n], 4), np.repeat(distance[:n], 4)
+    hit[ray], t[ray] = found, distance
     return hit.reshape(n, 4), t.reshape(n, 4)
 
 
@@ -155,15 +159,16 @@ def settle(
     Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
     """
     kept, ways, layers = [], [], []
+    doubt = least(rule, total)
     for level in range(rule.levels + 1):
         ph = phases_of(surface, leg, out, tubes, first, rule)
-        view = sight(surface, out, tubes, rule)
+        matters = ph.bound > doubt
+        view = sight(surface, out, tubes, matters, rule)
         back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
         lit = back < 0.0
         rough = lit & view.seen.any(axis=1) & too_rough(ph, tubes, rule)
         mixed = lit & view.mixed
-        least = max(rule.floor, rule.relative * total) / np.sqrt(max(1, (mixed | rough).sum()))
-        split = (mixed | rough) & (ph.bound > least) & (level < rule.levels)
+        split = (mixed | rough) & matters & (level < rule.levels)
         ready = ~split & lit & view.seen[:, CENTRE]
         kept.append(tubes.take(ready))
         ways.append(view.corners[ready])

@@ -239,9 +239,12 @@ class Phases:
     bound: Floats
     area: Floats
 
-    def total(self) -> complex:
-        """Return the scalar sum of all tubes [1/m]."""
-        return complex(np.sum(self.area * quadratic_means(self.six, 0.5))) if len(self.six) else 0j
+    def scale(self) -> float:
+        """Return the size [1/m] of the scattered field: the scalar sum of all tubes, or their rms sum where that cancels."""
+        if not len(self.six):
+            return 0.0
+        each = self.area * quadratic_means(self.six, 0.5)
+        return float(max(abs(each.sum()), np.sqrt(np.sum(np.abs(each) ** 2))))
 
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
@@ -259,6 +262,11 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
     span = corner.max(axis=1) - corner.min(axis=1)
     bound = area / (1.0 + 0.5 * span)
     return Phases(np.concatenate([corner, middle], axis=1), bend, miss, bound, area)
+
+
+def least(rule: Refinement, total: float) -> float:
+    """Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to `relative`."""
+    return max(rule.floor, rule.relative * total) / 10.0
 
 
 def too_rough(ph: Phases, tubes: Tubes, rule: Refinement) -> Bools:
