@@ -36,6 +36,8 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement
     """
     tubes = _seeds(surface, leg, bodies, rule)
     tubes = _cut_for_phase(surface, leg, out, tubes, rule)
+    tubes = _cut_at_terminator(surface, leg, leg, tubes)
+    tubes = _cut_at_terminator(surface, leg, out, tubes) if out != leg else tubes
     return _cut_for_sight(surface, leg, out, tubes, rule)
 
 
@@ -46,7 +48,6 @@ def _seeds(surface: Surface, leg: Leg, bodies: Bools, rule: Refinement) -> Tubes
     rows = np.flatnonzero(allowed[f.body] & (surface.area > 0.0)).astype(np.int32)
     k, _ = leg.rays(f.vertices[rows])
     towards = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
-    towards &= (np.einsum("nij,nj->ni", k, surface.normal[rows]) < 0.0).any(axis=1)
     rows = rows[towards | ~surface.closed[f.body[rows]]]
     bary = np.broadcast_to(np.eye(3), (len(rows), 3, 3)).copy()
     return stand(surface, leg, rows, bary, rule.slots)
@@ -67,6 +68,22 @@ def _cut_for_phase(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
         done.append(tubes.take(~split))
         tubes = halves(surface, leg, tubes.take(split), edge[split], first=True, jitter=rule.jitter)
     return Tubes.join(done) if done else tubes
+
+
+def _cut_at_terminator(surface: Surface, leg: Leg, way: Leg, tubes: Tubes) -> Tubes:
+    """Cut curved tubes along the line where the surface turns away from the end of `way`, and keep the lit parts.
+
+    All of a sphere's terminator lies at one range: left jagged, it adds up in phase.
+    """
+    k, _ = way.rays(tubes.points[:, :3])
+    cosine = -np.einsum("nij,nij->ni", k, tubes.normals[:, :3])
+    across = (cosine > 1e-9).any(axis=1) & (cosine < -1e-9).any(axis=1)
+    whole = tubes.take(~across & (cosine.sum(axis=1) > 0.0))
+    if not across.any():
+        return whole
+    parts, _ = along_line(surface, leg, tubes.take(across), np.where(cosine == 0.0, 1e-12, cosine)[across], True)
+    k, _ = way.rays(parts.points[:, CENTRE])
+    return Tubes.join([whole, parts.take(np.einsum("ij,ij->i", k, parts.normals[:, CENTRE]) < 0.0)])
 
 
 def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:

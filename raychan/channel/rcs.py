@@ -1,6 +1,11 @@
-"""Radar cross-section of a body by itself: the same tubes and fields as in a scene."""
+"""Radar cross-section of a body by itself: the tubes and fields of a scene, refined until two launches agree."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,29 +15,172 @@ from raychan.channel.legs import Leg
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import Refinement
-from raychan.frames import theta_phi
+from raychan.frames import direction, theta_phi
+from raychan.tables import Facets
 from raychan.units import C0
+from raychan.world.material import Material, resolve
+from raychan.world.mesh import Mesh
+from raychan.world.meshfile import from_trimesh, load
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+_POLARIZATIONS = {"VV": (0, 0), "VH": (0, 1), "HV": (1, 0), "HH": (1, 1)}
+_STEPS = 6
+_LEAST_DB = 1e-3  # what rounding and the quadratic phase leave even where two launches agree
+_MAX_ERROR_DB = 60.0
+
+
+@dataclass(frozen=True)
+class Rcs:
+    """Radar cross-sections: `sigma` [m^2], `error_db` stated error, `rays` cast and most `bounces` that counted, each of the
+    shape of the angles given."""
+
+    sigma: Floats
+    error_db: Floats
+    rays: NDArray[np.int64]
+    bounces: NDArray[np.int64]
+
+
+def rcs(
+    mesh: Any,
+    frequency: float,
+    azimuth_deg: Any,
+    elevation_deg: Any = 0.0,
+    polarization: str = "VV",
+    distance: float = np.inf,
+    material: str | Material = "pec",
+    tolerance_db: float = 0.25,
+    max_bounces: int = 3,
+    rx_azimuth_deg: Any = None,
+    rx_elevation_deg: Any = None,
+    rx_distance: float | None = None,
+) -> Rcs:
+    """Return the RCS of a mesh, monostatic unless a receiver's direction is given, near or far.
+
+    Args: mesh trimesh, Mesh or file; frequency [Hz]; angles [deg] from the target to the radar in its frame, which broadcast;
+    polarization receive then transmit (V theta-hat, H phi-hat); distance [m] from the origin, inf for plane waves;
+    tolerance_db [dB] wanted; rx_* the receiver's. A near value is that of the point target at the origin
+    that would return as much: 4 pi D^4 |E_s|^2 for unit field at 1 m.
+    Raises: ValueError for arguments out of range. Source: Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5.
+    """
+    _check(frequency, polarization, distance, tolerance_db, max_bounces)
+    bistatic = rx_azimuth_deg is not None or rx_elevation_deg is not None or rx_distance is not None
+    rx_az = azimuth_deg if rx_azimuth_deg is None else rx_azimuth_deg
+    rx_el = elevation_deg if rx_elevation_deg is None else rx_elevation_deg
+    angles = np.broadcast_arrays(*(np.radians(np.asarray(a, float)) for a in (azimuth_deg, elevation_deg, rx_az, rx_el)))
+    if not all(np.isfinite(a).all() for a in angles):
+        raise ValueError("angles must be finite numbers of degrees")
+    surface = Surface(facets_of(mesh, material, frequency))
+    row, col = _POLARIZATIONS[polarization.upper()]
+    out = np.zeros((4, angles[0].size))
+    for i, (az, el, raz, rel) in enumerate(zip(*(a.ravel() for a in angles), strict=True)):
+        leg = _leg(direction(az, el), distance)
+        back = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
+        out[:, i] = _refined(surface, leg, back, frequency, max_bounces, tolerance_db, row, col)
+    shape = angles[0].shape
+    sigma, error, rays, bounces = (o.reshape(shape) for o in out)
+    return Rcs(sigma, error, rays.astype(np.int64), bounces.astype(np.int64))
+
+
+def facets_of(mesh: Any, material: str | Material, frequency: float) -> Facets:
+    """Return the facets of one body at the origin of its own frame."""
+    body = load(mesh) if isinstance(mesh, str | Path) else mesh if isinstance(mesh, Mesh) else from_trimesh(mesh)
+    n = len(body.faces)
+    return Facets(
+        vertices=body.corners,
+        normals=body.normals,
+        body=np.zeros(n, np.int32),
+        part=body.part,
+        material=np.zeros(n, np.int32),
+        role=np.zeros(1, np.int8),
+        origin=np.zeros((1, 3)),
+        velocity=np.zeros((1, 3)),
+        spin=np.zeros((1, 3)),
+        materials=resolve([material], frequency),
+        body_names=("target",),
+        part_names=body.part_names,
+    )
+
+
+def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iterator[Refinement]:
+    """Yield ever finer rules; the lattice of cuts differs from one to the next."""
+    edge = min(0.3, surface.extent / 4.0)
+    for i in range(steps):
+        fine = 2.0**-i
+        yield Refinement(
+            wavenumber=2.0 * np.pi * frequency / C0,
+            phase=0.2 * fine,
+            turn=0.3 * fine,
+            relative=0.03 * fine**1.5,
+            max_edge=edge * fine,
+            jitter=0.0 if i % 2 == 0 else 0.13,
+        )
 
 
 def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:
     """Return the scattering amplitudes (bounces, 2, 2) [m] by number of bounces; sigma = 4 pi |sum|^2.
 
-    Rows are the receiver's V, H and columns the transmitter's; V, H are theta-hat, phi-hat of the direction of travel.
-    Point ends are scaled to their distances from the origin.
+    Rows are the receiver's V, H and columns the transmitter's; V, H are theta-hat, phi-hat of the direction that each
+    end looks to. Point ends are scaled to their distances from the origin.
     """
     bodies = np.ones(len(surface.facets.role), bool)
     total = np.zeros((bounces, 2, 2), complex)
     for routes in tube_routes(surface, leg, [out], bodies, rule, bounces):
-        count = int((routes.kind[0] > 0).sum()) - 1
-        parts = transfer(routes, surface.facets, frequency, lambda d: _basis(d), lambda d: _basis(-d))
-        total[min(count, bounces - 1)] += parts.sum(axis=0)
-    wavelength = C0 / frequency
-    reach = 1.0 if leg.far else float(np.linalg.norm(leg.end) * np.linalg.norm(out.end))
-    return total * (4.0 * np.pi / wavelength) * reach
+        count = int((routes.kind[0] != 0).sum()) - int((routes.kind[0] == 2).sum())
+        total[min(count, bounces) - 1] += transfer(routes, surface.facets, frequency, _basis, _basis).sum(axis=0)
+    reach = 1.0 if leg.far else float(np.linalg.norm(leg.end))
+    reach *= 1.0 if out.far else float(np.linalg.norm(out.end))
+    return total * (4.0 * np.pi * frequency / C0) * reach
 
 
-def _basis(travel: Floats) -> Complexes:
-    return np.stack(theta_phi(travel), axis=1).astype(complex)
+def _refined(
+    surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, tolerance_db: float, row: int, col: int
+) -> tuple[float, float, int, int]:
+    """Return (sigma, error in dB, rays, bounces), refining until the last two launches agree within the tolerance."""
+    before: complex | None = None
+    rays, error_db, value, by_bounce = surface.rays, _MAX_ERROR_DB, 0j, np.zeros(bounces, complex)
+    for rule in refinements(surface, frequency):
+        s = scattering(surface, leg, out, frequency, bounces, rule)
+        if out != leg:
+            # Over several bounces physical optics prefers the last surface; the mean of both ways is reciprocal.
+            s = 0.5 * (s + scattering(surface, out, leg, frequency, bounces, rule).transpose(0, 2, 1))
+        by_bounce = s[:, row, col]
+        value = complex(by_bounce.sum())
+        if before is not None:
+            error_db = stated_error(value, abs(value - before))
+            if error_db <= tolerance_db:
+                break
+        before = value
+    counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
+    return 4.0 * np.pi * abs(value) ** 2, error_db, surface.rays - rays, int(counted.max(initial=-1)) + 1
+
+
+def stated_error(value: complex, change: float) -> float:
+    """Return the error [dB] that a change of the amplitude [same unit] means for |value|^2."""
+    size = abs(value)
+    if size == 0.0:
+        return _LEAST_DB if change == 0.0 else _MAX_ERROR_DB
+    low = max(1.0 - change / size, 10.0 ** (-_MAX_ERROR_DB / 20.0))
+    return max(_LEAST_DB, -20.0 * float(np.log10(low)))
+
+
+def _leg(look: Floats, distance: float) -> Leg:
+    return Leg(end=look, far=True) if np.isinf(distance) else Leg(end=look * distance)
+
+
+def _basis(look: Floats) -> Complexes:
+    return np.stack(theta_phi(look), axis=1).astype(complex)
+
+
+def _check(frequency: float, polarization: str, distance: float, tolerance_db: float, bounces: int) -> None:
+    if not (np.isfinite(frequency) and frequency > 0.0):
+        raise ValueError(f"frequency = {frequency!r} Hz: must be above 0")
+    if polarization.upper() not in _POLARIZATIONS:
+        raise ValueError(f"polarization = {polarization!r}: must be one of {', '.join(_POLARIZATIONS)}")
+    if not distance > 0.0:
+        raise ValueError(f"distance = {distance!r} m: must be above 0, or inf")
+    if not tolerance_db > 0.0:
+        raise ValueError(f"tolerance_db = {tolerance_db!r}: must be above 0")
+    if bounces < 1:
+        raise ValueError(f"max_bounces = {bounces!r}: must be at least 1")
