@@ -133,7 +133,7 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     hover = np.abs(np.einsum("nij,nj->ni", rise, surface.normal[tubes.facet])).max(axis=1)
     slope = np.abs(np.einsum("ij,ij->i", k, surface.normal[tubes.facet]))
     slack = 1e-5 + 3.0 * hover / np.maximum(slope, 0.05)
-    whole = np.flatnonzero(matters)
+    whole = np.flatnonzero(matters & (not surface.convex_alone))
     ray = np.concatenate([4 * np.arange(n) + CENTRE, (4 * whole[:, None] + np.arange(3)).ravel()])
     view = leg.visible(surface, aim.reshape(-1, 3)[ray], tubes.facet[ray // 4], slack[ray // 4], rule.layers)
     seen, block = np.repeat(view.seen[:n], 4).reshape(n, 4), np.full((n, 4), -1, np.int32)

@@ -14,7 +14,7 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mirror:
     """A plane that reflects: a point on it, its unit normal towards the lit side, one of its facets, its body."""
 
@@ -28,7 +28,7 @@ class Mirror:
         return x - 2.0 * np.dot(x - self.point, self.normal) * self.normal
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """How points are seen over a leg: `seen` (n,), mirror points `corners` (n, m, 3) [m], `passed` (n, l) layers on the
     last stretch, end's side first, and the facet that blocks it (n,), -1 for none."""
@@ -39,7 +39,7 @@ class View:
     blocker: Ints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Leg:
     """The way between an end (a point, or a direction when `far`) and the surface over mirrors, end's side first."""
 

@@ -49,7 +49,7 @@ def profile(
     around = np.stack([np.roll(received, s) for s in range(-_PAD, _PAD + 1)])
     floor = max(noise * 10.0 ** (0.1 * _ABOVE_DB), received.max() * 10.0 ** (-0.1 * _SIDE_LOBES_DB))
     peaks = np.flatnonzero((received == around.max(axis=0)) & (received > floor))
-    peaks = _own(peaks[np.argsort(-received[peaks], kind="stable")], received, Envelope(window_name, n))
+    peaks = _own(peaks[np.argsort(-received[peaks], kind="stable")], received, Envelope(window, n))
     return Profile(
         range=np.arange(length, dtype=np.float64) * (waveform.range_resolution / _PAD),
         power=received,

@@ -104,18 +104,29 @@ def facets_of(mesh: Any, material: str | Material, frequency: float) -> Facets:
 
 
 def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iterator[Refinement]:
-    """Yield ever finer rules; the lattice of cuts differs from one to the next."""
+    """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again."""
     edge = min(0.3, surface.extent / 4.0)
+    own = _typical_edge(surface)
     for i in range(steps):
         fine = 2.0**-i
+        longest = edge * fine if i == 0 else min(edge * fine, 1.4 * own * fine)
         yield Refinement(
             wavenumber=2.0 * np.pi * frequency / C0,
             phase=0.2 * fine,
             turn=0.3 * fine,
             relative=0.03 * fine**1.5,
-            max_edge=edge * fine,
+            max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
         )
+
+
+def _typical_edge(surface: Surface) -> float:
+    """Return the median over the surface's area of its facets' longest edges [m]."""
+    v = surface.facets.vertices
+    longest = np.linalg.norm(np.roll(v, -1, axis=1) - v, axis=2).max(axis=1)
+    order = np.argsort(longest)
+    covered = np.cumsum(surface.area[order])
+    return float(longest[order][np.searchsorted(covered, 0.5 * covered[-1])])
 
 
 def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:

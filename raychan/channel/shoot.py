@@ -47,7 +47,7 @@ def tube_routes(
                 total = max(total, phases_of(surface, leg, out, some, first, rule).scale())
                 yield routes_of(surface, leg, out, some, first, corners, passed)
         tubes = tubes.take(counts < bounces)
-        if not len(tubes):
+        if not len(tubes) or surface.convex_alone:
             return
         before = tubes
         tubes = bounce(surface, leg, direct, before, first, total, rule)

@@ -26,6 +26,7 @@ class Surface(Tracer):
         self.smooth = np.arange(n, dtype=np.int32)
         self.closed = np.zeros(len(facets.role), bool)
         self.curved = np.zeros(n, bool)
+        self.convex_alone = False
         self.bulge = np.zeros((n, 3, 3))
         self.outline = np.zeros((0, 2, 3))
         self.first_edge = np.zeros(1, np.int64)
@@ -62,8 +63,17 @@ class Surface(Tracer):
         nb0, nb1 = f.normals[b, nxt[eb % 3]], f.normals[b, own[eb % 3]]
         soft = (np.einsum("ij,ij->i", na0, nb0) > 1 - 1e-6) & (np.einsum("ij,ij->i", na1, nb1) > 1 - 1e-6)
         self.smooth = _components(a[soft], b[soft], n)
+        self.convex_alone = len(f.role) == 1 and bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same])
         inner = flat | soft
         self._outline(np.concatenate([ea[inner], eb[inner]]))
+
+    def _convex(self, ea: Ints, eb: Ints) -> bool:
+        """Tell whether a closed body of one piece bends outward at every pair of half edges (ea, eb): it hides nothing."""
+        a, b = ea // 3, eb // 3
+        pieces = connected_components(coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(len(self.plane),) * 2))[0]
+        far_corner = self.facets.vertices[b, (eb % 3 + 2) % 3]
+        height = np.einsum("ij,ij->i", far_corner - self.facets.vertices[a, ea % 3], self.normal[a])
+        return bool(pieces == 1 and (height < 1e-9 * (1.0 + self.extent)).all())
 
     def _outline(self, inner: Ints) -> None:
         """List the edges around each plane (those not shared within it or a smooth patch): `outline[first_edge[p] : first_edge[p + 1]]`."""
@@ -90,8 +100,9 @@ class Surface(Tracer):
             ok = det > 1e-12
             safe = np.where(ok, det, 1.0)
             c = ((p - a * q) / safe)[:, None] * ni + ((q - a * p) / safe)[:, None] * nj
-            # An edge of normals that contradict each other (S-shape, or broken) stays straight.
-            ok &= np.linalg.norm(c, axis=1) < 0.5 * np.linalg.norm(d, axis=1)
+            # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it straight.
+            turn = np.sqrt(np.maximum(2.0 * (1.0 - a), 0.0))
+            ok &= np.linalg.norm(c, axis=1) < turn * np.linalg.norm(d, axis=1)
             self.bulge[:, e] = np.where(ok[:, None], c, 0.0)
         self.curved = (np.abs(self.bulge) > 1e-9).any(axis=(1, 2))
 

@@ -1,0 +1,96 @@
+"""The command line. Nothing heavy is imported until a command needs it."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+
+from raychan.cli.explain import explain
+from raychan.cli.info import info
+from raychan.cli.run import run
+from raychan.cli.view import view
+
+_HELP = """A street becomes a range-Doppler map, and every detection names the bodies it came from.
+
+A scene file (TOML) says which bodies stand where, of what they are made, how they move, and what radar looks at them.
+raychan traces the waves over them, synthesises what the receiver samples, and processes it as a radar would.
+
+[bold]raychan info scenes/urban.toml[/]
+  [dim]what is in it, and what the radar can resolve[/]
+[bold]raychan run scenes/urban.toml --out out/urban[/]
+  [dim]simulate: detections, files and pictures[/]
+[bold]raychan explain out/urban --range 25[/]
+  [dim]which paths made the return at 25 m[/]
+[bold]raychan view out/urban --html scene.html[/]
+  [dim]the scene and its rays, to turn and to pick[/]
+
+Ranges are in metres, speeds in m/s; a positive range rate recedes.
+Exit code 0: done; 2: the input is wrong, and the message says where; 130: interrupted, nothing written."""
+
+_STOPPED = "interrupted; nothing was written"
+
+app = typer.Typer(
+    help=_HELP,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from raychan import __version__
+
+        print(f"raychan {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _top(
+    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+) -> None:
+    pass
+
+
+for command in (run, info, explain, view):
+    app.command()(command)
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Run the command line and end the process with its exit code."""
+    sys.exit(invoke(sys.argv[1:] if argv is None else argv))
+
+
+def invoke(argv: list[str]) -> int:
+    """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C."""
+    try:
+        code = typer.main.get_command(app).main(args=argv, prog_name="raychan", standalone_mode=False)
+        sys.stdout.flush()
+        # typer turns Ctrl-C into an exit code of its own, silently.
+        return _fail(_STOPPED, 130) if code == 130 else int(code or 0)
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail(_STOPPED, 130)
+    except BrokenPipeError:
+        # The reader of a pipe went away, as `head` does; Python would complain again when it flushes at the end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except MemoryError:
+        return _fail("out of memory; ask for a coarser --tolerance or fewer --max-bounces")
+    except Exception as error:
+        if hasattr(error, "format_message"):  # typer's own, of options and arguments
+            text = error.format_message()
+            return _fail(text) if text else 2
+        from raychan.world.errors import SceneError
+
+        if isinstance(error, SceneError | OSError):
+            return _fail(str(error))
+        raise
+
+
+def _fail(text: str, code: int = 2) -> int:
+    print(f"raychan: {text}", file=sys.stderr)
+    return code

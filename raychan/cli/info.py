@@ -1,0 +1,179 @@
+"""raychan info: what is in a scene or a mesh, and what the radar can do with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from raychan.cli import show
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_WORDS = {
+    "tx_gain": "transmit gain",
+    "rx_gain": "receive gain",
+    "eirp": "EIRP",
+    "noise": "noise in a sample (kT0 F fs)",
+    "coherent_gain": "gain of chirps x samples",
+    "sensitivity": "noise in a cell of the map (rectangular windows)",
+}
+_FIGURES = (
+    "gain [dBi]",
+    "half-power width, azimuth [deg]",
+    "half-power width, elevation [deg]",
+    "highest side lobe, azimuth [dB]",
+    "highest side lobe, elevation [dB]",
+)
+# Tables 1 and 7 of the study whose antennas the presets are: gain, widths, side lobes.
+_PUBLISHED = {
+    "study_2x2": (10.36, 27.63, 54.7, -0.35, -16.03),
+    "study_patch": (7.06, 86.0, 86.27, -0.06, -18.62),
+    "study_array16": (28.75, 3.46, 6.3, -0.63, -13.18),
+}
+
+
+def info(
+    source: Annotated[
+        Path,
+        typer.Argument(help="Scene file, or a mesh (GLB, OBJ, PLY, STL).", metavar="SCENE|MESH", show_default=False),
+    ],
+    unit: Annotated[str, typer.Option(help="Unit of a mesh file: m, cm, mm, inch, ft.")] = "m",
+) -> None:
+    """Say what is in a scene or a mesh: bodies, parts, materials, link budget, resolutions, mesh health."""
+    from raychan.world.meshfile import SUFFIXES, load
+
+    if source.suffix.lower() in SUFFIXES:
+        _mesh(load(source, unit=unit), source)
+    else:
+        from raychan.world.scene import Scene
+
+        _scene(Scene.load(source))
+
+
+def _mesh(mesh: Any, source: Path) -> None:
+    import numpy as np
+
+    low, high = mesh.bounds
+    areas = np.bincount(mesh.part, mesh.areas, minlength=len(mesh.part_names))
+    counts = np.bincount(mesh.part, minlength=len(mesh.part_names))
+    r = mesh.report
+    size = " x ".join(f"{x:.3f}" for x in high - low)
+    facts = [
+        ("size, x forward by y left by z up", f"{size} m"),
+        ("vertices, facets", f"{len(mesh.vertices)}, {len(mesh.faces)}"),
+        ("watertight", "yes" if r.watertight else "no"),
+        *((name.replace("_", " "), str(value)) for name, value in vars(r).items() if name != "watertight"),
+    ]
+    screen = show.console()
+    screen.print(show.table(str(source), ("mesh", ""), facts, left=(0, 1)))
+    parts = [(n, str(c), f"{a:.4g}") for n, c, a in zip(mesh.part_names, counts, areas, strict=True)]
+    screen.print(show.table("", ("part", "facets", "area m2"), parts))
+    show.warn(r.warnings())
+
+
+def _scene(scene: Any) -> None:
+    screen = show.console()
+    screen.print(f"[bold]{scene.title}[/]", markup=True)
+    for made in (_bodies(scene), _parts(scene), *_radar(scene.sensor)):
+        screen.print(made)
+    show.warn(scene.warnings)
+
+
+def _bodies(scene: Any) -> Table:
+    import numpy as np
+
+    facets, points = scene.facets(0.0), scene.points(0.0)
+    radar = scene.sensor.position
+    rows = []
+    for b, name in enumerate(facets.body_names):
+        corners = facets.vertices[facets.body == b].reshape(-1, 3)
+        role = ("scatters", "mirror", "blocks")[facets.role[b]]
+        target = np.flatnonzero(points.body == b)
+        if len(target):
+            low, high = 10.0 * np.log10([points.sigma[target].min(), points.sigma[target].max()])
+            role = f"RCS {low:.1f} dBsm" if high - low < 0.05 else f"RCS {low:.1f} to {high:.1f} dBsm"
+        size, near = "", ""
+        if len(corners) and facets.role[b] != 1:
+            size = " x ".join(f"{x:.2f}" for x in np.ptp(corners, axis=0))
+            near = f"{np.linalg.norm(corners - radar, axis=1).min():.2f}"
+        place = ", ".join(f"{x:.2f}" for x in facets.origin[b])
+        speed = ", ".join(f"{x:g}" for x in facets.velocity[b])
+        rows.append((name, role, f"{len(corners) // 3}", size, place, speed, near))
+    heads = ("body", "role", "facets", "extent m", "origin m", "velocity m/s", "nearest corner m")
+    return show.table("Bodies", heads, rows, left=(0, 1))
+
+
+def _parts(scene: Any) -> Table:
+    """Return a row for each material of each body, with the parts made of it."""
+    import numpy as np
+
+    facets = scene.facets(0.0)
+    m = facets.materials
+    cross = np.cross(facets.vertices[:, 1] - facets.vertices[:, 0], facets.vertices[:, 2] - facets.vertices[:, 0])
+    area = 0.5 * np.linalg.norm(cross, axis=1)
+    rows = []
+    for b, body in enumerate(scene.bodies):
+        mine = facets.body == b
+        for k in np.unique(facets.material[mine]):
+            rows_of = mine & (facets.material == k)
+            parts = [facets.part_names[p] or "all" for p in np.unique(facets.part[rows_of])]
+            part = body.geometry.part_names.index(parts[0]) if parts[0] != "all" else 0
+            material = body.part_materials()[part]
+            name = material if isinstance(material, str) else material.name or "own"
+            what = "perfect conductor" if m.kind[k] == 0 else f"{m.eps[k].real:.3g} {m.eps[k].imag:+.3g}j"
+            layer = f"{1e3 * m.thickness[k]:.3g}" if m.kind[k] == 2 else ""
+            size = "" if facets.role[b] == 1 else f"{area[rows_of].sum():.3g}"
+            rows.append((body.name, name, what, layer, str(int(rows_of.sum())), size, ", ".join(parts)))
+    heads = ("body", "material", "relative permittivity", "layer mm", "facets", "area m2", "parts")
+    return show.table("Materials", heads, rows, left=(0, 1, 2, 6))
+
+
+def _radar(sensor: Any) -> list[Table]:
+    w = sensor.waveform
+    units = {"dbm": "dBm", "dbi": "dBi", "db": "dB", "m": "m"}
+    budget = []
+    for key, value in sensor.link_budget().items():
+        name, unit = key.rsplit("_", 1)
+        figure = f"{1e3 * value:.4g} mm" if unit == "m" else f"{value:.2f} {units[unit]}"
+        budget.append((_WORDS.get(name, name.replace("_", " ")), figure))
+    chirp_rows = _chirp(w)
+    tables = [
+        show.table("Radar", ("link budget", ""), budget, left=(0,)),
+        show.table("", ("waveform", ""), chirp_rows, left=(0,)),
+    ]
+    shown = {"transmit": sensor.tx} | ({"receive": sensor.rx} if sensor.rx != sensor.tx else {})
+    return tables + [_antenna(name, antenna) for name, antenna in shown.items()]
+
+
+def _chirp(w: Any) -> list[tuple[str, str]]:
+    return [
+        ("carrier, bandwidth", f"{w.carrier / 1e9:g} GHz, {w.bandwidth / 1e6:g} MHz"),
+        ("chirp sampled, repeated", f"{w.chirp_duration * 1e6:g} us, {w.repetition * 1e6:g} us"),
+        ("chirps x samples", f"{w.n_chirps} x {w.n_samples} {'I/Q' if w.complex_sampling else 'real'}"),
+        ("sample rate", f"{w.sample_rate / 1e6:.4g} MS/s"),
+        ("range resolution (rectangular window)", f"{w.range_resolution:.4g} m"),
+        ("range rate resolution (rectangular window)", f"{w.rate_resolution:.4g} m/s"),
+        ("unambiguous range", f"{w.unambiguous_range:.4g} m"),
+        ("unambiguous range rate", f"+-{w.unambiguous_rate:.4g} m/s"),
+    ]
+
+
+def _antenna(use: str, antenna: Any) -> Table:
+    """Return the computed figures of an antenna, beside the published ones where it is a preset."""
+    import math
+
+    from raychan.radar.antenna import PRESETS, preset
+    from raychan.radar.pattern import characteristics
+
+    found = vars(characteristics(antenna)).values()
+    name = next((n for n in PRESETS for p in "VH" if preset(n, p) == antenna), "")
+    published = _PUBLISHED.get(name, ("",) * 5)
+    rows = [
+        (quantity, "none" if math.isnan(x) else f"{x:.2f}", str(y))
+        for quantity, x, y in zip(_FIGURES, found, published, strict=True)
+    ]
+    title = f"{name or type(antenna).__name__}, {use}"
+    return show.table("", (f"antenna: {title}", "computed", "published" if name else ""), rows)

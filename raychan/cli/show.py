@@ -1,0 +1,85 @@
+"""How the commands print: tables on standard output, warnings and progress on standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from raychan.run.result import Result
+
+_WIDE = 150  # columns where the output is no terminal, so that no line is cut
+
+
+def console() -> Console:
+    """Return the console of standard output."""
+    return Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
+
+
+def warn(warnings: Iterable[str]) -> None:
+    """Print warnings on standard error, a line each."""
+    for text in warnings:
+        print(f"warning: {text}", file=sys.stderr)
+
+
+def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,)) -> Table:
+    """Return a table; columns in `left` are set flush left, the others right."""
+    made = Table(title=title or None, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
+    flush = set(left)
+    for i, head in enumerate(heads):
+        made.add_column(head, justify="left" if i in flush else "right", no_wrap=i not in flush, overflow="fold")
+    for row in rows:
+        made.add_row(*(Text(cell) for cell in row))
+    return made
+
+
+def detections(result: Result) -> Table:
+    """Return the detections of a result as a table."""
+    import numpy as np
+
+    from raychan.units import dbm
+
+    d = result.detections
+    azimuths = bool(np.isfinite(d.azimuth).any())
+    heads = ["range m", "range rate m/s", "speed m/s", *(["azimuth deg"] if azimuths else []), "SNR dB", "power dBm"]
+    rows = []
+    for i, why in enumerate(result.provenance):
+        cells = [f"{d.range[i]:.2f}", f"{d.rate[i]:+.2f}", f"{d.speed[i]:+.2f}"]
+        if azimuths:
+            cells.append("" if np.isnan(d.azimuth[i]) else f"{np.degrees(d.azimuth[i]):.1f}")
+        rows.append([*cells, f"{d.snr[i]:.1f}", f"{dbm(d.power[i]):.1f}", why.label, why.bodies])
+    n = len(heads)
+    title = f"{len(rows)} detection{'' if len(rows) == 1 else 's'}"
+    return table(title, [*heads, "label", "bodies"], rows, left=(n, n + 1))
+
+
+@contextmanager
+def progress(quiet: bool = False) -> Iterator[Callable[[str, float], None]]:
+    """Give a function to tell the progress to: bars on a terminal, nothing elsewhere."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda stage, share: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description:10}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[str, object] = {}
+
+        def tell(stage: str, share: float) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=1.0)
+            bars.update(tasks[stage], completed=min(1.0, share))  # type: ignore[arg-type]
+
+        yield tell

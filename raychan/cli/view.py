@@ -1,0 +1,57 @@
+"""raychan view: a scene, or a result with its rays, in a window, a picture or a page."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from raychan.cli import show
+
+
+def view(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="Scene file, or a directory that `raychan run` wrote.", metavar="SCENE|DIR", show_default=False
+        ),
+    ],
+    screenshot: Annotated[Path | None, typer.Option(help="Write a picture.", metavar="FILE.png")] = None,
+    html: Annotated[
+        Path | None, typer.Option(help="Write a page to turn and pick in, for any browser.", metavar="FILE.html")
+    ] = None,
+) -> None:
+    """Show a scene, and the rays of a result coloured by the power they bring.
+
+    Without --screenshot or --html a window opens, where a click on a ray prints its chain of bodies.
+    """
+    from raychan.run.files import StoreError
+    from raychan.run.store import load_result
+    from raychan.view.scene import drawing_of, scene_picture
+    from raychan.world.scene import Scene
+
+    if source.is_dir() or source.suffix == ".nc":
+        result = load_result(source)
+        if result.scene is None:
+            raise StoreError(f"{source}: its scene cannot be read again (a mesh file moved, or it was made in Python)")
+        drawing = drawing_of(result.scene, result)
+    else:
+        drawing = drawing_of(Scene.load(source))
+    if screenshot is not None:
+        if screenshot.suffix.lower() != ".png":
+            raise typer.BadParameter(f"--screenshot {screenshot}: the name must end in .png")
+        show.warn(scene_picture(drawing, screenshot))
+        print(screenshot)
+    if html is not None:
+        from raychan.view.web import page
+
+        print(page(drawing, html))
+    if screenshot is None and html is None:
+        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise typer.BadParameter("there is no display here; ask for --screenshot FILE.png or --html FILE.html")
+        from raychan.view.render import window
+
+        window(drawing)

@@ -1,0 +1,94 @@
+"""Waveform: a frame of equal linear frequency ramps, and what it can tell apart.
+
+The dechirped sample of a path of delay tau at time t after the start of ramp m is, with propagation exp(-j 2 pi f tau),
+
+    x(m, t) = a exp(-j 2 pi [f_c (tau - tau_0) + S t tau - S tau^2 / 2]),   tau = tau_0 + 2 v (m T_r + t) / c,
+
+where a is the path's amplitude at the start of the frame, which already holds exp(-j 2 pi f_c tau_0).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from raychan.units import C0
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """A frame of `n_chirps` equal ramps, `n_samples` samples in each."""
+
+    carrier: float
+    """Frequency at the start of the sampled part of the ramp [Hz]."""
+    bandwidth: float
+    """Frequency swept while sampling [Hz]."""
+    chirp_duration: float
+    """Time that is sampled in a ramp [s]."""
+    repetition: float
+    """Time from ramp to ramp [s]."""
+    n_chirps: int
+    n_samples: int
+    complex_sampling: bool = True
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if not (f.name == "complex_sampling" or (math.isfinite(value) and value > 0)):
+                raise ValueError(f"Waveform.{f.name} = {value!r}: must be positive and finite")
+        for name in ("n_chirps", "n_samples"):
+            if int(getattr(self, name)) != getattr(self, name):
+                raise ValueError(f"Waveform.{name} = {getattr(self, name)!r}: must be a whole number")
+        if self.repetition < self.chirp_duration * (1.0 - 1e-9):
+            raise ValueError(f"Waveform.repetition = {self.repetition:g} s: shorter than the chirp")
+
+    @property
+    def slope(self) -> float:
+        """Frequency over time of the ramp [Hz/s]."""
+        return self.bandwidth / self.chirp_duration
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples over time within a ramp [Hz]."""
+        return self.n_samples / self.chirp_duration
+
+    @property
+    def wavelength(self) -> float:
+        """Wavelength of the carrier [m]."""
+        return C0 / self.carrier
+
+    @property
+    def mid_frequency(self) -> float:
+        """Frequency at the middle of the sweep [Hz]: the one at which a whole frame measures Doppler and angle."""
+        return self.carrier + 0.5 * self.bandwidth
+
+    @property
+    def range_resolution(self) -> float:
+        """c/2B: the range cell of a rectangular window [m]."""
+        return C0 / (2.0 * self.bandwidth)
+
+    @property
+    def rate_resolution(self) -> float:
+        """lambda/(2 M T_r): the range-rate cell of a rectangular window [m/s], nominal, by the carrier."""
+        return self.wavelength / (2.0 * self.n_chirps * self.repetition)
+
+    @property
+    def unambiguous_range(self) -> float:
+        """Range at which the beat folds [m]: f_s c/2S with I/Q, half of it with real sampling."""
+        return self.range_resolution * self.n_samples / (1.0 if self.complex_sampling else 2.0)
+
+    @property
+    def unambiguous_rate(self) -> float:
+        """lambda/(4 T_r): range rates between plus and minus this do not fold [m/s], nominal, by the carrier."""
+        return self.wavelength / (4.0 * self.repetition)
+
+    @property
+    def frame_duration(self) -> float:
+        """Time from the first ramp's start to the end of the last repetition [s]."""
+        return self.n_chirps * self.repetition
+
+    @property
+    def centre(self) -> float:
+        """Middle of all sample instants [s]: the time to which the map's ranges and phases refer."""
+        step = self.chirp_duration / self.n_samples
+        return 0.5 * ((self.n_chirps - 1) * self.repetition + (self.n_samples - 1) * step)

@@ -1,0 +1,139 @@
+"""The one place that imports matplotlib: figures in one style, drawn without a display."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+STYLE: dict[Any, Any] = {
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.labelsize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "figure.facecolor": "white",
+}
+
+MARKS = {"direct": ("o", "#ffffff"), "multipath": ("^", "#ffd54a"), "clutter": ("X", "#ff8a80")}
+"""Marker and colour of a detection by its label, chosen to stand out on the map."""
+
+PALETTE = (
+    "#4477aa", "#44bb99", "#ee8866", "#66ccee", "#aa3377", "#228833", "#ccbb44", "#cc6677", "#882255", "#999933",
+)  # fmt: skip
+"""Paul Tol's bright and muted colours: told apart by colour-blind readers too."""
+
+
+def figure(width: float, height: float, layout: Any = "constrained") -> Any:
+    """Return an empty matplotlib Figure, sizes in inches, that needs no display."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        made = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(made)
+    return made
+
+
+def collections() -> Any:
+    """Return matplotlib's module of collections in 3-D."""
+    from mpl_toolkits.mplot3d import art3d
+
+    return art3d
+
+
+def style() -> Any:
+    """Return the context in which axes take the style."""
+    import matplotlib
+
+    return matplotlib.rc_context(STYLE)
+
+
+def save(made: Any, path: str | Path) -> Path:
+    """Write a figure at 200 dots an inch and return its path."""
+    path = Path(path)
+    made.savefig(path, dpi=200)
+    return path
+
+
+def outlined(width: float = 2.0, colour: str = "black") -> list[Any]:
+    """Return path effects that put an outline round text or lines, so that they read on any ground."""
+    from matplotlib import patheffects
+
+    return [patheffects.withStroke(linewidth=width, foreground=colour)]
+
+
+_ALONG = np.linspace(0.0, 1.0, 80)
+
+
+class Placer:
+    """Puts labels beside points so that they overlap neither each other nor what is already drawn there."""
+
+    def __init__(self, axes: Any) -> None:
+        self.axes = axes
+        self.taken = np.zeros((0, 4))  # boxes in pixels: left, bottom, right, top
+
+    def settle(self) -> None:
+        """Lay the figure out, so that data and pixels belong together; call when all else is drawn."""
+        self.axes.figure.draw_without_rendering()
+
+    def avoid(self, x: Floats, y: Floats, size: float) -> None:
+        """Keep labels and their lines off things of `size` points at data (x, y), each (n,)."""
+        at = self.axes.transData.transform(np.column_stack([x, y]))
+        half = 0.5 * size * self.axes.figure.dpi / 72.0
+        self.taken = np.concatenate([self.taken, np.hstack([at - half, at + half])])
+
+    def label(self, x: float, y: float, text: str, above: bool = False, **style: Any) -> bool:
+        """Write `text` at the nearest free place round (or above) data (x, y), with a line to it; False if none is."""
+        from matplotlib.text import Text
+
+        line = {"arrowstyle": "-", "lw": 0.6, "shrinkA": 0, "shrinkB": 3, "color": style.get("color", "black")}
+        note = self.axes.annotate(
+            text, (x, y), xytext=(0, 0), textcoords="offset points", ha="center", va="center", arrowprops=line, **style
+        )
+        renderer = self.axes.figure.canvas.get_renderer()
+        inside = self.axes.get_window_extent(renderer).extents
+        per_point = self.axes.figure.dpi / 72.0
+        size = note.get_window_extent(renderer)
+        point = self.axes.transData.transform((x, y))
+        places = _places(0.5 * size.width / per_point, 0.5 * size.height / per_point, above)
+        for own in (8.0 * per_point, np.inf):  # if no line is free to run, it may cross what is there
+            for place in places:
+                note.set_position(place)
+                note.update_positions(renderer)
+                box = np.array(Text.get_window_extent(note, renderer).padded(2.0).extents)
+                within = (box[:2] >= inside[:2]).all() and (box[2:] <= inside[2:]).all()
+                if within and self._free(point, box, own):
+                    self.taken = np.concatenate([self.taken, box[None]])
+                    return True
+        note.remove()
+        return False
+
+    def _free(self, point: Floats, box: Floats, own: float) -> bool:
+        """Say whether a box, and the line to it beyond `own` pixels from its point, meet nothing."""
+        low, high = self.taken[:, :2], self.taken[:, 2:]
+        if ((low < box[2:]) & (high > box[:2])).all(axis=1).any():
+            return False
+        way = point + _ALONG[:, None] * (0.5 * (box[:2] + box[2:]) - point)
+        way = way[np.linalg.norm(way - point, axis=1) > own, None]
+        return not ((low < way) & (way < high)).all(axis=2).any()
+
+
+def _places(wide: float, high: float, above: bool) -> list[tuple[float, float]]:
+    """Return offsets of a label's centre in points, the nearest first."""
+    found = []
+    for ring in range(12):
+        gap = 6.0 + 9.0 * ring
+        for step in (0, 1, -1, 2, -2, 3, -3) if above else range(16):
+            angle = math.pi * (0.5 + step / 8.0)
+            found.append((math.cos(angle) * (gap + wide), math.sin(angle) * (gap + high)))
+    return found

@@ -1,0 +1,158 @@
+"""Pictures of a result: the range-Doppler map and the power-delay profile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.report.canvas import MARKS, Placer, figure, outlined, save, style
+from raychan.run.provenance import chains, explain_cell, response_of
+from raychan.run.result import Explanation, Result
+from raychan.units import dbm, watt
+
+Floats = NDArray[np.float64]
+
+_DYNAMIC_DB = 90.0
+_LABELS = 12
+_PEAKS = 10
+
+
+def rdmap_picture(result: Result, path: str | Path) -> Path:
+    """Draw the range-Doppler map in dBm with its detections marked by label and named by their bodies."""
+    m, d = result.rdmap, result.detections
+    far = _reach(result)
+    keep = m.range <= far
+    power = dbm(np.maximum(m.power[:, keep], watt(-300.0)))
+    floor = dbm(m.noise) - 3.0 if m.noise > 0.0 else -np.inf
+    top = np.ceil(power.max() / 5.0) * 5.0
+    low = np.floor(max(floor, top - _DYNAMIC_DB) / 5.0) * 5.0
+    if top - low < 15.0:
+        top = low + 15.0
+    with style():
+        made = figure(8.2, 4.6)
+        axes = made.add_subplot()
+        r, v = m.range[keep], m.rate
+        image = axes.pcolormesh(r, v, power, vmin=low, vmax=top, cmap="viridis", shading="nearest", rasterized=True)
+        axes.set(xlabel="range [m]", ylabel="range rate [m/s]   (receding is positive)", title="Range-Doppler map")
+        axes.set_xlim(r[0], r[-1])
+        axes.set_ylim(*_rates(result))
+        made.colorbar(image, ax=axes, label="received power [dBm]", pad=0.01, aspect=30)
+        for label, (mark, colour) in MARKS.items():
+            rows = [i for i, e in enumerate(result.provenance) if e.label == label]
+            if rows:
+                axes.plot(
+                    d.range[rows], d.rate[rows], mark, ms=7, mfc="none", mec=colour, mew=1.4, ls="none",
+                    label=f"{label} ({len(rows)})", path_effects=outlined(2.6),
+                )  # fmt: skip
+        if len(d.range):
+            legend = axes.legend(
+                loc="upper right", labelcolor="white", frameon=True, facecolor="#222222", framealpha=0.7
+            )
+            legend.set_zorder(6)
+        if result.receiver.ego_speed and m.rate[0] < -result.receiver.ego_speed < m.rate[-1]:
+            axes.axhline(-result.receiver.ego_speed, color="white", lw=0.7, ls=(0, (4, 4)), alpha=0.6)
+            axes.annotate(
+                "at rest", (1.0, -result.receiver.ego_speed), xycoords=("axes fraction", "data"), xytext=(-4, 3),
+                textcoords="offset points", ha="right", color="white", fontsize=7, alpha=0.9,
+            )  # fmt: skip
+        _name_detections(result, axes)
+        return save(made, path)
+
+
+def profile_picture(result: Result, path: str | Path) -> Path:
+    """Draw the power-delay profile in dBm against range, its peaks named by the bodies that make them."""
+    p = result.profile
+    far = _reach(result)
+    keep = p.range <= far
+    power = dbm(np.maximum(p.power, watt(-300.0)))
+    top = power[keep].max(initial=-100.0)
+    noise = dbm(p.noise) if p.noise > 0.0 else -np.inf
+    low = max(noise - 12.0, top - 110.0)
+    with style():
+        made = figure(8.2, 3.6)
+        axes = made.add_subplot()
+        axes.plot(p.range[keep], np.maximum(power[keep], low), lw=1.1, color="#225588")
+        axes.fill_between(p.range[keep], low, np.maximum(power[keep], low), color="#225588", alpha=0.12, lw=0)
+        if p.noise > 0.0:
+            axes.axhline(noise, color="#aa3333", lw=0.8, ls="--")
+            axes.annotate(
+                "thermal noise", (1.0, noise), xycoords=("axes fraction", "data"), xytext=(-4, 3),
+                textcoords="offset points", ha="right", color="#aa3333", fontsize=8,
+                bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0},
+            )  # fmt: skip
+        axes.set(xlabel="range [m]", ylabel="received power [dBm]", title="Power-delay profile")
+        axes.set_xlim(p.range[0], far)
+        axes.set_ylim(low, top + 0.18 * (top - low))
+        axes.grid(alpha=0.25, lw=0.5)
+        _name_peaks(result, axes, power, far)
+        return save(made, path)
+
+
+def _reach(result: Result) -> float:
+    """Return the range up to which a picture is worth drawing [m]."""
+    found = result.detections.range
+    end = float(result.rdmap.range[-1])
+    return min(end, max(10.0, 1.2 * float(found.max()))) if len(found) else end
+
+
+def _rates(result: Result) -> tuple[float, float]:
+    """Return the range rates worth drawing: all detections and rest, with room, within the map."""
+    m = result.rdmap
+    seen = np.concatenate([result.detections.rate, [0.0, -result.receiver.ego_speed]])
+    room = max(3.0, 0.35 * float(np.ptp(seen)), 10.0 * m.rate_resolution)
+    return max(float(m.rate[0]), float(seen.min()) - room), min(float(m.rate[-1]), float(seen.max()) + room)
+
+
+def _name_detections(result: Result, axes: Any) -> None:
+    d = result.detections
+    placer = Placer(axes)
+    placer.settle()
+    placer.avoid(d.range, d.rate, 9.0)
+    named: list[tuple[str, float, float]] = []
+    for i, why in enumerate(result.provenance):
+        name = _short(why)
+        near = any(n == name and abs(r - d.range[i]) < 3.0 and abs(v - d.rate[i]) < 1.0 for n, r, v in named)
+        if near or len(named) >= _LABELS:
+            continue
+        named.append((name, float(d.range[i]), float(d.rate[i])))
+        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB"
+        look: dict[str, Any] = {
+            "color": MARKS[why.label][1],
+            "fontsize": 7,
+            "path_effects": outlined(1.8),
+            "linespacing": 1.1,
+        }
+        placer.label(float(d.range[i]), float(d.rate[i]), text, **look)
+
+
+def _name_peaks(result: Result, axes: Any, power: Floats, far: float) -> None:
+    p = result.profile
+    known, response = chains(result.paths, result.receiver.background), response_of(result.receiver)
+    placer = Placer(axes)
+    placer.settle()
+    end = int(np.searchsorted(p.range, far))
+    dense = np.linspace(p.range[0], p.range[max(end - 1, 0)], 8 * max(end, 1))
+    placer.avoid(dense, np.interp(dense, p.range, power), 2.0)
+    named: set[str] = set()
+    for peak in p.peaks:
+        at, height = float(p.range[peak]), float(power[peak])
+        if at > far or len(named) >= _PEAKS:
+            continue
+        why = explain_cell(result.paths, known, response, result.receiver, at, None, float(p.power[peak]))
+        name = _short(why)
+        if not why.contributions or name in named:
+            continue
+        named.add(name)
+        axes.plot(at, height, "o", ms=3.5, color="#225588")
+        placer.label(at, height, f"{name}\n{at:.2f} m", fontsize=7, color="#222222", above=True)
+
+
+def _short(why: Explanation) -> str:
+    """Return the bodies of the leading chain without their parts, repeats on one body drawn together."""
+    if not why.contributions:
+        return "noise"
+    bodies = [link.split(".")[0] for link in why.contributions[0].chain if not link.startswith("(")]
+    return " > ".join(b for i, b in enumerate(bodies) if i == 0 or b != bodies[i - 1]) or "line of sight"

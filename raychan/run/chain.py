@@ -1,0 +1,126 @@
+"""The chain: a scene becomes paths, a profile, a cube, a map and detections that know where they came from."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from raychan.channel.profile import profile
+from raychan.channel.solve import solve
+from raychan.channel.tubes import Refinement
+from raychan.process.detect import detect
+from raychan.process.spectrum import range_doppler
+from raychan.run.provenance import provenance
+from raychan.run.result import Receiver, Result
+from raychan.signal.cube import synthesize
+from raychan.tables import MIRROR, Facets
+from raychan.units import C0
+from raychan.world.scene import Scene
+
+Progress = Callable[[str, float], None]
+"""Called with the name of a stage and the share of it that is done, 0 to 1."""
+
+STAGES = ("geometry", "trace", "profile", "cube", "map", "detect", "explain")
+
+
+def simulate(
+    scene: Scene,
+    seed: int = 0,
+    tolerance_db: float | None = None,
+    max_bounces: int | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Run a scene from its geometry to its detections.
+
+    Args: seed of all that is random, one stream a stage, so that equal seeds give equal bytes; tolerance_db [dB] and
+    max_bounces override the scene's; progress is told how far each stage is.
+    Returns: Result. Raises: ValueError on a tolerance or a number of bounces out of range.
+    """
+    if tolerance_db is not None and not tolerance_db > 0.0:
+        raise ValueError(f"tolerance_db = {tolerance_db:g}: must be positive")
+    if max_bounces is not None and max_bounces < 1:
+        raise ValueError(f"max_bounces = {max_bounces}: must be at least 1")
+    tell = progress or (lambda stage, share: None)
+    timings: dict[str, float] = {}
+
+    @contextmanager
+    def stage(name: str) -> Iterator[None]:
+        tell(name, 0.0)
+        start = time.perf_counter()
+        yield
+        timings[name] = time.perf_counter() - start
+        tell(name, 1.0)
+
+    # Streams are numbered by stage, so that one more random stage leaves the others as they are.
+    noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    sensor, settings = scene.sensor, scene.processing
+    changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
+    model = _changed(scene.model, changes)
+    carrier = sensor.waveform.carrier
+    rule = Refinement(wavenumber=2.0 * np.pi * carrier / C0)
+    with stage("geometry"):
+        facets, points = scene.facets(0.0), scene.points(0.0)
+    with stage("trace"):
+        paths, stats = solve(facets, points, sensor, carrier, rule, model.max_bounces, progress)
+    with stage("profile"):
+        noise = sensor.noise_power if sensor.noise else 0.0
+        pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
+    with stage("cube"):
+        cube = synthesize(paths, sensor, noise_rng)
+    with stage("map"):
+        rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
+    with stage("detect"):
+        # The scene file names range before rate; a map's axes are rate, then range.
+        sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
+        detections = detect(
+            rdmap,
+            pfa=settings.pfa,
+            min_snr_db=settings.min_snr_db,
+            method=settings.cfar,
+            ego_speed=sensor.ego_speed,
+            windows=(settings.rate_window, settings.range_window),
+            waveform=sensor.waveform,
+            elements=np.asarray(sensor.elements),
+            **sizes,
+        )
+    receiver = Receiver(
+        sensor.waveform,
+        settings.range_window,
+        settings.rate_window,
+        sensor.power,
+        sensor.ego_speed,
+        background(facets),
+    )
+    with stage("explain"):
+        reasons = provenance(paths, rdmap, detections, receiver)
+    return Result(
+        paths=paths,
+        profile=pdp,
+        cube=cube,
+        rdmap=rdmap,
+        detections=detections,
+        provenance=reasons,
+        receiver=receiver,
+        seed=seed,
+        timings=timings,
+        ledger={},
+        stats={"rays": stats.rays, "tubes": stats.tubes, "mirror_chains": stats.legs},
+        warnings=tuple(scene.warnings),
+        scene=scene,
+        text=scene.text,
+        path=str(scene.path.resolve()) if scene.path else "",
+    )
+
+
+def background(facets: Facets) -> tuple[str, ...]:
+    """Return the names of bodies that are never targets: mirrors (the ground) and the radar's carrier 'ego...'."""
+    names = zip(facets.body_names, facets.role, strict=True)
+    return tuple(name for name, role in names if role == MIRROR or name.startswith("ego"))
+
+
+def _changed(model: Any, changes: dict[str, Any]) -> Any:
+    return model.model_copy(update=changes) if changes else model

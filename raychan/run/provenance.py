@@ -1,0 +1,205 @@
+"""Where a cell of the map came from: the paths that feed it, by the bodies they met, and the cell's label."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.run.response import Response
+from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver, Result
+from raychan.tables import KIND_LETTERS, TRANSMIT, Detections, Paths, RangeDoppler
+from raychan.units import C0
+
+Ints = NDArray[np.int64]
+
+_LEAST_SHARE = 0.005
+_UNEXPLAINED = 0.1  # a cell whose paths give less than this share of its power is noise
+
+
+@dataclass(frozen=True)
+class Chains:
+    """The paths of a run sorted by the chain of parts that they met, and these by the targets among them."""
+
+    part: Ints
+    """Chain of parts of each path (n,)."""
+    names: tuple[tuple[str, ...], ...]
+    bodies: tuple[tuple[str, ...], ...]
+    """Bodies met, in order, but for thin layers passed."""
+    targets: Ints
+    """Chain of targets, the ground and the radar's carrier left out, of each chain of parts."""
+
+
+def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
+    """Return the paths sorted by chain; bounces of one body on itself count as one link of a chain of targets."""
+    names: list[tuple[str, ...]] = []
+    bodies: list[tuple[str, ...]] = []
+    targets: list[int] = []
+    known: dict[tuple[str, ...], int] = {}
+    first, index = _alike(paths)
+    for row in first:
+        met = [link for link in zip(paths.body[row], paths.part[row], paths.kind[row], strict=True) if link[2]]
+        names.append(tuple(_name(paths, b, p, k) for b, p, k in met))
+        bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
+        left = [b for b in bodies[-1] if b not in background]
+        link = tuple(b for i, b in enumerate(left) if i == 0 or b != left[i - 1])
+        targets.append(known.setdefault(link, len(known)))
+    return Chains(index, tuple(names), tuple(bodies), np.array(targets, np.int64))
+
+
+def explain_cell(
+    paths: Paths, known: Chains, response: Response, receiver: Receiver, range: float, rate: float | None, power: float
+) -> Explanation:
+    """Return which paths make a cell.
+
+    Args: known the paths' chains; range [m]; rate [m/s], or None for a cell of the power-delay profile; power [W] that
+    the receiver sees there.
+    Each path counts with its amplitude times the response of both windows at its distance from the cell; paths over
+    the same chain add as waves, chains as powers.
+    """
+    at, turn = response.reference(paths.delay, None if rate is None else paths.rate)
+    weight = response.in_range(at - range) if rate is None else response.in_cell(at - range, paths.rate, rate)
+    wave = paths.amplitude * turn * weight
+    count = len(known.names)
+    summed = _sums(known.part, wave, count)
+    whole = complex(summed.sum())
+    predicted = abs(whole) ** 2 * receiver.power
+    speed = (rate or 0.0) + receiver.ego_speed
+    spread = float(np.sqrt((np.abs(paths.error * weight) ** 2).sum()))
+    error_db = float(20.0 * np.log10(1.0 + spread / abs(whole))) if abs(whole) > 0.0 else 0.0
+    shares = np.abs(summed) ** 2
+    if predicted < _UNEXPLAINED * power or not shares.sum() > 0.0:
+        return Explanation(range, rate or 0.0, speed, power, predicted, error_db, CLUTTER, ())
+    shares /= shares.sum()
+    # The ground beside a target adds to its return, so what leads is the target over all its ways.
+    leading = np.argmax(np.abs(_sums(known.targets, summed, int(known.targets.max()) + 1)))
+    size = np.abs(wave)
+    paths_in, sizes = np.bincount(known.part, minlength=count), np.bincount(known.part, size, count)
+    ranges, rates = (np.bincount(known.part, size * x, count) for x in (at, paths.rate))
+    order = np.argsort(-shares, kind="stable")
+    first = order[known.targets[order] == leading][0]
+    order = np.append(first, order[order != first])
+    parts = tuple(
+        Contribution(
+            known.names[g],
+            len(known.bodies[g]),
+            float(ranges[g] / sizes[g]),
+            float(rates[g] / sizes[g]),
+            float(shares[g]),
+            int(paths_in[g]),
+        )
+        for g in order
+        if (shares[g] >= _LEAST_SHARE or g == first) and sizes[g] > 0.0
+    )
+    strongest = int(np.argmax(np.where(known.part == first, size, -1.0)))
+    label = _label(paths, strongest, known.bodies[first], receiver)
+    return Explanation(range, rate or 0.0, speed, power, predicted, error_db, label, parts)
+
+
+def provenance(
+    paths: Paths, rdmap: RangeDoppler, detections: Detections, receiver: Receiver
+) -> tuple[Explanation, ...]:
+    """Return one explanation for each detection, of the cell where its peak stands, at the place that it reports."""
+    known, response = chains(paths, receiver.background), response_of(receiver)
+    found = []
+    for i, (row, column) in enumerate(detections.cell):
+        at, rate, power = rdmap.range[column], rdmap.rate[row], rdmap.power[row, column]
+        why = explain_cell(paths, known, response, receiver, float(at), float(rate), float(power))
+        found.append(
+            replace(
+                why,
+                range=float(detections.range[i]),
+                rate=float(detections.rate[i]),
+                speed=float(detections.speed[i]),
+                power=float(detections.power[i]),
+            )
+        )
+    return tuple(found)
+
+
+def explain(result: Result | str | Path, range: float, speed: float | None = None) -> Explanation:
+    """Return which paths over which bodies made the cell of a map.
+
+    Args: result a Result, or the directory or file of one; range [m]; speed [m/s] with the ego speed taken out, as
+    the detections print it; None takes the strongest speed at that range.
+    Raises: ValueError outside the map.
+    """
+    if not isinstance(result, Result):
+        from raychan.run.store import load_result
+
+        result = load_result(result)
+    rows, column = _cells(result.rdmap, range, None if speed is None else speed - result.receiver.ego_speed)
+    row = int(rows[np.argmax(result.rdmap.power[rows, column])])
+    cell = (row, column)
+    return explain_cell(
+        result.paths,
+        chains(result.paths, result.receiver.background),
+        response_of(result.receiver),
+        result.receiver,
+        float(result.rdmap.range[column]),
+        float(result.rdmap.rate[row]),
+        float(result.rdmap.power[cell]),
+    )
+
+
+def response_of(receiver: Receiver) -> Response:
+    """Return the response of a receiver's processor."""
+    return Response(receiver.waveform, receiver.range_window, receiver.rate_window)
+
+
+def _cells(rdmap: RangeDoppler, range: float, rate: float | None) -> tuple[Ints, int]:
+    if not rdmap.range[0] <= range <= rdmap.range[-1]:
+        raise ValueError(f"range {range:g} m lies outside the map, {rdmap.range[0]:.1f} to {rdmap.range[-1]:.1f} m")
+    column = int(np.argmin(np.abs(rdmap.range - range)))
+    if rate is None:
+        return np.arange(len(rdmap.rate)), column
+    low, high = rdmap.rate[0] - rdmap.rate_resolution, rdmap.rate[-1] + rdmap.rate_resolution
+    if not low <= rate <= high:
+        raise ValueError(f"range rate {rate:g} m/s lies outside the map, {low:.1f} to {high:.1f} m/s")
+    return np.array([np.argmin(np.abs(rdmap.rate - rate))]), column
+
+
+def _alike(paths: Paths) -> tuple[Ints, Ints]:
+    """Return one row of each chain, and the chain of each path (n,); slot by slot, for speed."""
+    code, most = np.zeros(len(paths.delay), np.int64), 1
+    width = (len(paths.body_names) + 1) * (len(paths.part_names) + 1) * len(KIND_LETTERS)
+    for body, part, kind in zip(paths.body.T, paths.part.T, paths.kind.T, strict=True):
+        if not kind.any():
+            break
+        if most > np.iinfo(np.int64).max // width:
+            code = np.unique(code, return_inverse=True)[1].astype(np.int64)
+            most = int(code.max(initial=0)) + 1
+        slot = (body + 1) * np.int64(len(paths.part_names) + 1) + part + 1
+        code, most = code * width + np.where(kind > 0, slot * len(KIND_LETTERS) + kind, 0), most * width
+    _, first, index = np.unique(code, return_index=True, return_inverse=True)
+    return first, index.astype(np.int64)
+
+
+def _sums(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
+    return np.bincount(index, values.real, count) + 1j * np.bincount(index, values.imag, count)
+
+
+def _name(paths: Paths, body: int, part: int, kind: int) -> str:
+    name = paths.body_names[body] if body >= 0 else "?"
+    part_name = paths.part_names[part] if part >= 0 else ""
+    if part_name:
+        name = f"{name}.{part_name}"
+    return f"({name})" if kind == TRANSMIT else name
+
+
+def _label(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver) -> str:
+    """Return the label of a cell whose strongest path is `row`, over `bodies`."""
+    targets = set(bodies) - set(receiver.background)
+    if not targets:
+        return CLUTTER
+    if len(set(bodies)) == 1:
+        return DIRECT
+    if len(targets) > 1:
+        return MULTIPATH
+    # Over the ground and one target: an echo of the target, or a ghost behind it if the way round is long.
+    index = [paths.body_names[b] in targets for b in paths.body[row]]
+    straight = np.linalg.norm(paths.vertices[row][index] - 0.5 * (paths.tx + paths.rx), axis=1).min()
+    detour = 0.5 * C0 * paths.delay[row] - straight
+    return DIRECT if detour < receiver.waveform.range_resolution else MULTIPATH

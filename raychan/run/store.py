@@ -1,0 +1,251 @@
+"""Results on disk: result.nc (netCDF-4), detections.csv, summary.json.
+
+In result.nc each record is a group, each column a variable with its unit; a complex column is two real ones, `_re` and
+`_im`, so that xarray, MATLAB's h5read and any HDF5 reader open it alike.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import math
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.radar.waveform import Waveform
+from raychan.run.files import StoreError
+from raychan.run.result import Contribution, Explanation, Receiver, Result
+from raychan.tables import Cube, Detections, Paths, Profile, RangeDoppler
+from raychan.units import dbm
+
+FORMAT = 1
+_CHANGED = "# changed: "  # how a scene notes overridden keys below its text
+COLUMNS = (
+    "range_m",
+    "range_rate_mps",
+    "speed_mps",
+    "azimuth_deg",
+    "snr_db",
+    "power_dbm",
+    "error_db",
+    "label",
+    "bodies",
+)
+_GROUPS: dict[str, Any] = {
+    "paths": Paths,
+    "profile": Profile,
+    "cube": Cube,
+    "rdmap": RangeDoppler,
+    "detections": Detections,
+}
+_JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
+_UNITS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_resolution": "m/s"} | {
+    "unambiguous_range": "m",
+    "unambiguous_rate": "m/s",
+}
+
+
+def save_result(result: Result, directory: str | Path) -> None:
+    """Write result.nc, detections.csv and summary.json into an existing directory.
+
+    Use inside `files.staging`, which makes the whole appear at once. Raises: StoreError where the disk refuses.
+    """
+    directory = Path(directory)
+    try:
+        _write_netcdf(result, directory / "result.nc")
+        with open(directory / "detections.csv", "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(COLUMNS)
+            writer.writerows(rows(result))
+        (directory / "summary.json").write_text(json.dumps(summary(result), indent=2) + "\n", encoding="utf-8")
+    except (OSError, RuntimeError) as error:  # h5py tells of a full disk by either
+        raise StoreError(f"{directory}: cannot write the result: {error}") from error
+
+
+def load_result(path: str | Path) -> Result:
+    """Return the Result stored in a directory or a result.nc; its scene is read again from the text if that can be.
+
+    Raises: StoreError if there is no such file or it is not one of ours.
+    """
+    import xarray as xr
+
+    path = Path(path)
+    file = path / "result.nc" if path.is_dir() else path
+    if not file.is_file():
+        raise StoreError(f"{file}: no such file; `raychan run` writes it")
+    try:
+        with xr.open_dataset(file, engine="h5netcdf") as root:
+            attrs = dict(root.attrs)
+        if int(attrs.get("format", 0)) != FORMAT:
+            raise StoreError(f"{file}: not a result of this version of raychan")
+        records = {name: _read_record(file, name, kind) for name, kind in _GROUPS.items()}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        if isinstance(error, StoreError):
+            raise
+        raise StoreError(f"{file}: cannot be read as a raychan result: {error}") from error
+    held = {name: json.loads(attrs[name]) for name in _JSON}
+    receiver = held["receiver"] | {"waveform": Waveform(**held["receiver"]["waveform"])}
+    receiver["background"] = tuple(receiver["background"])
+    text, where = str(attrs["scene"]), str(attrs["scene_path"])
+    return Result(
+        **records,
+        provenance=tuple(_explanation(e) for e in held["provenance"]),
+        receiver=Receiver(**receiver),
+        seed=int(attrs["seed"]),
+        timings=held["timings"],
+        ledger=held["ledger"],
+        stats=held["stats"],
+        warnings=tuple(held["warnings"]),
+        scene=_scene(text, where),
+        text=text,
+        path=where,
+    )
+
+
+def rows(result: Result) -> list[tuple[str, ...]]:
+    """Return the detections as text, a tuple of COLUMNS each; an azimuth that no array gives is empty."""
+    d = result.detections
+    return [
+        (
+            f"{d.range[i]:.4f}",
+            f"{d.rate[i]:.4f}",
+            f"{d.speed[i]:.4f}",
+            "" if math.isnan(d.azimuth[i]) else f"{math.degrees(d.azimuth[i]):.3f}",
+            f"{d.snr[i]:.2f}",
+            f"{dbm(d.power[i]):.2f}",
+            f"{why.error_db:.2f}",
+            why.label,
+            why.bodies,
+        )
+        for i, why in enumerate(result.provenance)
+    ]
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """Return what summary.json holds: counts, timings, tolerance reached, warnings, what was left out."""
+    return {
+        "scene": result.path,
+        "seed": result.seed,
+        "paths": len(result.paths.delay),
+        "detections": len(result.detections.range),
+        "labels": {x: sum(e.label == x for e in result.provenance) for x in ("direct", "multipath", "clutter")},
+        **_plain(result.stats),
+        "timings_s": {k: round(v, 4) for k, v in result.timings.items()},
+        "warnings": list(result.warnings),
+        "left_out": _plain(result.ledger),
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that shape a result."""
+    found = {"python": platform.python_version()}
+    for name in ("raychan", "numpy", "scipy", "numba", "embreex", "finufft", "trimesh"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+def _write_netcdf(result: Result, file: Path) -> None:
+    import xarray as xr
+
+    attrs = {
+        "title": "raychan result",
+        "format": FORMAT,
+        "conventions": "SI; x forward, y left, z up; exp(+jwt); range rate positive = receding; NAME_re + j NAME_im",
+        "seed": result.seed,
+        "scene": result.text,
+        "scene_path": result.path,
+        "versions": json.dumps(versions()),
+    }
+    attrs |= {name: json.dumps(_plain(getattr(result, name))) for name in _JSON}
+    xr.Dataset(attrs=attrs).to_netcdf(file, engine="h5netcdf")
+    for name in _GROUPS:
+        data = _dataset(getattr(result, name))
+        # Unused slots of chains make up most of the paths, and shrink to nothing; samples are noise and do not.
+        packed = {"zlib": True, "complevel": 1, "shuffle": True}
+        encoding = {column: packed for column in data} if name == "paths" and len(result.paths.delay) else {}
+        data.to_netcdf(file, engine="h5netcdf", group=name, mode="a", encoding=encoding)
+
+
+def _dataset(record: Any) -> Any:
+    import xarray as xr
+
+    variables: dict[str, Any] = {}
+    attrs: dict[str, Any] = {}
+    for f in dataclasses.fields(record):
+        value = getattr(record, f.name)
+        if "axes" in f.metadata:
+            dims = [f"xyz_{a}" if a.isdigit() else a for a in f.metadata["axes"]]
+            about = {"units": f.metadata["unit"], "long_name": f.metadata["doc"] or f.name}
+            if np.iscomplexobj(value):
+                variables[f"{f.name}_re"] = (dims, value.real, about)
+                variables[f"{f.name}_im"] = (dims, value.imag, about)
+            else:
+                variables[f.name] = (dims, value, about)
+        elif isinstance(value, tuple):
+            attrs[f.name] = json.dumps(value)
+        else:
+            attrs[f.name] = value
+            if f.name in _UNITS:
+                attrs[f"{f.name}_units"] = _UNITS[f.name]
+    return xr.Dataset(variables, attrs=attrs)
+
+
+def _read_record(file: Path, group: str, kind: Any) -> Any:
+    import xarray as xr
+
+    with xr.open_dataset(file, engine="h5netcdf", group=group, decode_cf=False) as data:
+        values: dict[str, Any] = {}
+        for f in dataclasses.fields(kind):
+            if "axes" not in f.metadata:
+                held = data.attrs[f.name]
+                values[f.name] = tuple(json.loads(held)) if isinstance(held, str) else float(held)
+            elif f.metadata["dtype"].kind == "c":
+                real = data[f"{f.name}_re"].values
+                value = np.empty(real.shape, f.metadata["dtype"])
+                value.real, value.imag = real, data[f"{f.name}_im"].values
+                values[f.name] = value
+            else:
+                values[f.name] = data[f.name].values
+    return kind(**values)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON can hold it."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else ("inf" if value > 0 else "-inf")
+    return value if isinstance(value, bool | int | float | str) or value is None else str(value)
+
+
+def _explanation(held: dict[str, Any]) -> Explanation:
+    parts = tuple(Contribution(**(c | {"chain": tuple(c["chain"])})) for c in held["contributions"])
+    return Explanation(**(held | {"contributions": parts}))
+
+
+def _scene(text: str, where: str) -> Any:
+    if not text:
+        return None
+    from raychan.world.errors import SceneError
+    from raychan.world.scene import Scene
+
+    try:
+        changes = [line.removeprefix(_CHANGED) for line in text.splitlines() if line.startswith(_CHANGED)]
+        return Scene.from_text(text, where or None).override(changes)
+    except (SceneError, OSError):
+        return None

@@ -1,0 +1,164 @@
+"""What there is to draw of a scene and its rays, as plain arrays: every way of drawing starts here."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.report.canvas import PALETTE
+from raychan.run.provenance import chains
+from raychan.run.result import Result
+from raychan.tables import LAYER, MIRROR, Facets, Points
+from raychan.units import dbm, undb
+
+Floats = NDArray[np.float64]
+
+_NAMED = {
+    "red": "#c0392b", "blue": "#2e6da4", "green": "#2e8b57", "yellow": "#d9b310", "white": "#e8e8e8",
+    "black": "#3a3a3a", "grey": "#8a8a8a", "gray": "#8a8a8a", "silver": "#b8bcc0", "orange": "#e07b39", "brown": "#7b5a3c",
+}  # fmt: skip
+"""A body whose name says its colour is drawn in it."""
+
+GLASS, GROUND = "#9fc5d8", "#b9b6ae"
+_RAYS = 30
+_WEAKEST_DB = 45.0  # rays weaker than the strongest by more than this are not drawn
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Triangles (n, 3, 3) [m] of one colour."""
+
+    name: str
+    triangles: Floats
+    colour: str
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class Ray:
+    """A way through the scene: points (k, 3) [m] from radar to radar, and the power it brings [dBm]."""
+
+    name: str
+    points: Floats
+    power: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Shapes and rays, and where the radar stands and looks."""
+
+    title: str
+    shapes: tuple[Shape, ...]
+    rays: tuple[Ray, ...]
+    radar: Floats
+    boresight: Floats
+    targets: tuple[tuple[str, tuple[float, float, float]], ...]
+    """Names and places to write them."""
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Return the lowest and highest corner of all but the ground."""
+        solid = [s.triangles.reshape(-1, 3) for s in self.shapes if s.name != "ground"]
+        every = np.concatenate([*solid, *(r.points for r in self.rays), self.radar[None]])
+        return every.min(axis=0), every.max(axis=0)
+
+    def save(self, path: str | Path) -> None:
+        """Write the drawing to an .npz file, for another process to render."""
+        arrays = {f"t{i}": s.triangles for i, s in enumerate(self.shapes)}
+        arrays |= {f"r{i}": r.points for i, r in enumerate(self.rays)}
+        about = asdict(self)
+        for item in (*about["shapes"], *about["rays"]):
+            item.pop("triangles", None)
+            item.pop("points", None)
+        about["radar"], about["boresight"] = self.radar.tolist(), self.boresight.tolist()
+        np.savez(path, about=np.array(json.dumps(about)), **arrays)  # type: ignore[arg-type]
+
+    @staticmethod
+    def load(path: str | Path) -> Drawing:
+        """Return a drawing from an .npz file."""
+        with np.load(path) as held:
+            about: dict[str, Any] = json.loads(str(held["about"]))
+            shapes = tuple(Shape(triangles=held[f"t{i}"], **s) for i, s in enumerate(about["shapes"]))
+            rays = tuple(Ray(points=held[f"r{i}"], **r) for i, r in enumerate(about["rays"]))
+        targets = tuple((name, (x, y, z)) for name, (x, y, z) in about["targets"])
+        radar, boresight = np.array(about["radar"]), np.array(about["boresight"])
+        return Drawing(about["title"], shapes, rays, radar, boresight, targets)
+
+
+def draw(
+    title: str, facets: Facets, points: Points, radar: Floats, boresight: Floats, result: Result | None
+) -> Drawing:
+    """Return the drawing of a scene at one instant; with a result, the ways that fed its detections too."""
+    rays = rays_of(result) if result is not None else ()
+    shapes: list[Shape] = []
+    targets: list[tuple[str, tuple[float, float, float]]] = []
+    glass = (facets.materials.kind == LAYER)[facets.material] if len(facets.material) else np.zeros(0, bool)
+    colours = iter(PALETTE * (1 + len(facets.body_names) // len(PALETTE)))
+    for b, name in enumerate(facets.body_names):
+        if facets.role[b] == MIRROR:
+            continue
+        mine = facets.body == b
+        colour = next((shade for word, shade in _NAMED.items() if word in name.lower().split("_")), None) or next(
+            colours
+        )
+        if not mine.any():
+            continue
+        for rows, tint, opacity in ((mine & ~glass, colour, 1.0), (mine & glass, GLASS, 0.4)):
+            if rows.any():
+                shapes.append(Shape(name, facets.vertices[rows], tint, opacity))
+        corners = facets.vertices[mine].reshape(-1, 3)
+        middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        targets.append((name, (float(middle[0]), float(middle[1]), float(corners[:, 2].max()))))
+    named = {name for name, _ in targets}
+    for i in range(len(points.position)):
+        name = facets.body_names[points.body[i]] if points.body[i] >= 0 else f"point {i}"
+        if name not in named:
+            x, y, z = points.position[i].tolist()
+            targets.append((name, (x, y, z)))
+    mirrors = facets.role[facets.body] == MIRROR if len(facets.body) else np.zeros(0, bool)
+    made = Drawing(title, tuple(shapes), rays, np.asarray(radar, float), np.asarray(boresight, float), tuple(targets))
+    if mirrors.any():
+        made = _with_ground(made, float(np.median(facets.vertices[mirrors][..., 2])))
+    return made
+
+
+def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
+    """Return the strongest path of each chain that fed a detection, weakest first; without any, of each chain."""
+    paths, known = result.paths, chains(result.paths, result.receiver.background)
+    size = np.abs(paths.amplitude)
+    index = {chain: i for i, chain in enumerate(known.names)}
+    power: dict[int, float] = {}
+    label: dict[int, str] = {}
+    for why in result.provenance:
+        for part in why.contributions:
+            g, watts = index.get(part.chain, -1), part.share * why.predicted
+            if g >= 0 and watts > power.get(g, 0.0):
+                power[g], label[g] = watts, why.label
+    if not power and len(size):
+        whole = np.bincount(known.part, size**2) * result.receiver.power
+        power = {int(g): float(whole[g]) for g in np.flatnonzero(whole > 0.0)}
+    rays = []
+    least = max(power.values(), default=0.0) * undb(-_WEAKEST_DB)
+    for g, watts in sorted(power.items(), key=lambda item: item[1])[-most:]:
+        if watts < least:
+            continue
+        rows = np.flatnonzero(known.part == g)
+        row = rows[np.argmax(size[rows])]
+        used = int((paths.kind[row] > 0).sum())
+        points = np.concatenate([paths.tx[None], paths.vertices[row, :used].astype(float), paths.rx[None]])
+        rays.append(Ray(" > ".join(known.names[g]) or "line of sight", points, float(dbm(watts)), label.get(g, "")))
+    return tuple(rays)
+
+
+def _with_ground(made: Drawing, height: float) -> Drawing:
+    low, high = made.bounds()
+    room = max(2.0, 0.05 * float((high - low)[:2].max()))
+    (x0, y0), (x1, y1) = low[:2] - room, high[:2] + room
+    a, b, c, d = ([x, y, height] for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+    ground = Shape("ground", np.array([[a, b, c], [a, c, d]]), GROUND)
+    return Drawing(made.title, (ground, *made.shapes), made.rays, made.radar, made.boresight, made.targets)

@@ -1,0 +1,50 @@
+"""The same drawing by matplotlib, where there is no OpenGL: surfaces may hide wrongly, places are right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.report.canvas import collections, figure, save, style
+from raychan.view.drawing import Drawing
+
+_MOST = 6000  # triangles drawn of a shape; matplotlib sorts and paints them one by one
+
+
+def picture(drawing: Drawing, path: str | Path) -> Path:
+    """Draw a scene in 3-D by matplotlib and return the picture's path."""
+    solids = collections()
+    with style():
+        made = figure(9.0, 5.0, layout=None)
+        axes: Any = made.add_axes((-0.05, -0.08, 0.98, 1.1), projection="3d", computed_zorder=False)
+        low, high = drawing.bounds()
+        room = 0.03 * (high - low).max()
+        low, high = low - room * np.array([1.0, 1.0, 0.0]), high + room
+        low[2] = min(low[2], 0.0)
+        for shape in drawing.shapes:
+            flat = shape.name == "ground"
+            triangles = np.clip(shape.triangles, low, high) if flat else shape.triangles
+            triangles = triangles[:: max(1, len(shape.triangles) // _MOST)]
+            opacity = 0.5 if flat else 0.8 * shape.opacity
+            faces = solids.Poly3DCollection(triangles, facecolors=shape.colour, alpha=opacity, shade=not flat)
+            faces.set_zorder(0 if flat else 1)
+            axes.add_collection3d(faces)
+        if drawing.rays:
+            lines = solids.Line3DCollection([r.points for r in drawing.rays], cmap="plasma", linewidths=1.4, zorder=2)
+            lines.set_array(np.array([r.power for r in drawing.rays]))
+            axes.add_collection3d(lines)
+            made.colorbar(lines, cax=made.add_axes((0.91, 0.2, 0.015, 0.6)), label="received power [dBm]")
+        axes.plot(*drawing.radar[:, None], marker=">", ms=9, color="#d62728", ls="none", zorder=3)
+        axes.text(*drawing.radar, "  radar", fontsize=8, zorder=4)
+        for name, (x, y, z) in drawing.targets:
+            axes.text(x, y, z + 0.3, name, fontsize=8, ha="center", zorder=4)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x [m]", ylabel="y [m]")
+        axes.set_box_aspect(high - low, zoom=1.25)
+        axes.locator_params(axis="y", nbins=4)
+        axes.locator_params(axis="z", nbins=3)
+        axes.view_init(elev=28.0, azim=-132.0)
+        axes.set_zlabel("z [m]")
+        made.suptitle(drawing.title)
+        return save(made, path)

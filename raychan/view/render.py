@@ -1,0 +1,133 @@
+"""The one place that imports pyvista. `python -m raychan.view.render DRAWING.npz PICTURE.png` draws in a process of its
+own, so that a crash of an OpenGL driver costs the picture and not the run.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.view.drawing import Drawing
+
+_SIZE = (2000, 1125)
+_MAP = "plasma"
+_POWER = "received power [dBm]"
+
+
+def screenshot(drawing: Drawing, path: str | Path) -> None:
+    """Render a drawing off screen into a PNG."""
+    plotter = _plotter(drawing, off_screen=True)
+    plotter.screenshot(str(path))
+    plotter.close()
+
+
+def window(drawing: Drawing) -> None:
+    """Show a drawing in a window; a click on a ray prints its chain and power."""
+    plotter = _plotter(drawing, off_screen=False)
+    plotter.enable_mesh_picking(_tell, left_clicking=True, show=False, show_message=False)
+    plotter.show(title=drawing.title)
+
+
+def _tell(mesh: Any) -> None:
+    if mesh is not None and "what" in mesh.field_data:
+        print(mesh.field_data["what"][0])
+
+
+def _plotter(drawing: Drawing, off_screen: bool) -> Any:
+    import pyvista as pv
+
+    plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(_SIZE), lighting="light kit")
+    plotter.set_background("white", top="#dfe8f1")
+    for shape in drawing.shapes:
+        flat = shape.name == "ground"
+        points = shape.triangles.reshape(-1, 3)
+        faces = np.column_stack([np.full(len(points) // 3, 3), np.arange(len(points)).reshape(-1, 3)])
+        mesh = pv.PolyData(points, faces.ravel())
+        plotter.add_mesh(
+            mesh, color=shape.colour, opacity=shape.opacity, ambient=0.25 if flat else 0.1, lighting=not flat
+        )
+    low, high = drawing.bounds()
+    scale = max(0.05, 0.011 * float(np.linalg.norm(high - low)))
+    _rings(drawing, plotter, pv)
+    _rays(drawing, plotter, pv, 0.09 * scale)
+    tip = drawing.radar + scale * drawing.boresight
+    cone = pv.Cone(center=tip, direction=-drawing.boresight, height=2 * scale, radius=scale, resolution=40)
+    plotter.add_mesh(cone, color="#d62728")
+    names = [name for name, _ in drawing.targets] + ["radar"]
+    places = [(x, y, z + 1.5 * scale) for _, (x, y, z) in drawing.targets]
+    places.append((drawing.radar[0], drawing.radar[1], drawing.radar[2] + 2.5 * scale))
+    plotter.add_point_labels(
+        np.array(places), names, font_size=22, text_color="#1a1a1a", shape_color="white", shape_opacity=0.75,
+        show_points=False, always_visible=True, margin=4,
+    )  # fmt: skip
+    _look(plotter, drawing)
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def _rings(drawing: Drawing, plotter: Any, pv: Any) -> None:
+    """Draw arcs of equal range on the ground, so that the picture can be measured."""
+    ground = [s for s in drawing.shapes if s.name == "ground"]
+    if not ground:
+        return
+    corners = ground[0].triangles.reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    reach = float(np.hypot(*(np.maximum(abs(low), abs(high)) - abs(drawing.radar))[:2]))
+    step = next(s for s in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, reach) if reach <= 12.0 * s)
+    places, names = [], []
+    for radius in np.arange(step, reach, step):
+        turn = np.linspace(-np.pi, np.pi, 721)
+        arc = drawing.radar + radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+        arc[:, 2] = low[2] + 0.01
+        inside = ((arc[:, :2] > low[:2]) & (arc[:, :2] < high[:2])).all(axis=1)
+        runs = np.split(np.flatnonzero(inside), np.flatnonzero(np.diff(np.flatnonzero(inside)) > 1) + 1)
+        for run in runs:
+            if len(run) > 2:
+                plotter.add_mesh(pv.lines_from_points(arc[run]), color="#8d8a80", line_width=1.5)
+        right = arc[inside][np.argmin(arc[inside][:, 1])] if inside.any() else None
+        if right is not None and right[0] > drawing.radar[0]:
+            places.append(right)
+            names.append(f"{radius:g} m")
+    if names:
+        plotter.add_point_labels(
+            np.array(places), names, font_size=18, text_color="#6b685f", shape=None, show_points=False, bold=False,
+            always_visible=True,
+        )  # fmt: skip
+
+
+def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
+    if not drawing.rays:
+        return
+    powers = [ray.power for ray in drawing.rays]
+    limits = [min(powers), max(max(powers), min(powers) + 1.0)]
+    for ray in drawing.rays:
+        tube = pv.lines_from_points(ray.points).tube(radius=radius)
+        tube.field_data["what"] = [f"{ray.name}: {ray.power:.1f} dBm {ray.label}"]
+        tube[_POWER] = np.full(tube.n_points, ray.power)
+        plotter.add_mesh(
+            tube, scalars=_POWER, cmap=_MAP, clim=limits, show_scalar_bar=False, lighting=False,
+        )  # fmt: skip
+    plotter.add_scalar_bar(
+        _POWER, vertical=False, position_x=0.03, position_y=0.88, width=0.28, height=0.07, color="#1a1a1a",
+        title_font_size=24, label_font_size=22, fmt="%.0f", n_labels=5,
+    )  # fmt: skip
+
+
+def _look(plotter: Any, drawing: Drawing) -> None:
+    """Look from behind the radar and to its right, down on the scene, close enough to fill the picture."""
+    low, high = drawing.bounds()
+    focus = 0.5 * (low + high)
+    ahead = drawing.boresight * [1.0, 1.0, 0.0]
+    ahead = ahead / (np.linalg.norm(ahead) or 1.0)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    away = -0.75 * ahead + 0.85 * right + 0.62 * np.array([0.0, 0.0, 1.0])
+    plotter.camera_position = [focus + 10.0 * away, focus, (0.0, 0.0, 1.0)]
+    plotter.reset_camera(bounds=(low[0], high[0], low[1], high[1], low[2], high[2]))
+    plotter.camera.zoom(1.36)
+
+
+if __name__ == "__main__":
+    screenshot(Drawing.load(sys.argv[1]), sys.argv[2])

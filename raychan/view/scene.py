@@ -1,0 +1,56 @@
+"""The picture of a scene and its rays: by pyvista where OpenGL works, by matplotlib where it does not."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from raychan.run.files import write_whole
+from raychan.run.result import Result
+from raychan.view import plain
+from raychan.view.drawing import Drawing, draw
+
+_PATIENCE_S = 180.0
+
+
+def drawing_of(scene: Any, result: Result | None = None) -> Drawing:
+    """Return the drawing of a scene, with the rays of its result if given."""
+    sensor = scene.sensor
+    boresight = sensor.boresight
+    return draw(scene.title, scene.facets(0.0), scene.points(0.0), sensor.position, boresight, result)
+
+
+def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:
+    """Draw into a PNG and return warnings: none, or why matplotlib had to do it.
+
+    pyvista runs in a process of its own: a driver that crashes or hangs is then a warning too.
+    """
+    trouble = _rendered(drawing, Path(path))
+    if trouble is None:
+        return []
+    plain.picture(drawing, path)
+    return [f"scene picture drawn by matplotlib, for OpenGL is not to be had here ({trouble})"]
+
+
+def _rendered(drawing: Drawing, path: Path) -> str | None:
+    if os.environ.get("RAYCHAN_NO_OPENGL"):
+        return "RAYCHAN_NO_OPENGL is set"
+    with tempfile.TemporaryDirectory() as room:
+        held, made = Path(room) / "drawing.npz", Path(room) / "scene.png"
+        drawing.save(held)
+        command = [sys.executable, "-m", "raychan.view.render", str(held), str(made)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE_S, check=False)
+        except subprocess.TimeoutExpired:
+            return f"no picture within {_PATIENCE_S:.0f} s"
+        if done.returncode < 0:
+            return f"the renderer died of signal {-done.returncode}"
+        if done.returncode or not made.is_file():
+            lines = done.stderr.strip().splitlines()
+            return lines[-1] if lines else f"the renderer ended with code {done.returncode}"
+        write_whole(path, made.read_bytes())
+    return None

@@ -1,0 +1,145 @@
+"""A body: a mesh with materials, a pose and a motion, and perhaps a given radar cross-section."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.tables import BLOCKER, MIRROR, SCATTERER
+from raychan.units import undb
+from raychan.world import shapes
+from raychan.world.errors import SceneError, nearest
+from raychan.world.material import Material
+from raychan.world.mesh import CREASE_DEG, Floats, Mesh
+from raychan.world.meshfile import from_trimesh, load
+from raychan.world.motion import Motion
+
+ROLES = {"scatterer": SCATTERER, "mirror": MIRROR, "blocker": BLOCKER}
+_SIZES = (1e-3, 200.0)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A thing in the scene: `mesh` (Mesh, trimesh or a path) or built-in `shape` with `params`, one of both.
+
+    Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; `material` for all parts or `materials` by
+    part (patterns), a name or a Material. `rcs` [dBsm], a number or (azimuth_deg, dBsm) pairs relative to its heading,
+    makes it a point target at `rcs_point` (body frame [m]) whose mesh only blocks.
+    """
+
+    name: str
+    mesh: Any = None
+    shape: str | None = None
+    params: Mapping[str, Any] = field(default_factory=dict)
+    material: str | Material | None = None
+    materials: Mapping[str, str | Material] = field(default_factory=dict)
+    position: Sequence[float] = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
+    roll_deg: float = 0.0
+    velocity: Sequence[float] = (0.0, 0.0, 0.0)
+    turn_rate_dps: float = 0.0
+    rcs: float | Sequence[tuple[float, float]] | None = None
+    rcs_point: Sequence[float] | None = None
+    role: str | None = None
+    unit: str = "m"
+    up: str | None = None
+    forward: str | None = None
+    scale: float = 1.0
+    crease_deg: float = CREASE_DEG
+
+    @cached_property
+    def geometry(self) -> Mesh:
+        """The mesh in the body's own frame."""
+        if (self.mesh is None) == (self.shape is None):
+            raise SceneError("keys do not fit together", key=self.name, allowed="either shape or mesh")
+        try:
+            if self.shape is not None:
+                try:
+                    return shapes.build(self.shape, dict(self.params))
+                except SceneError as e:
+                    raise e.at(key="" if e.key == "shape" else "params") from None
+            if isinstance(self.mesh, Mesh):
+                return self.mesh
+            if isinstance(self.mesh, (str, Path)):
+                return load(self.mesh, self.unit, self.up, self.forward, self.scale, self.crease_deg)
+            return from_trimesh(self.mesh, self.crease_deg)
+        except SceneError as e:
+            raise e.at(key=self.name) from None
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Pose at time 0 and rates."""
+        x, y, z = map(float, self.position)
+        u, v, w = map(float, self.velocity)
+        angles = np.radians([self.yaw_deg, self.pitch_deg, self.roll_deg, self.turn_rate_dps])
+        values = [x, y, z, u, v, w, *angles]
+        if not np.isfinite(values).all():
+            raise SceneError(
+                "pose or motion holds NaN or infinity", key=self.name, value=values, allowed="finite numbers"
+            )
+        yaw, pitch, roll, turn = map(float, angles)
+        return Motion((x, y, z), yaw, pitch, roll, (u, v, w), turn)
+
+    @property
+    def kind(self) -> int:
+        """tables.SCATTERER, MIRROR or BLOCKER: as `role` says; else ground mirrors, a body of given RCS blocks."""
+        if self.role is not None:
+            if self.role not in ROLES:
+                raise SceneError(
+                    f"unknown role '{self.role}'", key=f"{self.name}.role", allowed=nearest(self.role, ROLES)
+                )
+            return ROLES[self.role]
+        if self.rcs is not None:
+            return BLOCKER
+        return MIRROR if self.shape == "ground" else SCATTERER
+
+    def part_materials(self) -> list[str | Material]:
+        """Return the material of each part: by name or pattern, else the body's, else the shape's, else PEC."""
+        mesh = self.geometry
+        own = mesh.part_materials or ("pec",) * len(mesh.part_names)
+        for pattern in self.materials:
+            if not any(fnmatchcase(part, pattern) for part in mesh.part_names):
+                allowed = nearest(pattern, mesh.part_names)
+                raise SceneError("no such part", key=f"{self.name}.materials.{pattern}", value=pattern, allowed=allowed)
+        chosen: list[str | Material] = []
+        for part, default in zip(mesh.part_names, own, strict=True):
+            fits = [m for pattern, m in self.materials.items() if fnmatchcase(part, pattern)]
+            exact = self.materials.get(part)
+            chosen.append(exact or (fits[-1] if fits else None) or self.material or default)
+        return chosen
+
+    def target(self) -> tuple[Floats, Floats]:
+        """Return the RCS table: azimuths [rad] relative to the heading, from -pi to pi, and RCS [m2] there.
+
+        A table is linear in dB between its azimuths and wraps around; it is resampled every degree.
+        """
+        ends = np.array([-np.pi, np.pi])
+        if isinstance(self.rcs, (int, float)):
+            return ends, np.full(2, float(undb(self.rcs)))
+        pairs = np.asarray(self.rcs, float).reshape(-1, 2)
+        wrapped = (pairs[:, 0] + 180.0) % 360.0 - 180.0
+        order = np.argsort(wrapped)
+        knots = np.radians(np.arange(-180.0, 181.0))
+        level = np.interp(np.degrees(knots), wrapped[order], pairs[order, 1], period=360.0)
+        return knots, np.asarray(undb(level))
+
+    def target_point(self) -> Floats:
+        """Return where the point target stands in the body frame (3,) [m]."""
+        if self.rcs_point is None:
+            return np.asarray(self.geometry.bounds.mean(axis=0))
+        return np.asarray(self.rcs_point, float)
+
+    def notes(self) -> list[str]:
+        """Return warnings about a mesh from outside: its health, and a size that suggests another unit."""
+        said = [] if self.shape else [f"body '{self.name}': {text}" for text in self.geometry.report.warnings()]
+        size = max(self.geometry.report.size)
+        if self.shape is None and not _SIZES[0] * 10 <= size <= _SIZES[1]:
+            said.append(f"body '{self.name}' is {size:.4g} m across: check unit and scale")
+        return said

@@ -1,0 +1,82 @@
+"""What only the whole scene shows: a radar inside a body, targets that fold in range or range rate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from raychan.tables import MIRROR
+from raychan.world.errors import SceneError
+from raychan.world.mesh import Floats
+
+if TYPE_CHECKING:
+    from raychan.world.body import Body
+    from raychan.world.scene import Scene
+
+
+def radar_outside(scene: Scene) -> None:
+    """Raise SceneError where the radar is inside a body or below a mirror."""
+    if scene.radar is None:
+        return
+    at = np.array(scene.radar.position)
+    for body in scene.bodies:
+        local, mesh = body.motion.to_body(at), body.geometry
+        if body.kind == MIRROR:
+            c = mesh.corners[0]
+            n = np.cross(c[1] - c[0], c[2] - c[0])
+            if n @ (local - c[0]) <= 0.0:
+                where = "a place on its lit side"
+                raise SceneError(
+                    f"radar is behind '{body.name}'", key="radar.position", value=at.tolist(), allowed=where
+                )
+            continue
+        low, high = mesh.bounds
+        if (local >= low).all() and (local <= high).all() and mesh.winding(local) > 0.5:
+            where = "a place outside all bodies"
+            raise SceneError(f"radar is inside '{body.name}'", key="radar.position", value=at.tolist(), allowed=where)
+
+
+def nearest_point(body: Body, at: Floats) -> Floats:
+    """Return the corner or face centre of a body (world, (3,)) that is nearest to a point (3,)."""
+    mesh = body.geometry
+    points = np.concatenate([mesh.vertices, mesh.corners.mean(axis=1)])
+    local = body.motion.to_body(at)
+    return np.asarray(body.motion.to_world(points[np.argmin(np.linalg.norm(points - local, axis=1))]))
+
+
+def aliases(scene: Scene) -> list[str]:
+    """Return a warning for each body whose nearest point reads a folded range or range rate, and what it will read."""
+    if scene.radar is None:
+        return []
+    waveform, said = scene.sensor.waveform, []
+    at, own = np.array(scene.radar.position), np.array(scene.radar.velocity_mps)
+    limit, top = waveform.unambiguous_range, waveform.unambiguous_rate
+    for body in scene.bodies:
+        if body.kind == MIRROR:
+            continue
+        place = nearest_point(body, at) if body.rcs is None else body.motion.to_world(body.target_point())
+        way = place - at
+        far = float(np.linalg.norm(way))
+        rate = float((body.motion.velocity_at(place) - own) @ way / far) if far > 0.0 else 0.0
+        if far > limit:
+            seen = folded_range(far, limit, waveform.complex_sampling)
+            said.append(
+                f"body '{body.name}' at {far:.2f} m is beyond the unambiguous range {limit:.2f} m: "
+                f"it appears at {seen:.2f} m"
+            )
+        if abs(rate) > top:
+            seen = (rate + top) % (2.0 * top) - top
+            said.append(
+                f"body '{body.name}' at {rate:.2f} m/s is beyond the unambiguous range rate {top:.2f} m/s: "
+                f"it appears at {seen:.2f} m/s"
+            )
+    return said
+
+
+def folded_range(distance: float, limit: float, complex_sampling: bool) -> float:
+    """Return the range [m] at which a target beyond the unambiguous range `limit` [m] appears."""
+    if complex_sampling:
+        return distance % limit
+    rest = distance % (2.0 * limit)
+    return min(rest, 2.0 * limit - rest)

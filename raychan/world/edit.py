@@ -1,0 +1,61 @@
+"""TOML text to tables, and single keys of tables changed from outside."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from typing import Any
+
+from raychan.world.errors import SceneError, nearest
+
+
+def parsed(text: str, file: Any = None) -> dict[str, Any]:
+    """Return the tables of TOML text; SceneError with the line where it is broken."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as e:
+        found = re.search(r"line (\d+)", str(e))
+        line = int(found[1]) if found else len(text.splitlines())
+        raise SceneError(f"not valid TOML: {e}", file=file, line=line, allowed="TOML 1.0") from None
+
+
+def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -> dict[str, Any]:
+    """Return a copy of a scene's tables with keys set, each change written 'dotted.key=value'; bodies go by name."""
+    out = deepcopy(dict(data))
+    for change in changes:
+        key, found, value = change.partition("=")
+        words = key.strip().split(".")
+        if not found or not all(words):
+            raise SceneError(f"'{change}' is no change", file=file, key=key, allowed="key=value, as radar.power_dbm=10")
+        at: Any = out
+        for i, word in enumerate(words[:-1]):
+            at = _step(at, word, ".".join(words[: i + 1]), file)
+        if not isinstance(at, dict):
+            raise SceneError("holds no keys", file=file, key=".".join(words[:-1]), value=at, allowed="a table")
+        at[words[-1]] = _value(value.strip())
+    return out
+
+
+def _step(at: Any, word: str, key: str, file: Any) -> Any:
+    if isinstance(at, list):
+        names = [b.get("name") for b in at if isinstance(b, dict)]
+        if word not in names:
+            raise SceneError(
+                f"no body '{word}'", file=file, key=key, value=word, allowed=nearest(word, map(str, names))
+            )
+        return at[names.index(word)]
+    if isinstance(at, dict):
+        if isinstance(at.get(word), str):
+            raise SceneError("holds no keys", file=file, key=key, value=at[word], allowed="a table")
+        return at.setdefault(word, {})
+    raise SceneError("holds no keys", file=file, key=key, value=at, allowed="a table")
+
+
+def _value(text: str) -> Any:
+    """Return a TOML value; what is none is text."""
+    try:
+        return tomllib.loads(f"x = {text}")["x"]
+    except tomllib.TOMLDecodeError:
+        return text

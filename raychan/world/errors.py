@@ -1,0 +1,43 @@
+"""What is wrong with a scene, where, and what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+
+class SceneError(ValueError):
+    """A scene or mesh that cannot be used; says what is wrong, where, and what is allowed.
+
+    Attributes: file (path or None), key (dotted, '' where none applies), value (what was given), allowed (text).
+    """
+
+    def __init__(
+        self, problem: str, *, file: Any = None, key: str = "", value: Any = None, allowed: str = "", line: int = 0
+    ) -> None:
+        self.problem, self.file, self.key, self.value, self.allowed, self.line = (
+            problem,
+            file,
+            key,
+            value,
+            allowed,
+            line,
+        )
+        where = f"{file}:{line}" if file and line else str(file or "")
+        head = ": ".join(x for x in (where, key, problem) if x)
+        super().__init__(f"{head}; allowed: {allowed}" if allowed else head)
+
+    def at(self, *, file: Any = None, key: str = "") -> SceneError:
+        """Return the same error with its file or the front of its key added."""
+        path = ".".join(x for x in (key, self.key) if x)
+        return SceneError(
+            self.problem, file=self.file or file, key=path, value=self.value, allowed=self.allowed, line=self.line
+        )
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return a text that names the nearest known word, or lists all where none is near."""
+    names = sorted(map(str, known))
+    close = get_close_matches(word, names, n=1, cutoff=0.6)
+    return f"did you mean '{close[0]}'?" if close else "one of " + ", ".join(names)

@@ -1,0 +1,251 @@
+"""Triangle meshes: welded, freed of dead faces, wound outward, with the normals of the surface they stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from raychan.world.errors import SceneError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.signedinteger[Any]]
+
+CREASE_DEG = 20.0
+_WELD = 1e-9  # of the mesh's size
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """What was found in a mesh and what was done to it."""
+
+    vertices: int
+    faces: int
+    bodies: int
+    watertight: bool
+    open_edges: int
+    non_manifold_edges: int
+    size: tuple[float, float, float]
+    zero_area: int = 0
+    duplicates: int = 0
+    flipped: int = 0
+
+    def warnings(self) -> list[str]:
+        """Return one sentence for each thing a user should know."""
+        said = []
+        if self.zero_area:
+            said.append(f"{self.zero_area} faces of zero area dropped")
+        if self.duplicates:
+            said.append(f"{self.duplicates} duplicate faces dropped")
+        if self.flipped:
+            said.append(f"{self.flipped} faces turned to face outward")
+        if not self.watertight:
+            said.append(f"not watertight: {self.open_edges} open and {self.non_manifold_edges} non-manifold edges")
+        return said
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles in a body's own frame.
+
+    Fields: vertices (v, 3) [m]; faces (f, 3), counter-clockwise seen from outside; part (f,) index into part_names;
+    normals (f, 3, 3) unit normals of the true surface at the corners; part_materials names by part, or ().
+    """
+
+    vertices: Floats
+    faces: Ints
+    part: Ints
+    part_names: tuple[str, ...]
+    normals: Floats
+    report: MeshReport
+    part_materials: tuple[str, ...] = field(default=())
+
+    @property
+    def corners(self) -> Floats:
+        """Corners (f, 3, 3) [m] of the faces."""
+        return self.vertices[self.faces]
+
+    @property
+    def bounds(self) -> Floats:
+        """Lowest and highest corner (2, 3) [m]."""
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @property
+    def areas(self) -> Floats:
+        """Areas (f,) [m2] of the faces."""
+        return 0.5 * np.linalg.norm(_cross(self.vertices, self.faces), axis=1)
+
+    def volume(self) -> float:
+        """Return the signed volume [m3] enclosed; meaningful where watertight."""
+        c = self.corners
+        return float(np.einsum("ij,ij->", c[:, 0], np.cross(c[:, 1], c[:, 2])) / 6.0)
+
+    def winding(self, point: Floats) -> float:
+        """Return how often the faces surround a point (3,): 1 inside a closed body, 0 outside."""
+        a, b, c = np.moveaxis(self.corners - np.asarray(point, float), 1, 0)
+        la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+        dots = [np.einsum("ij,ij->i", *p) for p in ((a, b), (b, c), (c, a))]
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        angle = np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
+        return float(angle.sum() / (2.0 * np.pi))
+
+
+def make_mesh(
+    vertices: Floats,
+    faces: Ints,
+    part: Ints | None = None,
+    part_names: tuple[str, ...] = ("body",),
+    normals: Floats | None = None,
+    *,
+    crease_deg: float = CREASE_DEG,
+    part_materials: tuple[str, ...] = (),
+) -> Mesh:
+    """Return a checked Mesh of raw triangles: welded, dead faces dropped, closed pieces wound outward.
+
+    Args: vertices (v, 3) [m]; faces (f, 3); part (f,), normals (f, 3, 3) exact corner normals, or None to smooth over
+    edges that bend less than crease_deg (the faces' winding is then made consistent too).
+    Raises: SceneError for a mesh that is empty or holds NaN.
+    """
+    v, f = np.asarray(vertices, float).reshape(-1, 3), np.asarray(faces, np.int64).reshape(-1, 3)
+    if not np.isfinite(v).all():
+        bad = int((~np.isfinite(v)).any(axis=1).sum())
+        raise SceneError(f"{bad} vertices hold NaN or infinity", value=bad, allowed="finite coordinates")
+    kind = np.zeros(len(f), np.int32) if part is None else np.asarray(part, np.int32)
+    v, f = _weld(v, f)
+    keep, zero, twins = _alive(v, f)
+    if not keep.any():
+        raise SceneError("mesh is empty: no face with an area", value=len(f), allowed="at least one triangle")
+    f, kind = f[keep], kind[keep]
+    flipped = 0
+    if normals is None:
+        f, flipped = _wind(v, f)
+        corner_normals = smooth_normals(v, f, crease_deg)
+    else:
+        corner_normals = np.asarray(normals, float)[keep]
+    used, f = np.unique(f, return_inverse=True)
+    v, f = v[used], f.reshape(-1, 3).astype(np.int32)
+    report = _report(v, f, zero, twins, flipped)
+    return Mesh(v, f, kind, part_names, corner_normals, report, part_materials)
+
+
+def smooth_normals(vertices: Floats, faces: Ints, crease_deg: float = CREASE_DEG) -> Floats:
+    """Return corner normals (f, 3, 3), smoothed over edges that bend less than crease_deg.
+
+    Each face weighs by the sine of its corner over both edge lengths, which is exact for vertices on a sphere: an
+    angle of 0.1 degrees is 0.1 rad of two-way phase at 77 GHz over a 2 cm facet. Source: Max (1999), J. Graphics
+    Tools 4(2).
+    """
+    n = len(faces)
+    cross = _cross(vertices, faces)
+    unit = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+    a, b, ea, eb, opposed = _edge_pairs(faces)
+    soft = opposed & (np.einsum("ij,ij->i", unit[a], unit[b]) > np.cos(np.radians(crease_deg)))
+    a, b, ea, eb = a[soft], b[soft], ea[soft], eb[soft]
+    # Edge e runs from corner e to e + 1; its neighbour walks it the other way.
+    links = np.concatenate([[3 * a + ea, 3 * b + (eb + 1) % 3], [3 * a + (ea + 1) % 3, 3 * b + eb]], axis=1)
+    group = _components(links[0], links[1], 3 * n)
+    c = vertices[faces]
+    to_next, to_last = np.roll(c, -1, axis=1) - c, np.roll(c, 1, axis=1) - c
+    squares = np.einsum("nij,nij->ni", to_next, to_next) * np.einsum("nij,nij->ni", to_last, to_last)
+    weighted = (np.cross(to_next, to_last) / squares[..., None]).reshape(-1, 3)
+    total = np.stack([np.bincount(group, weighted[:, i]) for i in range(3)], axis=1)[group]
+    return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(n, 3, 3)
+
+
+def _cross(v: Floats, f: Ints) -> Floats:
+    return np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
+
+
+def _weld(v: Floats, f: Ints) -> tuple[Floats, Ints]:
+    if not len(v):
+        return v, f
+    step = max(float(np.ptp(v, axis=0).max()), 1e-300) * _WELD
+    key = np.round((v - v.min(axis=0)) / step).astype(np.int64)
+    order = np.lexsort(key.T)
+    new = np.concatenate([[True], (np.diff(key[order], axis=0) != 0).any(axis=1)])
+    index = np.empty(len(v), np.int64)
+    index[order] = np.cumsum(new) - 1
+    return v[order[new]], index[f]
+
+
+def _alive(v: Floats, f: Ints) -> tuple[NDArray[np.bool_], int, int]:
+    """Return which faces have an area and are the first of their kind, and the counts of the others."""
+    c = v[f]
+    longest = np.linalg.norm(np.roll(c, -1, axis=1) - c, axis=2).max(axis=1, initial=0.0)
+    flat = np.linalg.norm(_cross(v, f), axis=1) <= 1e-12 * longest**2
+    _, first = np.unique(np.sort(f, axis=1), axis=0, return_index=True)
+    once = np.zeros(len(f), bool)
+    once[first] = True
+    return once & ~flat, int(flat.sum()), int((~once & ~flat).sum())
+
+
+def _edges(f: Ints) -> tuple[Ints, NDArray[np.bool_], Ints]:
+    """Return the order that sorts the 3 f half-edges by their ends, their sense, and the number of each one's edge."""
+    start, end = f.ravel().astype(np.int64), np.roll(f, -1, axis=1).ravel().astype(np.int64)
+    key = np.minimum(start, end) * (int(f.max(initial=0)) + 1) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    run = np.concatenate([[0], np.cumsum(np.diff(key[order]) != 0)]) if len(order) else order
+    return order, start < end, run
+
+
+def _edge_pairs(f: Ints) -> tuple[Ints, Ints, Ints, Ints, NDArray[np.bool_]]:
+    """Return for edges of exactly two faces: the faces, their local edges, whether they walk it in opposite ways."""
+    order, sense, run = _edges(f)
+    twice = np.flatnonzero(np.bincount(run) == 2)
+    first = np.searchsorted(run, twice)
+    h, g = order[first], order[first + 1]
+    return h // 3, g // 3, h % 3, g % 3, sense[h] != sense[g]
+
+
+def _components(a: Ints, b: Ints, n: int) -> Ints:
+    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _wind(v: Floats, f: Ints) -> tuple[Ints, int]:
+    """Wind neighbours alike and closed pieces outward; return the faces and how many were turned."""
+    n = len(f)
+    a, b, _, _, opposed = _edge_pairs(f)
+    # Double cover: node f is the face as it is, node n + f the face turned; neighbours that agree share a component.
+    turn = np.where(opposed, 0, n)
+    cover = _components(np.concatenate([a, a + n]), np.concatenate([b + turn, b + n - turn]), 2 * n)
+    piece = _components(a, b, n)
+    _, root = np.unique(piece, return_index=True)
+    flip = cover[:n] != cover[root][piece]
+    # The least change: most faces of a piece keep their winding.
+    count = np.bincount(piece)
+    flip ^= (2 * np.bincount(piece, flip) > count)[piece]
+    out = np.where(flip[:, None], f[:, ::-1], f)
+    order, _, run = _edges(out)
+    uses = np.bincount(run)[run]
+    closed = np.bincount(piece, np.bincount(order[uses != 2] // 3, minlength=n)) == 0
+    c = v[out] - v.mean(axis=0)
+    volume = np.bincount(piece, np.einsum("ij,ij->i", c[:, 0], np.cross(c[:, 1], c[:, 2])))
+    inside_out = (closed & (volume < 0.0))[piece]
+    out = np.where(inside_out[:, None], out[:, ::-1], out)
+    return out, int((flip ^ inside_out).sum())
+
+
+def _report(v: Floats, f: Ints, zero: int, twins: int, flipped: int) -> MeshReport:
+    order, _, run = _edges(f)
+    uses = np.bincount(run)
+    opposed = _edge_pairs(f)[-1]
+    same = run[1:] == run[:-1]
+    bodies = len(np.unique(_components(order[:-1][same] // 3, order[1:][same] // 3, len(f))))
+    size = np.ptp(v, axis=0)
+    return MeshReport(
+        vertices=len(v),
+        faces=len(f),
+        bodies=bodies,
+        watertight=bool((uses == 2).all() and opposed.all()),
+        open_edges=int((uses == 1).sum()),
+        non_manifold_edges=int((uses > 2).sum()),
+        size=(float(size[0]), float(size[1]), float(size[2])),
+        zero_area=zero,
+        duplicates=twins,
+        flipped=flipped,
+    )

@@ -1,0 +1,104 @@
+"""Meshes from files (GLB, OBJ, PLY, STL) and from trimesh, turned to metres, x forward, z up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.world.errors import SceneError, nearest
+from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "ft": 0.3048}
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+_AXES = {s + a: (1.0 if s == "+" else -1.0) * np.eye(3)[i] for s in "+-" for i, a in enumerate("xyz")}
+
+
+def load(
+    path: str | Path,
+    unit: str = "m",
+    up: str | None = None,
+    forward: str | None = None,
+    scale: float = 1.0,
+    crease_deg: float = CREASE_DEG,
+) -> Mesh:
+    """Return the mesh of a file in the body frame (x forward, y left, z up); geometries of a baked scene are parts.
+
+    Args: unit m, cm, mm, inch or ft; up the file's axis that points up (default y for GLB, z else) and forward the one
+    that points ahead (default z where y is up, else x), as 'z', '-x', '+y'; scale a further factor.
+    Raises: SceneError for a file that is missing, unreadable or empty, and for options not allowed.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise SceneError("mesh file not found", file=file, value=str(file), allowed="a path to a file that exists")
+    if file.suffix.lower() not in SUFFIXES:
+        raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
+    if unit not in UNITS:
+        raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise SceneError(f"{scale!r} is not possible", file=file, key="scale", value=scale, allowed="above 0")
+    up = up or ("y" if file.suffix.lower() in (".glb", ".gltf") else "z")
+    turn = _turn(up, forward or ("z" if up.endswith("y") else "x"), file)
+    try:
+        import trimesh
+
+        scene = trimesh.load_scene(str(file), process=False)
+        return from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
+    except SceneError as e:
+        raise e.at(file=file) from None
+    except Exception as e:  # trimesh's readers raise whatever their parsers do
+        raise SceneError(f"cannot be read as a mesh ({e})", file=file, allowed="a valid " + file.suffix) from e
+
+
+def from_trimesh(source: Any, crease_deg: float = CREASE_DEG, matrix: Floats | None = None) -> Mesh:
+    """Return the Mesh of a trimesh.Trimesh or trimesh.Scene; each geometry of a scene is a part.
+
+    Args: matrix (3, 3) applied to all vertices; a reflection turns the faces with it.
+    """
+    pieces = _pieces(source)
+    m = np.eye(3) if matrix is None else np.asarray(matrix, float)
+    vertices, faces, part, base = [], [], [], 0
+    for i, (_, v, f) in enumerate(pieces):
+        vertices.append(v @ m.T)
+        faces.append((f if np.linalg.det(m) > 0.0 else f[:, ::-1]) + base)
+        part.append(np.full(len(f), i, np.int32))
+        base += len(v)
+    if not faces:
+        raise SceneError("mesh is empty: no triangles", allowed="at least one triangle")
+    names = tuple(name for name, _, _ in pieces)
+    return make_mesh(
+        np.concatenate(vertices), np.concatenate(faces), np.concatenate(part), names, crease_deg=crease_deg
+    )
+
+
+def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
+    if hasattr(source, "faces"):
+        return [("body", np.asarray(source.vertices, float), np.asarray(source.faces))]
+    found: list[tuple[str, Floats, Any]] = []
+    for node in source.graph.nodes_geometry:
+        transform, key = source.graph[node]
+        geometry = source.geometry[key]
+        if len(getattr(geometry, "faces", ())):
+            v = np.asarray(geometry.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
+            f = np.asarray(geometry.faces)
+            found.append((str(key), v, f if np.linalg.det(transform[:3, :3]) > 0.0 else f[:, ::-1]))
+    if len(found) == 1:
+        found = [("body", *found[0][1:])]
+    return found
+
+
+def _turn(up: str, forward: str, file: Path) -> Floats:
+    """Return the rotation that brings the file's forward to +x and its up to +z."""
+    axes = []
+    for key, word in (("up", up), ("forward", forward)):
+        name = word if word[:1] in "+-" else "+" + word
+        if name not in _AXES:
+            raise SceneError(f"unknown axis '{word}'", file=file, key=key, value=word, allowed="x, y, z, -x, -y or -z")
+        axes.append(_AXES[name])
+    z, x = axes
+    if abs(z @ x) > 0.5:
+        raise SceneError(
+            f"'{forward}' lies along up", file=file, key="forward", value=forward, allowed=f"an axis across up = '{up}'"
+        )
+    return np.stack([x, np.cross(z, x), z])

@@ -1,0 +1,254 @@
+"""The scene: bodies, a radar and settings, from a TOML file or from Python; facets and targets at any time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.tables import Facets, Points
+from raychan.world import check, edit
+from raychan.world.body import Body
+from raychan.world.errors import SceneError, nearest
+from raychan.world.material import Material, material, names, resolve, validity
+from raychan.world.mesh import Floats
+from raychan.world.mount import sensor_of
+from raychan.world.schema import BodyTable, MaterialTable, Model, Processing, RadarTable, SceneFile, checked
+
+__all__ = ["Body", "Scene", "SceneError"]
+
+
+class Scene:
+    """Bodies, materials, a radar and settings.
+
+    Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar a table as in a scene
+    file, or None; processing, model tables or mappings; materials by name, which bodies may use; folder to which
+    file names refer.
+    Raises: SceneError for a scene that cannot be.
+    """
+
+    def __init__(
+        self,
+        bodies: Iterable[Body] = (),
+        frequency: float | None = None,
+        radar: RadarTable | Mapping[str, Any] | None = None,
+        processing: Processing | Mapping[str, Any] | None = None,
+        model: Model | Mapping[str, Any] | None = None,
+        materials: Mapping[str, Material] | None = None,
+        title: str = "",
+        text: str = "",
+        path: Path | None = None,
+        folder: Path | None = None,
+    ) -> None:
+        self.title, self.text, self.path = title, text, path
+        self.folder = folder or Path.cwd()
+        self.bodies = tuple(bodies)
+        self.radar: RadarTable | None = None if radar is None else checked(RadarTable, radar, path)
+        self.processing: Processing = checked(Processing, processing or Processing(), path)
+        self.model: Model = checked(Model, model or Model(), path)
+        carrier = self.radar.waveform.carrier_ghz * 1e9 if self.radar else 77e9
+        self.frequency = carrier if frequency is None else float(frequency)
+        if not (np.isfinite(self.frequency) and self.frequency > 0.0):
+            raise SceneError(f"{frequency!r} is not possible", key="frequency", value=frequency, allowed="above 0 Hz")
+        self.materials = dict(materials or {})
+        self._data: dict[str, Any] | None = None
+        try:
+            self._prepare()
+        except SceneError as e:
+            raise e.at(file=path) from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Scene:
+        """Return the scene of a TOML file; SceneError where file, syntax, key or value is wrong."""
+        file = Path(path)
+        try:
+            text = file.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            raise SceneError("file not found", file=file, allowed="a scene file that exists") from None
+        except (OSError, UnicodeDecodeError) as e:
+            raise SceneError(f"cannot be read ({e})", file=file, allowed="a text file in TOML") from e
+        return cls.from_text(text, file)
+
+    @classmethod
+    def from_text(cls, text: str, path: str | Path | None = None) -> Scene:
+        """Return the scene of TOML text; `path` is where it came from."""
+        return cls.from_dict(edit.parsed(text, path), path, text)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], path: str | Path | None = None, text: str = "") -> Scene:
+        """Return the scene of tables as they stand in a scene file."""
+        file = None if path is None else Path(path)
+        tables: SceneFile = checked(SceneFile, data, file)
+        folder = Path.cwd() if file is None else file.parent
+        ghz = tables.scene.frequency_ghz
+        scene = cls(
+            bodies=[_body(b, folder) for b in tables.bodies],
+            frequency=None if ghz is None else ghz * 1e9,
+            radar=tables.radar,
+            processing=tables.processing,
+            model=tables.model,
+            materials={name: _material(name, m, file) for name, m in tables.materials.items()},
+            title=tables.scene.title,
+            text=text,
+            path=file,
+            folder=folder,
+        )
+        scene._data = dict(data)
+        return scene
+
+    def override(self, changes: Sequence[str]) -> Scene:
+        """Return the scene with keys changed: 'radar.power_dbm=10', 'bodies.suv.position=[12, 0, 0]'.
+
+        Raises: SceneError for a change that names no key or body; ValueError for a scene not from a file.
+        """
+        if not changes:
+            return self
+        if self._data is None:
+            raise ValueError("only a scene from a file or from tables has keys to change")
+        text = self.text + "".join(f"\n# changed: {c}" for c in changes)
+        return self.from_dict(edit.changed(self._data, changes, self.path), self.path, text)
+
+    def _prepare(self) -> None:
+        """Check everything once, so that a scene is complete or does not exist."""
+        seen: set[str] = set()
+        for body in self.bodies:
+            if body.name in seen:
+                raise SceneError(
+                    "two bodies of one name", key=f"bodies.{body.name}", allowed="a name of its own for each"
+                )
+            seen.add(body.name)
+            try:
+                self._chosen(body)
+                _ = body.motion, body.kind
+            except SceneError as e:
+                raise e.at(key="bodies") from None
+        check.radar_outside(self)
+        if self.radar is not None:
+            _ = self.sensor
+
+    @cached_property
+    def sensor(self) -> Any:
+        """The radar.Sensor at time 0; SceneError where the scene has no radar."""
+        if self.radar is None:
+            raise SceneError("the scene has no radar", file=self.path, key="radar", allowed="a [radar] table")
+        return sensor_of(self.radar, self.folder, self.path)
+
+    def sensor_at(self, time: float) -> Any:
+        """Return the radar.Sensor where its velocity has brought it at a time [s]."""
+        s = self.sensor
+        return replace(s, position=np.asarray(s.position) + time * np.asarray(s.velocity))
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What a user should know: meshes that were mended, materials out of range, targets that fold."""
+        said = [note for body in self.bodies for note in body.notes()]
+        used = {
+            m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
+        }
+        said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
+        return said + check.aliases(self)
+
+    def _chosen(self, body: Body) -> list[Material]:
+        """Return the materials of a body's parts: the scene's own first, then the built-in ones."""
+        found = []
+        for part, m in zip(body.geometry.part_names, body.part_materials(), strict=True):
+            if isinstance(m, str) and m not in self.materials and m not in names():
+                key = f"{body.name}.materials.{part}" if part in body.materials else f"{body.name}.material"
+                allowed = nearest(m, [*self.materials, *names()])
+                raise SceneError(f"unknown material '{m}'", key=key, value=m, allowed=allowed)
+            found.append((self.materials.get(m) or material(m, self.frequency)) if isinstance(m, str) else m)
+        return found
+
+    @cached_property
+    def _index(self) -> tuple[list[Material], list[str], list[tuple[Any, Any]]]:
+        """All materials, all part names, and for each body the material and the part number of its faces."""
+        materials: dict[Material, int] = {}
+        parts: dict[str, int] = {}
+        rows = []
+        for body in self.bodies:
+            mesh = body.geometry
+            lone = len(mesh.part_names) == 1
+            part = [parts.setdefault("" if lone and p == "body" else p, len(parts)) for p in mesh.part_names]
+            kind = [materials.setdefault(m, len(materials)) for m in self._chosen(body)]
+            rows.append((np.array(kind, np.int32)[mesh.part], np.array(part, np.int32)[mesh.part]))
+        return list(materials), list(parts), rows
+
+    def facets(self, time: float = 0.0) -> Facets:
+        """Return all triangles in the world at a time [s]; bodies in the scene's order."""
+        materials, parts, rows = self._index
+        turns = [b.motion.rotation(time) for b in self.bodies]
+        meshes = [b.geometry for b in self.bodies]
+        places = [b.motion.to_world(m.vertices, time)[m.faces] for b, m in zip(self.bodies, meshes, strict=True)]
+        body = [np.full(len(m.faces), i, np.int32) for i, m in enumerate(meshes)]
+        return Facets(
+            vertices=_stack(places, (3, 3), float),
+            normals=_stack([m.normals @ r.T for m, r in zip(meshes, turns, strict=True)], (3, 3), float),
+            body=_stack(body, (), np.int32),
+            part=_stack([p for _, p in rows], (), np.int32),
+            material=_stack([m for m, _ in rows], (), np.int32),
+            role=np.array([b.kind for b in self.bodies], np.int8),
+            origin=np.array([b.motion.origin(time) for b in self.bodies]).reshape(-1, 3),
+            velocity=np.array([b.motion.velocity for b in self.bodies], float).reshape(-1, 3),
+            spin=np.array([b.motion.spin for b in self.bodies]).reshape(-1, 3),
+            materials=resolve(materials, self.frequency),
+            body_names=tuple(b.name for b in self.bodies),
+            part_names=tuple(parts),
+        )
+
+    def points(self, time: float = 0.0) -> Points:
+        """Return the targets given by their RCS at a time [s]."""
+        rows = [(i, b) for i, b in enumerate(self.bodies) if b.rcs is not None]
+        tables = [b.target() for _, b in rows]
+        knots = max((t[0] for t in tables), key=len, default=np.array([-np.pi, np.pi]))
+        place: list[Floats] = [b.motion.to_world(b.target_point(), time) for _, b in rows]
+        return Points(
+            position=np.array(place).reshape(-1, 3),
+            velocity=np.array([b.motion.velocity_at(p, time) for (_, b), p in zip(rows, place, strict=True)]).reshape(
+                -1, 3
+            ),
+            body=np.array([i for i, _ in rows], np.int32),
+            azimuth=knots,
+            sigma=np.array([np.interp(knots, *t) for t in tables]).reshape(-1, len(knots)),
+            heading=np.array([b.motion.heading(time) for _, b in rows], float),
+        )
+
+
+def _stack(pieces: list[Any], shape: tuple[int, ...], dtype: Any) -> Any:
+    return np.concatenate(pieces) if pieces else np.zeros((0, *shape), dtype)
+
+
+def _body(t: BodyTable, folder: Path) -> Body:
+    return Body(
+        name=t.name,
+        mesh=None if t.mesh is None else folder / t.mesh,
+        shape=t.shape,
+        params=t.params,
+        material=t.material,
+        materials=t.materials,
+        position=t.position,
+        yaw_deg=t.yaw_deg,
+        pitch_deg=t.pitch_deg,
+        roll_deg=t.roll_deg,
+        velocity=t.velocity_mps,
+        turn_rate_dps=t.turn_rate_dps,
+        rcs=t.rcs_dbsm,
+        rcs_point=t.rcs_point,
+        role=t.role,
+        unit=t.unit,
+        up=t.up,
+        forward=t.forward,
+        scale=t.scale,
+        crease_deg=t.crease_deg,
+    )
+
+
+def _material(name: str, t: MaterialTable, file: Path | None) -> Material:
+    thickness = None if t.thickness_mm is None else t.thickness_mm * 1e-3
+    try:
+        return Material(t.eps_r, t.sigma, thickness, t.roughness_mm * 1e-3, t.pec, name, t.source)
+    except SceneError as e:
+        raise e.at(file=file, key=f"materials.{name}") from None

@@ -1,0 +1,55 @@
+"""Built-in parametric bodies, made of named parts with materials: SHAPES by name."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from raychan.world.errors import SceneError, nearest
+from raychan.world.mesh import Mesh
+from raychan.world.shapes.basic import box, cylinder, dihedral, ground, plate, sphere, trihedral
+from raychan.world.shapes.pedestrian import pedestrian
+from raychan.world.shapes.street import bench, bike_rack, guard_rail, lamp_post, trash_bin, wall
+from raychan.world.shapes.truck import truck
+from raychan.world.shapes.vehicle import car, suv, van
+
+_ALL = (
+    plate, sphere, cylinder, box, dihedral, trihedral, ground, car, suv, van, truck, pedestrian,
+    lamp_post, guard_rail, wall, bench, trash_bin, bike_rack,
+)  # fmt: skip
+SHAPES: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
+
+
+def build(name: str, params: dict[str, Any] | None = None) -> Mesh:
+    """Return a built-in shape by name with its parameters.
+
+    Raises: SceneError for an unknown shape or parameter (nearest name told), a size that is not positive, or sizes for
+    which the shape cannot be built.
+    """
+    if name not in SHAPES:
+        raise SceneError(f"unknown shape '{name}'", key="shape", value=name, allowed=nearest(name, SHAPES))
+    make, given = SHAPES[name], params or {}
+    known = inspect.signature(make).parameters
+    for key, value in given.items():
+        if key not in known:
+            raise SceneError(f"unknown parameter of '{name}'", key=key, value=value, allowed=nearest(key, known))
+        default = known[key].default
+        number = (isinstance(default, (int, float)) and not isinstance(default, bool)) or default is None
+        if number and (isinstance(value, bool) or not isinstance(value, (int, float))):
+            raise SceneError(f"{value!r} is not a number", key=key, value=value, allowed="a number [m]")
+        if number and not 0.0 <= value < float("inf"):
+            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a positive number [m]")
+        if number and value == 0.0 and default != 0.0 and key not in ("arm",):
+            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a positive number [m]")
+        if not number and not isinstance(value, type(default)):
+            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=type(default).__name__)
+    try:
+        return make(**given)
+    except SceneError:
+        raise
+    except (ValueError, ArithmeticError, IndexError, StopIteration) as e:
+        raise SceneError(f"'{name}' cannot be built with these sizes ({e})", key="shape", value=given) from e
+
+
+__all__ = ["SHAPES", "build"]

@@ -1,0 +1,178 @@
+"""The commands as a user meets them: what they print, what they write, how they fail."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from raychan.cli import invoke
+
+SCENE = """
+[scene]
+title = "A plate ahead"
+[radar]
+position = [0.0, 0.0, 1.0]
+velocity_mps = [5.0, 0.0, 0.0]
+[radar.waveform]
+bandwidth_mhz = 500.0
+chirp_us = 30.0
+chirps = 32
+samples = 64
+[model]
+max_bounces = 1
+[[bodies]]
+name = "sign"
+shape = "plate"
+position = [9.0, 0.0, 1.0]
+yaw_deg = 180.0
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    file = tmp_path / "plate.toml"
+    file.write_text(SCENE)
+    return file
+
+
+def run(scene, out, *more):
+    return invoke(["run", str(scene), "--out", str(out), "--no-pictures", *more])
+
+
+def test_run_prints_the_detections_and_writes_what_it_says(scene, tmp_path, capsys):
+    assert run(scene, tmp_path / "out") == 0
+    said = capsys.readouterr()
+    assert "sign" in said.out and "direct" in said.out
+    assert said.err == "", "quiet where there is no terminal"
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"result.nc", "detections.csv", "summary.json"}
+    first = (tmp_path / "out" / "detections.csv").read_text().splitlines()[1].split(",")
+    assert float(first[0]) == pytest.approx(9.0, abs=0.1)
+    assert float(first[1]) == pytest.approx(-5.0, abs=0.1)
+    assert float(first[2]) == pytest.approx(0.0, abs=0.1)
+
+
+def test_explain_and_view_read_what_run_wrote(scene, tmp_path, capsys):
+    out = tmp_path / "out"
+    run(scene, out)
+    capsys.readouterr()
+    assert invoke(["explain", str(out), "--range", "9", "--speed", "0"]) == 0
+    assert "radar > sign > radar, 1 interaction, 9.0" in capsys.readouterr().out
+    page = tmp_path / "scene.html"
+    assert invoke(["view", str(out), "--html", str(page)]) == 0
+    assert "/*DATA*/null" not in page.read_text() and '"sign"' in page.read_text()
+    assert "http" not in page.read_text(), "needs no network"
+
+
+def test_equal_seeds_give_equal_bytes_and_other_seeds_do_not(scene, tmp_path):
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        run(scene, tmp_path / name, "--seed", str(seed))
+    a, b, c = ((tmp_path / n / "detections.csv").read_bytes() for n in "abc")
+    assert a == b != c
+
+
+def test_set_overrides_a_key_and_the_result_remembers(scene, tmp_path):
+    from raychan.run.store import load_result
+
+    run(scene, tmp_path / "out", "--set", "bodies.sign.position=[6, 0, 1]")
+    again = load_result(tmp_path / "out")
+    assert again.detections.range[0] == pytest.approx(6.0, abs=0.1)
+    assert list(again.scene.facets().origin[0]) == [6.0, 0.0, 1.0]
+
+
+def test_a_scene_with_nothing_in_view_is_a_valid_result(scene, tmp_path, capsys):
+    assert run(scene, tmp_path / "out", "--set", "bodies.sign.position=[-9, 0, 1]") == 0
+    assert "0 detections" in capsys.readouterr().out
+
+
+def test_info_tells_of_scenes_and_of_meshes(scene, tmp_path, capsys):
+    trimesh = pytest.importorskip("trimesh")
+    assert invoke(["info", str(scene)]) == 0
+    said = capsys.readouterr().out
+    for word in ("sign", "study_2x2", "EIRP", "22.36 dBm", "unambiguous range", "published"):
+        assert word in said
+    box = tmp_path / "box.stl"
+    trimesh.creation.box((1.0, 2.0, 3.0)).export(box)
+    assert invoke(["info", str(box)]) == 0
+    said = capsys.readouterr().out
+    assert "1.000 x 2.000 x 3.000 m" in said and "watertight" in said
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (["run", "missing.toml", "--out", "o"], "missing.toml"),
+        (["run", "{scene}"], "--out"),
+        (["run", "{scene}", "--out", "o", "--set", "radar.powr_dbm=3"], "power_dbm"),
+        (["run", "{scene}", "--out", "o", "--tolerance", "-1"], "tolerance"),
+        (["run", "{scene}", "--out", "{scene}"], "is a file"),
+        (["explain", "nowhere", "--range", "3"], "nowhere"),
+        (["view", "{scene}", "--html", "no/such/place.html"], "no/such/place.html"),
+        (["view", "{scene}", "--screenshot", "x.jpg"], ".png"),
+        (["info", "nothing.stl"], "nothing.stl"),
+        (["sing"], "sing"),
+    ],
+)
+def test_bad_input_is_told_in_a_sentence_with_exit_code_2(command, words, scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert invoke([word.format(scene=scene) for word in command]) == 2
+    said = capsys.readouterr().err
+    assert words in said and "Traceback" not in said
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_explain_outside_the_map_is_told(scene, tmp_path, capsys):
+    run(scene, tmp_path / "out")
+    assert invoke(["explain", str(tmp_path / "out"), "--range", "900"]) == 2
+    assert "outside the map" in capsys.readouterr().err
+
+
+def python(code):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+
+
+_STOPPED = """
+import os, signal, sys
+import raychan.channel.solve, raychan.cli
+raychan.channel.solve.solve = lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)
+sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
+"""
+
+
+def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
+    done = python(_STOPPED.format(scene=str(scene), out=str(tmp_path / "out")))
+    assert (done.returncode, done.stdout) == (130, ""), done.stderr
+    assert done.stderr == "raychan: interrupted; nothing was written\n"
+    assert [p.name for p in tmp_path.iterdir()] == [scene.name]
+
+
+_HELP = """
+import sys, raychan.cli
+code = raychan.cli.invoke(["--help"])
+print(code, sorted({"numpy", "xarray", "numba"} & set(sys.modules)))
+"""
+
+
+def test_help_is_light_and_names_every_command():
+    done = python(_HELP)
+    assert done.stdout.endswith("0 []\n"), done.stdout + done.stderr
+    for command in ("run", "info", "explain", "view"):
+        assert f" {command} " in done.stdout
+
+
+def test_without_opengl_the_picture_is_drawn_by_matplotlib_with_a_warning(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("RAYCHAN_NO_OPENGL", "1")
+    assert invoke(["view", str(scene), "--screenshot", str(tmp_path / "s.png")]) == 0
+    assert "warning: scene picture drawn by matplotlib" in capsys.readouterr().err
+    assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_pictures_are_drawn_even_of_a_map_without_detections(scene, tmp_path, monkeypatch):
+    monkeypatch.setenv("RAYCHAN_NO_OPENGL", "1")
+    for name, place in (("one", "[9, 0, 1]"), ("none", "[-9, 0, 1]")):
+        command = ["run", str(scene), "--out", str(tmp_path / name), "--set", f"bodies.sign.position={place}"]
+        assert invoke(command) == 0
+        for picture in ("scene.png", "profile.png", "rdmap.png"):
+            assert (tmp_path / name / picture).stat().st_size > 5000

@@ -1,0 +1,134 @@
+"""The cube: the fast sum against the direct one, and both against the phase formula in plain numpy."""
+
+import numpy as np
+import pytest
+from echoes import SMALL, WIDE, echoes, sensor
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from raychan.radar.waveform import Waveform
+from raychan.signal.cube import synthesize
+from raychan.units import C0, db
+
+
+def formula(paths, wave: Waveform) -> np.ndarray:
+    """Samples straight from the convention of radar.waveform."""
+    m, s = np.arange(wave.n_chirps)[:, None], np.arange(wave.n_samples)
+    t = s * wave.chirp_duration / wave.n_samples
+    total = np.zeros((wave.n_chirps, wave.n_samples), complex)
+    for a, tau0, v in zip(paths.amplitude, paths.delay, paths.rate, strict=True):
+        grown = 2.0 * v * (m * wave.repetition + t) / C0
+        tau = tau0 + grown
+        total += a * np.exp(-2j * np.pi * (wave.carrier * grown + wave.slope * t * tau - 0.5 * wave.slope * tau**2))
+    return total
+
+
+def worst_db(cube, truth) -> float:
+    return float(db((np.abs(cube.samples[0] - truth) ** 2).max() / (np.abs(truth) ** 2).max()))
+
+
+def random_paths(seed: int, n: int, wave: Waveform, fastest: float = 30.0):
+    rng = np.random.default_rng(seed)
+    sizes = 10.0 ** rng.uniform(-3, 0, n) * np.exp(2j * np.pi * rng.random(n))
+    return echoes(rng.uniform(0.01, 1.0, n) * wave.unambiguous_range, rng.uniform(-fastest, fastest, n), sizes)
+
+
+@pytest.mark.parametrize("method", ["direct", "nufft"])
+def test_samples_are_those_of_the_phase_formula(method):
+    paths = random_paths(1, 12, WIDE)
+    assert worst_db(synthesize(paths, sensor(WIDE), method=method), formula(paths, WIDE)) < -100.0
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 60),
+    carrier=st.floats(10e9, 140e9),
+    bandwidth=st.floats(50e6, 4e9),
+    duration=st.floats(5e-6, 60e-6),
+    idle=st.floats(0.0, 40e-6),
+    chirps=st.integers(1, 33),
+    samples=st.integers(1, 130),
+)
+def test_fast_sum_equals_direct_sum_over_random_paths_and_waveforms(
+    seed, n, carrier, bandwidth, duration, idle, chirps, samples
+):
+    wave = Waveform(carrier, bandwidth, duration, duration + idle, chirps, samples)
+    paths = random_paths(seed, n, wave)
+    direct = synthesize(paths, sensor(wave), method="direct")
+    fast = synthesize(paths, sensor(wave), method="nufft", tolerance=1e-7)
+    # Peak of the sum, not of one path: paths that cancel must not be an excuse, nor a reason to fail.
+    peak = max(np.abs(direct.samples).max(), np.abs(paths.amplitude).max())
+    assert db((np.abs(fast.samples - direct.samples).max() / peak) ** 2) < -100.0
+
+
+def test_movers_at_4_ghz_migrate_over_several_cells_and_stay_exact():
+    paths = random_paths(2, 40, WIDE)
+    assert 30.0 * WIDE.frame_duration > 4.0 * WIDE.range_resolution
+    direct = synthesize(paths, sensor(WIDE), method="direct")
+    assert worst_db(synthesize(paths, sensor(WIDE), method="nufft"), direct.samples[0]) < -100.0
+
+
+def test_migration_left_out_would_be_wrong():
+    paths = echoes([20.0], 30.0)
+    still = formula(paths, WIDE) * 0
+    m, t = np.arange(128)[:, None] * WIDE.repetition, np.arange(1024) * WIDE.chirp_duration / 1024
+    tau = paths.delay[0]
+    turn = WIDE.carrier * 60.0 * (m + t) / C0 + WIDE.slope * t * tau - 0.5 * WIDE.slope * tau**2
+    still += np.exp(-2j * np.pi * turn)
+    assert worst_db(synthesize(paths, sensor(WIDE)), still) > -25.0
+
+
+def test_more_paths_than_one_chunk_add_up(monkeypatch):
+    monkeypatch.setattr("raychan.signal.cube._CHUNK", 7)
+    paths = random_paths(3, 40, SMALL)
+    assert worst_db(synthesize(paths, sensor(SMALL), method="nufft"), formula(paths, SMALL)) < -100.0
+
+
+def test_equal_inputs_give_equal_bytes_and_noise_follows_the_seed():
+    radar, paths = sensor(SMALL, noise=True), random_paths(4, 100, SMALL)
+    a, b, c = (synthesize(paths, radar, np.random.default_rng(s), method="nufft").samples for s in (5, 5, 6))
+    assert a.tobytes() == b.tobytes() != c.tobytes()
+
+
+def test_no_paths_give_silence():
+    cube = synthesize(echoes([]), sensor(SMALL))
+    assert cube.samples.shape == (1, 64, 128) and not cube.samples.any() and cube.noise_power == 0.0
+
+
+@pytest.mark.parametrize("complex_sampling", [True, False])
+def test_noise_alone_has_power_k_t_b_f(complex_sampling):
+    wave = Waveform(77e9, 1e9, 20e-6, 40e-6, 128, 1024, complex_sampling)
+    cube = synthesize(echoes([]), sensor(wave, noise=True), np.random.default_rng(7))
+    expected = 1.380649e-23 * 290.0 * (1024 / 20e-6) * 10**1.5 * (1.0 if complex_sampling else 0.5)
+    assert abs(db((np.abs(cube.samples) ** 2).mean() / expected)) < 0.1
+
+
+def test_real_samples_are_the_real_part():
+    real = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128, complex_sampling=False)
+    paths = random_paths(8, 5, SMALL)
+    i, iq = synthesize(paths, sensor(real)).samples, synthesize(paths, sensor(SMALL)).samples
+    assert np.array_equal(i.real, iq.real) and not i.imag.any()
+
+
+def test_power_is_amplitude_squared_times_transmitted_power():
+    cube = synthesize(echoes([10.0], amplitudes=1e-5j), sensor(SMALL, power=0.02))
+    assert np.allclose(np.abs(cube.samples) ** 2, 0.02e-10, rtol=1e-5)
+
+
+def test_a_receiver_set_aside_sees_the_paths_of_a_shifted_receiver():
+    azimuth, aside = 0.4, 0.05
+    radar = sensor(SMALL, elements=np.array([[0, 0, 0], [0, aside, 0]]), yaw=0.3)
+    # In the antenna's frame the wave comes from azimuth 0.4; the path to the second receiver is shorter.
+    paths = echoes([10.0], 3.0, 1.0, azimuth + 0.3)
+    shorter = aside * np.sin(azimuth)
+    moved = echoes([10.0 - 0.5 * shorter], 3.0, np.exp(2j * np.pi * SMALL.carrier * shorter / C0), azimuth + 0.3)
+    both = synthesize(paths, radar).samples
+    assert np.allclose(both[1], synthesize(moved, sensor(SMALL)).samples[0], atol=1e-4)
+    assert np.allclose(both[0], synthesize(paths, sensor(SMALL)).samples[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("bad", [{"method": "magic"}, {"tolerance": 0.0}])
+def test_bad_arguments_are_refused(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        synthesize(echoes([1.0]), sensor(SMALL), **bad)

@@ -1,0 +1,187 @@
+"""Built-in shapes: closed, outward, of the size asked for, with the normals of the true surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from raychan.world.errors import SceneError
+from raychan.world.material import names
+from raychan.world.shapes import SHAPES, build
+from raychan.world.shapes.curve import End, arcs, half_outline
+from raychan.world.shapes.piece import Assembly
+from raychan.world.shapes.solid import capsule, ellipsoid, offset_solid, rounded_block
+
+SHEETS = {"plate", "dihedral", "trihedral", "ground"}
+VEHICLES = ("car", "suv", "van", "truck")
+
+
+def flat_normals(mesh):
+    c = mesh.corners
+    n = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
+    return n / np.linalg.norm(n, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("name", sorted(set(SHAPES) - SHEETS))
+def test_every_solid_is_closed_and_faces_outward(name):
+    mesh = build(name)
+    assert mesh.report.watertight and mesh.report.zero_area == mesh.report.duplicates == 0
+    assert mesh.volume() > 0.0
+    agreement = np.einsum("fij,fj->fi", mesh.normals, flat_normals(mesh))
+    # Facets of a tight curve differ more from their corner normals; none may point the other way.
+    assert agreement.min() > 0.6
+    assert (mesh.areas[agreement.min(axis=1) < 0.95].sum() / mesh.areas.sum()) < 0.01
+
+
+@pytest.mark.parametrize("name", sorted(SHAPES))
+def test_unit_normals_known_materials_and_used_parts(name):
+    mesh = build(name)
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=2), 1.0, atol=1e-12)
+    assert set(mesh.part_materials) <= set(names())
+    assert set(mesh.part) == set(range(len(mesh.part_names)))
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_vehicles_have_the_size_asked_for_and_stand_on_the_ground(name):
+    size = {"length": 5.0, "width": 1.95, "height": 1.9}
+    mesh = build(name, size if name != "truck" else {"length": 7.5, "width": 2.4, "height": 3.2})
+    size = size if name != "truck" else {"length": 7.5, "width": 2.4, "height": 3.2}
+    own = ~np.isin(mesh.part, [i for i, n in enumerate(mesh.part_names) if n.startswith("mirror")])
+    low, high = (f(mesh.corners[own].reshape(-1, 3), axis=0) for f in (np.min, np.max))
+    np.testing.assert_allclose(high - low, list(size.values()), rtol=1e-9)
+    np.testing.assert_allclose([low[0] + high[0], low[1] + high[1], low[2]], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_vehicles_are_symmetric(name):
+    c = build(name).corners.mean(axis=1)
+    left, right = c[c[:, 1] > 1e-9], c[c[:, 1] < -1e-9]
+    moments = [(s[:, 0].sum(), np.abs(s[:, 1]).sum(), s[:, 2].sum()) for s in (left, right)]
+    # Caps are cut along one diagonal, so that single facets need not mirror each other.
+    np.testing.assert_allclose(moments[0], moments[1], rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        (
+            "car",
+            {"tail", "rear_door_left", "front_door_right", "mirror_left", "tyre_front_left", "plate", "hood", "roof"},
+        ),
+        ("suv", {"tail", "window_rear", "windscreen", "tyre_rear_right", "seats"}),
+        ("van", {"tail", "windscreen", "plate"}),
+        ("truck", {"tail", "tyre_front_left", "tyre_rear_right", "cab", "plate", "lock_bars"}),
+        ("pedestrian", {"head", "torso", "arm_left", "leg_right"}),
+        ("lamp_post", {"pole", "arm", "luminaire"}),
+    ],
+)
+def test_named_parts_exist(name, parts):
+    assert parts <= set(build(name).part_names)
+
+
+def test_parts_are_where_their_names_say():
+    mesh = build("car")
+    place = {n: mesh.corners[mesh.part == i].reshape(-1, 3).mean(axis=0) for i, n in enumerate(mesh.part_names)}
+    assert place["tail"][0] < -2.0 < 2.0 < place["front"][0]
+    assert place["tyre_front_left"][0] > 1.0 and place["tyre_front_left"][1] > 0.7
+    assert place["mirror_right"][1] < -0.9 and place["rear_door_left"][0] < place["front_door_left"][0]
+    assert place["roof"][2] > 1.2 and 0.5 < place["plate"][2] < 0.9
+
+
+def test_door_seams_are_grooves_of_the_depth_asked_for():
+    plan = half_outline(4.0, 1.8, End(3.0, 0.3), End(3.0, 0.3), 1e-6)
+    section = arcs([(np.inf, 1.0)], 0.0, 1e-3)
+    whole, cut = (_mesh(offset_solid(plan, section, g)) for g in ({}, {2.0: (0.01, 0.02)}))
+    # Two trapezoids (mean width three quarters of the mouth) over a height of 1 m.
+    assert whole.volume() - cut.volume() == pytest.approx(2 * 0.0075 * 0.02, rel=1e-3)
+    assert cut.report.watertight
+
+
+def _mesh(piece):
+    made = Assembly()
+    made.add("body", "pec", piece)
+    return made.mesh()
+
+
+def test_sphere_normals_are_radial_and_its_volume_is_known():
+    mesh = build("sphere", {"radius": 0.5})
+    np.testing.assert_allclose(mesh.normals, mesh.corners / 0.5, atol=1e-9)
+    np.testing.assert_allclose(mesh.report.size, 1.0, atol=1e-12)
+    assert mesh.volume() == pytest.approx(np.pi / 6.0, rel=3e-3)
+
+
+def test_ellipsoid_normals_are_the_gradient():
+    semi = np.array([0.1, 0.2, 0.3])
+    mesh = _mesh(ellipsoid(tuple(semi)))
+    gradient = mesh.corners / semi**2
+    gradient /= np.linalg.norm(gradient, axis=2, keepdims=True)
+    np.testing.assert_allclose(mesh.normals, gradient, atol=1e-9)
+
+
+def test_capsule_surface_keeps_its_distance_from_the_axis():
+    mesh = _mesh(capsule(np.zeros(3), np.array([0.3, 0.4, 1.2]), 0.1, 0.1))
+    axis = np.array([0.3, 0.4, 1.2])
+    t = np.clip(mesh.vertices @ axis / (axis @ axis), 0.0, 1.0)
+    np.testing.assert_allclose(np.linalg.norm(mesh.vertices - t[:, None] * axis, axis=1), 0.1, atol=1e-12)
+
+
+def test_rounded_block_surface_is_at_its_radius_from_the_inner_box():
+    mesh = _mesh(rounded_block(1.0, 2.0, 0.6, 0.1))
+    inner = np.array([0.4, 0.9, 0.2])
+    p = mesh.vertices - [0.0, 0.0, 0.3]
+    off = p - np.clip(p, -inner, inner)
+    np.testing.assert_allclose(np.linalg.norm(off, axis=1), 0.1, atol=1e-12)
+    c = mesh.corners - [0.0, 0.0, 0.3]
+    np.testing.assert_allclose(mesh.normals * 0.1, c - np.clip(c, -inner, inner), atol=1e-12)
+
+
+def test_finer_sag_brings_facets_to_the_surface():
+    for sag in (2e-3, 0.5e-3):
+        middle = build("sphere", {"max_sag": sag}).corners.mean(axis=1)
+        assert 0.5 - np.linalg.norm(middle, axis=1).min() < 2.0 * sag
+
+
+def test_bodywork_normals_agree_with_a_much_finer_tessellation():
+    coarse, fine = build("car", {"max_sag": 2e-3}), build("car", {"max_sag": 5e-5})
+    skin = ("tail", "rear_bumper", "boot", "floor", "quarter_left", "quarter_right")
+    near = np.isin(fine.part, [fine.part_names.index(n) for n in skin])
+    tail = coarse.part == coarse.part_names.index("tail")
+    at = cKDTree(fine.corners[near].mean(axis=1)).query(coarse.corners[tail].reshape(-1, 3))[1]
+    cosine = np.einsum("ij,ij->i", coarse.normals[tail].reshape(-1, 3), flat_normals(fine)[near][at])
+    # Half a facet of the fine fillet turns by 2.3 degrees, of the coarse one by 15.
+    assert np.degrees(np.arccos(cosine.min())) < 5.0
+
+
+def test_corners_open_to_plus_x():
+    for params in ({}, {"square": True}):
+        mesh = build("trihedral", params)
+        n = flat_normals(mesh)
+        np.testing.assert_allclose(n[:, 0], 1.0 / np.sqrt(3.0), atol=1e-12)
+        faces = np.unique(n.round(9), axis=0)
+        np.testing.assert_allclose(faces @ faces.T, np.eye(3), atol=1e-8)
+    np.testing.assert_allclose(flat_normals(build("dihedral"))[:, 0], 1.0 / np.sqrt(2.0), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "key"),
+    [
+        ("caar", {}, "shape"),
+        ("car", {"lenght": 4.0}, "lenght"),
+        ("car", {"length": -4.0}, "length"),
+        ("car", {"length": "4 m"}, "length"),
+        ("sphere", {"radius": 0.0}, "radius"),
+        ("sphere", {"radius": float("nan")}, "radius"),
+        ("car", {"length": 0.5}, "shape"),
+        ("trihedral", {"square": "yes"}, "square"),
+    ],
+)
+def test_bad_parameters_are_named(name, params, key):
+    with pytest.raises(SceneError) as caught:
+        build(name, params)
+    assert caught.value.key == key
+
+
+def test_nearest_shape_is_suggested():
+    with pytest.raises(SceneError, match="did you mean 'car'"):
+        build("carr")
