@@ -6,11 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.report.canvas import collections, figure, save, style
 from raychan.view.drawing import Drawing
 
 _MOST = 6000  # triangles drawn of a shape; matplotlib sorts and paints them one by one
+
+
+def _largest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest triangles, for small ones hide nothing and cost as much."""
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return triangles[np.argsort(-np.linalg.norm(cross, axis=1), kind="stable")[:_MOST]]
 
 
 def picture(drawing: Drawing, path: str | Path) -> Path:
