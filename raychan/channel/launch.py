@@ -21,6 +21,7 @@ from raychan.channel.tubes import (
     phases_of,
     stand,
     too_rough,
+    unit,
 )
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
@@ -49,6 +50,10 @@ def _seeds(surface: Surface, leg: Leg, bodies: Bools, rule: Refinement) -> Tubes
     k, _ = leg.rays(f.vertices[rows])
     towards = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
     rows = rows[towards | ~surface.closed[f.body[rows]]]
+    if leg.mirrors:
+        v = f.vertices[rows]
+        middle = v.mean(axis=1)
+        rows = rows[leg.may_reach(middle, np.linalg.norm(v - middle[:, None], axis=2).max(axis=1))]
     bary = np.broadcast_to(np.eye(3), (len(rows), 3, 3)).copy()
     return stand(surface, leg, rows, bary, rule.slots)
 
@@ -96,7 +101,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
         split = view.mixed & matters & (level < rule.levels)
         ready = ~split & view.seen[:, CENTRE]
         kept.append(tubes.take(ready))
-        _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready])
+        _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready], rule)
         if not split.any():
             break
         rows = np.flatnonzero(split)
@@ -155,18 +160,24 @@ def divide(
     return Tubes.join([half, third]), np.concatenate([np.tile(rows[~sharp], 2), np.tile(rows[sharp], 3)[real]])
 
 
-def _write_leg(surface: Surface, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints) -> None:
+def _write_leg(surface: Surface, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints, rule: Refinement) -> None:
     """Write the leg's mirrors and the layers passed into the tubes' history."""
     every = np.arange(len(tubes))
     for i, m in enumerate(leg.mirrors):
-        tubes.append(every, corners[:, i], m.normal, np.full(len(tubes), m.facet, np.int32), REFLECT)
-    write_layers(surface, tubes, tubes.points[:, CENTRE], tubes.k[:, CENTRE], passed)
+        facet = np.full(len(tubes), m.facet, np.int32)
+        tubes.append(every, corners[:, i], m.normal, facet, REFLECT)
+        before = corners[:, i - 1] if i else leg.end
+        d = unit(corners[:, i] - before)
+        tubes.strength = tubes.strength * surface.strength(facet, np.abs(d @ m.normal), rule.wavenumber)
+    write_layers(surface, tubes, tubes.points[:, CENTRE], tubes.k[:, CENTRE], passed, rule)
 
 
-def write_layers(surface: Surface, tubes: Tubes, point: Floats, k: Floats, passed: Ints) -> None:
+def write_layers(surface: Surface, tubes: Tubes, point: Floats, k: Floats, passed: Ints, rule: Refinement) -> None:
     """Write the layers (n, l) that the rays through `point` (n, 3) along k (n, 3) passed into the history."""
     for j in range(passed.shape[1]):
         rows = np.flatnonzero(passed[:, j] >= 0)
         facet = passed[rows, j]
         t = surface.distance(facet, point[rows], k[rows])
         tubes.append(rows, point[rows] + t[:, None] * k[rows], surface.normal[facet], facet, TRANSMIT)
+        cosine = np.abs(np.einsum("ij,ij->i", surface.normal[facet], k[rows]))
+        tubes.strength[rows] *= surface.strength(facet, cosine, rule.wavenumber, passing=True)

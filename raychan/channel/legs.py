@@ -16,12 +16,28 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Mirror:
-    """A plane that reflects: a point on it, its unit normal towards the lit side, one of its facets, its body."""
+    """A plane that reflects: a point on it, its unit normal towards the lit side, one of its facets, its body, and the
+    circle (centre [m], radius [m]) that holds all of it."""
 
     point: Floats
     normal: Floats
     facet: int
     body: int
+    centre: Floats
+    radius: float
+
+    @staticmethod
+    def of(surface: Surface, facet: int, side: float) -> Mirror:
+        """Return the mirror of the plane of a facet, lit on its outward side (+1) or from behind (-1)."""
+        v = surface.facets.vertices[surface.plane == surface.plane[facet]].reshape(-1, 3)
+        centre = 0.5 * (v.min(axis=0) + v.max(axis=0))
+        radius = float(np.linalg.norm(v - centre, axis=1).max())
+        body = int(surface.facets.body[facet])
+        return Mirror(surface.first[facet], side * surface.normal[facet], facet, body, centre, radius)
+
+    def turned(self) -> Mirror:
+        """Return the same plane lit from its other side."""
+        return Mirror(self.point, -self.normal, self.facet, self.body, self.centre, self.radius)
 
     def image(self, x: Floats) -> Floats:
         """Return x mirrored at the plane."""
@@ -87,6 +103,18 @@ class Leg:
             towards = towards + np.where(np.isfinite(t), t, 0.0)[:, None] * d
             out[:, i] = towards
         return out
+
+    def may_reach(self, points: Floats, size: Floats) -> Bools:
+        """Tell which balls about points (n, 3) of radius `size` (n,) [m] could be met: in front of the last mirror, and by
+        way of each mirror's circle."""
+        ok = np.ones(len(points), bool)
+        if self.mirrors:
+            ok &= (points - self.mirrors[-1].point) @ self.mirrors[-1].normal > -size
+            spots = self.bounces(points)
+            for i, m in enumerate(self.mirrors):
+                # A ray to the ball's rim meets a mirror nearer to the ray to its centre than the ball's radius.
+                ok &= np.linalg.norm(spots[:, i] - m.centre, axis=1) < m.radius + size
+        return ok
 
     def visible(
         self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None

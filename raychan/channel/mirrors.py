@@ -36,13 +36,11 @@ def planes_that_mirror(surface: Surface, end: Floats) -> list[Mirror]:
     for plane in np.flatnonzero(area >= _LEAST_AREA):
         facet = int(largest[plane])
         body = int(f.body[facet])
-        normal, point = surface.normal[facet], surface.first[facet]
-        height = float((end - point) @ normal)
+        height = float((end - surface.first[facet]) @ surface.normal[facet])
         if height < 0.0 and surface.closed[body]:
             continue
-        mirror = Mirror(point, normal if height >= 0.0 else -normal, facet, body)
-        centre = f.vertices[facet].mean(axis=0)
-        view = area[plane] * abs(height) / np.linalg.norm(end - centre) ** 3
+        mirror = Mirror.of(surface, facet, 1.0 if height >= 0.0 else -1.0)
+        view = area[plane] * abs(height) / np.linalg.norm(end - mirror.centre) ** 3
         found.append((np.inf if f.role[body] == MIRROR else view, mirror))
     found.sort(key=lambda pair: -pair[0])
     return [m for _, m in found[:_MOST]]
@@ -65,7 +63,7 @@ def legs_over(surface: Surface, end: Floats, bounces: int) -> list[Leg]:
 
 def _both_sides(surface: Surface, mirrors: list[Mirror]) -> list[Mirror]:
     """Add the back of each open sheet: a second mirror may be met from behind as seen from the end."""
-    backs = [Mirror(m.point, -m.normal, m.facet, m.body) for m in mirrors if not surface.closed[m.body]]
+    backs = [m.turned() for m in mirrors if not surface.closed[m.body]]
     return mirrors + [m for m in backs if surface.facets.role[m.body] != MIRROR]
 
 
@@ -93,14 +91,6 @@ def reachable(surface: Surface, leg: Leg) -> Bools:
     empty = ~np.isfinite(low).all(axis=1)
     centre = np.where(empty[:, None], 0.0, 0.5 * (low + high))
     radius = np.where(empty, 0.0, 0.5 * np.linalg.norm(np.where(empty[:, None], 0.0, high - low), axis=1))
-    last = leg.mirrors[-1]
-    front = (centre - last.point) @ last.normal > -radius
-    own = surface.plane == surface.plane[last.facet]
-    v = f.vertices[own].reshape(-1, 3)
-    middle = 0.5 * (v.min(axis=0) + v.max(axis=0))
-    reach = np.linalg.norm(v - middle, axis=1).max()
-    spot = leg.bounces(centre)[:, -1]
-    # The ray to the sphere's rim meets the mirror within the sphere's radius of the ray to its centre.
-    ok = ~empty & front & (np.linalg.norm(spot - middle, axis=1) < reach + radius)
-    ok[last.body] = False
+    ok = ~empty & leg.may_reach(centre, radius)
+    ok[leg.mirrors[-1].body] = False
     return ok

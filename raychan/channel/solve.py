@@ -48,6 +48,24 @@ class Stats:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - since
 
 
+def refinement(frequency: float, tolerance_db: float, floor: float = 0.0, layers: int = 2) -> Refinement:
+    """Return how finely tubes must be cut for a tolerance [dB].
+
+    Args: floor [1/m] the scattered amplitude that drowns in noise. The constants are those at which two
+    launches of the shapes in the tests differ by about half the tolerance.
+    """
+    fine = tolerance_db / 0.5
+    return Refinement(
+        wavenumber=2.0 * np.pi * frequency / C0,
+        phase=min(0.2, 0.1 * fine),
+        turn=min(0.3, 0.15 * fine),
+        relative=min(0.1, 0.02 * fine),
+        max_edge=0.3 * min(1.0, np.sqrt(fine)),
+        floor=floor,
+        layers=layers,
+    )
+
+
 def solve(
     facets: Facets,
     points: Points,

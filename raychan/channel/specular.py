@@ -97,10 +97,9 @@ def _found_chains(surface: Surface, tx: Floats, rx: Floats, bounces: int, seed: 
 def _exact(surface: Surface, tx: Floats, rx: Floats, chains: list[Chain], slots: int, layers: int) -> Routes:
     """Return the routes of the chains that are real: bounce points on their planes, in order, nothing in between."""
     rows = []
+    known = {step: Mirror.of(surface, *step) for step in {s for chain in chains for s in chain}}
     for chain in chains:
-        mirrors = tuple(
-            Mirror(surface.first[f], s * surface.normal[f], f, int(surface.facets.body[f])) for f, s in chain
-        )
+        mirrors = tuple(known[step] for step in chain)
         row = _one(surface, Leg(end=tx, mirrors=mirrors), rx, slots, layers)
         if row is not None:
             rows.append(row)
@@ -135,7 +134,7 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
     """Return (length, vertices, normals, facets, kinds) of one chain, or None if it is not real."""
     if any((rx - m.point) @ m.normal <= 0.0 for m in leg.mirrors[-1:]):
         return None
-    if np.linalg.norm(rx - leg.image) == 0.0:
+    if np.linalg.norm(rx - leg.image) == 0.0 or not leg.may_reach(rx[None], np.zeros(1))[0]:
         return None
     stops = [leg.end, *leg.bounces(rx[None])[0], rx]
     vertices, normals, facets, kinds = [], [], [], []

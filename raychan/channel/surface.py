@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from raychan.kernels.fresnel import coefficients_array
 from raychan.tables import Facets
 from raychan.world.embree import Tracer
 
@@ -116,6 +117,13 @@ class Surface(Tracer):
         """Return unit normals (n, ..., 3) of the true surface at barycentric coordinates."""
         v = np.einsum("n...i,nij->n...j", bary, self.facets.normals[facet])
         return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+    def strength(self, facet: Ints, cosine: Floats, wavenumber: float, passing: bool = False) -> Floats:
+        """Return the larger of |R_s|, |R_p| (or of |T_s|, |T_p| when `passing`) at facets (n,) for cosines of incidence."""
+        m = self.facets.materials
+        row = self.facets.material[facet]
+        c = np.abs(coefficients_array(m.kind[row], m.eps[row], m.thickness[row], m.roughness[row], cosine, wavenumber))
+        return c[:, 2:].max(axis=1) if passing else c[:, :2].max(axis=1)
 
     def barycentric(self, facet: Ints, point: Floats) -> Floats:
         """Return barycentric coordinates (n, ..., 3) of points in the planes of their facets."""

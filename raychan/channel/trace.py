@@ -39,7 +39,11 @@ def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, tota
     start = np.zeros((int(room.sum()), 4))
     through = np.full((int(room.sum()), rule.layers), -1, np.int32)
     _fly(surface, leg, out, tubes.take(room), start, through, 0, first, total, rule, landed)
-    return Tubes.join(landed) if landed else tubes.take(np.zeros(len(tubes), bool))
+    if not landed:
+        return tubes.take(np.zeros(len(tubes), bool))
+    after = Tubes.join(landed)
+    # What is left counts less than a tenth of what would be worth a cut: let it go.
+    return after.take(phases_of(surface, leg, out, after, False, rule).bound > 0.1 * least(rule, total))
 
 
 def _fly(
@@ -60,7 +64,7 @@ def _fly(
         split = mixed & matters & (level < rule.levels)
         ready = np.flatnonzero(~split & (mid >= 0))
         whole = np.where(agree[ready, None], hit[ready], mid[ready, None])
-        landed.append(_land(surface, leg, tubes.take(ready), k[ready], whole, through[ready]))
+        landed.append(_land(surface, leg, tubes.take(ready), k[ready], whole, through[ready], rule))
         behind = ready[surface.is_layer[mid[ready]]] if layer < rule.layers else ready[:0]
         if len(behind):
             beyond, passed = t[behind].copy(), through[behind].copy()
@@ -117,7 +121,7 @@ def _agree(surface: Surface, hit: Ints) -> Bools:
     return all_hit & (one_plane | one_patch)
 
 
-def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, through: Ints) -> Tubes:
+def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, through: Ints, rule: Refinement) -> Tubes:
     """Return tubes put down on the planes of the facets `hit` (n, 4), their reflection written into the history."""
     n = len(tubes)
     flat_k, flat_p, flat_hit = k.reshape(-1, 3), tubes.points.reshape(-1, 3), hit.ravel()
@@ -130,7 +134,9 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
     facet = hit[:, CENTRE].copy()
     every = np.arange(n)
     tubes.append(every, tubes.points[:, CENTRE], tubes.normals[:, CENTRE], tubes.facet, REFLECT)
-    write_layers(surface, tubes, tubes.points[:, CENTRE], k[:, CENTRE], through)
+    cosine = np.abs(np.einsum("ij,ij->i", tubes.normals[:, CENTRE], k[:, CENTRE]))
+    tubes.strength = tubes.strength * surface.strength(tubes.facet, cosine, rule.wavenumber)
+    write_layers(surface, tubes, tubes.points[:, CENTRE], k[:, CENTRE], through, rule)
     points = tubes.points + t[..., None] * k
     after = vector_area(points)
     across_before = np.einsum("ij,ij->i", before, k[:, CENTRE])

@@ -52,7 +52,7 @@ class Refinement:
 class Tubes:
     """Tubes standing on their present footprint; n tubes, 4 rays each (corners, centre), d slots of history.
 
-    `points` [m], `k` unit directions of arrival, `length` [m] from the transmitter, `normals` of the true surface on
+    `strength` left of the field by mirrors and layers; `points` [m], `k` unit directions of arrival, `length` [m] from the transmitter, `normals` of the true surface on
     the lit side, `spread` [1/m] field at the footprint, `flat` all mirrors so far were planes, `bary` corners on
     the first facet, `slots` of history in use, `bounces` counted with this one, `caustics` passed; then the history.
     """
@@ -63,6 +63,7 @@ class Tubes:
     normals: Floats
     facet: Ints
     spread: Floats
+    strength: Floats
     flat: Bools
     bary: Floats
     slots: Ints
@@ -106,6 +107,7 @@ def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> 
         normals=normals,
         facet=facet,
         spread=leg.spread(length[:, CENTRE]),
+        strength=np.ones(n),
         flat=np.ones(n, bool),
         bary=bary,
         slots=np.zeros(n, np.int8),
@@ -258,7 +260,7 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
     centre = k * (tubes.length[:, CENTRE] + back[:, CENTRE])
     miss = centre - corner.mean(axis=1) - bend.sum(axis=1) * (4.0 / 9.0)
     across = np.abs(np.einsum("ij,ij->i", vector_area(tubes.points), tubes.k[:, CENTRE]))
-    area = k / (2.0 * np.pi) * across * tubes.spread * out.spread(back[:, CENTRE])
+    area = k / (2.0 * np.pi) * across * tubes.strength * tubes.spread * out.spread(back[:, CENTRE])
     span = corner.max(axis=1) - corner.min(axis=1)
     bound = area / (1.0 + 0.5 * span)
     return Phases(np.concatenate([corner, middle], axis=1), bend, miss, bound, area)

@@ -20,7 +20,8 @@ Floats = NDArray[np.float64]
 
 _NAMED = {
     "red": "#c0392b", "blue": "#2e6da4", "green": "#2e8b57", "yellow": "#d9b310", "white": "#e8e8e8",
-    "black": "#3a3a3a", "grey": "#8a8a8a", "gray": "#8a8a8a", "silver": "#b8bcc0", "orange": "#e07b39", "brown": "#7b5a3c",
+    "black": "#3a3a3a", "grey": "#8a8a8a", "gray": "#8a8a8a", "silver": "#b8bcc0", "orange": "#e07b39",
+    "brown": "#7b5a3c",
 }  # fmt: skip
 """A body whose name says its colour is drawn in it."""
 

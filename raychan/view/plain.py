@@ -33,7 +33,7 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
         for shape in drawing.shapes:
             flat = shape.name == "ground"
             triangles = np.clip(shape.triangles, low, high) if flat else shape.triangles
-            triangles = triangles[:: max(1, len(shape.triangles) // _MOST)]
+            triangles = _largest(triangles)
             opacity = 0.5 if flat else 0.8 * shape.opacity
             faces = solids.Poly3DCollection(triangles, facecolors=shape.colour, alpha=opacity, shade=not flat)
             faces.set_zorder(0 if flat else 1)
