@@ -18,7 +18,7 @@ _HOME = {
     "Result": "raychan.run.result",
     "explain": "raychan.run.provenance",
     "load_result": "raychan.run.store",
-    "specular_paths": "raychan.channel.mirrors",
+    "rcs": "raychan.channel.rcs",
 }
 
 __all__ = [*_HOME, "__version__"]

@@ -9,7 +9,7 @@ from raychan.tables import PEC, Facets, Materials
 
 
 def facets(meshes, materials=None, smooth=None, role=None, velocity=None):
-    """Facets of trimeshes, a body each; materials rows (kind, eps, thickness, roughness); smooth: vertex normals used."""
+    """Facets of trimeshes, a body each; materials rows (kind, eps, thickness, roughness)."""
     rows = materials or [(PEC, 1.0 + 0j, 0.0, 0.0)] * len(meshes)
     tri = [np.asarray(m.triangles, float) for m in meshes]
     normals = []

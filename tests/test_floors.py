@@ -57,3 +57,11 @@ def test_each_heavy_library_is_imported_in_one_place_and_drawing_lazily():
                 homes[top].add(str(file.relative_to(ROOT)))
                 assert not (at_import and top in LAZY), f"{file}: {top} is imported at once"
     assert {top: {home} for top, home in HOME.items()} == dict(homes)
+
+
+def test_every_public_name_is_there():
+    import raychan
+
+    assert all(getattr(raychan, name) is not None for name in raychan.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = raychan.nonsense

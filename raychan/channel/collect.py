@@ -17,7 +17,8 @@ Ints = NDArray[np.int32]
 def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, corners: Floats, passed: Ints) -> Routes:
     """Return the routes of tubes that scatter on their present footprint and leave over `out`.
 
-    Args: first whether this is their first surface; corners (n, m, 3) mirror points of the way out, receiver's side first; passed (n, l) layers on its last stretch.
+    Args: first whether this is their first surface; corners (n, m, 3) mirror points of the way out, receiver's side
+    first; passed (n, l) layers on its last stretch.
     """
     n = len(tubes)
     end = np.asarray(out.end, float)
@@ -63,7 +64,8 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
 
 
 def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
-    """Return the mean obliquity times spreading at the corners over that at the centre (n, 3); zero beyond the terminator."""
+    """Return the mean obliquity times spreading at the corners over that at the centre (n, 3); zero beyond the
+    terminator."""
     cosine = -0.5 * np.einsum("nij,nij->ni", tubes.normals, tubes.k + back_k)
     strength = np.maximum(cosine, 0.0)
     if not far:

@@ -79,7 +79,8 @@ def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type
 
 @njit(cache=True, nogil=True)
 def meeting_lines(points, source, k, far, plane, facet, first, normal, side):  # type: ignore[no-untyped-def]
-    """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into each other.
+    """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into
+    each other.
 
     Args as for `edge_within`; facet (n, 4) met by each ray; first, normal (m, 3): a point and the normal of each facet.
     """
@@ -101,7 +102,8 @@ def meeting_lines(points, source, k, far, plane, facet, first, normal, side):  #
 
 @njit(cache=True, nogil=True)
 def edge_within(points, source, k, far, plane, first_edge, outline):  # type: ignore[no-untyped-def]
-    """Return signed distances (n, 3) [m] of each tube's corners from the plane through its source and an edge inside it.
+    """Return signed distances (n, 3) [m] of each tube's corners from the plane through its source and an edge inside
+    it.
 
     Args: points (n, 4, 3) [m] corners and centre; source (n, 3) [m] where the rays come from, or k (n, 3) their
     direction when far; plane (n, 4) where each ray lands (-1: nowhere); first_edge, outline: the edges around planes.

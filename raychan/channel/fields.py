@@ -1,4 +1,5 @@
-"""Fields: the replay of routes through the kernels. Materials, antennas and polarisations change here, never the routes."""
+"""Fields: the replay of routes through the kernels. Materials, antennas and polarisations change here, never the
+routes."""
 
 from __future__ import annotations
 
@@ -80,8 +81,8 @@ def _cosine(k, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _transfer(  # type: ignore[no-untyped-def]
-    tx, rx, far, vertices, normals, kind, material, scatter, lengths, length, taper, area, spread_in, spread_out, caustics,
-    sigma, m_kind, m_eps, m_thickness, m_rough, e_tx, e_rx, k, out,
+    tx, rx, far, vertices, normals, kind, material, scatter, lengths, length, taper, area, spread_in, spread_out,
+    caustics, sigma, m_kind, m_eps, m_thickness, m_rough, e_tx, e_rx, k, out,
 ):  # fmt: skip
     n, d = kind.shape
     terms = np.empty(3, np.complex128)

@@ -111,8 +111,8 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
 
 @dataclass(frozen=True)
 class Sight:
-    """How tubes are seen over a leg: `seen` (n, 4) rays, way of the centre ray (`corners`, `passed`), and `side` (n, 3): where a
-    shadow's edge runs through a tube, zeros where none is known."""
+    """How tubes are seen over a leg: `seen` (n, 4) rays, way of the centre ray (`corners`, `passed`), and `side` (n,
+    3): where a shadow's edge runs through a tube, zeros where none is known."""
 
     seen: Bools
     corners: Floats
@@ -150,8 +150,14 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
 
 
 def divide(
-    surface: Surface, leg: Leg, tubes: Tubes, rows: Ints, side: Floats, first: bool, rule: Refinement
-) -> tuple[Tubes, Ints]:
+    surface: Surface,
+    leg: Leg,
+    tubes: Tubes,
+    rows: NDArray[np.signedinteger],
+    side: Floats,
+    first: bool,
+    rule: Refinement,
+) -> tuple[Tubes, NDArray[np.signedinteger]]:
     """Cut tubes along the edge that runs through them, or in half; return the parts and the entry of `rows` of each."""
     sharp = (side != 0.0).any(axis=1)
     blunt = tubes.take(~sharp)

@@ -105,8 +105,8 @@ class Leg:
         return out
 
     def may_reach(self, points: Floats, size: Floats) -> Bools:
-        """Tell which balls about points (n, 3) of radius `size` (n,) [m] could be met: in front of the last mirror, and by
-        way of each mirror's circle."""
+        """Tell which balls about points (n, 3) of radius `size` (n,) [m] could be met: in front of the last mirror,
+        and by way of each mirror's circle."""
         ok = np.ones(len(points), bool)
         if self.mirrors:
             ok &= (points - self.mirrors[-1].point) @ self.mirrors[-1].normal > -size

@@ -29,12 +29,13 @@ _POLARIZATIONS = {"VV": (0, 0), "VH": (0, 1), "HV": (1, 0), "HH": (1, 1)}
 _STEPS = 6
 _LEAST_DB = 1e-3  # what rounding and the quadratic phase leave even where two launches agree
 _MAX_ERROR_DB = 60.0
+_GROWTH = 3.0  # rays of the next refinement over those of all before it, about
 
 
 @dataclass(frozen=True)
 class Rcs:
-    """Radar cross-sections: `sigma` [m^2], `error_db` stated error, `rays` cast and most `bounces` that counted, each of the
-    shape of the angles given."""
+    """Radar cross-sections: `sigma` [m^2], `error_db` stated error, `rays` cast and most `bounces` that counted, each
+    of the shape of the angles given."""
 
     sigma: Floats
     error_db: Floats
@@ -55,20 +56,24 @@ def rcs(
     rx_azimuth_deg: Any = None,
     rx_elevation_deg: Any = None,
     rx_distance: float | None = None,
+    max_rays: int = 1_000_000,
 ) -> Rcs:
     """Return the RCS of a mesh, monostatic unless a receiver's direction is given, near or far.
 
-    Args: mesh trimesh, Mesh or file; frequency [Hz]; angles [deg] from the target to the radar in its frame, which broadcast;
-    polarization receive then transmit (V theta-hat, H phi-hat); distance [m] from the origin, inf for plane waves;
-    tolerance_db [dB] wanted; rx_* the receiver's. A near value is that of the point target at the origin
-    that would return as much: 4 pi D^4 |E_s|^2 for unit field at 1 m.
+    Args: mesh trimesh, Mesh or file; frequency [Hz]; angles [deg] from the target to the radar in its frame, which
+    broadcast; polarization receive then transmit (V theta-hat, H phi-hat); distance [m] from the origin, inf for
+    plane waves;
+    tolerance_db [dB] wanted; rx_* the receiver's; max_rays an angle, about. A near value is that of the point target
+    at the origin that would return as much: 4 pi D^4 |E_s|^2 for unit field at 1 m.
     Raises: ValueError for arguments out of range. Source: Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5.
     """
     _check(frequency, polarization, distance, tolerance_db, max_bounces)
     bistatic = rx_azimuth_deg is not None or rx_elevation_deg is not None or rx_distance is not None
     rx_az = azimuth_deg if rx_azimuth_deg is None else rx_azimuth_deg
     rx_el = elevation_deg if rx_elevation_deg is None else rx_elevation_deg
-    angles = np.broadcast_arrays(*(np.radians(np.asarray(a, float)) for a in (azimuth_deg, elevation_deg, rx_az, rx_el)))
+    angles = np.broadcast_arrays(
+        *(np.radians(np.asarray(a, float)) for a in (azimuth_deg, elevation_deg, rx_az, rx_el))
+    )
     if not all(np.isfinite(a).all() for a in angles):
         raise ValueError("angles must be finite numbers of degrees")
     surface = Surface(facets_of(mesh, material, frequency))
@@ -77,7 +82,7 @@ def rcs(
     for i, (az, el, raz, rel) in enumerate(zip(*(a.ravel() for a in angles), strict=True)):
         leg = _leg(direction(az, el), distance)
         back = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
-        out[:, i] = _refined(surface, leg, back, frequency, max_bounces, tolerance_db, row, col)
+        out[:, i] = _refined(surface, leg, back, frequency, max_bounces, tolerance_db, max_rays, row, col)
     shape = angles[0].shape
     sigma, error, rays, bounces = (o.reshape(shape) for o in out)
     return Rcs(sigma, error, rays.astype(np.int64), bounces.astype(np.int64))
@@ -104,7 +109,8 @@ def facets_of(mesh: Any, material: str | Material, frequency: float) -> Facets:
 
 
 def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iterator[Refinement]:
-    """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again."""
+    """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again.
+    Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again."""
     edge = min(0.3, surface.extent / 4.0)
     own = _typical_edge(surface)
     for i in range(steps):
@@ -142,13 +148,22 @@ def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: 
         total[min(count, bounces) - 1] += transfer(routes, surface.facets, frequency, _basis, _basis).sum(axis=0)
     reach = 1.0 if leg.far else float(np.linalg.norm(leg.end))
     reach *= 1.0 if out.far else float(np.linalg.norm(out.end))
-    return total * (4.0 * np.pi * frequency / C0) * reach
+    scaled: Complexes = total * (4.0 * np.pi * frequency / C0) * reach
+    return scaled
 
 
 def _refined(
-    surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, tolerance_db: float, row: int, col: int
+    surface: Surface,
+    leg: Leg,
+    out: Leg,
+    frequency: float,
+    bounces: int,
+    tolerance_db: float,
+    max_rays: int,
+    row: int,
+    col: int,
 ) -> tuple[float, float, int, int]:
-    """Return (sigma, error in dB, rays, bounces), refining until the last two launches agree within the tolerance."""
+    """Return (sigma, error in dB, rays, bounces), refining until the last two launches agree or rays run out."""
     before: complex | None = None
     rays, error_db, value, by_bounce = surface.rays, _MAX_ERROR_DB, 0j, np.zeros(bounces, complex)
     for rule in refinements(surface, frequency):
@@ -160,7 +175,7 @@ def _refined(
         value = complex(by_bounce.sum())
         if before is not None:
             error_db = stated_error(value, abs(value - before))
-            if error_db <= tolerance_db:
+            if error_db <= tolerance_db or (surface.rays - rays) * _GROWTH > max_rays:
                 break
         before = value
     counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
@@ -181,7 +196,7 @@ def _leg(look: Floats, distance: float) -> Leg:
 
 
 def _basis(look: Floats) -> Complexes:
-    return np.stack(theta_phi(look), axis=1).astype(complex)
+    return np.stack(theta_phi(look), axis=1).astype(np.complex128)
 
 
 def _check(frequency: float, polarization: str, distance: float, tolerance_db: float, bounces: int) -> None:

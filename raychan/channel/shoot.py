@@ -32,7 +32,8 @@ def tube_routes(
         for out in outs:
             fits = counts + len(out.mirrors) <= bounces
             fits &= ~np.isin(f.body[tubes.facet], list(out.bodies))
-            # Ground has no return of its own here; a plane mirror lit from another body returns by its image, not twice.
+            # Ground has no return of its own here; a plane mirror lit from another body returns by its image, not
+            # twice.
             fits &= f.role[f.body[tubes.facet]] != MIRROR
             if not first:
                 fits &= ~(mirror_planes[tubes.facet] & _other_body(surface, tubes))

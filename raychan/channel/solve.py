@@ -28,10 +28,12 @@ Progress = Callable[[str, float], None]
 class Radar(Protocol):
     """What the solver asks of a radar (see radar.sensor.Sensor)."""
 
-    position: Floats
-    velocity: Floats
-    tx_field: Any
-    rx_field: Any
+    @property
+    def position(self) -> Floats: ...
+    @property
+    def velocity(self) -> Floats: ...
+    def tx_field(self, direction_world: Floats) -> Any: ...
+    def rx_field(self, direction_world: Floats) -> Any: ...
 
 
 @dataclass
@@ -212,7 +214,7 @@ def join(parts: list[Paths], facets: Facets, radar: Radar, slots: int) -> Paths:
             vertices=np.zeros((0, slots, 3), np.float32), error=np.zeros(0), body_names=facets.body_names,
             part_names=facets.part_names, tx=end, rx=end,
         )  # fmt: skip
-    rows = {
+    rows: dict[str, Any] = {
         f.name: np.concatenate([getattr(p, f.name) for p in parts])
         for f in dataclasses.fields(Paths)
         if f.metadata.get("axes", [""])[0] == "n"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -137,9 +139,12 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
     if np.linalg.norm(rx - leg.image) == 0.0 or not leg.may_reach(rx[None], np.zeros(1))[0]:
         return None
     stops = [leg.end, *leg.bounces(rx[None])[0], rx]
-    vertices, normals, facets, kinds = [], [], [], []
+    vertices: list[Floats] = []
+    normals: list[Floats] = []
+    facets: list[int] = []
+    kinds: list[int] = []
     skip = np.array([-1], np.int32)
-    for i, (a, b) in enumerate(zip(stops[:-1], stops[1:], strict=True)):
+    for i, (a, b) in enumerate(pairwise(stops)):
         gap = float(np.linalg.norm(b - a))
         if gap < 1e-9:
             return None

@@ -18,7 +18,8 @@ _WELD = 1e-6  # m
 
 
 class Surface(Tracer):
-    """A tracer that also knows which facets share a plane or a smooth patch, and the curved surface through corner normals."""
+    """A tracer that also knows which facets share a plane or a smooth patch, and the curved surface through corner
+    normals."""
 
     def __init__(self, facets: Facets) -> None:
         super().__init__(facets)
@@ -64,12 +65,15 @@ class Surface(Tracer):
         nb0, nb1 = f.normals[b, nxt[eb % 3]], f.normals[b, own[eb % 3]]
         soft = (np.einsum("ij,ij->i", na0, nb0) > 1 - 1e-6) & (np.einsum("ij,ij->i", na1, nb1) > 1 - 1e-6)
         self.smooth = _components(a[soft], b[soft], n)
-        self.convex_alone = len(f.role) == 1 and bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same])
+        self.convex_alone = (
+            len(f.role) == 1 and bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same])
+        )
         inner = flat | soft
         self._outline(np.concatenate([ea[inner], eb[inner]]))
 
     def _convex(self, ea: Ints, eb: Ints) -> bool:
-        """Tell whether a closed body of one piece bends outward at every pair of half edges (ea, eb): it hides nothing."""
+        """Tell whether a closed body of one piece bends outward at every pair of half edges (ea, eb): it hides
+        nothing."""
         a, b = ea // 3, eb // 3
         pieces = connected_components(coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(len(self.plane),) * 2))[0]
         far_corner = self.facets.vertices[b, (eb % 3 + 2) % 3]
@@ -77,7 +81,8 @@ class Surface(Tracer):
         return bool(pieces == 1 and (height < 1e-9 * (1.0 + self.extent)).all())
 
     def _outline(self, inner: Ints) -> None:
-        """List the edges around each plane (those not shared within it or a smooth patch): `outline[first_edge[p] : first_edge[p + 1]]`."""
+        """List the edges around each plane (those not shared within it or a smooth patch): `outline[first_edge[p] :
+        first_edge[p + 1]]`."""
         n = len(self.plane)
         outer = np.ones(3 * n, bool)
         outer[inner] = False
@@ -90,7 +95,8 @@ class Surface(Tracer):
         self.first_edge = np.searchsorted(plane[order], np.arange(n + 1))
 
     def _bend(self) -> None:
-        """Quadratic patch through corners and corner normals: x = sum l_i x_i - sum c_ij l_i l_j (Nagata 2005, eq. 10)."""
+        """Quadratic patch through corners and corner normals: x = sum l_i x_i - sum c_ij l_i l_j (Nagata 2005, eq.
+        10)."""
         f = self.facets
         for e, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
             d = f.vertices[:, j] - f.vertices[:, i]
@@ -101,10 +107,11 @@ class Surface(Tracer):
             ok = det > 1e-12
             safe = np.where(ok, det, 1.0)
             c = ((p - a * q) / safe)[:, None] * ni + ((q - a * p) / safe)[:, None] * nj
-            # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it straight.
+            # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it
+            # straight.
             turn = np.sqrt(np.maximum(2.0 * (1.0 - a), 0.0))
-            ok &= np.linalg.norm(c, axis=1) < turn * np.linalg.norm(d, axis=1)
-            self.bulge[:, e] = np.where(ok[:, None], c, 0.0)
+            small = np.linalg.norm(c, axis=1) < turn * np.linalg.norm(d, axis=1)
+            self.bulge[:, e] = np.where((ok & small)[:, None], c, 0.0)
         self.curved = (np.abs(self.bulge) > 1e-9).any(axis=(1, 2))
 
     def point(self, facet: Ints, bary: Floats) -> Floats:
@@ -119,7 +126,8 @@ class Surface(Tracer):
         return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
     def strength(self, facet: Ints, cosine: Floats, wavenumber: float, passing: bool = False) -> Floats:
-        """Return the larger of |R_s|, |R_p| (or of |T_s|, |T_p| when `passing`) at facets (n,) for cosines of incidence."""
+        """Return the larger of |R_s|, |R_p| (or of |T_s|, |T_p| when `passing`) at facets (n,) for cosines of
+        incidence."""
         m = self.facets.materials
         row = self.facets.material[facet]
         c = np.abs(coefficients_array(m.kind[row], m.eps[row], m.thickness[row], m.roughness[row], cosine, wavenumber))

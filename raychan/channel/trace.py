@@ -43,7 +43,8 @@ def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, tota
         return tubes.take(np.zeros(len(tubes), bool))
     after = Tubes.join(landed)
     # What is left counts less than a tenth of what would be worth a cut: let it go.
-    return after.take(phases_of(surface, leg, out, after, False, rule).bound > 0.1 * least(rule, total))
+    counts = phases_of(surface, leg, out, after, False, rule).bound > 0.1 * least(rule, total)
+    return after.take(np.flatnonzero(counts))
 
 
 def _fly(
@@ -127,7 +128,7 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
     flat_k, flat_p, flat_hit = k.reshape(-1, 3), tubes.points.reshape(-1, 3), hit.ravel()
     t = surface.distance(flat_hit, flat_p, flat_k).reshape(n, 4)
     # Rays that run beside the centre's plane cannot be put down on it: such a sliver is dropped.
-    sound = (t > -1e-6).all(axis=1) & (t < 10.0 * t[:, CENTRE:] + 1.0).all(axis=1)
+    sound = np.flatnonzero((t > -1e-6).all(axis=1) & (t < 10.0 * t[:, CENTRE:] + 1.0).all(axis=1))
     tubes, k, hit, through, t = tubes.take(sound), k[sound], hit[sound], through[sound], t[sound]
     n = len(tubes)
     before = vector_area(tubes.points)

@@ -1,8 +1,8 @@
 """Tubes of rays: their state between bounces, how they are cut in two, and how much they can matter.
 
 A tube is a triangle of three corner rays about a centre ray. Lengths and directions are known at all four, so a
-tube may be cut without tracing it again from the start: between corners the length follows from its values and gradients
-(the directions) by a Hermite rule that is exact to third order; on the first surface it is computed anew.
+tube may be cut without tracing it again from the start: between corners the length follows from its values and
+gradients (the directions) by a Hermite rule that is exact to third order; on the first surface it is computed anew.
 """
 
 from __future__ import annotations
@@ -30,9 +30,11 @@ class Refinement:
     """How finely tubes are cut.
 
     `wavenumber` [rad/m]; `phase` [rad] deviation from quadratic that a tube may have where its phase stands still;
-    `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the same
-    as a fraction of what was found so far; `max_edge` [m] of first tubes; `levels` of cutting for sight and bounces; `slots`
-    of history; `layers` that a stretch may pass; `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
+    `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the
+    same as a fraction of what was found so far; `max_edge` [m] of first tubes; `levels` of cutting for sight and
+    bounces;
+    `slots` of history; `layers` that a stretch may pass; `jitter` (0 to 0.5) draws cuts off the middle, for a second
+    lattice.
     """
 
     wavenumber: float
@@ -52,8 +54,9 @@ class Refinement:
 class Tubes:
     """Tubes standing on their present footprint; n tubes, 4 rays each (corners, centre), d slots of history.
 
-    `strength` left of the field by mirrors and layers; `points` [m], `k` unit directions of arrival, `length` [m] from the transmitter, `normals` of the true surface on
-    the lit side, `spread` [1/m] field at the footprint, `flat` all mirrors so far were planes, `bary` corners on
+    `strength` left of the field by mirrors and layers; `points` [m], `k` unit directions of arrival, `length` [m]
+    from the transmitter, `normals` of the true surface on the lit side, `spread` [1/m] field at the footprint, `flat`
+    all mirrors so far were planes, `bary` corners on
     the first facet, `slots` of history in use, `bounces` counted with this one, `caustics` passed; then the history.
     """
 
@@ -233,7 +236,8 @@ def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floa
 @dataclass(frozen=True)
 class Phases:
     """Phases of tubes over a way out [rad]: `six` (n, 6) at corners and edge middles, `bend` (n, 3) of the edges from
-    straight, `miss` (n,) of the quadratic through the six at the centre, `bound` (n,) [1/m] on what a tube can scatter."""
+    straight, `miss` (n,) of the quadratic through the six at the centre, `bound` (n,) [1/m] on what a tube can
+    scatter."""
 
     six: Floats
     bend: Floats
@@ -242,7 +246,8 @@ class Phases:
     area: Floats
 
     def scale(self) -> float:
-        """Return the size [1/m] of the scattered field: the scalar sum of all tubes, or their rms sum where that cancels."""
+        """Return the size [1/m] of the scattered field: the scalar sum of all tubes, or their rms sum where that
+        cancels."""
         if not len(self.six):
             return 0.0
         each = self.area * quadratic_means(self.six, 0.5)
@@ -267,7 +272,8 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
 
 
 def least(rule: Refinement, total: float) -> float:
-    """Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to `relative`."""
+    """Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to `relative`.
+    Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to `relative`."""
     return max(rule.floor, rule.relative * total) / 10.0
 
 

@@ -114,7 +114,7 @@ def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untype
     d12 = phases[4] - 0.5 * (phases[1] + phases[2])
     d20 = phases[5] - 0.5 * (phases[2] + phases[0])
     bend = max(abs(d01), abs(d12), abs(d20))
-    m = min(max(1, int(math.ceil(math.sqrt(bend / linear)))), 64)
+    m = min(max(1, math.ceil(math.sqrt(bend / linear))), 64)
     out[0], out[1], out[2] = 0j, 0j, 0j
     h = 1.0 / m
     # The mean of a piece's own bend: a third of the sum of its edges' bends, alike for all pieces.
