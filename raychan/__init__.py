@@ -19,6 +19,7 @@ _HOME = {
     "explain": "raychan.run.provenance",
     "load_result": "raychan.run.store",
     "rcs": "raychan.channel.rcs",
+    "specular_paths": "raychan.channel.specular",
 }
 
 __all__ = [*_HOME, "__version__"]

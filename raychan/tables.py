@@ -165,7 +165,6 @@ class Paths(Record):
     part: Ints = column("n d", np.int16)
     kind: Ints = column("n d", np.int8)
     vertices: NDArray[np.float32] = column("n d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
-    error: Floats = column("n", doc="standard deviation of |amplitude| from tube refinement")
     body_names: tuple[str, ...]
     part_names: tuple[str, ...]
     tx: Floats = column("3", unit="m")
@@ -205,6 +204,13 @@ class RangeDoppler(Record):
     rate_resolution: float
     unambiguous_range: float
     unambiguous_rate: float
+
+
+@dataclass(frozen=True)
+class MapError(Record):
+    """How wrong a map may be: the power that a launch with another lattice, less fine, differs by in each cell."""
+
+    power: Floats = column("v r", unit="W")
 
 
 @dataclass(frozen=True)

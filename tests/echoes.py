@@ -28,6 +28,6 @@ def echoes(ranges, rates=0.0, amplitudes=1.0, azimuth=0.0) -> Paths:
     none = np.full((n, 1), -1)
     return Paths(
         delay=2.0 * r / C0, amplitude=a.astype(complex), rate=v.astype(float), departure=look, arrival=look,
-        body=none, part=none, kind=none * 0, vertices=np.zeros((n, 1, 3)), error=np.zeros(n),
+        body=none, part=none, kind=none * 0, vertices=np.zeros((n, 1, 3)),
         body_names=(), part_names=(), tx=np.zeros(3), rx=np.zeros(3),
     )  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 from raychan.radar.waveform import Waveform
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
-from raychan.tables import Cube, Detections, Paths, Profile, RangeDoppler
+from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
 from raychan.units import C0
 
 WAVE = Waveform(
@@ -23,7 +23,7 @@ BODIES = ("ground", "suv", "truck", "walker")
 PARTS = ("", "tail", "")
 
 
-def paths(ranges, rates, amplitudes, chains, error=0.0) -> Paths:
+def paths(ranges, rates, amplitudes, chains) -> Paths:
     """Paths by range [m], rate [m/s], amplitude and chain, a list of (body, kind)."""
     n = len(ranges)
     body = np.full((n, 4), -1)
@@ -38,7 +38,7 @@ def paths(ranges, rates, amplitudes, chains, error=0.0) -> Paths:
         delay=2.0 * np.asarray(ranges, float) / C0, amplitude=np.asarray(amplitudes, complex),
         rate=np.asarray(rates, float), departure=forward, arrival=forward, body=body, kind=kind,
         part=np.where(body < 0, -1, np.isin(body, (1, 2))),
-        vertices=vertices, error=np.full(n, error), body_names=BODIES, part_names=PARTS, tx=np.zeros(3), rx=np.zeros(3),
+        vertices=vertices, body_names=BODIES, part_names=PARTS, tx=np.zeros(3), rx=np.zeros(3),
     )  # fmt: skip
 
 
@@ -69,8 +69,8 @@ def result(p: Paths, where, text: str = "") -> Result:
         range=ranges, power=power.max(axis=0), noise=1e-15, peaks=np.unique([c[1] for c in cells]).astype(int)
     )
     cube = Cube(samples=np.zeros((1, 64, 128), np.complex64), noise_power=1e-12)
-    why = provenance(p, rdmap, found, receiver())
+    why = provenance(p, rdmap, found, receiver(), 0.01 * power)
     return Result(
         p, profile, cube, rdmap, found, why, receiver(), seed=3, timings={"trace": 0.5},
-        ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text, path="street.toml" if text else "",
+        error=MapError(power=0.01 * power), ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text, path="street.toml" if text else "",
     )  # fmt: skip

@@ -109,9 +109,12 @@ def test_a_cell_that_no_path_explains_is_noise():
     assert cell(none, 12.0, 3.0, power=1e-3).bodies == "noise"
 
 
-def test_error_is_the_spread_of_the_paths_in_the_cell():
-    p = paths([9.0, 9.0], [0, 0], [1.0, 1.0], [DIRECT_SUV] * 2, error=0.1)
-    assert cell(p, 9.0, 0.0).error_db == pytest.approx(20 * np.log10(1 + 0.1 * np.sqrt(2) / 2))
+def test_error_is_what_two_launches_differ_by_in_the_cell():
+    p = paths([9.0, 9.0], [-7.0, -7.0], [1e-5, 1e-5], [DIRECT_SUV] * 2)
+    r = result(p, [(9.0, -7.0, 1e-10)])
+    predicted = (2e-5) ** 2
+    differ = np.sqrt(r.error.power[tuple(r.detections.cell[0])] / predicted)
+    assert explain(r, 9.0).error_db == pytest.approx(-20 * np.log10(1 - differ), rel=1e-2)
 
 
 def test_explain_finds_the_cell_of_a_result_by_range_and_speed():

@@ -23,7 +23,7 @@ CHAIN = [(2, REFLECT), (3, SCATTER), (2, REFLECT)]
 
 @pytest.fixture
 def made():
-    p = paths([9.0, 5.0], [-7.0, 1.0], [1e-5 + 2e-5j, 3e-6], [CHAIN, [(1, SCATTER)]], error=1e-7)
+    p = paths([9.0, 5.0], [-7.0, 1.0], [1e-5 + 2e-5j, 3e-6], [CHAIN, [(1, SCATTER)]])
     return result(p, [(9.0, -7.0, 5e-10), (5.0, 1.0, 9e-12)])
 
 

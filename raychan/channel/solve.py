@@ -50,10 +50,13 @@ class Stats:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - since
 
 
-def refinement(frequency: float, tolerance_db: float, floor: float = 0.0, layers: int = 2) -> Refinement:
+def refinement(
+    frequency: float, tolerance_db: float, floor: float = 0.0, layers: int = 2, jitter: float = 0.0
+) -> Refinement:
     """Return how finely tubes must be cut for a tolerance [dB].
 
-    Args: floor [1/m] the scattered amplitude that drowns in noise. The constants are those at which two
+    Args: floor [1/m] the scattered amplitude that drowns in noise; layers that a
+    stretch may pass; jitter another lattice. The constants are those at which two
     launches of the shapes in the tests differ by about half the tolerance.
     """
     fine = tolerance_db / 0.5
@@ -65,6 +68,8 @@ def refinement(frequency: float, tolerance_db: float, floor: float = 0.0, layers
         max_edge=0.3 * min(1.0, np.sqrt(fine)),
         floor=floor,
         layers=layers,
+        slots=8 + layers,
+        jitter=jitter,
     )
 
 
@@ -115,7 +120,7 @@ def solve(
     stats.rays = surface.rays
     if progress:
         progress("trace", 1.0)
-    return join(parts, facets, radar, rule.slots), stats
+    return join(parts or [nothing(facets, radar, rule.slots)]), stats
 
 
 def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes | None:
@@ -195,7 +200,6 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> 
         part=part[index],
         kind=routes.kind[index],
         vertices=routes.vertices[index].astype(np.float32),
-        error=np.zeros(len(index)),
         body_names=facets.body_names,
         part_names=facets.part_names,
         tx=routes.tx,
@@ -203,17 +207,28 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> 
     )
 
 
-def join(parts: list[Paths], facets: Facets, radar: Radar, slots: int) -> Paths:
-    """Return all paths of several sets as one record, empty if there are none."""
-    end = np.asarray(radar.position, float)
-    if not parts:
-        none = np.zeros((0, slots))
-        return Paths(
-            delay=np.zeros(0), amplitude=np.zeros(0, complex), rate=np.zeros(0), departure=np.zeros((0, 3)),
-            arrival=np.zeros((0, 3)), body=none.astype(np.int16), part=none.astype(np.int16), kind=none.astype(np.int8),
-            vertices=np.zeros((0, slots, 3), np.float32), error=np.zeros(0), body_names=facets.body_names,
-            part_names=facets.part_names, tx=end, rx=end,
-        )  # fmt: skip
+def nothing(facets: Facets, radar: Radar, slots: int) -> Paths:
+    """Return the empty record of a scene of which nothing is in view."""
+    end, none = np.asarray(radar.position, float), np.zeros((0, slots))
+    return Paths(
+        delay=np.zeros(0),
+        amplitude=np.zeros(0, complex),
+        rate=np.zeros(0),
+        departure=np.zeros((0, 3)),
+        arrival=np.zeros((0, 3)),
+        body=none.astype(np.int16),
+        part=none.astype(np.int16),
+        kind=none.astype(np.int8),
+        vertices=np.zeros((0, slots, 3), np.float32),
+        body_names=facets.body_names,
+        part_names=facets.part_names,
+        tx=end,
+        rx=end,
+    )
+
+
+def join(parts: list[Paths]) -> Paths:
+    """Return all paths of several sets as one record."""
     rows: dict[str, Any] = {
         f.name: np.concatenate([getattr(p, f.name) for p in parts])
         for f in dataclasses.fields(Paths)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.fields import transfer
+from raychan.channel.fields import rates, transfer
 from raychan.channel.legs import Leg, Mirror
 from raychan.channel.surface import Surface
 from raychan.frames import theta_phi
-from raychan.tables import REFLECT, TRANSMIT, Facets, Routes
+from raychan.tables import KIND_LETTERS, REFLECT, TRANSMIT, Facets, Routes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -203,3 +205,59 @@ def jones(routes: Routes, facets: Facets, frequency: float) -> NDArray[np.comple
         return np.stack(theta_phi(-look), axis=1).astype(complex)
 
     return transfer(routes, facets, frequency, leaving, arriving)
+
+
+@dataclass(frozen=True)
+class SpecularPaths:
+    """Exact paths between two points: n paths, d interactions at most.
+
+    `length` (n,) [m]; `gain` (n, 2, 2) rows receiver's V, H, columns transmitter's; `rate` (n,) [m/s] of the length;
+    `bodies` and `kind` (n, d): names and 'R' reflect or 'T' pass a thin layer, '' unused; `vertices` (n, d + 2, 3)
+    [m] from tx
+    to rx, rx repeated.
+    """
+
+    length: Floats
+    gain: NDArray[np.complex128]
+    rate: Floats
+    bodies: NDArray[np.str_]
+    kind: NDArray[np.str_]
+    vertices: Floats
+
+
+def specular_paths(
+    scene: Any,
+    tx: Any,
+    rx: Any,
+    max_bounces: int = 3,
+    tx_velocity: Any = (0.0, 0.0, 0.0),
+    rx_velocity: Any = (0.0, 0.0, 0.0),
+) -> SpecularPaths:
+    """Return the exact specular paths between two points of a scene, line of sight included, isotropic ends.
+
+    Args: scene Scene; tx, rx (3,) [m]; max_bounces the most reflections; velocities (3,) [m/s] of the ends.
+    Gains hold lambda/4 pi L and the carrier phase exp(-jkL); V, H are theta-hat, phi-hat of the direction of travel.
+    Raises: ValueError for points that are not three finite numbers. Source: image method, McKown, Hamilton 1991.
+    """
+    ends = [np.asarray(x, float) for x in (tx, rx, tx_velocity, rx_velocity)]
+    if any(x.shape != (3,) or not np.isfinite(x).all() for x in ends):
+        raise ValueError("tx, rx and their velocities must be three finite numbers each")
+    if max_bounces < 0:
+        raise ValueError(f"max_bounces = {max_bounces}: must be 0 or more")
+    facets = scene.facets(0.0)
+    routes = specular_routes(Surface(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)
+    order = np.argsort(routes.length, kind="stable")
+    used = routes.kind > 0
+    deep = int(used.sum(axis=1).max(initial=0))
+    names = np.array([*facets.body_names, ""])
+    n = len(order)
+    chain = np.concatenate([np.broadcast_to(ends[0], (n, 1, 3)), routes.vertices[:, :deep]], axis=1)
+    vertices = np.concatenate([chain, np.broadcast_to(ends[1], (n, 1, 3))], axis=1)
+    return SpecularPaths(
+        length=routes.length[order],
+        gain=jones(routes, facets, scene.frequency)[order],
+        rate=2.0 * rates(routes, facets, ends[2], ends[3])[order],
+        bodies=names[np.where(used, routes.body, -1)][order, :deep],
+        kind=np.array(KIND_LETTERS)[routes.kind][order, :deep],
+        vertices=vertices[order],
+    )

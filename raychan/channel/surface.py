@@ -111,7 +111,7 @@ class Surface(Tracer):
             # straight.
             turn = np.sqrt(np.maximum(2.0 * (1.0 - a), 0.0))
             small = np.linalg.norm(c, axis=1) < turn * np.linalg.norm(d, axis=1)
-            self.bulge[:, e] = np.where((ok & small)[:, None], c, 0.0)
+            self.bulge[:, e] = c * (ok & small)[:, None]
         self.curved = (np.abs(self.bulge) > 1e-9).any(axis=(1, 2))
 
     def point(self, facet: Ints, bary: Floats) -> Floats:

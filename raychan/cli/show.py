@@ -49,12 +49,13 @@ def detections(result: Result) -> Table:
     d = result.detections
     azimuths = bool(np.isfinite(d.azimuth).any())
     heads = ["range m", "range rate m/s", "speed m/s", *(["azimuth deg"] if azimuths else []), "SNR dB", "power dBm"]
+    heads.append("error dB")
     rows = []
     for i, why in enumerate(result.provenance):
         cells = [f"{d.range[i]:.2f}", f"{d.rate[i]:+.2f}", f"{d.speed[i]:+.2f}"]
         if azimuths:
             cells.append("" if np.isnan(d.azimuth[i]) else f"{np.degrees(d.azimuth[i]):.1f}")
-        rows.append([*cells, f"{d.snr[i]:.1f}", f"{dbm(d.power[i]):.1f}", why.label, why.bodies])
+        rows.append([*cells, f"{d.snr[i]:.1f}", f"{dbm(d.power[i]):.1f}", f"{why.error_db:.2f}", why.label, why.bodies])
     n = len(heads)
     title = f"{len(rows)} detection{'' if len(rows) == 1 else 's'}"
     return table(title, [*heads, "label", "bodies"], rows, left=(n, n + 1))

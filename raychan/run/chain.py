@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,21 +11,23 @@ from typing import Any
 import numpy as np
 
 from raychan.channel.profile import profile
-from raychan.channel.solve import solve
-from raychan.channel.tubes import Refinement
+from raychan.channel.solve import join, refinement, solve
+from raychan.frames import direction
 from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
+from raychan.radar.sensor import Sensor
+from raychan.radar.windows import processing_gain, window
+from raychan.run.ledger import ledger
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
 from raychan.signal.cube import synthesize
-from raychan.tables import MIRROR, Facets
-from raychan.units import C0
+from raychan.tables import MIRROR, Facets, MapError, Paths
 from raychan.world.scene import Scene
 
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, 0 to 1."""
 
-STAGES = ("geometry", "trace", "profile", "cube", "map", "detect", "explain")
+STAGES = ("geometry", "trace", "check", "profile", "cube", "map", "detect", "explain")
 
 
 def simulate(
@@ -61,11 +64,15 @@ def simulate(
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
     model = _changed(scene.model, changes)
     carrier = sensor.waveform.carrier
-    rule = Refinement(wavenumber=2.0 * np.pi * carrier / C0)
+    floor = drowned(sensor, settings)
     with stage("geometry"):
         facets, points = scene.facets(0.0), scene.points(0.0)
     with stage("trace"):
+        rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions)
         paths, stats = solve(facets, points, sensor, carrier, rule, model.max_bounces, progress)
+    with stage("check"):
+        rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, jitter=0.13)
+        others, more = solve(facets, points, sensor, carrier, rule, model.max_bounces)
     with stage("profile"):
         noise = sensor.noise_power if sensor.noise else 0.0
         pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
@@ -73,6 +80,7 @@ def simulate(
         cube = synthesize(paths, sensor, noise_rng)
     with stage("map"):
         rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
+        error = map_error(paths, others, sensor, settings)
     with stage("detect"):
         # The scene file names range before rate; a map's axes are rate, then range.
         sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
@@ -96,7 +104,9 @@ def simulate(
         background(facets),
     )
     with stage("explain"):
-        reasons = provenance(paths, rdmap, detections, receiver)
+        weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
+        left_out = ledger(paths, facets, sensor, settings, model.max_bounces, weakest)
+        reasons = provenance(paths, rdmap, detections, receiver, error.power)
     return Result(
         paths=paths,
         profile=pdp,
@@ -105,14 +115,46 @@ def simulate(
         detections=detections,
         provenance=reasons,
         receiver=receiver,
+        error=error,
         seed=seed,
         timings=timings,
-        ledger={},
-        stats={"rays": stats.rays, "tubes": stats.tubes, "mirror_chains": stats.legs},
+        ledger=left_out,
+        stats={
+            "rays": stats.rays + more.rays,
+            "tubes": stats.tubes,
+            "mirror_chains": stats.legs,
+            "tolerance_db": model.tolerance_db,
+            "reached_db": max((r.error_db for r in reasons), default=0.0),
+        },
         warnings=tuple(scene.warnings),
         scene=scene,
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
+    )
+
+
+def drowned(sensor: Sensor, settings: Any) -> float:
+    """Return the scattered amplitude [1/m, unit field at 1 m] of a return as strong as the noise in one cell of the
+    map."""
+    if not sensor.noise:
+        return 0.0
+    wave = sensor.waveform
+    gain = processing_gain(window(settings.range_window, wave.n_samples))
+    gain *= processing_gain(window(settings.rate_window, wave.n_chirps))
+    # The strongest direction of both antennas, on a grid finer than any beam of use.
+    azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
+    look = direction(azimuth.ravel(), elevation.ravel()) @ sensor.axes.T
+    ends = (np.linalg.norm(f(look), axis=1).max() for f in (sensor.tx_field, sensor.rx_field))
+    amplitude = np.sqrt(sensor.noise_power / gain / sensor.power)
+    return float(amplitude * 4.0 * np.pi / wave.wavelength / np.prod(list(ends)))
+
+
+def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any) -> MapError:
+    """Return the map of what two launches differ by: their difference sent through the same receiver, without noise."""
+    difference = join([paths, others.replace(amplitude=-others.amplitude)])
+    cube = synthesize(difference, dataclasses.replace(sensor, noise=False))
+    return MapError(
+        range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad).power
     )
 
 

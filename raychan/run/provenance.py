@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.rcs import stated_error
 from raychan.run.response import Response
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver, Result
 from raychan.tables import KIND_LETTERS, TRANSMIT, Detections, Paths, RangeDoppler
 from raychan.units import C0
 
 Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 _LEAST_SHARE = 0.005
 _UNEXPLAINED = 0.1  # a cell whose paths give less than this share of its power is noise
@@ -50,12 +52,19 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
 
 
 def explain_cell(
-    paths: Paths, known: Chains, response: Response, receiver: Receiver, range: float, rate: float | None, power: float
+    paths: Paths,
+    known: Chains,
+    response: Response,
+    receiver: Receiver,
+    range: float,
+    rate: float | None,
+    power: float,
+    error: float = 0.0,
 ) -> Explanation:
     """Return which paths make a cell.
 
     Args: known the paths' chains; range [m]; rate [m/s], or None for a cell of the power-delay profile; power [W] that
-    the receiver sees there.
+    the receiver sees there; error [W] by which two launches of tubes differ there.
     Each path counts with its amplitude times the response of both windows at its distance from the cell; paths over
     the same chain add as waves, chains as powers.
     """
@@ -67,8 +76,7 @@ def explain_cell(
     whole = complex(summed.sum())
     predicted = abs(whole) ** 2 * receiver.power
     speed = (rate or 0.0) + receiver.ego_speed
-    spread = float(np.sqrt((np.abs(paths.error * weight) ** 2).sum()))
-    error_db = float(20.0 * np.log10(1.0 + spread / abs(whole))) if abs(whole) > 0.0 else 0.0
+    error_db = stated_error(whole, float(np.sqrt(error / receiver.power)))
     shares = np.abs(summed) ** 2
     if predicted < _UNEXPLAINED * power or not shares.sum() > 0.0:
         return Explanation(range, rate or 0.0, speed, power, predicted, error_db, CLUTTER, ())
@@ -99,14 +107,16 @@ def explain_cell(
 
 
 def provenance(
-    paths: Paths, rdmap: RangeDoppler, detections: Detections, receiver: Receiver
+    paths: Paths, rdmap: RangeDoppler, detections: Detections, receiver: Receiver, error: Floats
 ) -> tuple[Explanation, ...]:
     """Return one explanation for each detection, of the cell where its peak stands, at the place that it reports."""
     known, response = chains(paths, receiver.background), response_of(receiver)
     found = []
     for i, (row, column) in enumerate(detections.cell):
         at, rate, power = rdmap.range[column], rdmap.rate[row], rdmap.power[row, column]
-        why = explain_cell(paths, known, response, receiver, float(at), float(rate), float(power))
+        why = explain_cell(
+            paths, known, response, receiver, float(at), float(rate), float(power), float(error[row, column])
+        )
         found.append(
             replace(
                 why,
@@ -141,6 +151,7 @@ def explain(result: Result | str | Path, range: float, speed: float | None = Non
         float(result.rdmap.range[column]),
         float(result.rdmap.rate[row]),
         float(result.rdmap.power[cell]),
+        float(result.error.power[cell]),
     )
 
 

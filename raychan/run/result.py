@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from raychan.radar.waveform import Waveform
-from raychan.tables import Cube, Detections, Paths, Profile, RangeDoppler
+from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
 
@@ -58,7 +58,7 @@ class Explanation:
     predicted: float
     """What the paths alone give; the rest is noise."""
     error_db: float
-    """Standard deviation of the power from the refinement of the tubes [dB]."""
+    """How far the power may be off, as two launches of tubes differ [dB]."""
     label: str
     contributions: tuple[Contribution, ...]
 
@@ -79,6 +79,7 @@ class Result:
     detections: Detections
     provenance: tuple[Explanation, ...]
     receiver: Receiver
+    error: MapError
     seed: int
     timings: dict[str, float] = field(default_factory=dict)
     ledger: dict[str, Any] = field(default_factory=dict)

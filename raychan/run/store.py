@@ -20,7 +20,7 @@ import numpy as np
 from raychan.radar.waveform import Waveform
 from raychan.run.files import StoreError
 from raychan.run.result import Contribution, Explanation, Receiver, Result
-from raychan.tables import Cube, Detections, Paths, Profile, RangeDoppler
+from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
 from raychan.units import dbm
 
 FORMAT = 1
@@ -41,6 +41,7 @@ _GROUPS: dict[str, Any] = {
     "profile": Profile,
     "cube": Cube,
     "rdmap": RangeDoppler,
+    "error": MapError,
     "detections": Detections,
 }
 _JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")

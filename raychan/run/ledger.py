@@ -1,0 +1,208 @@
+"""The ledger: what a run left out, each as a level against its weakest detection, or the word 'unknown'."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.surface import Surface
+from raychan.kernels.fresnel import coefficients_array
+from raychan.process.spectrum import range_doppler
+from raychan.radar.sensor import Sensor
+from raychan.signal.cube import synthesize
+from raychan.tables import MIRROR, TRANSMIT, Facets, Paths, take
+from raychan.units import C0, db
+
+Floats = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+NOTHING = "none"
+"""Level of a mechanism that the scene does not have, or that is not left out."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One mechanism: `level_db` against the weakest detection, 'unknown' where no estimate is had, 'none' where
+    nothing is; `kind` 'estimate', 'bound' or 'exact', and `how` it was found."""
+
+    level_db: float | str
+    kind: str
+    how: str
+
+
+def ledger(paths: Paths, facets: Facets, sensor: Sensor, settings: Any, bounces: int, weakest: float) -> dict[str, Any]:
+    """Return what was left out, by mechanism, against the weakest detection's power [W].
+
+    Args: bounces the most interactions that were traced; settings the scene's processing.
+    """
+    if not weakest > 0.0 or not len(facets.vertices):
+        return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
+    surface = Surface(facets)
+    found = {
+        "further bounces": _further(paths, sensor, settings, bounces, weakest),
+        "transmission": _transmission(paths, sensor, settings, weakest),
+        "diffraction": _diffraction(surface, sensor, weakest),
+        "diffuse scattering": _diffuse(surface, sensor, weakest),
+        "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
+        "intra-frame motion": _motion(paths, facets, sensor),
+    }
+    return {name: found[name] for name in _NAMES}
+
+
+_NAMES = (
+    "further bounces", "transmission", "diffraction", "diffuse scattering", "range migration", "intra-frame motion",
+)  # fmt: skip
+
+
+def _peak(paths: Paths, rows: NDArray[np.bool_], sensor: Sensor, settings: Any) -> float:
+    """Return the strongest cell [W] of the map of some of the paths alone."""
+    if not rows.any():
+        return 0.0
+    cube = synthesize(take(paths, rows), sensor)
+    return float(
+        range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad).power.max()
+    )
+
+
+def _further(paths: Paths, sensor: Sensor, settings: Any, bounces: int, weakest: float) -> Entry:
+    quiet = dataclasses.replace(sensor, noise=False)
+    met = ((paths.kind > 0) & (paths.kind != TRANSMIT)).sum(axis=1)
+    last, before = (_peak(paths, met == n, quiet, settings) for n in (bounces, bounces - 1))
+    if last == 0.0 or before == 0.0:
+        return Entry(UNKNOWN, "none", f"no path has {bounces} interactions: nothing to extrapolate from")
+    ratio = min(last / before, 1.0)
+    how = f"strongest cell of {bounces} interactions ({db(last / weakest):.0f} dB) times its ratio to {bounces - 1}"
+    return Entry(float(db(last * ratio / weakest)), "estimate", how)
+
+
+def _transmission(paths: Paths, sensor: Sensor, settings: Any, weakest: float) -> Entry:
+    passes = (paths.kind == TRANSMIT).sum(axis=1)
+    most = int(passes.max(initial=0))
+    if most == 0:
+        return Entry(NOTHING, "exact", "no path passes a thin layer")
+    quiet = dataclasses.replace(sensor, noise=False)
+    last = _peak(paths, passes == most, quiet, settings)
+    loss = _peak(paths, passes == max(most - 1, 0), quiet, settings)
+    ratio = min(last / loss, 1.0) if loss > 0.0 else 1.0
+    how = f"paths through {most} layers are in; one more, by their ratio to {most - 1}"
+    return Entry(float(db(max(last * ratio, 1e-40) / weakest)), "estimate", how)
+
+
+def _gain(sensor: Sensor, points: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return directions, distances [m] and the product of both antennas' gains towards points (n, 3)."""
+    d = points - np.asarray(sensor.position)
+    r = np.linalg.norm(d, axis=1)
+    look = d / r[:, None]
+    both = [np.linalg.norm(f(look), axis=1) ** 2 for f in (sensor.tx_field, sensor.rx_field)]
+    return look, r, both[0] * both[1]
+
+
+def _diffraction(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
+    """Edges' fringe currents: a straight edge of length L seen broadside returns at most L^2/pi (Ross 1966; Knott
+    2004)."""
+    edges = surface.outline
+    if not len(edges):
+        return Entry(NOTHING, "exact", "no surface has an edge")
+    middle = edges.mean(axis=1)
+    look, r, gain = _gain(sensor, middle)
+    span = edges[:, 1] - edges[:, 0]
+    wavelength = sensor.waveform.wavelength
+    # Only one Fresnel zone of a long edge is in phase; off broadside its ends are left: sinc^2.
+    length = np.linalg.norm(span, axis=1)
+    zone = np.minimum(length, np.sqrt(0.5 * wavelength * r))
+    along = np.einsum("ij,ij->i", span, look) * zone / np.where(length > 0, length, 1.0)
+    sigma = zone**2 / np.pi * np.sinc(2.0 * along / wavelength) ** 2
+    power = sensor.power * gain * wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
+    at = int(np.argmax(power))
+    name = surface.facets.body_names[_body_at(surface, middle[at])]
+    how = f"strongest edge's fringe field, L^2/pi broadside, if it were seen: on {name} at {r[at]:.1f} m"
+    return Entry(float(db(power[at] / weakest)), "bound", how)
+
+
+def _body_at(surface: Surface, point: Floats) -> int:
+    nearest = np.argmin(np.linalg.norm(surface.facets.vertices.mean(axis=1) - point, axis=1))
+    return int(surface.facets.body[nearest])
+
+
+def _diffuse(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
+    """What roughness takes from the mirror, sent out by Lambert's law from one range cell of the surface."""
+    f = surface.facets
+    m = f.materials
+    rough = m.roughness[f.material] > 0.0
+    if not rough.any():
+        return Entry(UNKNOWN, "none", "no material states a roughness")
+    rng = np.random.default_rng(0)
+    rows = np.flatnonzero(rough)
+    # Points over the rough facets, a ring of the ground at a time: near ground first.
+    at = _samples(surface, rows, np.asarray(sensor.position), rng)
+    points, facet, weight = at
+    look, r, gain = _gain(sensor, points)
+    cosine = np.abs(np.einsum("ij,ij->i", look, surface.normal[facet]))
+    row = f.material[facet]
+    k = 2.0 * np.pi / sensor.waveform.wavelength
+    flat = np.abs(coefficients_array(m.kind[row], m.eps[row], m.thickness[row], 0.0 * cosine, cosine, k)[:, :2]) ** 2
+    lost = 1.0 - np.exp(-4.0 * (k * m.roughness[row] * cosine) ** 2)
+    sigma = 4.0 * flat.mean(axis=1) * lost * cosine**2 * weight
+    power = sensor.power * gain * sensor.waveform.wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
+    cell = np.floor(r / sensor.waveform.range_resolution).astype(int)
+    summed = np.bincount(cell, power)
+    best = int(np.argmax(summed))
+    where = best * sensor.waveform.range_resolution
+    how = (
+        f"power that roughness takes from the mirror, by Lambert's law, strongest range cell ({where:.1f} m), all rates"
+    )
+    return Entry(float(db(max(summed[best], 1e-40) / weakest)), "estimate", how)
+
+
+def _samples(
+    surface: Surface, rows: NDArray[np.int64], eye: Floats, rng: np.random.Generator
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Return points on facets, their facet and the area [m^2] each stands for; the ground is sampled by its distance.
+    Return points on facets, their facet and the area [m^2] each stands for; the ground is sampled by its distance."""
+    f = surface.facets
+    ground = np.isin(f.body[rows], np.flatnonzero(f.role == MIRROR))
+    points, facet, weight = [], [], []
+    if (~ground).any():
+        some = rng.choice(rows[~ground], size=4000, p=surface.area[rows[~ground]] / surface.area[rows[~ground]].sum())
+        bary = rng.dirichlet(np.ones(3), size=len(some))
+        points.append(np.einsum("ni,nij->nj", bary, f.vertices[some]))
+        facet.append(some)
+        weight.append(np.full(len(some), surface.area[rows[~ground]].sum() / len(some)))
+    if ground.any():
+        one = rows[ground][0]
+        radius = np.geomspace(0.2, 80.0, 400)
+        angle = np.radians(np.arange(-180.0, 180.0, 3.0))
+        step = np.gradient(radius)
+        x, y = (np.outer(radius, g(angle)).ravel() for g in (np.cos, np.sin))
+        z = np.full(x.size, float(surface.first[one, 2]))
+        points.append(np.column_stack([eye[0] + x, eye[1] + y, z]))
+        facet.append(np.full(x.size, one))
+        weight.append(np.repeat(radius * step, len(angle)) * np.radians(3.0))
+    return np.concatenate(points), np.concatenate(facet), np.concatenate(weight)
+
+
+def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:
+    """Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at most.
+    Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at most."""
+    frame = sensor.waveform.frame_duration
+    used = paths.body >= 0
+    if not len(paths.delay):
+        return Entry(NOTHING, "exact", "no path")
+    used &= facets.role[np.maximum(paths.body, 0)] != MIRROR
+    body = np.maximum(paths.body, 0)
+    relative = facets.velocity[body] - np.asarray(sensor.velocity)
+    along = np.einsum("ndi,ni->nd", relative, paths.departure)
+    across = np.einsum("ndi,ndi->nd", relative, relative) - along**2
+    turning = np.linalg.norm(facets.spin, axis=1)[body]
+    ranges = np.maximum(0.5 * C0 * paths.delay, 0.5)
+    # Lever arm of turning bodies: at most a few metres of a vehicle.
+    bend = np.where(used, across / ranges[:, None] + turning**2 * 2.5, 0.0).max(axis=1)
+    phase = 2.0 * np.pi / sensor.waveform.wavelength * bend * frame**2 / 4.0
+    strong = np.abs(paths.amplitude) > 1e-3 * np.abs(paths.amplitude).max()
+    worst = float(phase[strong].max(initial=0.0))
+    how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level against the return that has it"
+    return Entry(float(db(max(worst, 1e-15) ** 2)), "bound", how)

@@ -1,0 +1,306 @@
+"""rcs against closed forms, series and quadrature that share no code with it, at the bars of issue 3, rays counted."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+from helpers import quad
+from truth import corner, mie, po, slab
+
+from raychan.channel.legs import Leg
+from raychan.channel.rcs import facets_of, rcs, refinements, scattering
+from raychan.channel.surface import Surface
+from raychan.kernels.fresnel import coefficients_array
+from raychan.tables import HALF_SPACE, LAYER
+from raychan.units import C0
+from raychan.world.material import Material
+from raychan.world.shapes import build
+
+F = 77e9
+K = 2.0 * np.pi * F / C0
+POLARIZATIONS = {"VV": (0, 0), "HH": (1, 1)}
+
+
+def db(x):
+    return 10.0 * np.log10(x)
+
+
+def sigma(s, pol="VV"):
+    return 4.0 * np.pi * np.abs(s[POLARIZATIONS[pol]]) ** 2
+
+
+def view(azimuth_deg, elevation_deg=0.0, distance=np.inf):
+    return po.direction(np.radians(azimuth_deg), np.radians(elevation_deg)), distance
+
+
+def ball(radius, subdivisions):
+    return trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+
+
+def tube(radius, height, sections):
+    return trimesh.creation.cylinder(radius=radius, height=height, sections=sections)
+
+
+def rms(x):
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+# --- plates -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("distance", [3.0, 12.0, 25.0])
+@pytest.mark.parametrize("size", [0.1, 0.2, 0.5, 1.5])
+def test_square_plate_in_its_near_field_is_its_quadrature(size, distance):
+    corners = po.rectangle(size, size)
+    got = rcs(quad(corners), F, 0.0, distance=distance, tolerance_db=0.05)
+    assert db(got.sigma / sigma(po.polygon(corners, K, view(0, 0, distance)))) == pytest.approx(0.0, abs=0.05)
+    assert got.rays <= 16_384
+
+
+def test_plate_seen_from_aside_in_its_near_field_is_its_quadrature():
+    corners = po.rectangle(0.2, 0.1)
+    got = rcs(quad(corners), F, 12.0, -7.0, distance=4.0)
+    assert db(got.sigma / sigma(po.polygon(corners, K, view(12, -7, 4.0)))) == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.parametrize("pol", ["VV", "HH"])
+def test_plate_against_angle_is_its_two_sincs(pol):
+    azimuth = np.arange(0.0, 60.1, 1.0)
+    got = rcs(quad(po.rectangle(0.1, 0.1)), F, azimuth, 0.0, pol)
+    true = np.array([sigma(po.rectangle_far(0.1, 0.1, K, view(a)[0]), pol) for a in azimuth])
+    seen = true > true.max() * 1e-4
+    assert rms(db(got.sigma / true)[seen]) < 0.3
+    assert got.rays.max() <= 65_536
+
+
+def test_plate_of_two_materials_of_facets_edge_on_returns_nothing():
+    got = rcs(quad(po.rectangle(0.1, 0.1)), F, 90.0)
+    assert got.sigma < 1e-12
+
+
+# --- curved bodies ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("distance", [np.inf, 12.0])
+@pytest.mark.parametrize("subdivisions", [3, 4])
+@pytest.mark.parametrize("radius", [0.05, 0.1, 0.3, 0.5])
+def test_sphere_is_its_mie_series_however_it_is_cut(radius, subdivisions, distance):
+    got = rcs(ball(radius, subdivisions), F, [10.0, 77.0], 20.0, distance=distance)
+    far = np.isinf(distance)
+    true = mie.rcs(radius, K) if far else 4 * np.pi * abs(mie.backscatter_near(radius, K, distance)) ** 2
+    assert np.abs(db(got.sigma / true)).max() < 0.2
+    assert got.rays.max() <= 65_536
+
+
+def test_sphere_has_no_cross_polarisation():
+    same, cross = (rcs(ball(0.1, 4), F, 33.0, 11.0, p).sigma for p in ("HH", "VH"))
+    assert db(cross / same) < -60.0
+
+
+@pytest.mark.parametrize(("radius", "height"), [(0.05, 0.2), (0.1, 0.3)])
+@pytest.mark.parametrize("sections", [32, 64, 128])
+def test_cylinder_broadside_and_off_is_its_quadrature(radius, height, sections):
+    elevation = np.array([0.0, 0.3, 1.0, 2.0, 3.0])
+    got = rcs(tube(radius, height, sections), F, 7.0, elevation)
+    true = np.array([sigma(po.cylinder(radius, height, K, view(7.0, e))) for e in elevation])
+    assert np.abs(db(got.sigma / true)).max() < 0.3
+    assert got.rays.max() <= 65_536
+
+
+@pytest.mark.parametrize("sections", [32, 128])
+def test_cylinder_in_its_near_field_is_its_quadrature(sections):
+    elevation = np.array([0.0, 1.0, 3.0])
+    got = rcs(tube(0.1, 0.3, sections), F, 7.0, elevation, distance=12.0)
+    true = np.array([sigma(po.cylinder(0.1, 0.3, K, view(7.0, e, 12.0))) for e in elevation])
+    assert np.abs(db(got.sigma / true)).max() < 0.3
+    assert got.rays.max() <= 65_536
+
+
+def test_cylinder_of_many_sections_far_off_broadside_is_its_quadrature():
+    elevation = np.array([25.0, 45.0, 60.0])
+    got = rcs(tube(0.05, 0.2, 128), F, 7.0, elevation)
+    true = np.array([sigma(po.cylinder(0.05, 0.2, K, view(7.0, e))) for e in elevation])
+    assert np.abs(db(got.sigma / true)).max() < 0.3
+
+
+# --- corners ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [0.1, 0.2, 0.3])
+def test_dihedral_peak_and_pattern_are_exact_footprints(size):
+    azimuth = np.arange(-30.0, 31.0, 2.0)
+    faces = corner.dihedral_faces(size, size)
+    got = rcs(corner.mesh(faces), F, azimuth)
+    error = db(got.sigma / [sigma(corner.corner(faces, K, view(a))) for a in azimuth])
+    assert abs(error[azimuth == 0.0]) < 0.1
+    assert rms(error) < 0.5
+    assert got.rays.max() <= 65_536
+
+
+def test_dihedral_in_its_near_field_is_exact_footprints():
+    faces = corner.dihedral_faces(0.1, 0.1)
+    got = rcs(corner.mesh(faces), F, [0.0, 20.0], distance=12.0)
+    error = db(got.sigma / [sigma(corner.corner(faces, K, view(a, 0.0, 12.0))) for a in (0.0, 20.0)])
+    assert np.abs(error).max() < 0.1
+
+
+def test_rolled_dihedral_turns_polarisation():
+    """Peak of a dihedral rolled by 30 deg: VV goes by cos^2 60 deg, VH by sin^2 60 deg."""
+    roll = trimesh.transformations.rotation_matrix(np.radians(30.0), [1, 0, 0])
+    mesh = corner.mesh(corner.dihedral_faces(0.2, 0.2)).apply_transform(roll)
+    vv, vh = (float(rcs(mesh, F, 0.0, 0.0, p).sigma) for p in ("VV", "VH"))
+    # One bounce returns nothing here that counts, so both are the double bounce of the upright one.
+    peak = 8 * np.pi * (0.2 * 0.2) ** 2 / (C0 / F) ** 2
+    assert db(vv / peak) == pytest.approx(db(np.cos(np.radians(60.0)) ** 2), abs=0.1)
+    assert db(vh / peak) == pytest.approx(db(np.sin(np.radians(60.0)) ** 2), abs=0.1)
+
+
+@pytest.mark.parametrize("square", [False, True])
+@pytest.mark.parametrize("size", [0.05, 0.1, 0.2, 0.3])
+def test_trihedral_boresight_and_pattern_are_exact_footprints(size, square):
+    faces = corner.trihedral_faces(size, square)
+    cut = np.arange(-20.0, 21.0, 5.0)
+    azimuth, elevation = np.concatenate([cut, 0 * cut]), np.concatenate([0 * cut, cut])
+    got = rcs(corner.mesh(faces), F, azimuth, elevation)
+    true = [sigma(corner.corner(faces, K, view(a, e))) for a, e in zip(azimuth, elevation, strict=True)]
+    error = db(got.sigma / true)
+    assert np.abs(error[(azimuth == 0.0) & (elevation == 0.0)]).max() < 0.2
+    assert rms(error) < 1.0
+    assert got.rays.max() <= 65_536
+
+
+# --- materials ----------------------------------------------------------------------------------------------------
+
+
+def slab_of(material):
+    eps = material.eps_r - 1j * material.sigma / (2 * np.pi * F * 8.8541878128e-12)
+    if material.thickness is None:
+        return lambda c: slab.half_space(c, eps)
+    return lambda c: slab.layer(c, eps, material.thickness, K)[:2]
+
+
+@pytest.mark.parametrize("pol", ["VV", "HH"])
+@pytest.mark.parametrize("distance", [np.inf, 5.0])
+@pytest.mark.parametrize(
+    "material",
+    [Material(eps_r=5.24, sigma=1.38), Material(eps_r=6.31, sigma=0.6, thickness=0.004)],
+    ids=["concrete", "glass layer"],
+)
+def test_dielectric_plate_is_fresnel_or_slab_times_physical_optics(material, distance, pol):
+    corners = po.rectangle(0.1, 0.1)
+    azimuth = np.array([0.0, 3.7, 20.0, 45.0])
+    got = rcs(quad(corners), F, azimuth, 0.0, pol, distance=distance, material=material, tolerance_db=0.05)
+    true = [sigma(po.polygon(corners, K, view(a, 0, distance), surface=slab_of(material)), pol) for a in azimuth]
+    assert np.abs(db(got.sigma / true)).max() < 0.05
+    assert got.rays.max() <= 16_384
+
+
+@pytest.mark.parametrize("pol", ["VV", "HH"])
+def test_dielectric_plate_from_two_sides_is_fresnel_at_its_specular_angle(pol):
+    corners = po.rectangle(0.1, 0.1)
+    material = Material(eps_r=5.24, sigma=1.38)
+    for angle in (20.0, 45.0, 66.0):
+        got = rcs(quad(corners), F, angle, 0.0, pol, material=material, rx_azimuth_deg=-angle, tolerance_db=0.05)
+        s = po.polygon(corners, K, view(angle), view(-angle), slab_of(material), "reciprocal")
+        assert db(got.sigma / sigma(s, pol)) == pytest.approx(0.0, abs=0.05)
+
+
+def test_passivity_of_random_surfaces():
+    rng = np.random.default_rng(1)
+    n = 100_000
+    kind = np.where(rng.random(n) < 0.3, HALF_SPACE, LAYER).astype(np.int8)
+    loss = np.where(rng.random(n) < 0.2, 0.0, 10.0 ** rng.uniform(-6, 4, n))
+    eps = 1.0 + 10.0 ** rng.uniform(-6, 2, n) - 1j * loss
+    thickness = np.where(kind == LAYER, 10.0 ** rng.uniform(-7, 1, n), 0.0)
+    roughness = np.where(rng.random(n) < 0.5, 0.0, 10.0 ** rng.uniform(-6, -2, n))
+    cosine = np.concatenate([rng.random(n // 2), 10.0 ** rng.uniform(-9, 0, n - n // 2)])
+    c = np.abs(coefficients_array(kind, eps, thickness, roughness, cosine, K)) ** 2
+    assert np.isfinite(c).all()
+    assert (c[:, :2] + c[:, 2:]).max() <= 1.0 + 1e-9
+
+
+# --- the answer is the body's, not the frame's, the lattice's or the mesh's ---------------------------------------
+
+
+def bodies():
+    return {
+        "plate": quad(po.rectangle(0.2, 0.1)),
+        "sphere": ball(0.1, 3),
+        "cylinder": tube(0.05, 0.2, 48),
+        "box": trimesh.creation.box((0.2, 0.15, 0.1)),
+        "dihedral": corner.mesh(corner.dihedral_faces(0.15, 0.1)),
+        "trihedral": corner.mesh(corner.trihedral_faces(0.1, True)),
+    }
+
+
+@pytest.mark.parametrize("name", bodies())
+@pytest.mark.parametrize("distance", [np.inf, 8.0])
+def test_ten_kilometres_away_nothing_but_the_phase_changes(name, distance):
+    facets = facets_of(bodies()[name], "pec", F)
+    shift, look = np.array([7000.0, -7100.0, 800.0]), view(8.0, 5.0)[0]
+    rule = next(itertools.islice(refinements(Surface(facets), F), 1, None))
+    size = []
+    for move in (np.zeros(3), shift):
+        surface = Surface(facets.replace(vertices=facets.vertices + move, origin=facets.origin + move))
+        leg = Leg(end=look, far=True) if np.isinf(distance) else Leg(end=look * distance + move)
+        s = scattering(surface, leg, leg, F, 3, rule).sum(axis=0)[0, 0]
+        # A near value is scaled by the square of the distance from the origin: take that out again.
+        size.append(abs(s) if np.isinf(distance) else abs(s) * distance**2 / np.linalg.norm(leg.end) ** 2)
+    assert 2 * db(size[1] / size[0]) == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("name", bodies())
+def test_turned_with_the_radar_nothing_changes(name):
+    """All four polarisations together, as the vertical turns too."""
+    mesh = bodies()[name]
+    turn = trimesh.transformations.random_rotation_matrix(np.random.default_rng(3).random(3))
+    look = view(10.0, 6.0)[0]
+    turned = turn[:3, :3] @ look
+    angles = np.degrees([np.arctan2(turned[1], turned[0]), np.arcsin(turned[2])])
+    moved = mesh.copy().apply_transform(turn)
+    pols = ("VV", "VH", "HV", "HH")
+    here = sum(float(rcs(mesh, F, 10.0, 6.0, p).sigma) for p in pols)
+    there = sum(float(rcs(moved, F, *angles, p).sigma) for p in pols)
+    assert db(there / here) == pytest.approx(0.0, abs=0.25)
+
+
+@pytest.mark.parametrize("name", bodies())
+def test_another_lattice_agrees_within_the_tolerance(name):
+    mesh = bodies()[name]
+    got = rcs(mesh, F, 9.0, 4.0, tolerance_db=0.25)
+    surface = Surface(facets_of(mesh, "pec", F))
+    leg = Leg(end=view(9.0, 4.0)[0], far=True)
+    rule = next(itertools.islice(refinements(surface, F), 2, None))
+    other = scattering(surface, leg, leg, F, 3, dataclasses.replace(rule, jitter=0.21)).sum(axis=0)
+    assert db(got.sigma / sigma(other)) == pytest.approx(0.0, abs=0.25)
+
+
+@pytest.mark.parametrize("name", ["plate", "box", "dihedral", "trihedral"])
+def test_splitting_every_triangle_in_four_changes_nothing(name):
+    mesh = bodies()[name]
+    values = [rcs(m, F, 9.0, 4.0, tolerance_db=0.01).sigma for m in (mesh, mesh.subdivide())]
+    assert db(values[1] / values[0]) == pytest.approx(0.0, abs=0.01)
+
+
+def test_exchange_of_transmitter_and_receiver_in_random_scenes():
+    """Fifty bodies, sizes, directions, distances and materials; polarisations change places too."""
+    rng = np.random.default_rng(7)
+    makes = list(bodies().values())
+    worst = 0.0
+    for i in range(50):
+        mesh = makes[i % len(makes)].copy().apply_scale(rng.uniform(0.3, 1.2))
+        tx, rx = rng.uniform(-40.0, 40.0, (2, 2)) if rng.random() < 0.5 else rng.uniform(-8.0, 8.0, (2, 2))
+        near = rng.uniform(2.0, 20.0, 2) if rng.random() < 0.5 else (np.inf, np.inf)
+        material = "pec" if rng.random() < 0.5 else Material(eps_r=rng.uniform(2, 8), sigma=rng.uniform(0, 2))
+        pol = ("VV", "VH", "HV", "HH")[rng.integers(4)]
+        both = []
+        for a, b, d, p in ((tx, rx, near, pol), (rx, tx, near[::-1], pol[::-1])):
+            got = rcs(mesh, F, *a, p, d[0], material, 0.1, rx_azimuth_deg=b[0], rx_elevation_deg=b[1], rx_distance=d[1])
+            both.append(float(got.sigma))
+        if max(both) > 1e-9:  # 1 mm^2/1000: nothing but rounding
+            worst = max(worst, abs(db(both[1] / both[0])))
+    assert worst < 0.1
