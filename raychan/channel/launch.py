@@ -20,6 +20,7 @@ from raychan.channel.tubes import (
     least,
     phases_of,
     stand,
+    that_count,
     too_rough,
     unit,
 )
@@ -94,7 +95,9 @@ def _cut_at_terminator(surface: Surface, leg: Leg, way: Leg, tubes: Tubes) -> Tu
 def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
     """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
     kept: list[Tubes] = []
-    doubt = least(rule, phases_of(surface, leg, out, tubes, True, rule).scale())
+    ph = phases_of(surface, leg, out, tubes, True, rule)
+    doubt = least(rule, ph.scale())
+    tubes = tubes.take(that_count(ph.bound, doubt))
     for level in range(rule.levels + 1):
         matters = phases_of(surface, leg, out, tubes, True, rule).bound > doubt
         view = sight(surface, leg, tubes, matters, rule)

@@ -83,14 +83,7 @@ def reachable(surface: Surface, leg: Leg) -> Bools:
     n = len(f.role)
     if not leg.mirrors:
         return np.ones(n, bool)
-    corner = f.vertices.reshape(-1, 3)
-    body = np.repeat(f.body, 3)
-    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
-    np.minimum.at(low, body, corner)
-    np.maximum.at(high, body, corner)
-    empty = ~np.isfinite(low).all(axis=1)
-    centre = np.where(empty[:, None], 0.0, 0.5 * (low + high))
-    radius = np.where(empty, 0.0, 0.5 * np.linalg.norm(np.where(empty[:, None], 0.0, high - low), axis=1))
+    centre, radius, empty = surface.balls
     ok = ~empty & leg.may_reach(centre, radius)
     ok[leg.mirrors[-1].body] = False
     return ok

@@ -148,8 +148,8 @@ def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: 
         total[min(count, bounces) - 1] += transfer(routes, surface.facets, frequency, _basis, _basis).sum(axis=0)
     reach = 1.0 if leg.far else float(np.linalg.norm(leg.end))
     reach *= 1.0 if out.far else float(np.linalg.norm(out.end))
-    scaled: Complexes = total * (4.0 * np.pi * frequency / C0) * reach
-    return scaled
+    total *= 4.0 * np.pi * frequency / C0 * reach
+    return total
 
 
 def _refined(

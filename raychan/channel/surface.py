@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
@@ -112,7 +114,20 @@ class Surface(Tracer):
             turn = np.sqrt(np.maximum(2.0 * (1.0 - a), 0.0))
             small = np.linalg.norm(c, axis=1) < turn * np.linalg.norm(d, axis=1)
             self.bulge[:, e] = c * (ok & small)[:, None]
-        self.curved = (np.abs(self.bulge) > 1e-9).any(axis=(1, 2))
+        self.curved = np.asarray((np.abs(self.bulge) > 1e-9).any(axis=(1, 2)))
+
+    @cached_property
+    def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+        """Centre (b, 3) [m] and radius (b,) [m] of a ball about each body, and which bodies (b,) have no facet."""
+        f = self.facets
+        n = len(f.role)
+        centre, radius, empty = np.zeros((n, 3)), np.zeros(n), np.ones(n, bool)
+        for b in range(n):
+            v = f.vertices[f.body == b].reshape(-1, 3)
+            if len(v):
+                low, high = v.min(axis=0), v.max(axis=0)
+                centre[b], radius[b], empty[b] = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low), False
+        return centre, radius, empty
 
     def point(self, facet: Ints, bary: Floats) -> Floats:
         """Return points (n, ..., 3) of the true surface at barycentric coordinates (n, ..., 3)."""

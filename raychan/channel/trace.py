@@ -16,6 +16,7 @@ from raychan.channel.tubes import (
     halves,
     least,
     phases_of,
+    that_count,
     too_rough,
     vector_area,
 )
@@ -42,9 +43,7 @@ def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, tota
     if not landed:
         return tubes.take(np.zeros(len(tubes), bool))
     after = Tubes.join(landed)
-    # What is left counts less than a tenth of what would be worth a cut: let it go.
-    counts = phases_of(surface, leg, out, after, False, rule).bound > 0.1 * least(rule, total)
-    return after.take(np.flatnonzero(counts))
+    return after.take(that_count(phases_of(surface, leg, out, after, False, rule).bound, least(rule, total)))
 
 
 def _fly(

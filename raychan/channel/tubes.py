@@ -277,6 +277,13 @@ def least(rule: Refinement, total: float) -> float:
     return max(rule.floor, rule.relative * total) / 10.0
 
 
+def that_count(bound: Floats, doubt: float) -> NDArray[np.intp]:
+    """Return the tubes to keep: the weakest are let go as long as all of them together, in phase, stay under `doubt`.
+    Return the tubes to keep: the weakest are let go as long as all of them together, in phase, stay under `doubt`."""
+    order = np.argsort(bound)
+    return np.sort(order[np.cumsum(bound[order]) > doubt])
+
+
 def too_rough(ph: Phases, tubes: Tubes, rule: Refinement) -> Bools:
     """Tell which tubes bend more than a quadratic phase and one direction of the surface can follow."""
     span = ph.six.max(axis=1) - ph.six.min(axis=1)
