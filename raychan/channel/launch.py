@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.edges import edge_within
+from raychan.channel.edges import edge_within, meeting_lines
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
@@ -149,6 +149,11 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     plane = np.where(block >= 0, surface.plane[np.maximum(block, 0)], -1)
     source = np.broadcast_to(leg.image, (n, 3))
     side = edge_within(tubes.points, source, -k, leg.far, plane, surface.first_edge, surface.outline)
+    # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
+    known = seen | (block >= 0)
+    facet = np.where(block >= 0, block, tubes.facet[:, None])
+    met = np.where(known, surface.plane[facet], -1)
+    meeting_lines(tubes.points, source, -k, leg.far, met, facet, surface.first, surface.normal, side)
     return Sight(seen, view.corners[:n], view.passed[:n], side)
 
 

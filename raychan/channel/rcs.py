@@ -29,7 +29,8 @@ _POLARIZATIONS = {"VV": (0, 0), "VH": (0, 1), "HV": (1, 0), "HH": (1, 1)}
 _STEPS = 6
 _LEAST_DB = 1e-3  # what rounding and the quadratic phase leave even where two launches agree
 _MAX_ERROR_DB = 60.0
-_GROWTH = 3.0  # rays of the next refinement over those of all before it, about
+_FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and a larger tube may miss them
+_GROWTH = 2.0  # rays of the next refinement over those of all before it, about
 
 
 @dataclass(frozen=True)
@@ -111,16 +112,16 @@ def facets_of(mesh: Any, material: str | Material, frequency: float) -> Facets:
 def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iterator[Refinement]:
     """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again.
     Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again."""
-    edge = min(0.3, surface.extent / 4.0)
+    edge = min(_FIRST_EDGE, surface.extent / 4.0)
     own = _typical_edge(surface)
     for i in range(steps):
         fine = 2.0**-i
-        longest = edge * fine if i == 0 else min(edge * fine, 1.4 * own * fine)
+        longest = edge if i == 0 else min(edge, 1.35 * own) * 0.6**i
         yield Refinement(
             wavenumber=2.0 * np.pi * frequency / C0,
             phase=0.2 * fine,
             turn=0.3 * fine,
-            relative=0.03 * fine**1.5,
+            relative=0.03 * fine,
             max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
         )

@@ -17,6 +17,7 @@ from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
 from raychan.radar.windows import processing_gain, window
+from raychan.run.auto import choose
 from raychan.run.ledger import ledger
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
@@ -27,7 +28,7 @@ from raychan.world.scene import Scene
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, 0 to 1."""
 
-STAGES = ("geometry", "trace", "check", "profile", "cube", "map", "detect", "explain")
+STAGES = ("geometry", "check", "trace", "profile", "cube", "map", "detect", "explain")
 
 
 def simulate(
@@ -67,12 +68,19 @@ def simulate(
     floor = drowned(sensor, settings)
     with stage("geometry"):
         facets, points = scene.facets(0.0), scene.points(0.0)
-    with stage("trace"):
-        rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions)
-        paths, stats = solve(facets, points, sensor, carrier, rule, model.max_bounces, progress)
+    # The coarse launch comes first: it tells what is needed, and later how wrong the fine one may be.
+    chosen = None
     with stage("check"):
         rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, jitter=0.13)
         others, more = solve(facets, points, sensor, carrier, rule, model.max_bounces)
+        if model.mode == "auto":
+            cell = noise_of_cell(sensor, settings)
+            chosen = choose(others, sensor, settings, cell, model.tolerance_db)
+            model = _changed(model, {"max_bounces": chosen.bounces, "max_transmissions": chosen.transmissions})
+    with stage("trace"):
+        rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions)
+        rule = dataclasses.replace(rule, slots=others.kind.shape[1])
+        paths, stats = solve(facets, points, sensor, carrier, rule, model.max_bounces, progress)
     with stage("profile"):
         noise = sensor.noise_power if sensor.noise else 0.0
         pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
@@ -118,7 +126,7 @@ def simulate(
         error=error,
         seed=seed,
         timings=timings,
-        ledger=left_out,
+        ledger=left_out if chosen is None else {**left_out, "model": chosen},
         stats={
             "rays": stats.rays + more.rays,
             "tubes": stats.tubes,
@@ -138,15 +146,21 @@ def drowned(sensor: Sensor, settings: Any) -> float:
     map."""
     if not sensor.noise:
         return 0.0
-    wave = sensor.waveform
-    gain = processing_gain(window(settings.range_window, wave.n_samples))
-    gain *= processing_gain(window(settings.rate_window, wave.n_chirps))
     # The strongest direction of both antennas, on a grid finer than any beam of use.
     azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
     look = direction(azimuth.ravel(), elevation.ravel()) @ sensor.axes.T
     ends = (np.linalg.norm(f(look), axis=1).max() for f in (sensor.tx_field, sensor.rx_field))
-    amplitude = np.sqrt(sensor.noise_power / gain / sensor.power)
-    return float(amplitude * 4.0 * np.pi / wave.wavelength / np.prod(list(ends)))
+    amplitude = np.sqrt(noise_of_cell(sensor, settings) / sensor.power)
+    return float(amplitude * 4.0 * np.pi / sensor.waveform.wavelength / np.prod(list(ends)))
+
+
+def noise_of_cell(sensor: Sensor, settings: Any) -> float:
+    """Return the thermal noise [W] of one cell of the map; 0 when noise is off."""
+    if not sensor.noise:
+        return 0.0
+    wave = sensor.waveform
+    gain = processing_gain(window(settings.range_window, wave.n_samples))
+    return float(sensor.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
 
 
 def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any) -> MapError:

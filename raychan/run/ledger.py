@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +10,9 @@ from numpy.typing import NDArray
 
 from raychan.channel.surface import Surface
 from raychan.kernels.fresnel import coefficients_array
-from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
-from raychan.signal.cube import synthesize
-from raychan.tables import MIRROR, TRANSMIT, Facets, Paths, take
+from raychan.run.auto import interactions, peak
+from raychan.tables import MIRROR, TRANSMIT, Facets, Paths
 from raychan.units import C0, db
 
 Floats = NDArray[np.float64]
@@ -58,20 +56,9 @@ _NAMES = (
 )  # fmt: skip
 
 
-def _peak(paths: Paths, rows: NDArray[np.bool_], sensor: Sensor, settings: Any) -> float:
-    """Return the strongest cell [W] of the map of some of the paths alone."""
-    if not rows.any():
-        return 0.0
-    cube = synthesize(take(paths, rows), sensor)
-    return float(
-        range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad).power.max()
-    )
-
-
 def _further(paths: Paths, sensor: Sensor, settings: Any, bounces: int, weakest: float) -> Entry:
-    quiet = dataclasses.replace(sensor, noise=False)
-    met = ((paths.kind > 0) & (paths.kind != TRANSMIT)).sum(axis=1)
-    last, before = (_peak(paths, met == n, quiet, settings) for n in (bounces, bounces - 1))
+    met = interactions(paths)
+    last, before = (peak(paths, met == n, sensor, settings) for n in (bounces, bounces - 1))
     if last == 0.0 or before == 0.0:
         return Entry(UNKNOWN, "none", f"no path has {bounces} interactions: nothing to extrapolate from")
     ratio = min(last / before, 1.0)
@@ -84,9 +71,8 @@ def _transmission(paths: Paths, sensor: Sensor, settings: Any, weakest: float) -
     most = int(passes.max(initial=0))
     if most == 0:
         return Entry(NOTHING, "exact", "no path passes a thin layer")
-    quiet = dataclasses.replace(sensor, noise=False)
-    last = _peak(paths, passes == most, quiet, settings)
-    loss = _peak(paths, passes == max(most - 1, 0), quiet, settings)
+    last = peak(paths, passes == most, sensor, settings)
+    loss = peak(paths, passes == max(most - 1, 0), sensor, settings)
     ratio = min(last / loss, 1.0) if loss > 0.0 else 1.0
     how = f"paths through {most} layers are in; one more, by their ratio to {most - 1}"
     return Entry(float(db(max(last * ratio, 1e-40) / weakest)), "estimate", how)

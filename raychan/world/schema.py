@@ -122,7 +122,8 @@ class Processing(Table):
 class Model(Table):
     """[model]: what the channel takes into account, and how well."""
 
-    mode: Literal["physical"] = "physical"
+    mode: Literal["physical", "auto"] = "physical"
+    """physical: all that max_bounces and max_transmissions allow; auto: of these only what tolerance_db needs."""
     max_bounces: Annotated[int, Field(strict=True, ge=1, le=12)] = 3
     tolerance_db: Positive = 0.5
     max_transmissions: Annotated[int, Field(strict=True, ge=0, le=16)] = 4
