@@ -22,13 +22,13 @@ from raychan.run.ledger import ledger
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
 from raychan.signal.cube import synthesize
-from raychan.tables import MIRROR, Facets, MapError, Paths
+from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, RangeDoppler
 from raychan.world.scene import Scene
 
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, 0 to 1."""
 
-STAGES = ("geometry", "check", "trace", "profile", "cube", "map", "detect", "explain")
+STAGES = ("geometry", "check", "trace", "profile", "receive", "explain")
 
 
 def simulate(
@@ -84,25 +84,9 @@ def simulate(
     with stage("profile"):
         noise = sensor.noise_power if sensor.noise else 0.0
         pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
-    with stage("cube"):
-        cube = synthesize(paths, sensor, noise_rng)
-    with stage("map"):
-        rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
+    with stage("receive"):
+        cube, rdmap, detections = receive(paths, sensor, settings, noise_rng)
         error = map_error(paths, others, sensor, settings)
-    with stage("detect"):
-        # The scene file names range before rate; a map's axes are rate, then range.
-        sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
-        detections = detect(
-            rdmap,
-            pfa=settings.pfa,
-            min_snr_db=settings.min_snr_db,
-            method=settings.cfar,
-            ego_speed=sensor.ego_speed,
-            windows=(settings.rate_window, settings.range_window),
-            waveform=sensor.waveform,
-            elements=np.asarray(sensor.elements),
-            **sizes,
-        )
     receiver = Receiver(
         sensor.waveform,
         settings.range_window,
@@ -139,6 +123,28 @@ def simulate(
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
+
+
+def receive(
+    paths: Paths, sensor: Sensor, settings: Any, rng: np.random.Generator
+) -> tuple[Cube, RangeDoppler, Detections]:
+    """Return what the receiver makes of the paths; it sees nothing else of the scene."""
+    cube = synthesize(paths, sensor, rng)
+    rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
+    # The scene file names range before rate; a map's axes are rate, then range.
+    sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
+    detections = detect(
+        rdmap,
+        pfa=settings.pfa,
+        min_snr_db=settings.min_snr_db,
+        method=settings.cfar,
+        ego_speed=sensor.ego_speed,
+        windows=(settings.rate_window, settings.range_window),
+        waveform=sensor.waveform,
+        elements=np.asarray(sensor.elements),
+        **sizes,
+    )
+    return cube, rdmap, detections
 
 
 def drowned(sensor: Sensor, settings: Any) -> float:
