@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.diffract import diffracted_paths
 from raychan.channel.fields import departures, rates, transfer
 from raychan.channel.legs import Leg
 from raychan.channel.mirrors import legs_over, reachable
@@ -81,11 +82,13 @@ def solve(
     rule: Refinement,
     bounces: int,
     progress: Progress | None = None,
+    diffraction: bool = False,
 ) -> tuple[Paths, Stats]:
     """Return the paths of a scene seen by a monostatic radar, and what they cost.
 
     Args: frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
-    both ways counted; progress is told (stage, share done).
+    both ways counted; progress is told (stage, share done); diffraction adds single wedges on the ways to point
+    targets.
     """
     stats = Stats()
     since = perf_counter()
@@ -98,6 +101,8 @@ def solve(
     found = point_routes(surface, points, legs, legs, bounces, rule.slots, rule.layers)
     if found is not None:
         parts.append(paths_of(found, facets, radar, frequency))
+    if diffraction:
+        parts += diffracted_paths(surface, points, radar, frequency, rule.slots, legs)
     found = _foot_points(surface, legs, rule)
     if found is not None:
         parts.append(paths_of(found, facets, radar, frequency))

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 _WELD = 1e-6  # m
+_SHARP = 0.95  # cosine of corner normals across an edge above which it is round, not a wedge
 
 
 class Surface(Tracer):
@@ -34,6 +35,9 @@ class Surface(Tracer):
         self.bulge = np.zeros((n, 3, 3))
         self.outline = np.zeros((0, 2, 3))
         self.first_edge = np.zeros(1, np.int64)
+        self.wedge = np.zeros((0, 2, 3))
+        self.wedge_facet = np.zeros((0, 2), np.int32)
+        self.wedge_n = np.zeros(0)
         if n:
             self._join()
             self._bend()
@@ -70,6 +74,8 @@ class Surface(Tracer):
         self.convex_alone = (
             len(f.role) == 1 and bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same])
         )
+        every = order[:-1][same], order[1:][same]
+        self._wedges(*every, order[odd])
         inner = flat | soft
         self._outline(np.concatenate([ea[inner], eb[inner]]))
 
@@ -95,6 +101,23 @@ class Surface(Tracer):
         a, b = v[edges // 3, edges % 3], v[edges // 3, (edges + 1) % 3]
         self.outline = np.stack([a, b], axis=1)[order]
         self.first_edge = np.searchsorted(plane[order], np.arange(n + 1))
+
+    def _wedges(self, ea: Ints, eb: Ints, rim: Ints) -> None:
+        """List convex edges: `wedge` (w, 2, 3) ends [m], `wedge_facet` (w, 2) faces 0 and n, `wedge_n` exterior angle
+        over pi; the rims of open sheets are half planes."""
+        a, b = ea // 3, eb // 3
+        v, corner = self.facets.vertices, np.arange(3)
+        cosine = np.einsum("ij,ij->i", self.normal[a], self.normal[b])
+        far = v[b, corner[(eb % 3 + 2) % 3]]
+        convex = np.einsum("ij,ij->i", far - v[a, ea % 3], self.normal[a]) < -1e-9
+        na = self.facets.normals[a, ea % 3]
+        nb = self.facets.normals[b, (eb % 3 + 1) % 3]
+        sharp = convex & (np.einsum("ij,ij->i", na, nb) < _SHARP)
+        pick = np.concatenate([ea[sharp], rim])
+        self.wedge = np.stack([v[pick // 3, pick % 3], v[pick // 3, (pick % 3 + 1) % 3]], axis=1)
+        self.wedge_facet = np.stack([pick // 3, np.concatenate([b[sharp], rim // 3])], axis=1).astype(np.int32)
+        turn = np.arccos(np.clip(cosine[sharp], -1.0, 1.0)) / np.pi
+        self.wedge_n = np.concatenate([1.0 + turn, np.full(len(rim), 2.0)])
 
     def _bend(self) -> None:
         """Quadratic patch through corners and corner normals: x = sum l_i x_i - sum c_ij l_i l_j (Nagata 2005, eq.

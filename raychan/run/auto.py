@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
 from raychan.signal.cube import synthesize
-from raychan.tables import TRANSMIT, Paths, take
+from raychan.tables import DIFFRACT, TRANSMIT, Paths, take
 from raychan.units import db, undb
 
 
@@ -22,6 +22,7 @@ class Choice:
 
     bounces: int
     transmissions: int
+    diffraction: bool
     why: tuple[str, ...]
 
 
@@ -65,4 +66,9 @@ def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_
                     f"{n} {name}: strongest cell {db(level / limit):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
                 )
         chosen.append(keep)
-    return Choice(chosen[0], chosen[1], tuple(why))
+    level = peak(paths, (paths.kind == DIFFRACT).any(axis=1), sensor, settings)
+    say = "needed" if level > limit else "not needed"
+    why.append(
+        f"diffraction: strongest cell {db(max(level / limit, 1e-30)):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
+    )
+    return Choice(chosen[0], chosen[1], level > limit, tuple(why))

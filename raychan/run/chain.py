@@ -72,15 +72,23 @@ def simulate(
     chosen = None
     with stage("check"):
         rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, jitter=0.13)
-        others, more = solve(facets, points, sensor, carrier, rule, model.max_bounces)
+        everything = model.diffraction or model.mode == "auto"
+        others, more = solve(facets, points, sensor, carrier, rule, model.max_bounces, diffraction=everything)
         if model.mode == "auto":
             cell = noise_of_cell(sensor, settings)
             chosen = choose(others, sensor, settings, cell, model.tolerance_db)
-            model = _changed(model, {"max_bounces": chosen.bounces, "max_transmissions": chosen.transmissions})
+            model = _changed(
+                model,
+                {
+                    "max_bounces": chosen.bounces,
+                    "max_transmissions": chosen.transmissions,
+                    "diffraction": chosen.diffraction,
+                },
+            )
     with stage("trace"):
         rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions)
         rule = dataclasses.replace(rule, slots=others.kind.shape[1])
-        paths, stats = solve(facets, points, sensor, carrier, rule, model.max_bounces, progress)
+        paths, stats = solve(facets, points, sensor, carrier, rule, model.max_bounces, progress, model.diffraction)
     with stage("profile"):
         noise = sensor.noise_power if sensor.noise else 0.0
         pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
@@ -97,7 +105,7 @@ def simulate(
     )
     with stage("explain"):
         weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
-        left_out = ledger(paths, facets, sensor, settings, model.max_bounces, weakest)
+        left_out = ledger(paths, facets, points, sensor, settings, model, weakest)
         reasons = provenance(paths, rdmap, detections, receiver, error.power)
     return Result(
         paths=paths,

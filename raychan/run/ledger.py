@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.diffract import diffracted_paths
+from raychan.channel.legs import Leg
+from raychan.channel.solve import join
 from raychan.channel.surface import Surface
 from raychan.kernels.fresnel import coefficients_array
 from raychan.radar.sensor import Sensor
 from raychan.run.auto import interactions, peak
-from raychan.tables import MIRROR, TRANSMIT, Facets, Paths
+from raychan.tables import MIRROR, TRANSMIT, Facets, Paths, Points
 from raychan.units import C0, db
 
 Floats = NDArray[np.float64]
@@ -32,18 +35,21 @@ class Entry:
     how: str
 
 
-def ledger(paths: Paths, facets: Facets, sensor: Sensor, settings: Any, bounces: int, weakest: float) -> dict[str, Any]:
+def ledger(
+    paths: Paths, facets: Facets, points: Points, sensor: Sensor, settings: Any, model: Any, weakest: float
+) -> dict[str, Any]:
     """Return what was left out, by mechanism, against the weakest detection's power [W].
 
-    Args: bounces the most interactions that were traced; settings the scene's processing.
+    Args: settings, model the scene's processing and what was modelled.
     """
     if not weakest > 0.0 or not len(facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
     surface = Surface(facets)
     found = {
-        "further bounces": _further(paths, sensor, settings, bounces, weakest),
+        "further bounces": _further(paths, sensor, settings, model.max_bounces, weakest),
         "transmission": _transmission(paths, sensor, settings, weakest),
         "diffraction": _diffraction(surface, sensor, weakest),
+        "diffraction to point targets": _around(surface, points, sensor, settings, model, weakest),
         "diffuse scattering": _diffuse(surface, sensor, weakest),
         "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
         "intra-frame motion": _motion(paths, facets, sensor),
@@ -52,8 +58,14 @@ def ledger(paths: Paths, facets: Facets, sensor: Sensor, settings: Any, bounces:
 
 
 _NAMES = (
-    "further bounces", "transmission", "diffraction", "diffuse scattering", "range migration", "intra-frame motion",
-)  # fmt: skip
+    "further bounces",
+    "transmission",
+    "diffraction",
+    "diffraction to point targets",
+    "diffuse scattering",
+    "range migration",
+    "intra-frame motion",
+)
 
 
 def _further(paths: Paths, sensor: Sensor, settings: Any, bounces: int, weakest: float) -> Entry:
@@ -107,6 +119,22 @@ def _diffraction(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
     name = surface.facets.body_names[_body_at(surface, middle[at])]
     how = f"strongest edge's fringe field, L^2/pi broadside, if it were seen: on {name} at {r[at]:.1f} m"
     return Entry(float(db(power[at] / weakest)), "bound", how)
+
+
+def _around(surface: Surface, points: Points, sensor: Sensor, settings: Any, model: Any, weakest: float) -> Entry:
+    """What reaches targets given by their RCS over one wedge in, out or both."""
+    if not len(points.body):
+        return Entry(NOTHING, "exact", "no target is given by its RCS")
+    if model.diffraction:
+        return Entry(NOTHING, "exact", "modelled: single wedges, UTD")
+    parts = diffracted_paths(
+        surface, points, sensor, sensor.waveform.carrier, 8, [Leg(end=np.asarray(sensor.position))]
+    )
+    if not parts:
+        return Entry(NOTHING, "estimate", "no wedge stands near the way to a target")
+    found = join(parts)
+    level = peak(found, np.ones(len(found.delay), bool), sensor, settings)
+    return Entry(float(db(max(level, 1e-40) / weakest)), "estimate", "strongest cell of the diffracted returns (UTD)")
 
 
 def _body_at(surface: Surface, point: Floats) -> int:

@@ -127,6 +127,8 @@ class Model(Table):
     max_bounces: Annotated[int, Field(strict=True, ge=1, le=12)] = 3
     tolerance_db: Positive = 0.5
     max_transmissions: Annotated[int, Field(strict=True, ge=0, le=16)] = 4
+    diffraction: bool = False
+    """Single diffraction at wedges on the ways to targets given by their RCS."""
 
 
 class MaterialTable(Table):
