@@ -168,3 +168,19 @@ def test_missing_broken_and_unknown_files(tmp_path):
     (tmp_path / "a.step").write_text("")
     with pytest.raises(SceneError, match="unknown mesh format"):
         load(tmp_path / "a.step")
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        trimesh.creation.icosphere(subdivisions=2, radius=0.3),
+        trimesh.creation.cylinder(radius=0.2, height=0.5, sections=24),
+        trimesh.creation.box(extents=(1, 2, 3)),
+    ],
+    ids=["sphere", "cylinder", "box"],
+)
+def test_a_mesh_cut_in_its_planes_is_the_same_body(solid):
+    whole, cut = from_trimesh(solid), from_trimesh(solid.subdivide().subdivide())
+    assert len(cut.faces) == len(whole.faces)
+    assert cut.report.watertight
+    assert cut.volume() == pytest.approx(solid.volume, rel=1e-9)

@@ -11,6 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from raychan.world.errors import SceneError
+from raychan.world.flatten import merge_flat
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
@@ -123,6 +124,7 @@ def make_mesh(
     flipped = 0
     if normals is None:
         f, flipped = _wind(v, f)
+        f, kind = merge_flat(v, f, kind, _edge_pairs, _components)
         corner_normals = smooth_normals(v, f, crease_deg)
     else:
         corner_normals = np.asarray(normals, float)[keep]
