@@ -71,9 +71,9 @@ class Surface(Tracer):
         nb0, nb1 = f.normals[b, nxt[eb % 3]], f.normals[b, own[eb % 3]]
         soft = (np.einsum("ij,ij->i", na0, nb0) > 1 - 1e-6) & (np.einsum("ij,ij->i", na1, nb1) > 1 - 1e-6)
         self.smooth = _components(a[soft], b[soft], n)
-        self.convex_alone = (
-            len(f.role) == 1 and bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same])
-        )
+        one_sheet = bool((self.plane == self.plane[0]).all())
+        convex = one_sheet or (bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same]))
+        self.convex_alone = len(f.role) == 1 and convex
         every = order[:-1][same], order[1:][same]
         self._wedges(*every, order[odd])
         inner = flat | soft
