@@ -18,7 +18,6 @@ from raychan.kernels.fresnel import coefficients_array
 from raychan.tables import HALF_SPACE, LAYER
 from raychan.units import C0
 from raychan.world.material import Material
-from raychan.world.shapes import build
 
 F = 77e9
 K = 2.0 * np.pi * F / C0
@@ -45,6 +44,14 @@ def tube(radius, height, sections):
     return trimesh.creation.cylinder(radius=radius, height=height, sections=sections)
 
 
+def amplitudes(facets, look, distance=np.inf, step=1, move=0.0, **changes):
+    """Scattering matrix (2, 2) [m] of one launch, the `step`-th refinement; seen from look * distance + move."""
+    surface = Surface(facets)
+    rule = dataclasses.replace(next(itertools.islice(refinements(surface, F), step, None)), **changes)
+    leg = Leg(end=look, far=True) if np.isinf(distance) else Leg(end=look * distance + move)
+    return scattering(surface, leg, leg, F, 3, rule).sum(axis=0)
+
+
 def rms(x):
     return float(np.sqrt(np.mean(np.square(x))))
 
@@ -62,9 +69,13 @@ def test_square_plate_in_its_near_field_is_its_quadrature(size, distance):
 
 
 def test_plate_seen_from_aside_in_its_near_field_is_its_quadrature():
-    corners = po.rectangle(0.2, 0.1)
-    got = rcs(quad(corners), F, 12.0, -7.0, distance=4.0)
-    assert db(got.sigma / sigma(po.polygon(corners, K, view(12, -7, 4.0)))) == pytest.approx(0.0, abs=0.05)
+    """Within 0.05 dB down to 40 dB below the peak, as the far pattern is judged; within the stated error everywhere."""
+    corners, angles = po.rectangle(0.2, 0.1), [(0.0, 0.0), (2.0, -1.0), (5.0, 0.0), (0.0, 9.0), (12.0, -7.0)]
+    got = rcs(quad(corners), F, *zip(*angles, strict=True), distance=4.0, tolerance_db=0.05)
+    true = np.array([sigma(po.polygon(corners, K, view(*a, 4.0))) for a in angles])
+    error = np.abs(db(got.sigma / true))
+    assert error[true > 1e-4 * true.max()].max() < 0.05
+    assert (error <= got.error_db).all()
 
 
 @pytest.mark.parametrize("pol", ["VV", "HH"])
@@ -77,7 +88,7 @@ def test_plate_against_angle_is_its_two_sincs(pol):
     assert got.rays.max() <= 65_536
 
 
-def test_plate_of_two_materials_of_facets_edge_on_returns_nothing():
+def test_plate_edge_on_returns_nothing():
     got = rcs(quad(po.rectangle(0.1, 0.1)), F, 90.0)
     assert got.sigma < 1e-12
 
@@ -97,8 +108,8 @@ def test_sphere_is_its_mie_series_however_it_is_cut(radius, subdivisions, distan
 
 
 def test_sphere_has_no_cross_polarisation():
-    same, cross = (rcs(ball(0.1, 4), F, 33.0, 11.0, p).sigma for p in ("HH", "VH"))
-    assert db(cross / same) < -60.0
+    s = np.abs(amplitudes(facets_of(ball(0.1, 4), "pec", F), view(33.0, 11.0)[0]))
+    assert 2 * db(max(s[0, 1], s[1, 0]) / s[1, 1]) < -60.0
 
 
 @pytest.mark.parametrize(("radius", "height"), [(0.05, 0.2), (0.1, 0.3)])
@@ -193,7 +204,7 @@ def slab_of(material):
 def test_dielectric_plate_is_fresnel_or_slab_times_physical_optics(material, distance, pol):
     corners = po.rectangle(0.1, 0.1)
     azimuth = np.array([0.0, 3.7, 20.0, 45.0])
-    got = rcs(quad(corners), F, azimuth, 0.0, pol, distance=distance, material=material, tolerance_db=0.05)
+    got = rcs(quad(corners), F, azimuth, 0.0, pol, distance=distance, material=material)
     true = [sigma(po.polygon(corners, K, view(a, 0, distance), surface=slab_of(material)), pol) for a in azimuth]
     assert np.abs(db(got.sigma / true)).max() < 0.05
     assert got.rays.max() <= 16_384
@@ -242,15 +253,12 @@ def bodies():
 def test_ten_kilometres_away_nothing_but_the_phase_changes(name, distance):
     facets = facets_of(bodies()[name], "pec", F)
     shift, look = np.array([7000.0, -7100.0, 800.0]), view(8.0, 5.0)[0]
-    rule = next(itertools.islice(refinements(Surface(facets), F), 1, None))
-    size = []
-    for move in (np.zeros(3), shift):
-        surface = Surface(facets.replace(vertices=facets.vertices + move, origin=facets.origin + move))
-        leg = Leg(end=look, far=True) if np.isinf(distance) else Leg(end=look * distance + move)
-        s = scattering(surface, leg, leg, F, 3, rule).sum(axis=0)[0, 0]
+    moved = facets.replace(vertices=facets.vertices + shift, origin=facets.origin + shift)
+    here, there = amplitudes(facets, look, distance)[0, 0], amplitudes(moved, look, distance, move=shift)[0, 0]
+    if not np.isinf(distance):
         # A near value is scaled by the square of the distance from the origin: take that out again.
-        size.append(abs(s) if np.isinf(distance) else abs(s) * distance**2 / np.linalg.norm(leg.end) ** 2)
-    assert 2 * db(size[1] / size[0]) == pytest.approx(0.0, abs=0.01)
+        there *= distance**2 / np.sum((look * distance + shift) ** 2)
+    assert 2 * db(abs(there / here)) == pytest.approx(0.0, abs=0.01)
 
 
 @pytest.mark.parametrize("name", bodies())
@@ -259,23 +267,17 @@ def test_turned_with_the_radar_nothing_changes(name):
     mesh = bodies()[name]
     turn = trimesh.transformations.random_rotation_matrix(np.random.default_rng(3).random(3))
     look = view(10.0, 6.0)[0]
-    turned = turn[:3, :3] @ look
-    angles = np.degrees([np.arctan2(turned[1], turned[0]), np.arcsin(turned[2])])
     moved = mesh.copy().apply_transform(turn)
-    pols = ("VV", "VH", "HV", "HH")
-    here = sum(float(rcs(mesh, F, 10.0, 6.0, p).sigma) for p in pols)
-    there = sum(float(rcs(moved, F, *angles, p).sigma) for p in pols)
-    assert db(there / here) == pytest.approx(0.0, abs=0.25)
+    here = np.linalg.norm(amplitudes(facets_of(mesh, "pec", F), look))
+    there = np.linalg.norm(amplitudes(facets_of(moved, "pec", F), turn[:3, :3] @ look))
+    assert 2 * db(there / here) == pytest.approx(0.0, abs=0.25)
 
 
 @pytest.mark.parametrize("name", bodies())
 def test_another_lattice_agrees_within_the_tolerance(name):
     mesh = bodies()[name]
     got = rcs(mesh, F, 9.0, 4.0, tolerance_db=0.25)
-    surface = Surface(facets_of(mesh, "pec", F))
-    leg = Leg(end=view(9.0, 4.0)[0], far=True)
-    rule = next(itertools.islice(refinements(surface, F), 2, None))
-    other = scattering(surface, leg, leg, F, 3, dataclasses.replace(rule, jitter=0.21)).sum(axis=0)
+    other = amplitudes(facets_of(mesh, "pec", F), view(9.0, 4.0)[0], step=2, jitter=0.21)
     assert db(got.sigma / sigma(other)) == pytest.approx(0.0, abs=0.25)
 
 
@@ -289,18 +291,63 @@ def test_splitting_every_triangle_in_four_changes_nothing(name):
 def test_exchange_of_transmitter_and_receiver_in_random_scenes():
     """Fifty bodies, sizes, directions, distances and materials; polarisations change places too."""
     rng = np.random.default_rng(7)
-    makes = list(bodies().values())
+    makes = list((bodies() | {"sphere": ball(0.1, 2), "cylinder": tube(0.05, 0.2, 24)}).values())
     worst = 0.0
     for i in range(50):
-        mesh = makes[i % len(makes)].copy().apply_scale(rng.uniform(0.3, 1.2))
+        mesh = makes[i % len(makes)].copy().apply_scale(rng.uniform(0.3, 1.0))
         tx, rx = rng.uniform(-40.0, 40.0, (2, 2)) if rng.random() < 0.5 else rng.uniform(-8.0, 8.0, (2, 2))
         near = rng.uniform(2.0, 20.0, 2) if rng.random() < 0.5 else (np.inf, np.inf)
         material = "pec" if rng.random() < 0.5 else Material(eps_r=rng.uniform(2, 8), sigma=rng.uniform(0, 2))
         pol = ("VV", "VH", "HV", "HH")[rng.integers(4)]
         both = []
         for a, b, d, p in ((tx, rx, near, pol), (rx, tx, near[::-1], pol[::-1])):
-            got = rcs(mesh, F, *a, p, d[0], material, 0.1, rx_azimuth_deg=b[0], rx_elevation_deg=b[1], rx_distance=d[1])
+            back = {"rx_azimuth_deg": b[0], "rx_elevation_deg": b[1], "rx_distance": d[1]}
+            got = rcs(mesh, F, *a, p, d[0], material, 0.1, max_rays=20_000, **back)
             both.append(float(got.sigma))
         if max(both) > 1e-9:  # 1 mm^2/1000: nothing but rounding
             worst = max(worst, abs(db(both[1] / both[0])))
     assert worst < 0.1
+
+
+# --- the stated error ---------------------------------------------------------------------------------------------
+
+
+def random_case(rng, i):
+    """Mesh, azimuth, elevation [deg], distance [m] and true sigma [m^2] of one of six kinds of bodies, far or near."""
+    near = rng.random() < 0.4
+    d = float(rng.uniform(3.0, 20.0)) if near else np.inf
+    az, el = rng.uniform(-40.0, 40.0, 2)
+    kind = i % 6
+    if kind == 0:
+        corners = po.rectangle(*rng.uniform(0.05, 0.3, 2))
+        return quad(corners), az, el, d, sigma(po.polygon(corners, K, view(az, el, d)))
+    if kind == 1:
+        r = rng.uniform(0.03, 0.4)
+        true = 4 * np.pi * abs(mie.backscatter_near(r, K, d)) ** 2 if near else mie.rcs(r, K)
+        return ball(r, int(rng.integers(3, 5))), az, el, d, true
+    if kind == 2:
+        r, h, el = rng.uniform(0.03, 0.1), rng.uniform(0.05, 0.3), rng.uniform(-3.0, 3.0)
+        return tube(r, h, int(rng.choice([64, 128]))), az, el, d, sigma(po.cylinder(r, h, K, view(az, el, d)))
+    if kind == 3:
+        a, el = rng.uniform(0.05, 0.1), rng.uniform(-5.0, 5.0)
+        faces = corner.dihedral_faces(a, a * rng.uniform(0.5, 1.0))
+        return corner.mesh(faces), 0.7 * az, el, d, sigma(corner.corner(faces, K, view(0.7 * az, el, d)))
+    if kind == 4:
+        faces = corner.trihedral_faces(rng.uniform(0.05, 0.3), rng.random() < 0.5)
+        return corner.mesh(faces), az / 2, el / 2, np.inf, sigma(corner.corner(faces, K, view(az / 2, el / 2)))
+    box = trimesh.creation.box(rng.uniform(0.05, 0.3, 3))
+    return box, az, el, d, sigma(po.triangles(np.asarray(box.triangles), K, view(az, el, d)))
+
+
+def test_the_true_error_lies_within_the_stated_one_and_not_far_within():
+    """42 random cases, 95 % of them; the ratio where there is an error to speak of."""
+    rng = np.random.default_rng(11)
+    true, stated = [], []
+    for i in range(42):
+        mesh, az, el, d, exact = random_case(rng, i)
+        got = rcs(mesh, F, az, el, distance=d)
+        true.append(abs(float(db(got.sigma / exact))))
+        stated.append(float(got.error_db))
+    e, s = np.array(true), np.array(stated)
+    assert np.mean(e <= s) >= 0.95, f"{np.sum(e > s)} of {len(e)} beyond: {np.round(np.column_stack([e, s])[e > s], 4)}"
+    assert np.median((s / e)[e > 1e-3]) <= 4.0

@@ -9,7 +9,9 @@ import typer
 
 from raychan.cli.explain import explain
 from raychan.cli.info import info
+from raychan.cli.rcs import rcs
 from raychan.cli.run import run
+from raychan.cli.study import study
 from raychan.cli.view import view
 
 _HELP = """A street becomes a range-Doppler map, and every detection names the bodies it came from.
@@ -56,8 +58,9 @@ def _top(
     pass
 
 
-for command in (run, info, explain, view):
+for command in (run, info, rcs, explain, view):
     app.command()(command)
+app.add_typer(study, name="study")
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -71,6 +71,9 @@ def merge_flat(
     begin = np.searchsorted(owner[by_owner], np.arange(len(f) + 1))
     for p in np.flatnonzero(whole):
         corners = _loop(by_owner[begin[p] : begin[p + 1]], following, stop, is_corner)
+        # Begin at the lowest corner, so that the same outline is always fanned alike.
+        lowest = min(range(len(corners)), key=lambda i: tuple(v[corners[i]]))
+        corners = corners[lowest:] + corners[:lowest]
         fans.append(np.array([[corners[0], corners[i], corners[i + 1]] for i in range(1, len(corners) - 1)]))
         parts.append(np.full(len(corners) - 2, part[first_face[p]]))
     return np.concatenate(fans), np.concatenate(parts)
