@@ -72,5 +72,6 @@ def result(p: Paths, where, text: str = "") -> Result:
     why = provenance(p, rdmap, found, receiver(), 0.01 * power)
     return Result(
         p, profile, cube, rdmap, found, why, receiver(), seed=3, timings={"trace": 0.5},
-        error=MapError(power=0.01 * power), ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text, path="street.toml" if text else "",
+        error=MapError(power=0.01 * power), ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text,
+        path="street.toml" if text else "",
     )  # fmt: skip

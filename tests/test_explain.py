@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from records import WAVE, paths, receiver, result
 
+from raychan.channel.rcs import stated_error
 from raychan.process.spectrum import range_doppler
 from raychan.radar.antenna import Isotropic
 from raychan.radar.sensor import Sensor
@@ -110,11 +111,11 @@ def test_a_cell_that_no_path_explains_is_noise():
 
 
 def test_error_is_what_two_launches_differ_by_in_the_cell():
-    p = paths([9.0, 9.0], [-7.0, -7.0], [1e-5, 1e-5], [DIRECT_SUV] * 2)
-    r = result(p, [(9.0, -7.0, 1e-10)])
-    predicted = (2e-5) ** 2
-    differ = np.sqrt(r.error.power[tuple(r.detections.cell[0])] / predicted)
-    assert explain(r, 9.0).error_db == pytest.approx(-20 * np.log10(1 - differ), rel=1e-2)
+    at = 60 * WAVE.range_resolution
+    p = paths([at, at], [0.0, 0.0], [1e-5, 1e-5], [DIRECT_SUV] * 2)
+    r = result(p, [(at, 0.0, 1e-10)])
+    differ = np.sqrt(r.error.power[tuple(r.detections.cell[0])])
+    assert explain(r, at).error_db == pytest.approx(stated_error(2e-5, differ), rel=1e-3)
 
 
 def test_explain_finds_the_cell_of_a_result_by_range_and_speed():

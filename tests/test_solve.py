@@ -117,7 +117,7 @@ def test_range_rates_are_those_of_the_moved_scene():
 
     def strongest(t):
         f = scene_of_mirrors(t, v)
-        paths, _ = solve(f, nothing(), radar(np.array([0, 0, 0.5]) + own * t, own), F, refinement(F, 0.5), 3)
+        paths, _ = solve(f, nothing(), radar(np.array([0, 0, 0.5]) + own * t, own), F, refinement(F, 2.0), 1)
         seen = {}
         for chain in np.unique(paths.body, axis=0):
             rows = np.flatnonzero((paths.body == chain).all(axis=1))

@@ -21,6 +21,7 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 CENTRE = 3
+_MANY = 4096  # tubes under which letting some go saves nothing
 _MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
@@ -278,10 +279,11 @@ def least(rule: Refinement, total: float) -> float:
 
 
 def that_count(bound: Floats, doubt: float) -> NDArray[np.intp]:
-    """Return the tubes to keep: the weakest are let go as long as all of them together, in phase, stay under `doubt`.
-    Return the tubes to keep: the weakest are let go as long as all of them together, in phase, stay under `doubt`."""
+    """Return the tubes to keep: of many, the weakest are let go while all these in phase stay under 0.3 `doubt`."""
+    if len(bound) < _MANY:
+        return np.arange(len(bound))
     order = np.argsort(bound)
-    return np.sort(order[np.cumsum(bound[order]) > doubt])
+    return np.sort(order[np.cumsum(bound[order]) > 0.3 * doubt])
 
 
 def too_rough(ph: Phases, tubes: Tubes, rule: Refinement) -> Bools:

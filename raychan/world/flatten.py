@@ -1,6 +1,7 @@
 """Faces that were cut in a plane, made whole again: a mesh and its subdivision are then the same body.
 
-Without this the normals of a curved surface, which are found at the vertices, would change with every cut of its facets.
+Without this the normals of a curved surface, which are found at the vertices, would change with every cut of its
+facets.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ def merge_flat(
 ) -> tuple[Ints, Ints]:
     """Return faces and their parts with convex plane pieces triangulated anew from their true corners.
 
-    Args: v (v, 3) [m], f (f, 3), part (f,); pairs, components the mesh's own edge pairs and connected components. A vertex
-    is dropped only if no piece about it has a corner there, so that no edge gets a vertex in its middle.
+    Args: v (v, 3) [m], f (f, 3), part (f,); pairs, components the mesh's own edge pairs and connected components. A
+    vertex is dropped only if no piece about it has a corner there, so that no edge gets a vertex in its middle.
     """
     normal = np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -124,7 +124,8 @@ def make_mesh(
     flipped = 0
     if normals is None:
         f, flipped = _wind(v, f)
-        f, kind = merge_flat(v, f, kind, _edge_pairs, _components)
+        f, merged = merge_flat(v, f, kind.astype(np.int64), _edge_pairs, _components)
+        kind = merged.astype(np.int32)
         corner_normals = smooth_normals(v, f, crease_deg)
     else:
         corner_normals = np.asarray(normals, float)[keep]

@@ -1,0 +1,222 @@
+"""raychan rcs: radar cross-section of a mesh or a built-in shape against angle, with its error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from raychan.cli import show
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from raychan.channel.rcs import Rcs
+    from raychan.world.mesh import Mesh
+
+_MOST_ANGLES = 1_000_000
+_CHUNKS = 50
+_UNSURE_DB = 60.0  # the error that raychan.rcs states where it knows nothing
+
+
+def rcs(
+    source: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Mesh file (GLB, OBJ, PLY, STL); with --shape its parameters, such as radius=0.3.",
+            metavar="MESH | KEY=VALUE...",
+            show_default=False,
+        ),
+    ] = None,
+    shape: Annotated[
+        str | None, typer.Option(help="Built-in shape instead of a mesh: plate, sphere, trihedral, car...")
+    ] = None,
+    frequency_ghz: Annotated[float, typer.Option(help="Frequency [GHz].", metavar="GHZ")] = 77.0,
+    azimuth: Annotated[
+        str,
+        typer.Option(help="Azimuth from the target to the radar [deg]: one, or first:last:step.", metavar="A[:B:STEP]"),
+    ] = "0",
+    elevation: Annotated[str, typer.Option(help="Elevation [deg], likewise.", metavar="A[:B:STEP]")] = "0",
+    polarization: Annotated[str, typer.Option(help="Receive then transmit: VV, VH, HV or HH.")] = "VV",
+    distance: Annotated[
+        str, typer.Option(help="Radar's distance from the target's origin [m], or inf.", metavar="M")
+    ] = "inf",
+    material: Annotated[str, typer.Option(help="What all of it is made of, such as pec or glass.")] = "pec",
+    tolerance: Annotated[float, typer.Option(help="Error to refine to [dB].", metavar="DB")] = 0.25,
+    max_bounces: Annotated[int, typer.Option(help="Bounces along a path.", metavar="N")] = 3,
+    unit: Annotated[str, typer.Option(help="Unit of the mesh file: m, cm, mm, inch, ft.")] = "m",
+    up: Annotated[
+        str | None, typer.Option(help="The file's axis that points up; y for GLB and z else if not given.")
+    ] = None,
+    scale: Annotated[float, typer.Option(help="Further factor on the mesh's size.")] = 1.0,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Write a table to this file.", metavar="FILE.csv")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw RCS against angle to this file.", metavar="FILE.png")] = None,
+) -> None:
+    """Compute the radar cross-section of a mesh or a built-in shape against angle, and how wrong it may be.
+
+    Angles point from the target to the radar in the target's frame (x forward, y left, z up).
+    """
+    import numpy as np
+
+    for file, endings in ((out, (".csv",)), (plot, (".png", ".pdf", ".svg"))):
+        _writable(file, endings)
+    az, el = angles(azimuth, "--azimuth"), angles(elevation, "--elevation")
+    if len(az) * len(el) > _MOST_ANGLES:
+        raise typer.BadParameter(f"{len(az) * len(el)} angles wanted; at most {_MOST_ANGLES} can be")
+    mesh, name = _target(source or [], shape, unit, up, scale)
+    grid = np.meshgrid(az, el)
+    try:
+        far = float(distance)
+    except ValueError:
+        raise typer.BadParameter(f"--distance: '{distance}' is not a number of metres, nor inf") from None
+    settings: dict[str, Any] = {
+        "polarization": polarization,
+        "distance": far,
+        "material": material,
+        "tolerance_db": tolerance,
+        "max_bounces": max_bounces,
+    }
+    with show.progress() as tell:
+        found = _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell)
+    rows = _rows(grid[0].ravel(), grid[1].ravel(), found)
+    title = f"{name}, {frequency_ghz:g} GHz, {polarization.upper()}, " + (
+        "far field" if np.isinf(far) else f"radar at {far:g} m"
+    )
+    files = {}
+    if out is not None:
+        files[out] = _csv(rows).encode()
+    if plot is not None:
+        dbsm = np.array([r[3] for r in rows]).reshape(grid[0].shape)
+        files[plot] = _drawn(az, el, dbsm, found.error_db.reshape(grid[0].shape), title, plot.suffix)
+    from raychan.run.files import write_whole
+
+    for file, content in files.items():
+        write_whole(file, content)
+    screen = show.console()
+    screen.print(_table(title, rows))
+    _warn(found, tolerance)
+    if files:
+        screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
+
+
+def angles(text: str, option: str) -> Any:
+    """Return the angles (n,) [deg] that 'A' or 'A:B:STEP' stands for, B included. Raises: typer.BadParameter."""
+    import numpy as np
+
+    try:
+        numbers = [float(part) for part in text.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3) or not np.isfinite(numbers).all():
+        raise typer.BadParameter(f"{option}: '{text}' is neither a number of degrees nor first:last:step, as -30:30:1")
+    if len(numbers) == 1:
+        return np.array(numbers)
+    first, last, step = numbers
+    if step == 0.0 or (last - first) * step < 0.0:
+        raise typer.BadParameter(f"{option}: '{text}' never ends: the step must lead from the first angle to the last")
+    count = (last - first) / step
+    if count > _MOST_ANGLES:
+        raise typer.BadParameter(f"{option}: '{text}' asks for {count:.3g} angles; at most {_MOST_ANGLES} can be")
+    return first + step * np.arange(int(count + 1e-9) + 1)
+
+
+def _writable(file: Path | None, endings: tuple[str, ...]) -> None:
+    if file is None:
+        return
+    if file.suffix.lower() not in endings:
+        raise typer.BadParameter(f"{file}: must end in {' or '.join(endings)}")
+    if not file.parent.is_dir():
+        raise typer.BadParameter(f"{file}: there is no directory {file.parent}")
+
+
+def _target(source: list[str], shape: str | None, unit: str, up: str | None, scale: float) -> tuple[Mesh, str]:
+    """Return the mesh of a file, or of a built-in shape with its parameters, and what to call it."""
+    if shape is None:
+        from raychan.world.meshfile import load
+
+        if len(source) != 1:
+            raise typer.BadParameter("one mesh file is wanted, or --shape NAME with its parameters")
+        return load(source[0], unit=unit, up=up, scale=scale), Path(source[0]).name
+    from raychan.world.shapes import build
+
+    return build(shape, dict(_parameter(text) for text in source)), " ".join([shape, *source])
+
+
+def _parameter(text: str) -> tuple[str, Any]:
+    key, sign, value = text.partition("=")
+    if not sign:
+        raise typer.BadParameter(f"'{text}' is no parameter of a shape; write KEY=VALUE, as radius=0.3")
+    if value.lower() in ("true", "false"):
+        return key, value.lower() == "true"
+    try:
+        return key, float(value)
+    except ValueError:
+        return key, value
+
+
+def _sweep(mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, Any], tell: Callable[..., None]) -> Rcs:
+    """Return the RCS at all angles, a chunk at a time so that progress can be told."""
+    import numpy as np
+
+    from raychan.channel.rcs import Rcs
+    from raychan.channel.rcs import rcs as compute
+
+    parts: list[Rcs] = []
+    done = 0
+    tell("rcs", 0.0)
+    for rows in np.array_split(np.arange(len(az)), min(_CHUNKS, len(az))):
+        try:
+            parts.append(compute(mesh, frequency, az[rows], el[rows], **settings))
+        except ValueError as error:
+            from raychan.world.errors import SceneError
+
+            if isinstance(error, SceneError):
+                raise
+            raise typer.BadParameter(str(error)) from error
+        done += len(rows)
+        tell("rcs", done / len(az))
+    return Rcs(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("sigma", "error_db", "rays", "bounces")))
+
+
+def _rows(az: Any, el: Any, found: Rcs) -> list[tuple[float, float, float, float, float, int, int]]:
+    import numpy as np
+
+    with np.errstate(divide="ignore"):
+        dbsm = 10.0 * np.log10(found.sigma)
+    columns = (az, el, found.sigma, dbsm, found.error_db, found.rays, found.bounces)
+    return list(zip(*(c.tolist() for c in columns), strict=True))
+
+
+def _csv(rows: list[Any]) -> str:
+    head = "azimuth_deg,elevation_deg,sigma_m2,rcs_dbsm,error_db,rays,bounces"
+    lines = [f"{a:.10g},{e:.10g},{s:.8g},{d:.6g},{x:.4g},{r},{b}" for a, e, s, d, x, r, b in rows]
+    return "\n".join([head, *lines, ""])
+
+
+def _table(title: str, rows: list[Any]) -> Any:
+    cells = [
+        (f"{a:g}", f"{e:g}", f"{d:.2f}", "unknown" if x >= _UNSURE_DB else f"{x:.3f}", f"{r}", f"{b}")
+        for a, e, _, d, x, r, b in rows
+    ]
+    heads = ("azimuth deg", "elevation deg", "RCS dBsm", "error dB", "rays", "bounces")
+    return show.table(title, heads, cells, left=())
+
+
+def _warn(found: Rcs, tolerance: float) -> None:
+    over = int((found.error_db > tolerance).sum())
+    if over:
+        count, worst = found.error_db.size, float(found.error_db.max())
+        most = "unknown" if worst >= _UNSURE_DB else f"{worst:.2f} dB"
+        show.warn([f"{over} of {count} angles miss the tolerance of {tolerance:g} dB; largest stated error: {most}"])
+
+
+def _drawn(az: Any, el: Any, dbsm: Any, error: Any, title: str, suffix: str) -> bytes:
+    import tempfile
+
+    from raychan.report.rcs_figure import rcs_picture
+
+    with tempfile.TemporaryDirectory() as stage:
+        return rcs_picture(az, el, dbsm, error, title, Path(stage) / f"rcs{suffix}").read_bytes()

@@ -1,0 +1,85 @@
+"""raychan study: how accurate, how fast, and where methods fail."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from raychan.cli import show
+from raychan.cli.study_stability import stability
+
+if TYPE_CHECKING:
+    from raychan.study.tradeoff import Row
+
+study = typer.Typer(
+    no_args_is_help=True, help="Studies of the method itself: error against effort; behaviour where methods fail."
+)
+
+
+@study.callback()
+def _top() -> None:
+    pass
+
+
+@study.command()
+def tradeoff(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Directory for figures and CSV; made if missing.", metavar="DIR")
+    ],
+    case: Annotated[
+        list[str] | None,
+        typer.Option("--case", help="Only this case; may be repeated.", metavar="NAME", show_default=False),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer settings and a coarser truth for the heavy cases.")
+    ] = False,
+) -> None:
+    """Chart error against seconds and rays: five methods on six cases.
+
+    Writes tradeoff.csv, tradeoff_CASE.png for each case and tradeoff.png with the settings that none beats.
+    """
+    from raychan.report.tradeoff_figures import case_picture, summary_picture
+    from raychan.run.files import staging
+    from raychan.study.tradeoff import tradeoff, write_csv
+
+    with staging(out) as stage, show.progress() as tell:
+        try:
+            rows = tradeoff(case or (), quick=quick, progress=tell)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+        write_csv(rows, stage / "tradeoff.csv")
+        for name in dict.fromkeys(r.case for r in rows):
+            case_picture([r for r in rows if r.case == name], stage / f"tradeoff_{name}.png")
+        summary_picture(rows, stage / "tradeoff.png")
+    screen = show.console()
+    heads = ["case", "method", "setting", "rays", "seconds", "rms error dB", "on the front"]
+    screen.print(show.table("Error against effort", heads, [_cells(r) for r in rows], left=(0, 1, 2, 6)))
+    for line in _verdicts(rows):
+        screen.print(line, soft_wrap=True)
+    screen.print(f"figures and table: {out}", soft_wrap=True)
+
+
+study.command()(stability)
+
+
+def _cells(r: Row) -> list[str]:
+    fronts = [name for name, on in (("rays", r.front_rays), ("seconds", r.front_seconds)) if on]
+    setting = f"{r.setting} (default)" if r.default else r.setting
+    return [
+        r.case, r.method, setting, f"{r.rays:,.0f}", f"{r.seconds:.3f}", f"{r.error_db:.2f}", ", ".join(fronts),
+    ]  # fmt: skip
+
+
+def _verdicts(rows: list[Row]) -> list[str]:
+    """Say for each case whether the default lies on the front of error against seconds, and what beats it if not."""
+    from raychan.study.tradeoff import beaten_by
+
+    lines = []
+    for row in (r for r in rows if r.default):
+        better = beaten_by(rows, row)
+        others = list(dict.fromkeys(f"{b.method}, {b.setting}" for b in sorted(better, key=lambda b: b.seconds)))
+        verdict = "on the front" if not better else "beaten by " + "; ".join(others[:3])
+        lines.append(f"default on {row.case}: {row.error_db:.2f} dB in {row.seconds:.2f} s, {verdict}")
+    return lines

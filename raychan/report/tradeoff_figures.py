@@ -1,0 +1,95 @@
+"""Pictures of the trade-off: error against rays and seconds, a figure a case, and one of all with their fronts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.report.canvas import PALETTE, figure, save, style
+from raychan.study.methods import ADAPTIVE, METHODS, MIRRORS, POINT, POINTS, UNIFORM
+from raychan.study.tradeoff import Row
+
+_LOOK = {
+    ADAPTIVE: ("o", PALETTE[4]),
+    UNIFORM: ("s", PALETTE[0]),
+    POINT: ("^", PALETTE[2]),
+    MIRRORS: ("D", PALETTE[5]),
+    POINTS: ("X", PALETTE[6]),
+}
+_LOW, _HIGH = 0.01, 60.0
+_TICKS = (0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30)
+
+
+def case_picture(rows: Sequence[Row], path: Path) -> Path:
+    """Draw one case: error in dB against rays (left) and seconds (right)."""
+    with style():
+        made = figure(9.0, 4.4)
+        left, right = made.subplots(1, 2, sharey=True)
+        for axes, key in ((left, "rays"), (right, "seconds")):
+            _lines(axes, rows, key)
+            axes.set_xlabel("rays, all views" if key == "rays" else "seconds, all views")
+        left.set_ylabel("rms error [dB]")
+        made.suptitle(f"{rows[0].title}\n", fontsize=11, fontweight="bold")
+        left.set_title(f"truth: {rows[0].truth}", fontsize=7, loc="left", fontweight="normal", color="#555555")
+        handles, names = left.get_legend_handles_labels()
+        made.legend(handles, names, loc="outside lower center", ncols=4)
+        return save(made, path)
+
+
+def summary_picture(rows: Sequence[Row], path: Path) -> Path:
+    """Draw all cases, error against seconds, with the front of settings that none beats."""
+    cases = list(dict.fromkeys(r.case for r in rows))
+    across = min(3 if len(cases) <= 6 else 4, len(cases))
+    down = -(-len(cases) // across)
+    with style():
+        made = figure(3.7 * across + 0.3, 2.9 * down + 0.8)
+        grid = np.atleast_1d(made.subplots(down, across, sharey=True, squeeze=False)).ravel()
+        for axes, name in zip(grid, cases, strict=False):
+            mine = [r for r in rows if r.case == name]
+            front = sorted((r for r in mine if r.front_seconds), key=lambda r: r.seconds)
+            x = [max(r.seconds, 1e-5) for r in front]
+            y = [_shown(max(r.error_db, r.truth_db)) for r in front]
+            axes.step([*x, 1e3], [*y, y[-1]], where="post", color="#bbbbbb", lw=5, alpha=0.6, zorder=1, label="front")
+            _lines(axes, mine, "seconds")
+            axes.set_title(mine[0].title, fontsize=9)
+        for axes in grid[len(cases) :]:
+            axes.set_visible(False)
+        for i, axes in enumerate(grid[: len(cases)]):
+            if i % across == 0:
+                axes.set_ylabel("rms error [dB]")
+            if i + across >= len(cases):
+                axes.set_xlabel("seconds, all views")
+        handles, names = grid[0].get_legend_handles_labels()
+        made.legend(handles, names, loc="outside lower center", ncols=4)
+        return save(made, path)
+
+
+def _shown(error: float) -> float:
+    return min(max(error, _LOW), _HIGH)
+
+
+def _lines(axes: Any, rows: Sequence[Row], key: str) -> None:
+    """Draw every method as a marked line over its settings; the default as a star; what no truth can tell, shaded."""
+    for method in METHODS:
+        mine = sorted((r for r in rows if r.method == method), key=lambda r: float(getattr(r, key)))
+        x = [max(float(getattr(r, key)), 1e-5) for r in mine]
+        mark, colour = _LOOK[method]
+        axes.plot(x, [_shown(r.error_db) for r in mine], marker=mark, color=colour, ms=5, lw=1.2, label=method)
+    for i, r in enumerate(r for r in rows if r.default):
+        axes.plot(
+            max(float(getattr(r, key)), 1e-5), _shown(r.error_db), "*", ms=15, mfc="#ffd54a", mec="black", mew=0.8,
+            ls="none", zorder=5, label="default setting" if i == 0 else None,
+        )  # fmt: skip
+    axes.axhspan(_LOW / 2, rows[0].truth_db, color="#eeeeee", lw=0, zorder=0, label="closer than the truth is known")
+    axes.set(xscale="log", yscale="log", ylim=(_LOW * 0.8, _HIGH * 1.3))
+    axes.set_xlim(*_span([max(float(getattr(r, key)), 1e-5) for r in rows]))
+    axes.set_yticks(_TICKS, [f"{t:g}" for t in _TICKS])
+    axes.minorticks_off()
+    axes.grid(alpha=0.3, lw=0.5)
+
+
+def _span(values: Sequence[float]) -> tuple[float, float]:
+    return min(values) / 2.0, max(values) * 3.0

@@ -1,0 +1,205 @@
+"""The scene case of the trade-off: each method's paths through the same receiver, noiseless, to a map."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.legs import Leg, Mirror
+from raychan.channel.solve import refinement, solve
+from raychan.process.spectrum import range_doppler
+from raychan.signal.cube import synthesize
+from raychan.study.cases import Street
+from raychan.study.lattice import Echo, Window, echoes
+from raychan.study.methods import ADAPTIVE, MIRRORS, POINT, POINTS, UNIFORM, Run, mean_rcs
+from raychan.study.specular import glints
+from raychan.tables import MIRROR, SCATTERER, Facets, Paths
+from raychan.units import C0
+from raychan.world.embree import Tracer
+from raychan.world.scene import Scene
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_FINE_SAG = 1e-4  # m: flat facets of the lattice methods lie this close to the true surface
+_NEAR = 3.0  # m: nearer (and, as ranges wrap, at the far end) the map shows the ground under the radar, not a target
+_OWN = "ego"  # bodies of this name carry the radar
+
+
+class Road:
+    """A loaded scene, its facets, and the receiver that turns paths into a map."""
+
+    def __init__(self, case: Street) -> None:
+        self.scene = Scene.load(case.path)
+        self.sensor: Any = dataclasses.replace(self.scene.sensor, noise=False)
+        self.frequency = float(self.sensor.waveform.carrier)
+        self.bounces = self.scene.model.max_bounces
+        self.tolerance_db = float(self.scene.model.tolerance_db)
+        self.facets = self.scene.facets(0.0)
+        curved = [b.name for b in self.scene.bodies if b.name and self._takes_sag(b)]
+        changes = [f"bodies.{name}.params.max_sag={_FINE_SAG}" for name in curved]
+        self.fine = (self.scene.override(changes) if changes else self.scene).facets(0.0)
+
+    def _takes_sag(self, body: Any) -> bool:
+        return getattr(body, "shape", None) in ("car", "suv", "van", "lamp_post")
+
+    @property
+    def end(self) -> Floats:
+        """Where the radar stands [m]."""
+        return np.asarray(self.sensor.position, float)
+
+    def map_of(self, paths: Paths) -> Floats:
+        """Return the noiseless range-Doppler map [W] of paths."""
+        cube = synthesize(paths, self.sensor)
+        p = self.scene.processing
+        found = range_doppler(cube, self.sensor.waveform, p.range_window, p.rate_window, p.pad)
+        return np.asarray(found.power[:, (found.range > _NEAR) & (found.range < found.range[-1] - _NEAR)])
+
+    def paths_of(self, parts: list[Echo]) -> Paths:
+        """Return echoes as paths; what they met is not kept."""
+        wave = C0 / self.frequency / (4.0 * np.pi)
+        columns = {f.name: np.concatenate([getattr(e, f.name) for e in parts]) for f in dataclasses.fields(Echo)}
+        keep = columns["amplitude"] != 0.0
+        n, none = int(keep.sum()), np.full((int(keep.sum()), 1), -1, np.int16)
+        return Paths(
+            delay=columns["length"][keep] / C0,
+            amplitude=wave * columns["amplitude"][keep],
+            rate=columns["rate"][keep],
+            departure=columns["away"][keep],
+            arrival=columns["look"][keep],
+            body=none,
+            part=none,
+            kind=np.ones((n, 1), np.int8),
+            vertices=np.zeros((n, 1, 3), np.float32),
+            body_names=self.facets.body_names,
+            part_names=self.facets.part_names,
+            tx=self.end,
+            rx=self.end,
+        )
+
+    def targets(self, facets: Facets) -> Bools:
+        """Return which facets belong to bodies that scatter, the radar's carrier excepted."""
+        own = np.array([name.startswith(_OWN) for name in facets.body_names])
+        return (facets.role[facets.body] == SCATTERER) & ~own[facets.body]
+
+
+def tubes(road: Road, tolerance_db: float, jitter: float = 0.0, checked: bool = True) -> Run:
+    """Return the map by adaptive tubes as `raychan run` does: cut for a tolerance, and once more to state the error."""
+    since = perf_counter()
+    f, s = road.frequency, road.sensor
+    points = road.scene.points(0.0)
+    rule = dataclasses.replace(refinement(f, tolerance_db), jitter=jitter)
+    paths, stats = solve(road.facets, points, s, f, rule, road.bounces)
+    rays = stats.rays
+    if checked:
+        rule = dataclasses.replace(refinement(f, 3.0 * tolerance_db), jitter=0.13)
+        rays += solve(road.facets, points, s, f, rule, road.bounces)[1].rays
+    return Run(road.map_of(paths), rays, perf_counter() - since)
+
+
+def lattice(road: Road, rays: int, phased: bool) -> Run:
+    """Return the map by rays on a lattice over the bodies and their images in the ground."""
+    since = perf_counter()
+    tracer = Tracer(road.fine)
+    outs = [Leg(end=road.end)]
+    v = road.fine.vertices[road.targets(road.fine)].reshape(-1, 3)
+    for facet in np.flatnonzero(road.fine.role[road.fine.body] == MIRROR)[:1]:
+        mirror = Mirror(
+            tracer.first[facet], tracer.normal[facet], int(facet), int(road.fine.body[facet]), tracer.first[facet], 1e3
+        )
+        outs.append(Leg(end=road.end, mirrors=(mirror,)))
+        image = v - 2.0 * ((v - mirror.point) @ mirror.normal)[:, None] * mirror.normal
+        v = np.concatenate([v, image])
+    window = Window.onto(road.end, v, np.array([1.0, 0.0, 0.0]))
+    s = road.sensor
+    found = echoes(
+        tracer, window, outs, s.tx_field, s.rx_field, road.frequency, rays, road.bounces, phased, np.asarray(s.velocity)
+    )  # fmt: skip
+    return Run(road.map_of(road.paths_of(list(found))), tracer.rays, perf_counter() - since)
+
+
+def specular(road: Road, fine: int) -> Run:
+    """Return the map by specular points of one reflection alone, the bodies conducting."""
+    since = perf_counter()
+    facets = road.fine if fine else road.facets
+    tracer = Tracer(facets)
+    k = 2.0 * np.pi * road.frequency / C0
+    found = glints(tracer, road.end, k)
+    mine = road.targets(facets)[found.facet]
+    parts = [_direct(road, found.point[mine], found.field[mine], facets.velocity[facets.body[found.facet[mine]]])]
+    return Run(road.map_of(road.paths_of(parts)), max(tracer.rays, 1), perf_counter() - since)
+
+
+def as_points(road: Road, aspects: int) -> Run:
+    """Return the map with each body a point of its mean RCS at the place nearest to the radar; tables made before."""
+    facets = road.facets
+    mine = road.targets(facets)
+    places, sigma, speed = [], [], []
+    for body in np.unique(facets.body[mine]):
+        v = facets.vertices[facets.body == body].reshape(-1, 3)
+        near = v[np.argmin(np.linalg.norm(v - road.end, axis=1))]
+        named = next(b for b in road.scene.bodies if b.name == facets.body_names[body])
+        places.append(near)
+        sigma.append(mean_rcs(named.geometry, aspects, 20.0, road.bounces))
+        speed.append(facets.velocity[body])
+    since = perf_counter()
+    p = np.array(places)
+    r = np.linalg.norm(p - road.end, axis=1)
+    k = 2.0 * np.pi * road.frequency / C0
+    field = np.sqrt(np.array(sigma) / (4.0 * np.pi)) / r**2 * np.exp(-2j * k * r)
+    value = road.map_of(road.paths_of([_direct(road, p, field, np.array(speed))]))
+    return Run(value, len(p), perf_counter() - since)
+
+
+def _direct(road: Road, point: Floats, field: Any, velocity: Floats) -> Echo:
+    """Return echoes straight from points (n, 3) of scattered field (n,) [1/m] moving at `velocity` (n, 3) [m/s]."""
+    d = point - road.end
+    r = np.linalg.norm(d, axis=1)
+    d = d / r[:, None]
+    s = road.sensor
+    couple = np.einsum("ij,ij->i", s.tx_field(d), s.rx_field(d))
+    rate = np.einsum("ij,ij->i", velocity - np.asarray(s.velocity), d)
+    return Echo(field * couple, 2.0 * r, rate, d, d)
+
+
+def error_db(value: Floats, truth: Floats, depth_db: float = 30.0) -> float:
+    """Return the rms error [dB] of map cells within `depth_db` of the true peak; cells a method leaves dark count 90 dB
+    below the peak."""
+    rows = truth > truth.max() * 10.0 ** (-depth_db / 10.0)
+    floor = truth.max() * 1e-9
+    return float(np.sqrt(np.mean((10.0 * np.log10(np.maximum(value[rows], floor) / truth[rows])) ** 2)))
+
+
+@dataclass(frozen=True)
+class Effort:
+    """One setting of a method for the scene."""
+
+    method: str
+    label: str
+    default: bool
+    run: Callable[[Road], Run]
+
+
+def efforts(default_db: float, quick: bool) -> list[Effort]:
+    """Return all settings of all methods for the scene whose default tolerance is `default_db`."""
+    made = []
+    for t in () if quick else (8.0 * default_db, default_db):
+        made.append(Effort(ADAPTIVE, f"launch, {t:g} dB", False, lambda road, t=t: tubes(road, t, checked=False)))  # type: ignore[misc]
+    made.append(Effort(ADAPTIVE, f"{default_db:g} dB", True, lambda road: tubes(road, default_db)))
+    for method, phased in ((UNIFORM, True), (POINT, False)):
+        for n in (8_000, 64_000) if quick else (8_000, 32_000, 128_000, 512_000):
+            made.append(Effort(method, f"{n}", False, lambda road, n=n, phased=phased: lattice(road, n, phased)))  # type: ignore[misc]
+    for i, mesh in enumerate(("plain mesh", "fine mesh")):
+        made.append(Effort(MIRRORS, mesh, False, lambda road, i=i: specular(road, i)))  # type: ignore[misc]
+    for n in (1, 4) if quick else (1, 4, 16):
+        made.append(Effort(POINTS, f"{n} aspects", False, lambda road, n=n: as_points(road, n)))  # type: ignore[misc]
+    return made
+
+
+__all__ = ["Road", "efforts", "error_db", "lattice", "tubes"]

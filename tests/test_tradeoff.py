@@ -1,0 +1,103 @@
+"""The trade-off study: its lattice and glints against closed forms, its fronts and files."""
+
+import csv
+
+import numpy as np
+import pytest
+from truth import po
+
+from raychan.channel.legs import Leg
+from raychan.channel.rcs import facets_of
+from raychan.cli import invoke
+from raychan.study import cases, methods
+from raychan.study.lattice import Window, echoes
+from raychan.study.specular import glints
+from raychan.study.tradeoff import Row, beaten_by, marked, write_csv
+from raychan.world.embree import Tracer
+from raychan.world.shapes import build
+
+
+def row(method, rays, seconds, error, default=False):
+    return Row("c", "c", "t", 0.05, method, "s", default, rays, seconds, error)
+
+
+def test_near_plate_truth_equals_the_independent_quadrature():
+    case = cases.plate()
+    for view, sigma in zip(case.views, case.truth, strict=True):
+        tx = po.direction(*np.radians(view[:2])), view[2]
+        s = po.polygon(po.rectangle(1.5, 1.5), cases.WAVENUMBER, tx)
+        assert 10 * np.log10(sigma / (4 * np.pi * abs(s[0, 0]) ** 2)) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_uniform_tubes_meet_the_near_plate_and_point_samples_do_not_yet():
+    case = cases.plate()
+    fine, coarse = methods.lattice(case, 4_096, tubes=True), methods.lattice(case, 4_096, tubes=False)
+    assert abs(10 * np.log10(fine.value[0] / case.truth[0])) < 0.02
+    assert abs(10 * np.log10(coarse.value[0] / case.truth[0])) > 1.0
+
+
+def test_uniform_tubes_meet_the_trihedral_closed_form():
+    case = cases.trihedral()
+    closed = 4 * np.pi * 0.2**4 / (3 * (2 * np.pi / cases.WAVENUMBER) ** 2)
+    run = methods.lattice(case, 64_000, tubes=True)
+    assert 10 * np.log10(run.value[0] / closed) == pytest.approx(0.0, abs=0.1)
+    assert np.abs(10 * np.log10(run.value / case.truth)).max() < 0.05
+
+
+def test_glint_of_a_sphere_is_its_high_frequency_limit():
+    end = np.array([12.0, 1.0, 2.0])
+    tracer = Tracer(facets_of(build("sphere", {"radius": 0.5}), "pec", cases.FREQUENCY))
+    found = glints(tracer, end, cases.WAVENUMBER)
+    reach = np.linalg.norm(end)
+    sigma = 4 * np.pi * abs(found.field.sum() * reach**2) ** 2
+    assert sigma == pytest.approx(np.pi * 0.25 * (reach / (reach - 0.5)) ** 2, rel=2e-3)
+
+
+def test_rate_of_a_lattice_echo_is_half_the_rate_of_its_length():
+    end, own = np.array([0.0, 0.0, 0.0]), np.array([7.0, 0.5, 0.0])
+    mesh = build("dihedral", {"size": 0.2, "height": 0.2})
+
+    def lengths(shift):
+        facets = facets_of(mesh, "pec", cases.FREQUENCY)
+        turned = facets.vertices * [-1.0, -1.0, 1.0] + [8.0, 0.1, 0.05]
+        facets = facets.replace(vertices=turned, velocity=np.array([[3.0, 1.0, -0.5]]))
+        facets = facets.replace(vertices=turned + shift * (facets.velocity[0] - own))
+        window = Window.onto(end, turned.reshape(-1, 3), np.array([1.0, 0.0, 0.0]))
+
+        def field(d):
+            return cases.vertical(d)
+
+        return list(echoes(Tracer(facets), window, [Leg(end=end)], field, field, 77e9, 40_000, 2, True, own))
+
+    # The shortest way of the double bounce, which a fixed lattice follows as the scene moves.
+    step = 0.02
+    before, now, after = lengths(-step), lengths(0.0), lengths(step)
+    best = np.argmin(now[1].length)
+    slope = (after[1].length.min() - before[1].length.min()) / (4.0 * step)
+    assert now[1].rate[best] == pytest.approx(slope, abs=0.02)
+
+
+def test_front_holds_what_none_beats_and_errors_below_the_truth_count_as_equal():
+    rows = marked([row("a", 10, 1.0, 3.0), row("b", 20, 2.0, 0.04), row("c", 30, 3.0, 0.01), row("d", 40, 0.5, 9.0)])
+    assert [r.front_seconds for r in rows] == [True, True, False, True]
+    assert [r.front_rays for r in rows] == [True, True, False, False]
+    assert [r.method for r in beaten_by(rows, rows[2])] == ["b"]
+
+
+def test_csv_has_a_line_a_row(tmp_path):
+    rows = [row("a, b", 10, 1.0, 3.0), row("b", 20, 2.0, 0.04, default=True)]
+    with write_csv(rows, tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
+        read = list(csv.DictReader(file))
+    assert [r["method"] for r in read] == ["a, b", "b"] and float(read[1]["error_db"]) == 0.04
+
+
+def test_command_writes_figures_and_table_and_says_where_the_default_stands(tmp_path, capsys):
+    assert invoke(["study", "tradeoff", "--quick", "--case", "dihedral", "--out", str(tmp_path / "o")]) == 0
+    names = {f.name for f in (tmp_path / "o").iterdir()}
+    assert names == {"tradeoff.csv", "tradeoff.png", "tradeoff_dihedral.png"}
+    assert "default on dihedral" in capsys.readouterr().out
+
+
+def test_unknown_case_is_refused_by_name(tmp_path, capsys):
+    assert invoke(["study", "tradeoff", "--case", "spehre", "--out", str(tmp_path / "o")]) == 2
+    assert "spehre" in capsys.readouterr().err and not (tmp_path / "o").exists()
