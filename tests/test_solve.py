@@ -158,3 +158,16 @@ def test_a_scene_ten_kilometres_away_is_the_same_scene():
     there, _ = solve(facets(meshes), nothing(), radar(np.array([0, 0, 0.5]) + shift), F, refinement(F, 0.5), 3)
     a, b = here.amplitude.sum(), there.amplitude.sum()
     assert abs(20 * np.log10(abs(b / a))) < 0.01
+
+
+def test_a_surface_drawn_twice_returns_once():
+    def plate(half):
+        return quad([[10, -half, -half], [10, -half, half], [10, half, half], [10, half, -half]])
+
+    def level(meshes):
+        paths, _ = solve(facets(meshes), nothing(), radar((0, 0, 0)), F, refinement(F, 0.2), 1)
+        return 20 * np.log10(abs(paths.amplitude.sum()))
+
+    alone = level([plate(0.5)])
+    assert level([plate(0.5), plate(0.5)]) == pytest.approx(alone, abs=0.01)
+    assert level([plate(0.5), plate(0.2)]) == pytest.approx(alone, abs=0.01)

@@ -40,6 +40,8 @@ class Tracer:
         self.area = 0.5 * norm[:, 0]
         self.is_layer = facets.materials.kind[facets.material] == LAYER if len(v) else np.zeros(0, bool)
         self.rays = 0
+        # Which facets are one surface; each for itself until someone knows better.
+        self.plane = self.smooth = np.arange(len(v), dtype=np.int32)
         self._any_layer = bool(self.is_layer.any())
         self._scene: Any = None
         self.extent = 0.0
@@ -103,6 +105,14 @@ class Tracer:
             pace[todo] *= 2.0
         return facet, distance
 
+    def _twin(self, facet: Ints, t: Floats, limit: Floats, slack: Floats, target: Ints) -> NDArray[np.bool_]:
+        """Tell which rays met another surface lying in the plane of their target at the same place: it counts there,
+        the target does not, so that what is drawn twice returns once."""
+        a, b = np.maximum(facet, 0), np.maximum(target, 0)
+        there = (facet >= 0) & (target >= 0) & (np.abs(t - limit) < np.minimum(slack, 2e-5))
+        apart = (self.plane[a] != self.plane[b]) & (self.smooth[a] != self.smooth[b])
+        return there & apart & (np.abs(np.einsum("ij,ij->i", self.normal[a], self.normal[b])) > 1.0 - 1e-9)
+
     def walk(
         self,
         origin: Floats,
@@ -131,6 +141,7 @@ class Tracer:
         while len(todo):
             facet, t = self.cast(origin[todo], direction[todo], skip[todo], start[todo])
             clear = (facet < 0) | (t >= limit[todo] - slack[todo]) | (facet == target[todo])
+            clear &= ~self._twin(facet, t, limit[todo], slack[todo], target[todo])
             if inside is not None:
                 clear |= self.facets.body[np.maximum(facet, 0)] == inside[todo]
             reached[todo[clear]] = True
