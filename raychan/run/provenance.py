@@ -18,6 +18,7 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 _LEAST_SHARE = 0.005
+_DEPTH = 0.3  # m: an echo over the ground no further behind its target than a road user is deep is no ghost
 _UNEXPLAINED = 0.1  # a cell whose paths give less than this share of its power is noise
 
 
@@ -213,4 +214,4 @@ def _label(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver) 
     index = [paths.body_names[b] in targets for b in paths.body[row]]
     straight = np.linalg.norm(paths.vertices[row][index] - 0.5 * (paths.tx + paths.rx), axis=1).min()
     detour = 0.5 * C0 * paths.delay[row] - straight
-    return DIRECT if detour < receiver.waveform.range_resolution else MULTIPATH
+    return DIRECT if detour < max(receiver.waveform.range_resolution, _DEPTH) else MULTIPATH
