@@ -53,7 +53,7 @@ def legs_over(surface: Surface, end: Floats, bounces: int) -> list[Leg]:
     if bounces < 1:
         return legs
     mirrors = planes_that_mirror(surface, direct.end)
-    everything = planes_that_mirror(surface, direct.end) if bounces < 2 else _both_sides(surface, mirrors)
+    everything = mirrors if bounces < 2 else _both_sides(surface, mirrors)
     for count in range(1, bounces + 1):
         for chain in permutations(everything, count):
             if _possible(direct.end, chain):

@@ -112,8 +112,8 @@ def facets_of(mesh: Any, material: str | Material, frequency: float) -> Facets:
 
 
 def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iterator[Refinement]:
-    """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again.
-    Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets again."""
+    """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets
+    again."""
     edge = min(_FIRST_EDGE, surface.extent / 4.0)
     own = _typical_edge(surface)
     for i in range(steps):

@@ -273,8 +273,8 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
 
 
 def least(rule: Refinement, total: float) -> float:
-    """Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to `relative`.
-    Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to `relative`."""
+    """Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to
+    `relative`."""
     return max(rule.floor, rule.relative * total) / 10.0
 
 

@@ -175,8 +175,8 @@ def _diffuse(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
 def _samples(
     surface: Surface, rows: NDArray[np.int64], eye: Floats, rng: np.random.Generator
 ) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Return points on facets, their facet and the area [m^2] each stands for; the ground is sampled by its distance.
-    Return points on facets, their facet and the area [m^2] each stands for; the ground is sampled by its distance."""
+    """Return points on facets, their facet and the area [m^2] each stands for; the ground is sampled by its
+    distance."""
     f = surface.facets
     ground = np.isin(f.body[rows], np.flatnonzero(f.role == MIRROR))
     points, facet, weight = [], [], []
@@ -200,8 +200,8 @@ def _samples(
 
 
 def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:
-    """Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at most.
-    Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at most."""
+    """Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at
+    most."""
     frame = sensor.waveform.frame_duration
     used = paths.body >= 0
     if not len(paths.delay):
