@@ -160,14 +160,37 @@ def rates(routes: Routes, facets: Facets, tx_velocity: Floats, rx_velocity: Floa
 
     Mirrors may slide in their plane without effect: the length is stationary there (Fermat).
     """
-    n = len(routes.kind)
-    body = np.maximum(routes.body, 0)
-    v = facets.velocity[body] + np.cross(facets.spin[body], routes.vertices - facets.origin[body])
-    used = routes.kind > 0
-    x = np.concatenate([np.broadcast_to(routes.tx, (n, 1, 3)), routes.vertices], axis=1)
-    v = np.concatenate([np.broadcast_to(tx_velocity, (n, 1, 3)), np.where(used[..., None], v, rx_velocity)], axis=1)
-    x = np.concatenate([x, np.broadcast_to(routes.rx, (n, 1, 3))], axis=1)
-    v = np.concatenate([v, np.broadcast_to(rx_velocity, (n, 1, 3))], axis=1)
-    step = np.diff(x, axis=1)
-    size = np.linalg.norm(step, axis=2, keepdims=True)
-    return 0.5 * np.einsum("nij,nij->n", np.diff(v, axis=1), step / np.where(size > 0, size, 1.0))
+    return _rates(
+        routes.tx, routes.rx, routes.vertices, routes.kind, routes.body, facets.velocity, facets.spin,
+        facets.origin, np.asarray(tx_velocity, float), np.asarray(rx_velocity, float),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _rates(  # type: ignore[no-untyped-def]
+    tx, rx, vertices, kind, body, velocity, spin, origin, tx_velocity, rx_velocity
+):
+    n, d = kind.shape
+    out = np.empty(n)
+    x, v, y, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(n):
+        x[:], v[:] = tx, tx_velocity
+        total = 0.0
+        for j in range(d + 1):
+            last = j == d or kind[i, j] == 0
+            if last:
+                y[:], w[:] = rx, rx_velocity
+            else:
+                y[:] = vertices[i, j]
+                b = max(body[i, j], 0)
+                s, o = spin[b], origin[b]
+                w[0] = velocity[b, 0] + s[1] * (y[2] - o[2]) - s[2] * (y[1] - o[1])
+                w[1] = velocity[b, 1] + s[2] * (y[0] - o[0]) - s[0] * (y[2] - o[2])
+                w[2] = velocity[b, 2] + s[0] * (y[1] - o[1]) - s[1] * (y[0] - o[0])
+            k = _heading(x, y)
+            total += (w[0] - v[0]) * k[0] + (w[1] - v[1]) * k[1] + (w[2] - v[2]) * k[2]
+            if last:
+                break
+            x[:], v[:] = y, w
+        out[i] = 0.5 * total
+    return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
     CENTRE,
+    MOST_BEND,
     Refinement,
     Tubes,
     along_line,
@@ -21,9 +23,9 @@ from raychan.channel.tubes import (
     phases_of,
     stand,
     that_count,
-    too_rough,
     unit,
 )
+from raychan.kernels.patch import edge_to_cut, halved, lit_parts
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
 Floats = NDArray[np.float64]
@@ -36,60 +38,47 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement
 
     Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do.
     """
-    tubes = _seeds(surface, leg, bodies, rule)
-    tubes = _cut_for_phase(surface, leg, out, tubes, rule)
-    tubes = _cut_at_terminator(surface, leg, leg, tubes)
-    tubes = _cut_at_terminator(surface, leg, out, tubes) if out != leg else tubes
-    return _cut_for_sight(surface, leg, out, tubes, rule)
+    f = surface.facets
+    shape = f.vertices, f.normals, surface.bulge
+    ways = leg.image, leg.far, out.image, out.far
+    facet = _seeds(surface, leg, bodies)
+    facet, bary = _cut_for_phase(facet, shape, ways, rule)
+    facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
+    if out != leg:
+        facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
+    return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), rule)
 
 
-def _seeds(surface: Surface, leg: Leg, bodies: Bools, rule: Refinement) -> Tubes:
+def _seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
+    """Return the facets that could be met over `leg`."""
     f = surface.facets
     allowed = bodies & (f.role == SCATTERER)
     allowed[list(leg.bodies)] = False
     rows = np.flatnonzero(allowed[f.body] & (surface.area > 0.0)).astype(np.int32)
     k, _ = leg.rays(f.vertices[rows])
     towards = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
-    rows = rows[towards | ~surface.closed[f.body[rows]]]
+    rows = rows[towards | surface.open_facet[rows]]
     if leg.mirrors:
         v = f.vertices[rows]
         middle = v.mean(axis=1)
         rows = rows[leg.may_reach(middle, np.linalg.norm(v - middle[:, None], axis=2).max(axis=1))]
-    bary = np.broadcast_to(np.eye(3), (len(rows), 3, 3)).copy()
-    return stand(surface, leg, rows, bary, rule.slots)
+    return rows
 
 
-def _cut_for_phase(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
+def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement) -> tuple[Ints, Floats]:
     """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts."""
-    done, spent = [], 0
-    while len(tubes):
-        ph = phases_of(surface, leg, out, tubes, True, rule)
-        edges = edge_lengths(tubes)
-        rough = too_rough(ph, tubes, rule)
-        split = rough | (edges.max(axis=1) > rule.max_edge)
-        edge = np.where(rough, np.argmax(np.abs(ph.bend), axis=1), np.argmax(edges, axis=1))
-        spent += len(tubes)
+    bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
+    done, spent, level = [(facet[:0], bary[:0])], 0, 0
+    while len(facet):
+        spent += len(facet)
+        edge = edge_to_cut(facet, bary, *shape, *ways, rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND)
         if spent > rule.max_tubes:
-            split[:] = False
-        done.append(tubes.take(~split))
-        tubes = halves(surface, leg, tubes.take(split), edge[split], first=True, jitter=rule.jitter)
-    return Tubes.join(done) if done else tubes
-
-
-def _cut_at_terminator(surface: Surface, leg: Leg, way: Leg, tubes: Tubes) -> Tubes:
-    """Cut curved tubes along the line where the surface turns away from the end of `way`, and keep the lit parts.
-
-    All of a sphere's terminator lies at one range: left jagged, it adds up in phase.
-    """
-    k, _ = way.rays(tubes.points[:, :3])
-    cosine = -np.einsum("nij,nij->ni", k, tubes.normals[:, :3])
-    across = (cosine > 1e-9).any(axis=1) & (cosine < -1e-9).any(axis=1)
-    whole = tubes.take(~across & (cosine.sum(axis=1) > 0.0))
-    if not across.any():
-        return whole
-    parts, _ = along_line(surface, leg, tubes.take(across), np.where(cosine == 0.0, 1e-12, cosine)[across], True)
-    k, _ = way.rays(parts.points[:, CENTRE])
-    return Tubes.join([whole, parts.take(np.einsum("ij,ij->i", k, parts.normals[:, CENTRE]) < 0.0)])
+            edge[:] = -1
+        done.append((facet[edge < 0], bary[edge < 0]))
+        more = edge >= 0
+        facet, bary = halved(facet[more], bary[more], edge[more], rule.jitter, level)
+        level += 1
+    return np.concatenate([f for f, _ in done]), np.concatenate([b for _, b in done])
 
 
 def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:

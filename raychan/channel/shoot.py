@@ -12,7 +12,7 @@ from raychan.channel.launch import launch
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce, settle
-from raychan.channel.tubes import Refinement, Tubes, phases_of
+from raychan.channel.tubes import CENTRE, Refinement, Tubes, phases_of
 from raychan.tables import MIRROR, REFLECT, TRANSMIT, Routes
 
 Floats = NDArray[np.float64]
@@ -37,6 +37,8 @@ def tube_routes(
             fits &= f.role[f.body[tubes.facet]] != MIRROR
             if not first:
                 fits &= ~(mirror_planes[tubes.facet] & _other_body(surface, tubes))
+            if out.mirrors or not first:
+                fits &= _may_leave(out, tubes)
             some = tubes.take(fits)
             if not len(some):
                 continue
@@ -69,6 +71,17 @@ def _other_body(surface: Surface, tubes: Tubes) -> NDArray[np.bool_]:
     f = surface.facets
     previous = tubes.facets[np.arange(len(tubes)), _last_bounce(tubes)]
     return f.body[previous] != f.body[tubes.facet]
+
+
+def _may_leave(out: Leg, tubes: Tubes) -> NDArray[np.bool_]:
+    """Tell which tubes could send something over a way out: turned to it, and within the circles of its mirrors."""
+    centre = tubes.points[:, CENTRE]
+    ok = np.einsum("nj,nj->n", out.rays(centre)[0], tubes.normals[:, CENTRE]) < 0.0
+    if out.mirrors:
+        rows = np.flatnonzero(ok)
+        size = np.linalg.norm(tubes.points[rows, :3] - centre[rows, None], axis=2).max(axis=1)
+        ok[rows] = out.may_reach(centre[rows], size)
+    return ok
 
 
 def _planes_in(surface: Surface, legs: list[Leg]) -> NDArray[np.bool_]:

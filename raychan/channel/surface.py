@@ -30,6 +30,7 @@ class Surface(Tracer):
         self.plane = np.arange(n, dtype=np.int32)
         self.smooth = np.arange(n, dtype=np.int32)
         self.closed = np.zeros(len(facets.role), bool)
+        self.open_facet = np.ones(n, bool)
         self.curved = np.zeros(n, bool)
         self.convex_alone = False
         self.bulge = np.zeros((n, 3, 3))
@@ -60,6 +61,7 @@ class Surface(Tracer):
         open_bodies = np.unique(f.body[order[odd] // 3])
         self.closed[:] = True
         self.closed[open_bodies] = False
+        self.open_facet = ~self.closed[f.body]
         a, b = order[:-1][same] // 3, order[1:][same] // 3
         kin = (f.part[a] == f.part[b]) & (f.material[a] == f.material[b])
         a, b, ea, eb = a[kin], b[kin], order[:-1][same][kin], order[1:][same][kin]

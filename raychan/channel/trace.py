@@ -17,7 +17,6 @@ from raychan.channel.tubes import (
     least,
     phases_of,
     that_count,
-    too_rough,
     vector_area,
 )
 from raychan.tables import REFLECT
@@ -172,7 +171,7 @@ def settle(
         view = sight(surface, out, tubes, matters, rule)
         back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
         lit = back < 0.0
-        rough = lit & view.seen.any(axis=1) & too_rough(ph, tubes, rule)
+        rough = lit & view.seen.any(axis=1) & (ph.rough > 1.0)
         mixed = lit & view.mixed
         split = (mixed | rough) & matters & (level < rule.levels)
         ready = ~split & lit & view.seen[:, CENTRE]

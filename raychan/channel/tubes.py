@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
+from raychan.kernels.patch import phases, rays_on
 from raychan.kernels.po import quadratic_means
 
 Floats = NDArray[np.float64]
@@ -22,7 +23,7 @@ Bools = NDArray[np.bool_]
 
 CENTRE = 3
 _MANY = 4096  # tubes under which letting some go saves nothing
-_MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
+MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
@@ -125,14 +126,8 @@ def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> 
 
 
 def _first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    full = np.concatenate([bary, bary.mean(axis=1, keepdims=True)], axis=1)
-    points = surface.point(facet, full)
-    k, length = leg.rays(points)
-    normals = surface.normal_at(facet, full)
-    # The back of an open sheet is lit from behind; a closed body keeps its outward normals.
-    open_sheet = ~surface.closed[surface.facets.body[facet]]
-    behind = open_sheet & (np.einsum("ij,ij->i", normals[:, CENTRE], k[:, CENTRE]) > 0.0)
-    return points, np.array(k), length, np.where(behind[:, None, None], -normals, normals)
+    f = surface.facets
+    return rays_on(facet, bary, f.vertices, f.normals, surface.bulge, surface.open_facet, leg.image, leg.far)
 
 
 def halves(surface: Surface, leg: Leg, tubes: Tubes, edge: Ints, first: bool, jitter: float = 0.0) -> Tubes:
@@ -237,14 +232,14 @@ def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floa
 @dataclass(frozen=True)
 class Phases:
     """Phases of tubes over a way out [rad]: `six` (n, 6) at corners and edge middles, `bend` (n, 3) of the edges from
-    straight, `miss` (n,) of the quadratic through the six at the centre, `bound` (n,) [1/m] on what a tube can
-    scatter."""
+    straight, `bound` (n,) [1/m] on what a tube can scatter, `area` the same were it in phase, `rough` (n,) above 1
+    where a tube bends more than a quadratic phase and one direction of the surface can follow."""
 
     six: Floats
     bend: Floats
-    miss: Floats
     bound: Floats
     area: Floats
+    rough: Floats
 
     def scale(self) -> float:
         """Return the size [1/m] of the scattered field: the scalar sum of all tubes, or their rms sum where that
@@ -257,19 +252,12 @@ class Phases:
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
     """Return the phases of tubes over the way out, and what each can scatter back at most."""
-    k = rule.wavenumber
-    points, length = middles(surface, leg, tubes, first)
-    back = out.rays(tubes.points)[1]
-    corner = k * (tubes.length[:, :3] + back[:, :3])
-    middle = k * (length + out.rays(points)[1])
-    bend = middle - 0.5 * (corner + np.roll(corner, -1, axis=1))
-    centre = k * (tubes.length[:, CENTRE] + back[:, CENTRE])
-    miss = centre - corner.mean(axis=1) - bend.sum(axis=1) * (4.0 / 9.0)
-    across = np.abs(np.einsum("ij,ij->i", vector_area(tubes.points), tubes.k[:, CENTRE]))
-    area = k / (2.0 * np.pi) * across * tubes.strength * tubes.spread * out.spread(back[:, CENTRE])
-    span = corner.max(axis=1) - corner.min(axis=1)
-    bound = area / (1.0 + 0.5 * span)
-    return Phases(np.concatenate([corner, middle], axis=1), bend, miss, bound, area)
+    six, bend, bound, area, rough = phases(
+        tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary, first, surface.facets.vertices,
+        surface.bulge, leg.image, leg.far, out.image, out.far, rule.wavenumber, tubes.strength, tubes.spread,
+        rule.phase, rule.turn, MOST_BEND,
+    )  # fmt: skip
+    return Phases(six, bend, bound, area, rough)
 
 
 def least(rule: Refinement, total: float) -> float:
@@ -282,16 +270,12 @@ def that_count(bound: Floats, doubt: float) -> NDArray[np.intp]:
     """Return the tubes to keep: of many, the weakest are let go while all these in phase stay under 0.3 `doubt`."""
     if len(bound) < _MANY:
         return np.arange(len(bound))
-    order = np.argsort(bound)
-    return np.sort(order[np.cumsum(bound[order]) > 0.3 * doubt])
-
-
-def too_rough(ph: Phases, tubes: Tubes, rule: Refinement) -> Bools:
-    """Tell which tubes bend more than a quadratic phase and one direction of the surface can follow."""
-    span = ph.six.max(axis=1) - ph.six.min(axis=1)
-    turn = np.linalg.norm(tubes.normals[:, :3] - tubes.normals[:, CENTRE:], axis=2).max(axis=1)
-    off = np.maximum(np.abs(ph.miss), np.abs(ph.bend).max(axis=1) * (rule.phase / _MOST_BEND))
-    return (np.maximum(off / rule.phase, turn / rule.turn) / (1.0 + 0.5 * span)) > 1.0
+    # The weakest few are enough: none that alone exceeds the sum is looked at.
+    weak = np.flatnonzero(bound < 0.3 * doubt)
+    order = weak[np.argsort(bound[weak])]
+    keep = np.ones(len(bound), bool)
+    keep[order[np.cumsum(bound[order]) <= 0.3 * doubt]] = False
+    return np.flatnonzero(keep)
 
 
 def unit(v: Floats) -> Floats:

@@ -12,33 +12,6 @@ from raychan.kernels.polar import Vec, cross, dot, mirror, reflect
 
 
 @njit(cache=True)
-def _pair(a: float, b: float) -> complex:
-    """Mean of exp(-j phi) along a line on which phi runs from a to b."""
-    h = 0.5 * (a - b)
-    s = 1.0 - h * h / 6.0 if abs(h) < 1e-4 else math.sin(h) / h
-    return s * cmath.exp(-0.5j * (a + b))
-
-
-@njit(cache=True)
-def triangle_mean(p0: float, p1: float, p2: float) -> complex:
-    """Return the mean of exp(-j phi) over a triangle on which phi is linear with corner values p0, p1, p2 [rad].
-
-    The second divided difference of exp at the corner phases (Hermite-Genocchi), times two; equal to
-    Gordon (1975) for a triangle, without his singular cases.
-    """
-    low, high = min(p0, p1, p2), max(p0, p1, p2)
-    mid = p0 + p1 + p2 - low - high
-    span = high - low
-    if span < 0.02:
-        m = (p0 + p1 + p2) / 3.0
-        a, b, c = p0 - m, p1 - m, p2 - m
-        second = (a * a + b * b + c * c) / 12.0
-        third = (a * a * a + b * b * b + c * c * c) / 30.0
-        return cmath.exp(-1j * m) * complex(1.0 - 0.5 * second, third / 6.0)
-    return 2j * (_pair(mid, high) - _pair(low, mid)) / span
-
-
-@njit(cache=True)
 def _radiated(e: Vec, k: Vec, s: Vec, n: Vec, r_s: complex, r_p: complex, g: Vec) -> complex:
     """Project on g what the currents of the reflected wave of (e, k) radiate towards s."""
     er = reflect(e, k, n, r_s, r_p)
@@ -67,38 +40,68 @@ def huygens(
 
 
 @njit(cache=True)
-def _corner_terms(p0: float, p1: float, p2: float, out) -> None:  # type: ignore[no-untyped-def]
-    """Write into out (3,) the parts of triangle_mean that belong to each corner.
+def _edge(a: float, b: float, ea: complex, eb: complex) -> complex:
+    """Mean of exp(-j phi) along a line on which phi runs from a to b, given exp(-j a) and exp(-j b)."""
+    gap = b - a
+    if abs(gap) < 1e-3:
+        return ea * complex(1.0 - gap * gap / 6.0, gap * (gap * gap / 24.0 - 0.5))
+    return 1j * (eb - ea) / gap
 
-    Where the phase runs, the integral is a sum of corner terms; what two or three corners within 2 rad have
-    in common is shared equally.
+
+@njit(cache=True)
+def _corner_terms(
+    p0: float, p1: float, p2: float, e0: complex, e1: complex, e2: complex
+) -> tuple[complex, complex, complex]:
+    """Return the parts of the mean of exp(-j phi) over a triangle that belong to each corner, given e = exp(-j p).
+
+    The mean is the second divided difference of exp at the corner phases (Hermite-Genocchi), times two: Gordon
+    (1975) for a triangle, without his singular cases. Where the phase runs, it is a sum of corner terms; what
+    corners within 2 rad have in common is shared equally.
     """
-    values = (p0, p1, p2)
-    low, high = 0, 0
-    for i in range(1, 3):
-        if values[i] < values[low]:
-            low = i
-        if values[i] >= values[high]:
-            high = i
-    span = values[high] - values[low]
-    if span < 2.0 or low == high:
-        # First order in the phase: the mean of l_i phi over a triangle is (phi_i - mean) / 12.
-        whole, mean = triangle_mean(p0, p1, p2), (p0 + p1 + p2) / 3.0
-        for i in range(3):
-            out[i] = whole * complex(1.0 / 3.0, (mean - values[i]) / 12.0)
-        return
-    mid = 3 - low - high
-    out[0], out[1], out[2] = 0j, 0j, 0j
-    for a, b, sign in ((mid, high, 1.0), (low, mid, -1.0)):
-        gap = values[b] - values[a]
-        scale = 2j * sign / span
-        if gap < 2.0:
-            edge = scale * _pair(values[a], values[b])
-            out[a] += edge * complex(0.5, gap / 12.0)
-            out[b] += edge * complex(0.5, -gap / 12.0)
+    # Sorted, low to high, with the place each came from.
+    i0, i1, i2 = 0, 1, 2
+    if p0 > p1:
+        p0, p1, e0, e1, i0, i1 = p1, p0, e1, e0, i1, i0
+    if p1 > p2:
+        p1, p2, e1, e2, i1, i2 = p2, p1, e2, e1, i2, i1
+    if p0 > p1:
+        p0, p1, e0, e1, i0, i1 = p1, p0, e1, e0, i1, i0
+    span, x = p2 - p0, p1 - p0
+    if span < 2.0:
+        if span < 0.05:
+            # Complete homogeneous sums of (0, x, span): the divided difference as a series.
+            xx, yy, xy = x * x, span * span, x * span
+            real = 1.0 - (xx + xy + yy) / 12.0 + (xx * xx + xx * xy + xx * yy + xy * yy + yy * yy) / 360.0
+            whole = e0 * complex(real, -(x + span) / 3.0 + (x + span) * (xx + yy) / 60.0)
         else:
-            out[a] += scale * cmath.exp(-1j * values[a]) / (1j * gap)
-            out[b] -= scale * cmath.exp(-1j * values[b]) / (1j * gap)
+            whole = 2j * (_edge(p1, p2, e1, e2) - _edge(p0, p1, e0, e1)) / span
+        # First order in the phase: the mean of l_i phi over a triangle is (phi_i - mean) / 12.
+        mean = (x + span) / 3.0
+        t0 = whole * complex(1.0 / 3.0, mean / 12.0)
+        t1 = whole * complex(1.0 / 3.0, (mean - x) / 12.0)
+        t2 = whole * complex(1.0 / 3.0, (mean - span) / 12.0)
+    else:
+        scale = 2j / span
+        gap = p2 - p1
+        if gap < 2.0:
+            upper = scale * _edge(p1, p2, e1, e2)
+            t1, t2 = upper * complex(0.5, gap / 12.0), upper * complex(0.5, -gap / 12.0)
+        else:
+            t1, t2 = scale * e1 / (1j * gap), -scale * e2 / (1j * gap)
+        if x < 2.0:
+            lower = scale * _edge(p0, p1, e0, e1)
+            t0 = -lower * complex(0.5, x / 12.0)
+            t1 -= lower * complex(0.5, -x / 12.0)
+        else:
+            t0 = -scale * e0 / (1j * x)
+            t1 += scale * e1 / (1j * x)
+    r0 = t0 if i0 == 0 else (t1 if i1 == 0 else t2)
+    r1 = t0 if i0 == 1 else (t1 if i1 == 1 else t2)
+    r2 = t0 if i0 == 2 else (t1 if i1 == 2 else t2)
+    return r0, r1, r2
+
+
+_MOST = 20  # pieces along an edge: enough for the most that a tube which counts may bend
 
 
 @njit(cache=True)
@@ -114,30 +117,49 @@ def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untype
     d12 = phases[4] - 0.5 * (phases[1] + phases[2])
     d20 = phases[5] - 0.5 * (phases[2] + phases[0])
     bend = max(abs(d01), abs(d12), abs(d20))
-    m = min(max(1, math.ceil(math.sqrt(bend / linear))), 64)
-    out[0], out[1], out[2] = 0j, 0j, 0j
+    m = min(max(1, math.ceil(math.sqrt(bend / linear))), _MOST)
     h = 1.0 / m
     # The mean of a piece's own bend: a third of the sum of its edges' bends, alike for all pieces.
     shift = cmath.exp(-1j * (d01 + d12 + d20) * h * h / 3.0) * h * h
-    part = np.empty(3, np.complex128)
-    for i in range(m):
-        for j in range(m - i):
-            for flip in range(2):
-                if flip == 1 and j == m - i - 1:
-                    continue
-                # Corners in steps along edges 01 and 02; the flipped piece is the upright one's neighbour.
-                a = (i + flip, j + flip)
-                b = (i + 1, j) if flip == 0 else (i, j + 1)
-                c = (i, j + 1) if flip == 0 else (i + 1, j)
-                pa = _quadratic(phases, d01, d12, d20, a[0] * h, a[1] * h)
-                pb = _quadratic(phases, d01, d12, d20, b[0] * h, b[1] * h)
-                pc = _quadratic(phases, d01, d12, d20, c[0] * h, c[1] * h)
-                _corner_terms(pa, pb, pc, part)
-                for t, q in ((part[0], a), (part[1], b), (part[2], c)):
-                    v, w = q[0] * h, q[1] * h
-                    out[0] += shift * t * (1.0 - v - w)
-                    out[1] += shift * t * v
-                    out[2] += shift * t * w
+    if m == 1:
+        e0, e1, e2 = cmath.exp(-1j * phases[0]), cmath.exp(-1j * phases[1]), cmath.exp(-1j * phases[2])
+        t0, t1, t2 = _corner_terms(phases[0], phases[1], phases[2], e0, e1, e2)
+        out[0], out[1], out[2] = shift * t0, shift * t1, shift * t2
+        return 1
+    p, e = np.empty((2, m + 1)), np.empty((2, m + 1), np.complex128)
+    total, s1, s2 = 0j, 0j, 0j
+    # Along a row the phase is a parabola, so its exponential follows from two running factors.
+    curve = -8.0 * d20 * h * h
+    turn = cmath.exp(-1j * curve)
+    for i in range(m + 1):
+        row = i & 1
+        v = i * h
+        first = _quadratic(phases, d01, d12, d20, v, 0.0)
+        step = _quadratic(phases, d01, d12, d20, v, h) - first
+        value, factor = cmath.exp(-1j * first), cmath.exp(-1j * step)
+        for j in range(m - i + 1):
+            p[row, j], e[row, j] = first, value
+            first += step
+            step += curve
+            value *= factor
+            factor *= turn
+        if i == 0:
+            continue
+        # Pieces between rows i - 1 and i: upright ones, then their neighbours (flipped).
+        low = 1 - row
+        for j in range(m - i + 1):
+            p0, p1, p2 = p[low, j], p[row, j], p[low, j + 1]
+            t0, t1, t2 = _corner_terms(p0, p1, p2, e[low, j], e[row, j], e[low, j + 1])
+            total += t0 + t1 + t2
+            s1 += t0 * (i - 1) + t1 * i + t2 * (i - 1)
+            s2 += t0 * j + t1 * j + t2 * (j + 1)
+            if j < m - i:
+                p0, p1, p2 = p[row, j + 1], p[low, j + 1], p[row, j]
+                t0, t1, t2 = _corner_terms(p0, p1, p2, e[row, j + 1], e[low, j + 1], e[row, j])
+                total += t0 + t1 + t2
+                s1 += t0 * i + t1 * (i - 1) + t2 * i
+                s2 += t0 * (j + 1) + t1 * (j + 1) + t2 * j
+    out[0], out[1], out[2] = shift * (total - (s1 + s2) * h), shift * s1 * h, shift * s2 * h
     return m * m
 
 
