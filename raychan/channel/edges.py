@@ -10,43 +10,58 @@ _INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's
 
 
 @njit(cache=True, inline="always")
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True)
-def _cross(a, b, out):  # type: ignore[no-untyped-def]
+def cross_into(a, b, out):  # type: ignore[no-untyped-def]
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
-def _inside(a, b, corners, centre, source, k, far, n):  # type: ignore[no-untyped-def]
-    """Return how much of segment ab (0 to 1) lies inside the pyramid of rays."""
-    low, high = 0.0, 1.0
-    depth = _dot(0.5 * (a + b) - centre, k)
-    if depth <= 0.0:
-        return 0.0
-    # The centre ray at the edge's depth scales distances from the three sides.
-    middle = centre + depth * k
+def inside(a, b, corners, centre, source, k, far, begin, end, n):  # type: ignore[no-untyped-def]
+    """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays."""
+    scale = 1.0
+    if not far:
+        edge, here = 0.0, 0.0
+        for c in range(3):
+            edge += (0.5 * (a[c] + b[c]) - source[c]) * k[c]
+            here += (centre[c] - source[c]) * k[c]
+        scale = min(max(edge / here, 0.01), 100.0)
     for e in range(3):
         p, q = corners[e], corners[(e + 1) % 3]
         if far:
-            _cross(q - p, k, n)
+            cross_into(q - p, k, n)
         else:
-            _cross(p - source, q - source, n)
-        whole = _dot(middle - p, n)
+            cross_into(p - source, q - source, n)
+        whole, fa, fb = 0.0, 0.0, 0.0
+        for c in range(3):
+            whole += (centre[c] - p[c]) * n[c]
+            fa += (a[c] - p[c]) * n[c]
+            fb += (b[c] - p[c]) * n[c]
         if whole == 0.0:
-            return 0.0
-        fa, fb = _dot(a - p, n) / whole - _INSIDE, _dot(b - p, n) / whole - _INSIDE
+            return 0.0, 0.0
+        fa, fb = fa / whole - _INSIDE * scale, fb / whole - _INSIDE * scale
         if fa < 0.0 and fb < 0.0:
-            return 0.0
+            return 0.0, 0.0
         if fa < 0.0:
-            low = max(low, fa / (fa - fb))
+            begin = max(begin, fa / (fa - fb))
         elif fb < 0.0:
-            high = min(high, fa / (fa - fb))
-    return max(high - low, 0.0)
+            end = min(end, fa / (fa - fb))
+    return begin, max(end, begin)
+
+
+@njit(cache=True, inline="always")
+def above(ha, hb):  # type: ignore[no-untyped-def]
+    """Return the part (0 to 1) of a segment whose ends have heights ha, hb that lies above zero; equal: none."""
+    if ha <= 0.0 and hb <= 0.0:
+        return 0.0, 0.0
+    if ha <= 0.0:
+        return ha / (ha - hb), 1.0
+    return 0.0, 1.0 if hb > 0.0 else ha / (ha - hb)
 
 
 @njit(cache=True)
@@ -56,16 +71,16 @@ def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type
     Returns whether it parts the rays that land on plane a from those that land on plane b (bodies that
     run into each other have no edge there).
     """
-    c1 = _dot(k, n1) if far else _dot(source - p1, n1)
-    c2 = _dot(k, n2) if far else _dot(source - p2, n2)
+    c1 = dot(k, n1) if far else dot(source - p1, n1)
+    c2 = dot(k, n2) if far else dot(source - p2, n2)
     m = c2 * n1 - c1 * n2
-    size = np.sqrt(_dot(m, m))
+    size = np.sqrt(dot(m, m))
     if size < 1e-12:
         return False
-    offset = c2 * _dot(p1, n1) - c1 * _dot(p2, n2)
+    offset = c2 * dot(p1, n1) - c1 * dot(p2, n2)
     sign = 0.0
     for q in range(4):
-        f = (_dot(points[q], m) - offset) / size
+        f = (dot(points[q], m) - offset) / size
         if q < 3:
             side[q] = f
         if plane[q] == a or plane[q] == b:
@@ -120,16 +135,19 @@ def edge_within(points, source, k, far, plane, first_edge, outline):  # type: ig
                 continue
             for e in range(first_edge[g], first_edge[g + 1]):
                 a, b = outline[e, 0], outline[e, 1]
-                share = _inside(a, b, points[i], points[i, 3], source[i], k[i], far, work)
-                length = share * np.sqrt(np.sum((b - a) ** 2))
+                begin, end = above(dot(a - points[i, 3], k[i]), dot(b - points[i, 3], k[i]))
+                if begin == end:
+                    continue
+                begin, end = inside(a, b, points[i], points[i, 3], source[i], k[i], far, begin, end, work)
+                length = (end - begin) * np.sqrt(np.sum((b - a) ** 2))
                 if length <= best:
                     continue
-                _cross(b - a, k[i] if far else source[i] - a, m)
-                size = np.sqrt(_dot(m, m))
+                cross_into(b - a, k[i] if far else source[i] - a, m)
+                size = np.sqrt(dot(m, m))
                 if size == 0.0:
                     continue
                 for q in range(3):
-                    side[q] = _dot(points[i, q] - a, m) / size
+                    side[q] = dot(points[i, q] - a, m) / size
                 if side.min() < 0.0 and side.max() > 0.0:
                     best = length
                     best_side[i] = side

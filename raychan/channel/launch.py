@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.edges import edge_within, meeting_lines
+from raychan.channel.edges import meeting_lines
 from raychan.channel.legs import Leg
+from raychan.channel.shadows import shadows_of
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
     CENTRE,
@@ -135,9 +136,9 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     view = leg.visible(surface, aim.reshape(-1, 3)[ray], tubes.facet[ray // 4], slack[ray // 4], rule.layers)
     seen, block = np.repeat(view.seen[:n], 4).reshape(n, 4), np.full((n, 4), -1, np.int32)
     seen.reshape(-1)[ray], block.reshape(-1)[ray] = view.seen, view.blocker
-    plane = np.where(block >= 0, surface.plane[np.maximum(block, 0)], -1)
     source = np.broadcast_to(leg.image, (n, 3))
-    side = edge_within(tubes.points, source, -k, leg.far, plane, surface.first_edge, surface.outline)
+    partly = seen.any(axis=1) & matters
+    side = shadows_of(surface, leg).across(tubes.points, surface.normal[tubes.facet], partly, slack)
     # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
     known = seen | (block >= 0)
     facet = np.where(block >= 0, block, tubes.facet[:, None])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +38,9 @@ class Surface(Tracer):
         self.bulge = np.zeros((n, 3, 3))
         self.outline = np.zeros((0, 2, 3))
         self.first_edge = np.zeros(1, np.int64)
+        self.edge_ends = np.zeros((0, 2, 3))
+        self.edge_faces = np.zeros((0, 2), np.int32)
+        self.shadows: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()  # by leg
         self.wedge = np.zeros((0, 2, 3))
         self.wedge_facet = np.zeros((0, 2), np.int32)
         self.wedge_n = np.zeros(0)
@@ -78,6 +83,7 @@ class Surface(Tracer):
         self.convex_alone = len(f.role) == 1 and convex
         every = order[:-1][same], order[1:][same]
         self._wedges(*every, order[odd])
+        self._list_edges(*every, order[odd])
         inner = flat | soft
         self._outline(np.concatenate([ea[inner], eb[inner]]))
 
@@ -103,6 +109,18 @@ class Surface(Tracer):
         a, b = v[edges // 3, edges % 3], v[edges // 3, (edges + 1) % 3]
         self.outline = np.stack([a, b], axis=1)[order]
         self.first_edge = np.searchsorted(plane[order], np.arange(n + 1))
+
+    def _list_edges(self, ea: Ints, eb: Ints, rim: Ints) -> None:
+        """List every edge that can be a body's outline: `edge_ends` (e, 2, 3) [m] and `edge_faces` (e, 2), -1 beyond a
+        rim. Hollow edges hide nothing; between coplanar facets none is seen."""
+        a, b = ea // 3, eb // 3
+        v = self.facets.vertices
+        height = np.einsum("ij,ij->i", v[b, (eb % 3 + 2) % 3] - v[a, ea % 3], self.normal[a])
+        bent = height < -1e-9 * np.sqrt(self.area[b])
+        pick = np.concatenate([ea[bent], rim])
+        self.edge_ends = np.stack([v[pick // 3, pick % 3], v[pick // 3, (pick % 3 + 1) % 3]], axis=1)
+        beyond = np.concatenate([b[bent], np.full(len(rim), -1)])
+        self.edge_faces = np.stack([pick // 3, beyond], axis=1).astype(np.int32)
 
     def _wedges(self, ea: Ints, eb: Ints, rim: Ints) -> None:
         """List convex edges: `wedge` (w, 2, 3) ends [m], `wedge_facet` (w, 2) faces 0 and n, `wedge_n` exterior angle
