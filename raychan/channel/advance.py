@@ -1,84 +1,116 @@
-"""Advance: how long paths are when their bodies have moved on, as rigid bodies do; no ray is traced.
+"""Advance: what routes carry once their bodies have moved on; no ray is traced.
 
-Each vertex goes with its body. Over plane mirrors the length is that to the images of both ends in the planes where
-they are by then, so it is exact for any turn as long as the same mirrors are met; on curved mirrors the plane at the
-vertex stands in for the surface.
+A footprint goes with its body, so that the lengths through its corners and the phase integral over it are found anew
+for every instant. Over plane mirrors a length is that to the images of both ends in the planes where they are by then:
+exact for any turn, as long as the same surfaces are met and seen; on a curved mirror the plane at the vertex stands in
+for the surface. Obliquity and spreading stay as they were.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from raychan.tables import DIFFRACT, POINT, REFLECT, SCATTER, Paths
+from raychan.channel.fields import transfer
+from raychan.kernels.po import triangle_terms
+from raychan.tables import REFLECT, SCATTER, Facets, Routes
+from raychan.units import C0
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+_LINEAR = 0.01  # rad: how far the phase of a piece of the footprint may bend in the integral
 
 
 @dataclass(frozen=True)
 class Poses:
-    """Where bodies and the radar have gone: world points x of body b are at turn[b] @ (x - origin[b]) + place[b]."""
+    """Where bodies and radar are at instants t: points x of body b have gone to turn[t, b] @ (x - origin[b]) +
+    place[t, b]."""
 
-    turn: Floats
-    """(b, 3, 3)."""
     origin: Floats
-    """(b, 3) [m] before."""
+    """(b, 3) [m] when traced."""
+    turn: Floats
+    """(t, b, 3, 3)."""
     place: Floats
-    """(b, 3) [m] after."""
+    """(t, b, 3) [m]."""
     radar: Floats
-    """(3,) [m] after."""
+    """(t, 3) [m]."""
 
 
-def length_changes(paths: Paths, poses: Poses) -> Floats:
-    """Return by how much each path (n,) has grown [m] once bodies and radar stand at `poses`."""
-    still = Poses(np.broadcast_to(np.eye(3), poses.turn.shape).copy(), poses.origin, poses.origin, paths.tx)
-    return _lengths(paths, poses) - _lengths(paths, still)
+_SOON = 1e-4  # s: over which a rate is a difference; its error is far below a rate cell for any turn
 
 
-def _lengths(paths: Paths, poses: Poses) -> Floats:
-    out = np.empty(len(paths.delay))
-    _fill(
-        paths.vertices, paths.kind, paths.body, np.ascontiguousarray(paths.tx), poses.turn, poses.origin, poses.place,
-        np.ascontiguousarray(poses.radar), out,
+def corner_rates(routes: Routes, facets: Facets, velocity: Floats) -> Floats:
+    """Return range rates (n, 3) [m/s] of the ways over the corners of footprints: half the rate of their length.
+
+    Args: velocity (3,) [m/s] of the radar. They differ over a body that turns or crosses, and what neighbouring tubes
+    have at the corner they share cancels only if it keeps moving alike.
+    """
+    late = _SOON * np.array([-0.5, 0.5])[:, None, None]
+    poses = Poses(
+        origin=facets.origin,
+        turn=np.array([[_turned(s) for s in t * facets.spin] for t in late]).reshape(2, -1, 3, 3),
+        place=facets.origin + late * facets.velocity,
+        radar=routes.tx + late[:, 0] * np.asarray(velocity, float),
+    )
+    ways = np.empty((2, len(routes.kind), 3))
+    _corner_ways(
+        routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points, poses.origin,
+        poses.turn, poses.place, poses.radar, ways,
     )  # fmt: skip
-    return out
+    return np.asarray(0.5 * (ways[1] - ways[0]) / _SOON)
+
+
+def _turned(turn: Floats) -> Floats:
+    """Return the matrix (3, 3) of a small turn [rad] about a vector, to second order."""
+    x, y, z = turn
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + cross + 0.5 * cross @ cross
+
+
+def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> Complexes:
+    """Return what routes (n,) carry but for their phase and the integral over their footprint."""
+    n = len(routes.kind)
+    bare: Routes = routes.replace(lengths=np.zeros((n, 6)), length=np.zeros(n), taper=np.ones((n, 3)))
+    ends: list[Any] = [lambda d, f=f: np.asarray(f(d))[:, None] for f in (radar.tx_field, radar.rx_field)]
+    return transfer(bare, facets, frequency, *ends)[:, 0, 0]
+
+
+def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:
+    """Return lengths [m] and amplitudes (t, n, 3) of the parts of routes that belong to each corner of their footprint.
+
+    Without a footprint, or where the integral is one part, the second and third are empty: amplitude 0.
+    """
+    shape = (len(poses.radar), len(routes.kind), 3)
+    lengths, amplitudes = np.empty(shape), np.empty(shape, np.complex128)
+    _carry(
+        routes.tx, routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points,
+        routes.lengths, routes.length, routes.taper, strength, poses.origin, poses.turn, poses.place, poses.radar,
+        2.0 * np.pi * frequency / C0, lengths, amplitudes,
+    )  # fmt: skip
+    return lengths, amplitudes
 
 
 @njit(cache=True, inline="always")
 def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
     u, v, w = x[0] - origin[b, 0], x[1] - origin[b, 1], x[2] - origin[b, 2]
-    r, o = turn[b], place[b]
     return (
-        r[0, 0] * u + r[0, 1] * v + r[0, 2] * w + o[0],
-        r[1, 0] * u + r[1, 1] * v + r[1, 2] * w + o[1],
-        r[2, 0] * u + r[2, 1] * v + r[2, 2] * w + o[2],
+        turn[b, 0, 0] * u + turn[b, 0, 1] * v + turn[b, 0, 2] * w + place[b, 0],
+        turn[b, 1, 0] * u + turn[b, 1, 1] * v + turn[b, 1, 2] * w + place[b, 1],
+        turn[b, 2, 0] * u + turn[b, 2, 1] * v + turn[b, 2, 2] * w + place[b, 2],
     )
 
 
 @njit(cache=True, inline="always")
-def _way(a, b):  # type: ignore[no-untyped-def]
-    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    s = (x * x + y * y + z * z) ** 0.5
-    s = s if s > 0.0 else 1.0
-    return x / s, y / s, z / s
-
-
-@njit(cache=True)
-def _image(source, before, vertex, after, b, turn, origin, place):  # type: ignore[no-untyped-def]
-    """Mirror a point in the plane at a vertex, which `before` and `after` tell of, where body b has carried it."""
-    d, e = _way(before, vertex), _way(vertex, after)
-    n = (e[0] - d[0], e[1] - d[1], e[2] - d[2])
-    size = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) ** 0.5
-    if size < 1e-9:
-        return source
-    r = turn[b]
-    x = (r[0, 0] * n[0] + r[0, 1] * n[1] + r[0, 2] * n[2]) / size
-    y = (r[1, 0] * n[0] + r[1, 1] * n[1] + r[1, 2] * n[2]) / size
-    z = (r[2, 0] * n[0] + r[2, 1] * n[1] + r[2, 2] * n[2]) / size
+def _image(source, vertex, normal, b, turn, origin, place):  # type: ignore[no-untyped-def]
+    """Mirror a point in the plane of a vertex where body b has carried it."""
     p = _moved(vertex, b, turn, origin, place)
+    x = turn[b, 0, 0] * normal[0] + turn[b, 0, 1] * normal[1] + turn[b, 0, 2] * normal[2]
+    y = turn[b, 1, 0] * normal[0] + turn[b, 1, 1] * normal[1] + turn[b, 1, 2] * normal[2]
+    z = turn[b, 2, 0] * normal[0] + turn[b, 2, 1] * normal[1] + turn[b, 2, 2] * normal[2]
     h = 2.0 * ((source[0] - p[0]) * x + (source[1] - p[1]) * y + (source[2] - p[2]) * z)
     return source[0] - h * x, source[1] - h * y, source[2] - h * z
 
@@ -88,51 +120,90 @@ def _apart(a, b):  # type: ignore[no-untyped-def]
     return ((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2) ** 0.5
 
 
+@njit(cache=True)
+def _ways(vertices, normals, kind, body, at, used, points, turn, origin, place, end, out):  # type: ignore[no-untyped-def]
+    """Write the lengths (7,) of one route through its footprint's points and its vertex at one instant."""
+    forth = (end[0], end[1], end[2])
+    back = forth
+    for j in range(at):
+        if kind[j] == REFLECT:
+            forth = _image(forth, vertices[j], normals[j], body[j], turn, origin, place)
+    if at == used:
+        out[:] = _apart(forth, back)
+        return
+    for j in range(used - 1, at, -1):
+        if kind[j] == REFLECT:
+            back = _image(back, vertices[j], normals[j], body[j], turn, origin, place)
+    b = body[at]
+    centre = _moved(vertices[at], b, turn, origin, place)
+    out[6] = _apart(forth, centre) + _apart(back, centre)
+    if kind[at] != SCATTER:
+        out[:6] = out[6]
+        return
+    for c in range(6):
+        p = _moved(points[c], b, turn, origin, place)
+        out[c] = _apart(forth, p) + _apart(back, p)
+
+
 @njit(cache=True, parallel=True)
-def _fill(vertices, kind, body, end, turn, origin, place, radar, out):  # type: ignore[no-untyped-def]
+def _corner_ways(  # type: ignore[no-untyped-def]
+    vertices, normals, kind, body, scatter, points, origin, turn, place, radar, out
+):
     n, d = kind.shape
-    old = (end[0], end[1], end[2])
-    new = (radar[0], radar[1], radar[2])
     for i in prange(n):
+        now = np.empty(7)
         used = 0
         while used < d and kind[i, used] > 0:
             used += 1
-        at, bent = used, False
-        for j in range(used):
-            if kind[i, j] == SCATTER or kind[i, j] == POINT:
-                at = j
-            bent = bent or kind[i, j] == DIFFRACT
-        if bent:
-            # An edge has no image: along the vertices, which is right to first order of the motion.
-            last, total = new, 0.0
-            for j in range(used):
-                v = vertices[i, j]
-                here = _moved((float(v[0]), float(v[1]), float(v[2])), body[i, j], turn, origin, place)
-                total += _apart(last, here)
-                last = here
-            out[i] = total + _apart(last, new)
-            continue
-        forth = new
-        for j in range(at):
-            if kind[i, j] == REFLECT:
-                a, v = vertices[i, j - 1], vertices[i, j]
-                before = (float(a[0]), float(a[1]), float(a[2])) if j > 0 else old
-                c = vertices[i, j + 1] if j + 1 < used else vertices[i, j]
-                after = (float(c[0]), float(c[1]), float(c[2])) if j + 1 < used else old
-                here = (float(v[0]), float(v[1]), float(v[2]))
-                forth = _image(forth, before, here, after, body[i, j], turn, origin, place)
-        if at == used:
-            out[i] = _apart(forth, new)
-            continue
-        back = new
-        for j in range(used - 1, at, -1):
-            if kind[i, j] == REFLECT:
-                a, v = vertices[i, j - 1], vertices[i, j]
-                before = (float(a[0]), float(a[1]), float(a[2]))
-                c = vertices[i, j + 1] if j + 1 < used else vertices[i, j]
-                after = (float(c[0]), float(c[1]), float(c[2])) if j + 1 < used else old
-                here = (float(v[0]), float(v[1]), float(v[2]))
-                back = _image(back, before, here, after, body[i, j], turn, origin, place)
-        s = vertices[i, at]
-        point = _moved((float(s[0]), float(s[1]), float(s[2])), body[i, at], turn, origin, place)
-        out[i] = _apart(forth, point) + _apart(back, point)
+        at = scatter[i] if scatter[i] >= 0 else used
+        for t in range(2):
+            _ways(
+                vertices[i], normals[i], kind[i], body[i], at, used, points[i], turn[t], origin, place[t], radar[t], now
+            )
+            out[t, i, :] = now[:3]
+
+
+_APART = 2e-3  # m of path: footprints longer than this in range give each corner its own delay
+
+
+@njit(cache=True, parallel=True)
+def _carry(  # type: ignore[no-untyped-def]
+    tx, vertices, normals, kind, body, scatter, points, lengths, length, taper, strength, origin, turn, place, radar,
+    k, out_lengths, out,
+):  # fmt: skip
+    n, d = kind.shape
+    still = np.zeros((origin.shape[0], 3, 3))
+    for b in range(origin.shape[0]):
+        still[b, 0, 0] = still[b, 1, 1] = still[b, 2, 2] = 1.0
+    for i in prange(n):
+        now, then, phases, terms = np.empty(7), np.empty(7), np.empty(6), np.empty(3, np.complex128)
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        at = scatter[i] if scatter[i] >= 0 else used
+        _ways(vertices[i], normals[i], kind[i], body[i], at, used, points[i], still, origin, origin, tx, then)
+        for t in range(radar.shape[0]):
+            _ways(
+                vertices[i], normals[i], kind[i], body[i], at, used, points[i], turn[t], origin, place[t], radar[t], now
+            )
+            centre = length[i] + now[6] - then[6]
+            out_lengths[t, i, :] = centre
+            out[t, i, :] = 0.0
+            if at == used or kind[i, at] != SCATTER:
+                out[t, i, 0] = strength[i] * np.exp(-1j * k * centre)
+                continue
+            low, high = np.inf, -np.inf
+            for c in range(6):
+                way = lengths[i, c] + now[c] - then[c]
+                phases[c] = k * way
+                if c < 3:
+                    out_lengths[t, i, c] = way
+                    low, high = min(low, way), max(high, way)
+            triangle_terms(phases, _LINEAR, terms)
+            if high - low > _APART:
+                for c in range(3):
+                    out[t, i, c] = strength[i] * taper[i, c] * terms[c]
+            else:
+                out_lengths[t, i, :] = centre
+                for c in range(3):
+                    out[t, i, 0] += strength[i] * taper[i, c] * terms[c]

@@ -52,6 +52,7 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
         body=np.where(tubes.facets >= 0, body, -1).astype(np.int16),
         kind=tubes.kinds,
         scatter=scatter,
+        points=np.concatenate([tubes.points[:, :3], middle], axis=1),
         lengths=lengths,
         length=tubes.length[:, CENTRE] + back[:, CENTRE],
         taper=_taper(tubes, back_k, back, out.far),

@@ -93,11 +93,12 @@ def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type
 
 
 @njit(cache=True, nogil=True)
-def meeting_lines(points, source, k, far, plane, facet, first, normal, side):  # type: ignore[no-untyped-def]
+def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side):  # type: ignore[no-untyped-def]
     """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into
     each other.
 
-    Args as for `edge_within`; facet (n, 4) met by each ray; first, normal (m, 3): a point and the normal of each facet.
+    Args as for `edge_within`; facet (n, 4) met by each ray, -1 for the tube's own plane, of normal own (n, 3); first,
+    normal (m, 3): a point and the normal of each facet.
     """
     work = np.empty(3)
     for i in range(points.shape[0]):
@@ -108,9 +109,9 @@ def meeting_lines(points, source, k, far, plane, facet, first, normal, side):  #
             if a < 0 or b < 0 or a == b:
                 continue
             fa, fb = facet[i, r], facet[i, r + 1]
-            if _between(
-                points[i], source[i], k[i], far, plane[i], first[fa], normal[fa], first[fb], normal[fb], a, b, work
-            ):
+            pa, na = (first[fa], normal[fa]) if fa >= 0 else (points[i, 3], own[i])
+            pb, nb = (first[fb], normal[fb]) if fb >= 0 else (points[i, 3], own[i])
+            if _between(points[i], source[i], k[i], far, plane[i], pa, na, pb, nb, a, b, work):
                 side[i] = work
                 break
 

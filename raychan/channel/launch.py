@@ -25,6 +25,7 @@ from raychan.channel.tubes import (
     stand,
     that_count,
     unit,
+    vector_area,
 )
 from raychan.kernels.patch import edge_to_cut, halved, lit_parts
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
@@ -143,7 +144,9 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     known = seen | (block >= 0)
     facet = np.where(block >= 0, block, tubes.facet[:, None])
     met = np.where(known, surface.plane[facet], -1)
-    meeting_lines(tubes.points, source, -k, leg.far, met, facet, surface.first, surface.normal, side)
+    own = vector_area(tubes.points)
+    own /= np.maximum(np.linalg.norm(own, axis=1), 1e-300)[:, None]
+    meeting_lines(tubes.points, source, -k, leg.far, met, block, surface.first, surface.normal, own, side)
     return Sight(seen, view.corners[:n], view.passed[:n], side)
 
 

@@ -135,6 +135,8 @@ class Leg:
             d, length = _towards(start, stop)
             # Both ends of each stretch lie on the lit side of the mirror, and the mirror itself is hit first.
             lit = (start - m.point) @ m.normal > 0.0
+            if i:
+                lit &= (stop - self.mirrors[i - 1].point) @ self.mirrors[i - 1].normal > 0.0
             rows = np.flatnonzero(seen & lit & (length > 0.0))
             hit, _ = surface.cast(start[rows], d[rows], skip[rows])
             ok = (hit >= 0) & (surface.plane[hit] == surface.plane[m.facet])

@@ -76,6 +76,7 @@ def _route(surface, points, p, leg, out, seen_in, seen_out, slots):  # type: ign
         "body": np.array(body + [-1] * free, np.int16),
         "kind": np.array(kinds + [0] * free, np.int8)[: max(used, slots)],
         "scatter": np.int8(scatter),
+        "points": np.zeros((6, 3)),
         "lengths": np.full(6, length),
         "length": length,
         "taper": np.ones(3),

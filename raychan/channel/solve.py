@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.advance import corner_rates
 from raychan.channel.diffract import diffracted_paths
 from raychan.channel.fields import departures, rates, transfer
 from raychan.channel.legs import Leg
@@ -19,7 +20,7 @@ from raychan.channel.scatterers import point_routes
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import Refinement
-from raychan.tables import MIRROR, REFLECT, SCATTER, Facets, Paths, Points, Routes
+from raychan.tables import MIRROR, REFLECT, SCATTER, Facets, Paths, Points, Routes, take
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -83,12 +84,13 @@ def solve(
     bounces: int,
     progress: Progress | None = None,
     diffraction: bool = False,
+    each: Callable[[Routes], None] | None = None,
 ) -> tuple[Paths, Stats]:
     """Return the paths of a scene seen by a monostatic radar, and what they cost.
 
     Args: frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
     both ways counted; progress is told (stage, share done); diffraction adds single wedges on the ways to point
-    targets.
+    targets; each is given every set of routes.
     """
     stats = Stats()
     since = perf_counter()
@@ -97,15 +99,21 @@ def solve(
     legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1)
     stats.legs = len(legs)
     parts: list[Paths] = []
+
+    def carry(routes: Routes) -> None:
+        parts.append(paths_of(routes, facets, radar, frequency))
+        if each:
+            each(routes)
+
     since = perf_counter()
     found = point_routes(surface, points, legs, legs, bounces, rule.slots, rule.layers)
     if found is not None:
-        parts.append(paths_of(found, facets, radar, frequency))
+        carry(found)
     if diffraction:
         parts += diffracted_paths(surface, points, radar, frequency, rule.slots, legs)
     found = _foot_points(surface, legs, rule)
     if found is not None:
-        parts.append(paths_of(found, facets, radar, frequency))
+        carry(found)
     stats.add("points", since)
     for i, leg in enumerate(legs):
         if progress:
@@ -118,7 +126,7 @@ def solve(
             stats.add("trace", since)
             since = perf_counter()
             stats.tubes += len(routes.kind)
-            parts.append(paths_of(routes, facets, radar, frequency))
+            carry(routes)
             stats.add("fields", since)
             since = perf_counter()
         stats.add("trace", since)
@@ -160,6 +168,7 @@ def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes 
         body=body,
         kind=kind,
         scatter=np.full(n, -1, np.int8),
+        points=np.zeros((n, 6, 3)),
         lengths=np.repeat(length[:, None], 6, axis=1),
         length=length,
         taper=np.ones((n, 3)),
@@ -198,7 +207,7 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> 
     return Paths(
         delay=length / C0,
         amplitude=amplitude,
-        rate=rate[index],
+        rate=np.concatenate([rate[whole], corner_rates(take(routes, rows), facets, v).ravel()]),
         departure=away[index],
         arrival=look[index],
         body=routes.body[index],

@@ -123,6 +123,7 @@ def _exact(surface: Surface, tx: Floats, rx: Floats, chains: list[Chain], slots:
         body=np.where(facet >= 0, body, -1).astype(np.int16),
         kind=column[3].reshape(shape).astype(np.int8),
         scatter=np.full(n, -1, np.int8),
+        points=np.zeros((n, 6, 3)),
         lengths=np.repeat(length[:, None], 6, axis=1).reshape(n, 6),
         length=length,
         taper=np.ones((n, 3)),

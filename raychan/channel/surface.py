@@ -40,6 +40,7 @@ class Surface(Tracer):
         self.first_edge = np.zeros(1, np.int64)
         self.edge_ends = np.zeros((0, 2, 3))
         self.edge_faces = np.zeros((0, 2), np.int32)
+        self.between: Any = None
         self.shadows: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()  # by leg
         self.wedge = np.zeros((0, 2, 3))
         self.wedge_facet = np.zeros((0, 2), np.int32)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.between import between
 from raychan.channel.edges import edge_within, meeting_lines
 from raychan.channel.launch import divide, sight, write_layers
 from raychan.channel.legs import Leg
@@ -58,7 +59,7 @@ def _fly(
         hit, t = _cast(surface, tubes, k, start, matters)
         mid = hit[:, CENTRE]
         agree = _agree(surface, hit)
-        side = _edges(surface, leg, tubes, k, hit)
+        side = _edges(surface, leg, tubes, k, hit, t, matters & (hit >= 0).any(axis=1))
         mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
         split = mixed & matters & (level < rule.levels)
         ready = np.flatnonzero(~split & (mid >= 0))
@@ -79,15 +80,29 @@ def _fly(
         start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
 
 
-def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints) -> Floats:
-    """Return the sides (n, 3) of an edge that runs through each tube; zeros where none does or mirrors were curved."""
-    plane = np.where(hit >= 0, surface.plane[np.maximum(hit, 0)], -1)
-    centre = k[:, CENTRE]
-    source = tubes.points[:, CENTRE] - tubes.length[:, CENTRE, None] * centre
-    side = edge_within(tubes.points, source, centre, leg.far, plane, surface.first_edge, surface.outline)
-    meeting_lines(tubes.points, source, centre, leg.far, plane, hit, surface.first, surface.normal, side)
+def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, t: Floats, wanted: Bools) -> Floats:
+    """Return the sides (n, 3) of an edge that runs through each tube; zeros where none does."""
     flat = tubes.flat & ~surface.curved[tubes.facet]
-    return np.where(flat[:, None], side, 0.0)
+    mid = k[:, CENTRE]
+    reach = np.where(hit[:, CENTRE] >= 0, t[:, CENTRE], 0.0)
+    # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the section that the
+    # tube has where it lands.
+    spread = np.where(flat, 0.0, reach)[:, None, None] * (k - mid[:, None])
+    plane = np.where(hit >= 0, surface.plane[np.maximum(hit, 0)], -1)
+    source = tubes.points[:, CENTRE] - tubes.length[:, CENTRE, None] * mid
+    side = np.zeros((len(tubes), 3))
+    for rows, far in ((np.flatnonzero(flat), leg.far), (np.flatnonzero(~flat), True)):
+        at = tubes.points[rows] + spread[rows]
+        found = edge_within(at, source[rows], mid[rows], far, plane[rows], surface.first_edge, surface.outline)
+        meeting_lines(
+            at, source[rows], mid[rows], far, plane[rows], hit[rows], surface.first, surface.normal, mid[rows], found
+        )
+        lands = wanted[rows] & (hit[rows, CENTRE] >= 0)
+        between(surface).across(
+            tubes.points[rows], k[rows], source[rows], far, flat[rows], hit[rows, CENTRE], reach[rows], lands, found
+        )
+        side[rows] = found
+    return side
 
 
 def mirrored(tubes: Tubes) -> Floats:

@@ -21,6 +21,7 @@ Ints = NDArray[np.int32]
 _CHUNK = 1 << 16
 _MISS = np.int32(-1)
 _SLACK = 2e-6  # of a coordinate: a few float32 spacings
+_TOUCH = 2e-5  # m: surfaces nearer than this lie on each other
 _NEAREST = 1e-6  # m: a hit closer than this is the surface the ray leaves
 
 
@@ -109,7 +110,7 @@ class Tracer:
         """Tell which rays met another surface lying in the plane of their target at the same place: it counts there,
         the target does not, so that what is drawn twice returns once."""
         a, b = np.maximum(facet, 0), np.maximum(target, 0)
-        there = (facet >= 0) & (target >= 0) & (np.abs(t - limit) < np.minimum(slack, 2e-5))
+        there = (facet >= 0) & (target >= 0) & (np.abs(t - limit) < np.minimum(slack, _TOUCH))
         apart = (self.plane[a] != self.plane[b]) & (self.smooth[a] != self.smooth[b])
         return there & apart & (np.abs(np.einsum("ij,ij->i", self.normal[a], self.normal[b])) > 1.0 - 1e-9)
 
@@ -140,7 +141,10 @@ class Tracer:
         todo, start = np.arange(n), np.zeros(n)
         while len(todo):
             facet, t = self.cast(origin[todo], direction[todo], skip[todo], start[todo])
-            clear = (facet < 0) | (t >= limit[todo] - slack[todo]) | (facet == target[todo])
+            # Only the target's own curved surface may lie before it by more than rounding.
+            own = self.smooth[facet] == self.smooth[target[todo]]
+            near = np.where(own, slack[todo], np.minimum(slack[todo], _TOUCH))
+            clear = (facet < 0) | (t >= limit[todo] - near) | (facet == target[todo])
             clear &= ~self._twin(facet, t, limit[todo], slack[todo], target[todo])
             if inside is not None:
                 clear |= self.facets.body[np.maximum(facet, 0)] == inside[todo]

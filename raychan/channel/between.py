@@ -1,0 +1,209 @@
+"""Between: the silhouettes that stand between a tube's mirror and the surface on which it lands."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from raychan.channel.edges import above, cross_into, dot, inside
+from raychan.channel.surface import Surface
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+_MOST_CELLS = 2_000_000
+_LEAST_CELL = 0.02  # m
+_CLEAR = 1e-5  # m: what lies nearer to a surface belongs to it
+
+
+class Between:
+    """Every edge that can be an outline, in a grid of cubes; tubes walk through it from mirror to landing."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.surface = surface
+        ends = surface.edge_ends
+        low, high = (ends.min(axis=(0, 1)), ends.max(axis=(0, 1))) if len(ends) else (np.zeros(3), np.ones(3))
+        volume = float(np.prod(high - low + _LEAST_CELL))
+        self.cell = max(_LEAST_CELL, (volume / _MOST_CELLS) ** (1.0 / 3.0))
+        self.low = low - self.cell
+        self.shape = np.ceil((high - self.low) / self.cell).astype(np.int64) + 2
+        self.first, self.index = _fill(ends, self.low, self.cell, self.shape)
+
+    def across(
+        self,
+        points: Floats,
+        k: Floats,
+        source: Floats,
+        far: bool,
+        flat: Bools,
+        hit: Ints,
+        reach: Floats,
+        wanted: Bools,
+        side: Floats,
+    ) -> None:
+        """Fill in rows of side (n, 3) that are zero: corners' distances [m] from the longest shadow edge on a tube.
+
+        Args: points (n, 4, 3) [m] footprints; k (n, 4, 3) directions after reflection, from a source (n, 3) [m] where
+        all mirrors were flat (n,); hit (n,) facet on which the centre lands, after reach (n,) [m]; wanted (n,).
+        """
+        s = self.surface
+        _across(
+            points, k, source, far, flat, hit, reach, wanted, s.edge_ends, s.edge_faces, s.first, s.normal,
+            self.first, self.index, self.low, self.cell, self.shape, side,
+        )  # fmt: skip
+
+
+def between(surface: Surface) -> Between:
+    """Return the grid of a surface's edges, made once."""
+    if surface.between is None:
+        surface.between = Between(surface)
+    found: Between = surface.between
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _fill(ends, low, cell, shape):  # type: ignore[no-untyped-def]
+    """Return the edges in each cell as (first, index): edges are walked in steps of half a cell."""
+    total = shape[0] * shape[1] * shape[2]
+    first = np.zeros(total + 1, np.int64)
+    index = np.zeros(0, np.int32)
+    for fill in range(2):
+        for e in range(len(ends)):
+            a, b = ends[e, 0], ends[e, 1]
+            size = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+            steps = int(2.0 * size / cell) + 1
+            last = -1
+            for s in range(steps + 1):
+                t = s / steps
+                i = int((a[0] + t * (b[0] - a[0]) - low[0]) / cell)
+                j = int((a[1] + t * (b[1] - a[1]) - low[1]) / cell)
+                k = int((a[2] + t * (b[2] - a[2]) - low[2]) / cell)
+                at = (i * shape[1] + j) * shape[2] + k
+                if at == last:
+                    continue
+                last = at
+                if fill == 0:
+                    first[at + 1] += 1
+                else:
+                    index[first[at]] = e
+                    first[at] += 1
+        if fill == 0:
+            first = np.cumsum(first)
+            index = np.empty(first[-1], np.int32)
+    for at in range(total, 0, -1):
+        first[at] = first[at - 1]
+    first[0] = 0
+    return first, index
+
+
+@njit(cache=True, inline="always")
+def _outline(faces, source, k, far, first, normal):  # type: ignore[no-untyped-def]
+    """Tell whether the faces of an edge look to different sides as seen from the source."""
+    if faces[1] < 0:
+        return True
+    front = 0
+    for f in range(2):
+        look = 0.0
+        for c in range(3):
+            look += normal[faces[f], c] * (-k[c] if far else source[c] - first[faces[f], c])
+        front += 1 if look > 0.0 else 0
+    return front == 1
+
+
+@njit(cache=True, nogil=True)
+def _across(  # type: ignore[no-untyped-def]
+    points,
+    ks,
+    source,
+    far,
+    flat,
+    hit,
+    reach,
+    wanted,
+    ends,
+    faces,
+    first_point,
+    normal,
+    first,
+    index,
+    low,
+    cell,
+    shape,
+    out,
+):
+    tried = np.full(len(ends), -1, np.int64)
+    side, m, work, k = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    least, most, section = np.empty(3), np.empty(3), np.empty((4, 3))
+    begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
+    for i in range(len(points)):
+        if not wanted[i] or out[i].any():
+            continue
+        centre = points[i, 3]
+        k[:] = ks[i, 3]
+        plane, at_plane = normal[hit[i]], first_point[hit[i]]
+        sign = -1.0 if dot(k, plane) > 0.0 else 1.0
+        steps = int(reach[i] / cell) + 1
+        best = 0.0
+        for s in range(steps):
+            for c in range(3):
+                least[c], most[c] = np.inf, -np.inf
+                for q in range(4):
+                    for t in (s / steps * reach[i], (s + 1) / steps * reach[i]):
+                        x = points[i, q, c] + t * ks[i, q, c]
+                        least[c], most[c] = min(least[c], x), max(most[c], x)
+                begin_cell[c] = max(int((least[c] - 0.25 * cell - low[c]) / cell), 0)
+                end_cell[c] = min(int((most[c] + 0.25 * cell - low[c]) / cell) + 1, shape[c])
+            for ci in range(begin_cell[0], end_cell[0]):
+                for cj in range(begin_cell[1], end_cell[1]):
+                    row = (ci * shape[1] + cj) * shape[2]
+                    if end_cell[2] <= begin_cell[2]:
+                        continue
+                    for at in range(first[row + begin_cell[2]], first[row + end_cell[2]]):
+                        e = index[at]
+                        if tried[e] == i:
+                            continue
+                        tried[e] = i
+                        if not _outline(faces[e], source[i], k, far, first_point, normal):
+                            continue
+                        a, b = ends[e, 0], ends[e, 1]
+                        # The part beyond the mirror, and before the plane of landing.
+                        da, db, ha, hb = -_CLEAR, -_CLEAR, -_CLEAR, -_CLEAR
+                        for c in range(3):
+                            da += (a[c] - centre[c]) * k[c]
+                            db += (b[c] - centre[c]) * k[c]
+                            ha += sign * (a[c] - at_plane[c]) * plane[c]
+                            hb += sign * (b[c] - at_plane[c]) * plane[c]
+                        begin, end = above(da, db)
+                        low_end, high_end = above(ha, hb)
+                        begin, end = max(begin, low_end), min(end, high_end)
+                        if begin >= end:
+                            continue
+                        # Off a curved mirror the rays count as parallel, in the section that they have here.
+                        depth = 0.0
+                        for c in range(3):
+                            depth += (a[c] + 0.5 * (begin + end) * (b[c] - a[c]) - centre[c]) * k[c]
+                        for q in range(4):
+                            for c in range(3):
+                                section[q, c] = points[i, q, c]
+                                if not flat[i]:
+                                    section[q, c] += depth * (ks[i, q, c] - k[c])
+                        begin, end = inside(a, b, section, centre, source[i], k, far, begin, end, work)
+                        length = (end - begin) * np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+                        if length <= best:
+                            continue
+                        if far:
+                            cross_into(b - a, k, m)
+                        else:
+                            cross_into(b - a, source[i] - a, m)
+                        size = np.sqrt(dot(m, m))
+                        if size == 0.0:
+                            continue
+                        for q in range(3):
+                            side[q] = 0.0
+                            for c in range(3):
+                                side[q] += (section[q, c] - a[c]) * m[c] / size
+                        if side.min() < 0.0 < side.max():
+                            best = length
+                            out[i] = side
