@@ -164,8 +164,9 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
     tubes.caustics = tubes.caustics + (across_before * across_after < 0.0)
     bary = surface.barycentric(hit.reshape(-1), points.reshape(-1, 3))
     normals = surface.normal_at(hit.reshape(-1), np.clip(bary, -0.5, 1.5)).reshape(n, 4, 3)
-    side = -np.sign(np.einsum("nij,nij->ni", normals, k))
-    tubes.normals = normals * np.where(side == 0.0, 1.0, side)[..., None]
+    # The centre says which side is lit; a corner beyond the terminator then shows its back and carries nothing.
+    behind = np.einsum("nj,nj->n", normals[:, CENTRE], k[:, CENTRE]) > 0.0
+    tubes.normals = np.where(behind[:, None, None], -normals, normals)
     tubes.points, tubes.k, tubes.length, tubes.flat, tubes.facet = points, k, length, flat, facet
     tubes.bounces = tubes.bounces + np.int8(1)
     return tubes

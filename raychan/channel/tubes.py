@@ -279,5 +279,6 @@ def that_count(bound: Floats, doubt: float) -> NDArray[np.intp]:
 
 
 def unit(v: Floats) -> Floats:
-    """Return vectors (..., 3) scaled to length one."""
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+    """Return vectors (..., 3) scaled to length one; a vector of none stays as it is."""
+    size = np.linalg.norm(v, axis=-1, keepdims=True)
+    return v / np.where(size > 0.0, size, 1.0)
