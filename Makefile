@@ -1,15 +1,16 @@
-# make demo: a street becomes a range-Doppler map.   make test: lint, format, types, tests.
+# make demo: a street becomes a range-Doppler map.   make test: lint, format, types, tests.   make bench: speed.
 # PYTHON is the interpreter that makes the environment; anything from 3.11 on will do.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test clean
+.PHONY: help demo test bench clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
 	@echo "make test   ruff, ruff format, mypy, pytest"
+	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
 	@echo "make clean  remove $(VENV), out and caches"
 
 demo: $(VENV)/.installed
@@ -20,6 +21,9 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+bench: $(VENV)/.installed
+	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
 # A stamp younger than pyproject.toml says that the environment is up to date.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python

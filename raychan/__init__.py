@@ -5,8 +5,19 @@ The public names below are loaded when first used, so that `import raychan` cost
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import Any
+
+_PLACES = (os.path.dirname(__file__), os.path.expanduser("~"))
+if "NUMBA_CACHE_DIR" not in os.environ and not any(os.access(place, os.W_OK) for place in _PLACES):
+    # Compiled loops are kept beside the package or in the home; where neither can be written, numba refuses to run.
+    import atexit
+    import shutil
+    import tempfile
+
+    os.environ["NUMBA_CACHE_DIR"] = _kept = tempfile.mkdtemp(prefix="raychan-")
+    atexit.register(shutil.rmtree, _kept, ignore_errors=True)
 
 _HOME = {
     "Scene": "raychan.world.scene",
@@ -20,6 +31,7 @@ _HOME = {
     "load_result": "raychan.run.store",
     "rcs": "raychan.channel.rcs",
     "specular_paths": "raychan.channel.specular",
+    "visibility": "raychan.study.visibility",
 }
 
 __all__ = [*_HOME, "__version__"]

@@ -29,6 +29,15 @@ def rotation(yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Array:
     )
 
 
+def yaw_pitch_roll(matrix: Array) -> tuple[float, float, float]:
+    """Return the angles [rad] of which `rotation` makes the matrix (3, 3); roll 0 where the nose is upright."""
+    level = float(np.hypot(matrix[0, 0], matrix[1, 0]))
+    pitch = float(np.arctan2(-matrix[2, 0], level))
+    if level < 1e-9:
+        return float(np.arctan2(-matrix[0, 1], matrix[1, 1])), pitch, 0.0
+    return float(np.arctan2(matrix[1, 0], matrix[0, 0])), pitch, float(np.arctan2(matrix[2, 1], matrix[2, 2]))
+
+
 def direction(azimuth: Any, elevation: Any = 0.0) -> Array:
     """Return unit vectors (..., 3) of azimuth and elevation [rad]."""
     az, el = np.broadcast_arrays(np.asarray(azimuth, float), np.asarray(elevation, float))

@@ -140,6 +140,7 @@ class Routes(Record):
     body: Ints = column("n d", np.int16)
     kind: Ints = column("n d", np.int8)
     scatter: Ints = column("n", np.int8)
+    points: Floats = column("n 6 3", unit="m", doc="footprint: corners, then middles of its edges; 0 without footprint")
     lengths: Floats = column("n 6", unit="m", doc="total lengths through the footprint's corners and edge middles")
     length: Floats = column("n", unit="m", doc="total length through the vertices")
     taper: Floats = column("n 3", doc="how strongly each corner is lit and seen, relative to the centre")

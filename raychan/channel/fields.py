@@ -4,6 +4,7 @@ routes."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
@@ -52,12 +53,27 @@ def transfer(
     material = facets.material[np.maximum(routes.facet, 0)].astype(np.int64) if len(facets.material) else routes.facet
     k = 2.0 * np.pi * frequency / C0
     out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3), np.complex128)
-    _transfer(
-        routes.tx, routes.rx, routes.far, routes.vertices, routes.normals, routes.kind, material, routes.scatter,
-        routes.lengths, routes.length, routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics,
-        routes.sigma, m.kind, m.eps, m.thickness, m.roughness, e_tx, e_rx, k, out,
+    columns = (
+        routes.vertices, routes.normals, routes.kind, material, routes.scatter, routes.lengths, routes.length,
+        routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma, e_tx, e_rx, out,
     )  # fmt: skip
+
+    def some(at: slice) -> None:
+        _transfer(
+            routes.tx, routes.rx, routes.far, m.kind, m.eps, m.thickness, m.roughness, k, *(c[at] for c in columns)
+        )
+
+    in_two(len(out), some)
     return out if corners else out.sum(axis=3)
+
+
+def in_two(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
+    """Do the work on rows 0 to n, on two threads when there are many: each must release the interpreter's lock."""
+    if n < least:
+        work(slice(0, n))
+        return
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(work, (slice(0, n // 2), slice(n // 2, n))))
 
 
 @njit(cache=True)
@@ -81,8 +97,8 @@ def _cosine(k, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _transfer(  # type: ignore[no-untyped-def]
-    tx, rx, far, vertices, normals, kind, material, scatter, lengths, length, taper, area, spread_in, spread_out,
-    caustics, sigma, m_kind, m_eps, m_thickness, m_rough, e_tx, e_rx, k, out,
+    tx, rx, far, m_kind, m_eps, m_thickness, m_rough, k, vertices, normals, kind, material, scatter, lengths, length,
+    taper, area, spread_in, spread_out, caustics, sigma, e_tx, e_rx, out,
 ):  # fmt: skip
     n, d = kind.shape
     terms = np.empty(3, np.complex128)

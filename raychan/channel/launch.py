@@ -73,7 +73,8 @@ def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement) -> tupl
     done, spent, level = [(facet[:0], bary[:0])], 0, 0
     while len(facet):
         spent += len(facet)
-        edge = edge_to_cut(facet, bary, *shape, *ways, rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND)
+        limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND
+        edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
         if spent > rule.max_tubes:
             edge[:] = -1
         done.append((facet[edge < 0], bary[edge < 0]))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from raychan.channel.collect import routes_of
 from raychan.channel.launch import launch
 from raychan.channel.legs import Leg
+from raychan.channel.mirrors import reachable
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce, settle
 from raychan.channel.tubes import CENTRE, Refinement, Tubes, phases_of
@@ -27,11 +28,15 @@ def tube_routes(
     tubes = launch(surface, leg, direct, bodies, rule)
     mirror_planes = _planes_in(surface, outs)
     first, total = True, 0.0
+    reach = [reachable(surface, out) for out in outs]
     while len(tubes):
         counts = tubes.bounces
-        for out in outs:
+        present = np.bincount(f.body[tubes.facet], minlength=len(f.role)) > 0
+        for out, may in zip(outs, reach, strict=True):
+            if not (present & may).any():
+                continue
             fits = counts + len(out.mirrors) <= bounces
-            fits &= ~np.isin(f.body[tubes.facet], list(out.bodies))
+            fits &= may[f.body[tubes.facet]] & ~np.isin(f.body[tubes.facet], list(out.bodies))
             # Ground has no return of its own here; a plane mirror lit from another body returns by its image, not
             # twice.
             fits &= f.role[f.body[tubes.facet]] != MIRROR

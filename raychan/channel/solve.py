@@ -23,6 +23,8 @@ from raychan.channel.tubes import Refinement
 from raychan.tables import MIRROR, REFLECT, SCATTER, Facets, Paths, Points, Routes, take
 from raychan.units import C0
 
+APART = 2e-3  # m of path: what 4 GHz of bandwidth cannot tell from one delay at -26 dB
+
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
@@ -76,7 +78,7 @@ def refinement(
 
 
 def solve(
-    facets: Facets,
+    facets: Facets | Surface,
     points: Points,
     radar: Radar,
     frequency: float,
@@ -85,23 +87,26 @@ def solve(
     progress: Progress | None = None,
     diffraction: bool = False,
     each: Callable[[Routes], None] | None = None,
+    apart: float = APART,
 ) -> tuple[Paths, Stats]:
     """Return the paths of a scene seen by a monostatic radar, and what they cost.
 
-    Args: frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
+    Args: facets, or the surface made of them, which serves many solutions;
+    frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
     both ways counted; progress is told (stage, share done); diffraction adds single wedges on the ways to point
-    targets; each is given every set of routes.
+    targets; each is given every set of routes; apart as for `paths_of`.
     """
     stats = Stats()
     since = perf_counter()
-    surface = Surface(facets)
+    surface = facets if isinstance(facets, Surface) else Surface(facets)
+    facets, before = surface.facets, surface.rays
     stats.add("build", since)
     legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1)
     stats.legs = len(legs)
     parts: list[Paths] = []
 
     def carry(routes: Routes) -> None:
-        parts.append(paths_of(routes, facets, radar, frequency))
+        parts.append(paths_of(routes, facets, radar, frequency, apart))
         if each:
             each(routes)
 
@@ -130,7 +135,7 @@ def solve(
             stats.add("fields", since)
             since = perf_counter()
         stats.add("trace", since)
-    stats.rays = surface.rays
+    stats.rays = surface.rays - before
     if progress:
         progress("trace", 1.0)
     return join(parts or [nothing(facets, radar, rule.slots)]), stats
@@ -180,11 +185,9 @@ def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes 
     )
 
 
-_APART = 2e-3  # m of path: footprints longer than this in range give each corner its own delay
-
-
-def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> Paths:
-    """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
+def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float, apart: float = APART) -> Paths:
+    """Return what routes carry for a radar; footprints longer than `apart` [m] of path become three paths, one a
+    corner."""
     a = transfer(
         routes,
         facets,
@@ -197,7 +200,7 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> 
     rate = rates(routes, facets, v, v)
     away, look = departures(routes)
     spans = routes.lengths[:, :3].max(axis=1) - routes.lengths[:, :3].min(axis=1)
-    long = (routes.kind == SCATTER).any(axis=1) & (spans > _APART)
+    long = (routes.kind == SCATTER).any(axis=1) & (spans > apart)
     whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
     index = np.concatenate([whole, np.repeat(rows, 3)])
     amplitude = np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])

@@ -11,7 +11,9 @@ from raychan.cli.explain import explain
 from raychan.cli.info import info
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
+from raychan.cli.show import Interrupted
 from raychan.cli.study import study
+from raychan.cli.validate import validate
 from raychan.cli.view import view
 
 _HELP = """A street becomes a range-Doppler map, and every detection names the bodies it came from.
@@ -29,7 +31,8 @@ raychan traces the waves over them, synthesises what the receiver samples, and p
   [dim]the scene and its rays, to turn and to pick[/]
 
 Ranges are in metres, speeds in m/s; a positive range rate recedes.
-Exit code 0: done; 2: the input is wrong, and the message says where; 130: interrupted, nothing written."""
+Exit code 0: done; 1: validate found a difference that is not known, or one that healed; 2: the input is wrong, and
+the message says where; 130: interrupted, nothing written."""
 
 _STOPPED = "interrupted; nothing was written"
 
@@ -58,7 +61,7 @@ def _top(
     pass
 
 
-for command in (run, info, rcs, explain, view):
+for command in (run, info, rcs, explain, view, validate):
     app.command()(command)
 app.add_typer(study, name="study")
 
@@ -77,6 +80,8 @@ def invoke(argv: list[str]) -> int:
         return _fail(_STOPPED, 130) if code == 130 else int(code or 0)
     except (KeyboardInterrupt, typer.Abort):
         return _fail(_STOPPED, 130)
+    except Interrupted as stop:
+        return _fail(str(stop), 130)
     except BrokenPipeError:
         # The reader of a pipe went away, as `head` does; Python would complain again when it flushes at the end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

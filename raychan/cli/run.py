@@ -1,9 +1,10 @@
-"""raychan run: a scene becomes a map, detections, files and pictures."""
+"""raychan run: a scene, or a sequence of its frames, becomes maps, detections, files and pictures."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +12,7 @@ from raychan.cli import show
 
 if TYPE_CHECKING:
     from raychan.run.result import Result
+    from raychan.world.scene import Scene
 
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
 
@@ -35,34 +37,88 @@ def run(
         ),
     ] = None,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no pictures.")] = False,
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            help="Simulate a sequence of N frames: poses advance by velocities and turn rates.", metavar="N", min=1
+        ),
+    ] = None,
+    frame_interval: Annotated[
+        float | None,
+        typer.Option(help="From frame to frame [s]; without pause if not given.", metavar="S", min=1e-9),
+    ] = None,
 ) -> None:
     """Simulate a scene: paths, power-delay profile, I/Q cube, range-Doppler map, detections.
 
     Writes result.nc (netCDF-4: all of it), detections.csv, summary.json (timings, error reached, what was left out) and
     three pictures. The directory changes only when everything is ready.
+
+    With --frames, DIR holds frame_0000, frame_0001, ..., each such a directory and written as soon as it is ready, and
+    detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 is what a run without --frames gives.
     """
-    from raychan.run.chain import simulate
-    from raychan.run.files import staging
-    from raychan.run.store import save_result
     from raychan.world.scene import Scene
 
+    if frame_interval is not None and frames is None:
+        raise typer.BadParameter("it needs --frames", param_hint="--frame-interval")
     loaded = Scene.load(scene)
     if set_:
         loaded = loaded.override(set_)
+    options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
+    if frames is None:
+        _single(loaded, out, options, not no_pictures)
+    else:
+        _sequence(loaded, out, frames, frame_interval, options, not no_pictures)
+
+
+def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:
+    from raychan.run.chain import simulate
+    from raychan.run.files import staging
+    from raychan.run.store import save_result
+
     with staging(out) as stage, show.progress() as tell:
-        result = simulate(loaded, seed=seed, tolerance_db=tolerance, max_bounces=max_bounces, progress=tell)
+        result = simulate(scene, **options, progress=tell)
         save_result(result, stage)
         warnings = list(result.warnings)
-        if not no_pictures:
+        if pictures:
             warnings += _pictures(result, stage, tell)
     show.warn(warnings)
     screen = show.console()
     screen.print(show.detections(result))
     took = sum(result.timings.values())
-    screen.print(f"{len(result.paths.delay)} paths in {took:.1f} s; seed {seed}")
-    if not no_pictures:
+    screen.print(f"{len(result.paths.delay)} paths in {took:.1f} s; seed {result.seed}")
+    if pictures:
         screen.print("pictures: " + ", ".join(str(out / name) for name in PICTURES), soft_wrap=True)
     screen.print(f"all of it: {out / 'result.nc'}, detections.csv and summary.json beside it", soft_wrap=True)
+
+
+def _sequence(
+    scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
+) -> None:
+    from raychan.run.sequence import Store, frames
+
+    store, told, screen = Store(out), set(), show.console()
+    start = perf_counter()
+    try:
+        with show.progress() as tell:
+            for frame in frames(scene, count, interval, **options, progress=tell):
+                drawn: list[str] = []
+                store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
+                # A sequence says each warning once.
+                new = [w for w in dict.fromkeys([*frame.result.warnings, *drawn]) if w not in told]
+                told.update(new)
+                show.warn(new)
+                found = len(frame.result.detections.range)
+                took = sum(frame.result.timings.values())
+                plural = "" if found == 1 else "s"
+                screen.print(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}  in {took:.2f} s")
+    except KeyboardInterrupt:
+        done = f"{store.count} of {count} frames are in {out}" if store.count else "nothing was written"
+        raise show.Interrupted(f"interrupted; {done}") from None
+    took = perf_counter() - start
+    screen.print(f"{count} frame{'' if count == 1 else 's'} in {took:.1f} s; seeds from {options['seed']}")
+    screen.print(
+        f"all of it: {out / 'frame_0000'} and on; detections of all frames: {out / 'detections.csv'}", soft_wrap=True
+    )
 
 
 def _pictures(result: Result, stage: Path, tell) -> list[str]:  # type: ignore[no-untyped-def]

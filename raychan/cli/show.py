@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 _WIDE = 150  # columns where the output is no terminal, so that no line is cut
 
 
+class Interrupted(Exception):
+    """Ctrl-C in a command that keeps what is ready; the message says what that is."""
+
+
 def console() -> Console:
     """Return the console of standard output."""
     return Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)

@@ -1,4 +1,4 @@
-"""raychan study: how accurate, how fast, and where methods fail."""
+"""raychan study: how accurate, how fast, where methods fail; and one body through many scenes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import typer
 
 from raychan.cli import show
 from raychan.cli.study_stability import stability
+from raychan.cli.study_sweep import sweep
 
 if TYPE_CHECKING:
     from raychan.study.tradeoff import Row
 
 study = typer.Typer(
-    no_args_is_help=True, help="Studies of the method itself: error against effort; behaviour where methods fail."
+    no_args_is_help=True,
+    help="Studies: error against effort; behaviour where methods fail; one body through varied scenes.",
 )
 
 
@@ -62,6 +64,7 @@ def tradeoff(
 
 
 study.command()(stability)
+study.command()(sweep)
 
 
 def _cells(r: Row) -> list[str]:

@@ -23,21 +23,41 @@ def view(
     html: Annotated[
         Path | None, typer.Option(help="Write a page to turn and pick in, for any browser.", metavar="FILE.html")
     ] = None,
+    range: Annotated[
+        float | None,
+        typer.Option("--range", help="Show only the rays that make the cell at this range [m].", metavar="M"),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(help="Speed of that cell [m/s]; the strongest at that range if not given.", metavar="M/S"),
+    ] = None,
 ) -> None:
     """Show a scene, and the rays of a result coloured by the power they bring.
 
-    Without --screenshot or --html a window opens, where a click on a ray prints its chain of bodies.
+    Without --screenshot or --html a window opens, where a click on a ray prints its chain of bodies. With --range only
+    the rays behind one cell of the map are shown, and bodies that they do not meet are seen through.
     """
     from raychan.run.files import StoreError
+    from raychan.run.provenance import explain
     from raychan.run.store import load_result
     from raychan.view.scene import drawing_of, scene_picture
     from raychan.world.scene import Scene
 
+    if speed is not None and range is None:
+        raise typer.BadParameter("it needs --range", param_hint="--speed")
     if source.is_dir() or source.suffix == ".nc":
         result = load_result(source)
         if result.scene is None:
             raise StoreError(f"{source}: its scene cannot be read again (a mesh file moved, or it was made in Python)")
-        drawing = drawing_of(result.scene, result)
+        try:
+            cell = None if range is None else explain(result, range, speed)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from error
+        if cell is not None and not cell.contributions:
+            show.warn(["no path explains this cell: noise"])
+        drawing = drawing_of(result.scene, result, cell)
+    elif range is not None:
+        raise typer.BadParameter(f"{source} is a scene; a directory that `raychan run` wrote has cells to show")
     else:
         drawing = drawing_of(Scene.load(source))
     if screenshot is not None:

@@ -64,3 +64,63 @@ def add_bent(out: Complexes, plane: Complexes, growth: float, slope: float, repe
         for s in range(samples):
             out[m, s] += plane[m, s] * bend[s] * turn
             turn *= one
+
+
+_ABREAST = 8  # echoes whose recurrences run side by side, so that a core's vector unit is full
+_PIECE = 128  # samples after which a recurrence starts anew from the exact phase
+
+
+@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
+def ramp_sums(
+    amplitude: Complexes,
+    delay: Floats,
+    growth: Floats,
+    carrier: float,
+    slope: float,
+    step: float,
+    samples: int,
+) -> Complexes:
+    """Return samples (ramps, samples) of echoes (ramps, n) that every ramp has of its own.
+
+    Args as for `beat_sum`, amplitude and delay at the start of each ramp. Along a ramp the phase is quadratic in the
+    sample number, so that each sample follows from the one before by two complex products.
+    """
+    ramps, count = delay.shape
+    out = np.zeros((ramps, samples), np.complex128)
+    for m in prange(ramps):
+        re, im = np.zeros(samples), np.zeros(samples)
+        z, w, q = np.empty((2, _ABREAST)), np.empty((2, _ABREAST)), np.empty((2, _ABREAST))
+        turn = np.empty(3)
+        for first in range(0, count, _ABREAST):
+            for start in range(0, samples, _PIECE):
+                z[:], w[:], q[:] = 0.0, 0.0, 0.0
+                for lane in range(min(_ABREAST, count - first)):
+                    p = first + lane
+                    for i in range(3):
+                        t = (start + i) * step
+                        grown = growth[m, p] * t
+                        tau = delay[m, p] + grown
+                        turn[i] = carrier * grown + slope * tau * (t - 0.5 * tau)
+                    angle = -2.0 * math.pi * (turn[0] - math.floor(turn[0]))
+                    begin = amplitude[m, p] * complex(math.cos(angle), math.sin(angle))
+                    along = -2.0 * math.pi * (turn[1] - turn[0])
+                    bend = -2.0 * math.pi * (turn[2] - 2.0 * turn[1] + turn[0])
+                    z[0, lane], z[1, lane] = begin.real, begin.imag
+                    w[0, lane], w[1, lane] = math.cos(along), math.sin(along)
+                    q[0, lane], q[1, lane] = math.cos(bend), math.sin(bend)
+                for s in range(start, min(start + _PIECE, samples)):
+                    sum_re, sum_im = 0.0, 0.0
+                    for lane in range(_ABREAST):
+                        sum_re += z[0, lane]
+                        sum_im += z[1, lane]
+                        r = z[0, lane] * w[0, lane] - z[1, lane] * w[1, lane]
+                        z[1, lane] = z[0, lane] * w[1, lane] + z[1, lane] * w[0, lane]
+                        z[0, lane] = r
+                        r = w[0, lane] * q[0, lane] - w[1, lane] * q[1, lane]
+                        w[1, lane] = w[0, lane] * q[1, lane] + w[1, lane] * q[0, lane]
+                        w[0, lane] = r
+                    re[s] += sum_re
+                    im[s] += sum_im
+        for s in range(samples):
+            out[m, s] = complex(re[s], im[s])
+    return out

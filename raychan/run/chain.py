@@ -6,29 +6,70 @@ import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from raychan.channel.profile import profile
-from raychan.channel.solve import join, refinement, solve
+from raychan.channel.solve import APART, join, refinement, solve
+from raychan.channel.surface import Surface
 from raychan.frames import direction
 from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
 from raychan.radar.windows import processing_gain, window
-from raychan.run.auto import choose
-from raychan.run.ledger import ledger
+from raychan.run.auto import Choice, choose
+from raychan.run.ledger import Entry, ledger
+from raychan.run.microdoppler import moving, needed, retraced
+from raychan.run.pieces import Retraced, Traced
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
+from raychan.run.spread import claimed
 from raychan.signal.cube import synthesize
-from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, RangeDoppler
+from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, Points, RangeDoppler, Routes
+from raychan.units import db
 from raychan.world.scene import Scene
 
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, 0 to 1."""
 
 STAGES = ("geometry", "check", "trace", "profile", "receive", "explain")
+
+
+class Clock:
+    """Seconds by stage; tells the progress of each."""
+
+    def __init__(self, progress: Progress | None = None) -> None:
+        self.tell = progress or (lambda stage, share: None)
+        self.timings: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time a stage."""
+        self.tell(name, 0.0)
+        start = time.perf_counter()
+        yield
+        self.timings[name] = time.perf_counter() - start
+        self.tell(name, 1.0)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What the tracing of a scene gives: the same whatever the noise."""
+
+    surface: Surface
+    points: Points
+    paths: Paths
+    others: Paths
+    """Of the coarse launch, which tells how wrong the fine one may be."""
+    model: Any
+    """The scene's, with what was asked for and what mode = "auto" chose."""
+    chosen: Choice | None
+    stats: dict[str, Any]
+    turned: Retraced | None = None
+    """Samples of a frame that was traced more than once."""
 
 
 def simulate(
@@ -44,36 +85,32 @@ def simulate(
     max_bounces override the scene's; progress is told how far each stage is.
     Returns: Result. Raises: ValueError on a tolerance or a number of bounces out of range.
     """
+    clock = Clock(progress)
+    return result_of(scene, trace(scene, tolerance_db, max_bounces, clock), seed, clock)
+
+
+def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clock: Clock) -> Channel:
+    """Return the channel of a scene; arguments and errors as those of `simulate`."""
     if tolerance_db is not None and not tolerance_db > 0.0:
         raise ValueError(f"tolerance_db = {tolerance_db:g}: must be positive")
     if max_bounces is not None and max_bounces < 1:
         raise ValueError(f"max_bounces = {max_bounces}: must be at least 1")
-    tell = progress or (lambda stage, share: None)
-    timings: dict[str, float] = {}
-
-    @contextmanager
-    def stage(name: str) -> Iterator[None]:
-        tell(name, 0.0)
-        start = time.perf_counter()
-        yield
-        timings[name] = time.perf_counter() - start
-        tell(name, 1.0)
-
-    # Streams are numbered by stage, so that one more random stage leaves the others as they are.
-    noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     sensor, settings = scene.sensor, scene.processing
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
     model = _changed(scene.model, changes)
     carrier = sensor.waveform.carrier
     floor = drowned(sensor, settings)
-    with stage("geometry"):
-        facets, points = scene.facets(0.0), scene.points(0.0)
+    apart = APART * 4e9 / sensor.waveform.bandwidth
+    with clock.stage("geometry"):
+        surface, points = Surface(scene.facets(0.0)), scene.points(0.0)
     # The coarse launch comes first: it tells what is needed, and later how wrong the fine one may be.
     chosen = None
-    with stage("check"):
+    with clock.stage("check"):
         rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, jitter=0.13)
         everything = model.diffraction or model.mode == "auto"
-        others, more = solve(facets, points, sensor, carrier, rule, model.max_bounces, diffraction=everything)
+        others, more = solve(
+            surface, points, sensor, carrier, rule, model.max_bounces, diffraction=everything, apart=apart
+        )
         if model.mode == "auto":
             cell = noise_of_cell(sensor, settings)
             chosen = choose(others, sensor, settings, cell, model.tolerance_db)
@@ -85,16 +122,40 @@ def simulate(
                     "diffraction": chosen.diffraction,
                 },
             )
-    with stage("trace"):
+    with clock.stage("trace"):
         rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions)
         rule = dataclasses.replace(rule, slots=others.kind.shape[1])
-        paths, stats = solve(facets, points, sensor, carrier, rule, model.max_bounces, progress, model.diffraction)
-    with stage("profile"):
+        again = needed(scene, model.retrace, rule.max_edge)
+        routes: list[Routes] = []
+        each = routes.append if again else None
+        way = (model.max_bounces, clock.tell, model.diffraction, each, apart)
+        paths, stats = solve(surface, points, sensor, carrier, rule, *way)
+    turned = None
+    if again:
+        with clock.stage("retrace"):
+            turned = retraced(scene, rule, model, Traced(paths, tuple(routes)), partial(clock.tell, "retrace"), apart)
+    cost = {
+        "rays": stats.rays + more.rays + (turned.rays if turned else 0),
+        "tubes": stats.tubes,
+        "mirror_chains": stats.legs,
+        "tracings": len(turned.times) if turned else 1,
+        "tolerance_db": model.tolerance_db,
+    }
+    return Channel(surface, points, paths, others, model, chosen, cost, turned)
+
+
+def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
+    """Return what the receiver makes of a channel, and how each detection came about."""
+    # Streams are numbered by stage, so that one more random stage leaves the others as they are.
+    noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    sensor, settings = scene.sensor, scene.processing
+    facets, paths = channel.surface.facets, channel.paths
+    with clock.stage("profile"):
         noise = sensor.noise_power if sensor.noise else 0.0
         pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
-    with stage("receive"):
-        cube, rdmap, detections = receive(paths, sensor, settings, noise_rng)
-        error = map_error(paths, others, sensor, settings)
+    with clock.stage("receive"):
+        cube, rdmap, detections = receive(paths, sensor, settings, noise_rng, channel.turned)
+        error = map_error(paths, channel.others, sensor, settings, channel.turned)
     receiver = Receiver(
         sensor.waveform,
         settings.range_window,
@@ -103,10 +164,16 @@ def simulate(
         sensor.ego_speed,
         background(facets),
     )
-    with stage("explain"):
+    with clock.stage("explain"):
         weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
-        left_out = ledger(paths, facets, points, sensor, settings, model, weakest)
+        left_out = ledger(paths, channel.surface, channel.points, sensor, settings, channel.model, weakest)
+        if channel.turned:
+            left_out["intra-frame motion"] = motion(channel.turned)
         reasons = provenance(paths, rdmap, detections, receiver, error.power)
+        if channel.turned:
+            quiet = Cube(samples=channel.turned.turning.astype(np.complex64), noise_power=0.0)
+            brought = range_doppler(quiet, sensor.waveform, *_windows(settings)).power
+            reasons = claimed(reasons, paths, moving(scene), brought, error.power, detections, receiver)
     return Result(
         paths=paths,
         profile=pdp,
@@ -117,15 +184,9 @@ def simulate(
         receiver=receiver,
         error=error,
         seed=seed,
-        timings=timings,
-        ledger=left_out if chosen is None else {**left_out, "model": chosen},
-        stats={
-            "rays": stats.rays + more.rays,
-            "tubes": stats.tubes,
-            "mirror_chains": stats.legs,
-            "tolerance_db": model.tolerance_db,
-            "reached_db": max((r.error_db for r in reasons), default=0.0),
-        },
+        timings=clock.timings,
+        ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
+        stats=channel.stats | {"reached_db": max((r.error_db for r in reasons), default=0.0)},
         warnings=tuple(scene.warnings),
         scene=scene,
         text=scene.text,
@@ -134,10 +195,11 @@ def simulate(
 
 
 def receive(
-    paths: Paths, sensor: Sensor, settings: Any, rng: np.random.Generator
+    paths: Paths, sensor: Sensor, settings: Any, rng: np.random.Generator, turned: Retraced | None = None
 ) -> tuple[Cube, RangeDoppler, Detections]:
-    """Return what the receiver makes of the paths; it sees nothing else of the scene."""
-    cube = synthesize(paths, sensor, rng)
+    """Return what the receiver makes of the paths, or of the samples of a frame with turning bodies; it sees nothing
+    else of the scene."""
+    cube = turned.cube(sensor, rng) if turned else synthesize(paths, sensor, rng)
     rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
     # The scene file names range before rate; a map's axes are rate, then range.
     sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
@@ -177,13 +239,29 @@ def noise_of_cell(sensor: Sensor, settings: Any) -> float:
     return float(sensor.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
 
 
-def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any) -> MapError:
-    """Return the map of what two launches differ by: their difference sent through the same receiver, without noise."""
+def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any, turned: Retraced | None = None) -> MapError:
+    """Return the map of what two launches differ by: their difference sent through the same receiver, without noise;
+    to it comes what neighbouring tracings of turning bodies differ by."""
     difference = join([paths, others.replace(amplitude=-others.amplitude)])
     cube = synthesize(difference, dataclasses.replace(sensor, noise=False))
-    return MapError(
-        range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad).power
-    )
+    windows = _windows(settings)
+    power = range_doppler(cube, sensor.waveform, *windows).power
+    if turned:
+        cube = Cube(samples=turned.error.astype(np.complex64), noise_power=0.0)
+        power = power + range_doppler(cube, sensor.waveform, *windows).power
+    return MapError(power)
+
+
+def motion(turned: Retraced) -> Entry:
+    """Return the ledger's entry of a frame that was traced more than once."""
+    level = float(db(max(turned.level(), 1e-30)))
+    ends = "" if turned.reached else "; more of them do not bring it under the tolerance"
+    how = f"traced {len(turned.times)} times within the frame; what they differ by, against the whole frame{ends}"
+    return Entry(level, "estimate", how)
+
+
+def _windows(settings: Any) -> tuple[str, str, tuple[int, int]]:
+    return settings.range_window, settings.rate_window, settings.pad
 
 
 def background(facets: Facets) -> tuple[str, ...]:

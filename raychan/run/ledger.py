@@ -15,7 +15,7 @@ from raychan.channel.surface import Surface
 from raychan.kernels.fresnel import coefficients_array
 from raychan.radar.sensor import Sensor
 from raychan.run.auto import interactions, peak
-from raychan.tables import MIRROR, TRANSMIT, Facets, Paths, Points
+from raychan.tables import MIRROR, TRANSMIT, Facets, Paths, Points, take
 from raychan.units import C0, db
 
 Floats = NDArray[np.float64]
@@ -36,15 +36,14 @@ class Entry:
 
 
 def ledger(
-    paths: Paths, facets: Facets, points: Points, sensor: Sensor, settings: Any, model: Any, weakest: float
+    paths: Paths, surface: Surface, points: Points, sensor: Sensor, settings: Any, model: Any, weakest: float
 ) -> dict[str, Any]:
     """Return what was left out, by mechanism, against the weakest detection's power [W].
 
     Args: settings, model the scene's processing and what was modelled.
     """
-    if not weakest > 0.0 or not len(facets.vertices):
+    if not weakest > 0.0 or not len(surface.facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
-    surface = Surface(facets)
     found = {
         "further bounces": _further(paths, sensor, settings, model.max_bounces, weakest),
         "transmission": _transmission(paths, sensor, settings, weakest),
@@ -52,7 +51,7 @@ def ledger(
         "diffraction to point targets": _around(surface, points, sensor, settings, model, weakest),
         "diffuse scattering": _diffuse(surface, sensor, weakest),
         "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
-        "intra-frame motion": _motion(paths, facets, sensor),
+        "intra-frame motion": _motion(paths, surface.facets, sensor),
     }
     return {name: found[name] for name in _NAMES}
 
@@ -203,9 +202,11 @@ def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:
     """Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at
     most."""
     frame = sensor.waveform.frame_duration
-    used = paths.body >= 0
     if not len(paths.delay):
         return Entry(NOTHING, "exact", "no path")
+    size = np.abs(paths.amplitude)
+    paths = take(paths, np.flatnonzero(size > 1e-3 * size.max()))
+    used = paths.body >= 0
     used &= facets.role[np.maximum(paths.body, 0)] != MIRROR
     body = np.maximum(paths.body, 0)
     relative = facets.velocity[body] - np.asarray(sensor.velocity)
@@ -216,7 +217,6 @@ def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:
     # Lever arm of turning bodies: at most a few metres of a vehicle.
     bend = np.where(used, across / ranges[:, None] + turning**2 * 2.5, 0.0).max(axis=1)
     phase = 2.0 * np.pi / sensor.waveform.wavelength * bend * frame**2 / 4.0
-    strong = np.abs(paths.amplitude) > 1e-3 * np.abs(paths.amplitude).max()
-    worst = float(phase[strong].max(initial=0.0))
+    worst = float(phase.max(initial=0.0))
     how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level against the return that has it"
     return Entry(float(db(max(worst, 1e-15) ** 2)), "bound", how)

@@ -69,9 +69,7 @@ def explain_cell(
     Each path counts with its amplitude times the response of both windows at its distance from the cell; paths over
     the same chain add as waves, chains as powers.
     """
-    at, turn = response.reference(paths.delay, None if rate is None else paths.rate)
-    weight = response.in_range(at - range) if rate is None else response.in_cell(at - range, paths.rate, rate)
-    wave = paths.amplitude * turn * weight
+    wave, at = waves_in(paths, response, range, rate)
     count = len(known.names)
     summed = _sums(known.part, wave, count)
     whole = complex(summed.sum())
@@ -103,8 +101,21 @@ def explain_cell(
         if (shares[g] >= _LEAST_SHARE or g == first) and sizes[g] > 0.0
     )
     strongest = int(np.argmax(np.where(known.part == first, size, -1.0)))
-    label = _label(paths, strongest, known.bodies[first], receiver)
+    label = label_of(paths, strongest, known.bodies[first], receiver)
     return Explanation(range, rate or 0.0, speed, power, predicted, error_db, label, parts)
+
+
+def waves_in(
+    paths: Paths, response: Response, range: float, rate: float | None
+) -> tuple[NDArray[np.complex128], Floats]:
+    """Return what each path (n,) brings to a cell, its amplitude times the response of both windows there, and the
+    range (n,) [m] at which it stands.
+
+    Args: range [m] and rate [m/s] of the cell; None for a cell of the power-delay profile.
+    """
+    at, turn = response.reference(paths.delay, None if rate is None else paths.rate)
+    weight = response.in_range(at - range) if rate is None else response.in_cell(at - range, paths.rate, rate)
+    return paths.amplitude * turn * weight, at
 
 
 def provenance(
@@ -201,7 +212,7 @@ def _name(paths: Paths, body: int, part: int, kind: int) -> str:
     return f"({name})" if kind == TRANSMIT else name
 
 
-def _label(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver) -> str:
+def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver) -> str:
     """Return the label of a cell whose strongest path is `row`, over `bodies`."""
     targets = set(bodies) - set(receiver.background)
     if not targets:

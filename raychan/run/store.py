@@ -242,11 +242,13 @@ def _explanation(held: dict[str, Any]) -> Explanation:
 def _scene(text: str, where: str) -> Any:
     if not text:
         return None
+    from raychan.world.edit import LATER
     from raychan.world.errors import SceneError
     from raychan.world.scene import Scene
 
     try:
         changes = [line.removeprefix(_CHANGED) for line in text.splitlines() if line.startswith(_CHANGED)]
-        return Scene.from_text(text, where or None).override(changes)
+        later = sum(float(line.removeprefix(LATER)) for line in text.splitlines() if line.startswith(LATER))
+        return Scene.from_text(text, where or None).override(changes).at(later)
     except (SceneError, OSError):
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.report.canvas import PALETTE
-from raychan.run.provenance import chains
-from raychan.run.result import Result
-from raychan.tables import LAYER, MIRROR, Facets, Points
+from raychan.run.provenance import chains, response_of, waves_in
+from raychan.run.result import Explanation, Result
+from raychan.tables import LAYER, MIRROR, Facets, Paths, Points
 from raychan.units import dbm, undb
 
 Floats = NDArray[np.float64]
@@ -27,6 +27,8 @@ _NAMED = {
 
 GLASS, GROUND = "#9fc5d8", "#b9b6ae"
 _RAYS = 30
+_LINES = 8  # chains that a caption lists
+_ASIDE = 0.25  # opacity of bodies that have no part in a cell
 _WEAKEST_DB = 45.0  # rays weaker than the strongest by more than this are not drawn
 
 
@@ -61,6 +63,8 @@ class Drawing:
     boresight: Floats
     targets: tuple[tuple[str, tuple[float, float, float]], ...]
     """Names and places to write them."""
+    caption: str = ""
+    """What is shown, where only some of the rays are."""
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Return the lowest and highest corner of all but the ground."""
@@ -88,14 +92,26 @@ class Drawing:
             rays = tuple(Ray(points=held[f"r{i}"], **r) for i, r in enumerate(about["rays"]))
         targets = tuple((name, (x, y, z)) for name, (x, y, z) in about["targets"])
         radar, boresight = np.array(about["radar"]), np.array(about["boresight"])
-        return Drawing(about["title"], shapes, rays, radar, boresight, targets)
+        return Drawing(about["title"], shapes, rays, radar, boresight, targets, about["caption"])
 
 
 def draw(
-    title: str, facets: Facets, points: Points, radar: Floats, boresight: Floats, result: Result | None
+    title: str,
+    facets: Facets,
+    points: Points,
+    radar: Floats,
+    boresight: Floats,
+    result: Result | None,
+    cell: Explanation | None = None,
 ) -> Drawing:
-    """Return the drawing of a scene at one instant; with a result, the ways that fed its detections too."""
-    rays = rays_of(result) if result is not None else ()
+    """Return the drawing of a scene at one instant; with a result, the ways that fed its detections too.
+
+    Args: cell the one cell of the map whose ways alone are drawn; bodies that they do not meet are seen through.
+    """
+    rays: tuple[Ray, ...] = ()
+    if result is not None:
+        rays = rays_of(result) if cell is None else rays_in(result, cell)
+    met = None if cell is None else {_body(link) for part in cell.contributions for link in part.chain}
     shapes: list[Shape] = []
     targets: list[tuple[str, tuple[float, float, float]]] = []
     glass = (facets.materials.kind == LAYER)[facets.material] if len(facets.material) else np.zeros(0, bool)
@@ -109,7 +125,8 @@ def draw(
         )
         if not mine.any():
             continue
-        for rows, tint, opacity in ((mine & ~glass, colour, 1.0), (mine & glass, GLASS, 0.4)):
+        thin = 1.0 if met is None or name in met else _ASIDE
+        for rows, tint, opacity in ((mine & ~glass, colour, thin), (mine & glass, GLASS, 0.4 * thin)):
             if rows.any():
                 shapes.append(Shape(name, facets.vertices[rows], tint, opacity))
         corners = facets.vertices[mine].reshape(-1, 3)
@@ -122,7 +139,9 @@ def draw(
             x, y, z = points.position[i].tolist()
             targets.append((name, (x, y, z)))
     mirrors = facets.role[facets.body] == MIRROR if len(facets.body) else np.zeros(0, bool)
-    made = Drawing(title, tuple(shapes), rays, np.asarray(radar, float), np.asarray(boresight, float), tuple(targets))
+    caption = "" if cell is None else _listed([part.text() for part in cell.contributions])
+    eye, ahead = np.asarray(radar, float), np.asarray(boresight, float)
+    made = Drawing(title, tuple(shapes), rays, eye, ahead, tuple(targets), caption)
     if mirrors.any():
         made = _with_ground(made, float(np.median(facets.vertices[mirrors][..., 2])))
     return made
@@ -149,11 +168,36 @@ def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
         if watts < least:
             continue
         rows = np.flatnonzero(known.part == g)
-        row = rows[np.argmax(size[rows])]
-        used = int((paths.kind[row] > 0).sum())
-        points = np.concatenate([paths.tx[None], paths.vertices[row, :used].astype(float), paths.rx[None]])
-        rays.append(Ray(" > ".join(known.names[g]) or "line of sight", points, float(dbm(watts)), label.get(g, "")))
+        rays.append(_ray(paths, int(rows[np.argmax(size[rows])]), known.names[g], watts, label.get(g, "")))
     return tuple(rays)
+
+
+def rays_in(result: Result, cell: Explanation) -> tuple[Ray, ...]:
+    """Return the strongest path of each chain that makes a cell of the map, there and not elsewhere, weakest first."""
+    paths, known = result.paths, chains(result.paths, result.receiver.background)
+    size = np.abs(waves_in(paths, response_of(result.receiver), cell.range, cell.rate)[0])
+    index = {chain: i for i, chain in enumerate(known.names)}
+    rays = []
+    for part in sorted(cell.contributions, key=lambda part: part.share):
+        row = int(np.argmax(np.where(known.part == index[part.chain], size, -1.0)))
+        rays.append(_ray(paths, row, part.chain, part.share * cell.predicted, cell.label))
+    return tuple(rays)
+
+
+def _ray(paths: Paths, row: int, chain: tuple[str, ...], watts: float, label: str) -> Ray:
+    used = int((paths.kind[row] > 0).sum())
+    points = np.concatenate([paths.tx[None], paths.vertices[row, :used].astype(float), paths.rx[None]])
+    return Ray(" > ".join(chain) or "line of sight", points, float(dbm(watts)), label)
+
+
+def _listed(lines: list[str]) -> str:
+    more = [f"and {len(lines) - _LINES} weaker"] if len(lines) > _LINES else []
+    return "\n".join(lines[:_LINES] + more)
+
+
+def _body(link: str) -> str:
+    """Return the body of a link of a chain: 'body', 'body.part', or either in brackets for a layer passed."""
+    return link.strip("()").split(".")[0]
 
 
 def _with_ground(made: Drawing, height: float) -> Drawing:
@@ -162,4 +206,4 @@ def _with_ground(made: Drawing, height: float) -> Drawing:
     (x0, y0), (x1, y1) = low[:2] - room, high[:2] + room
     a, b, c, d = ([x, y, height] for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
     ground = Shape("ground", np.array([[a, b, c], [a, c, d]]), GROUND)
-    return Drawing(made.title, (ground, *made.shapes), made.rays, made.radar, made.boresight, made.targets)
+    return replace(made, shapes=(ground, *made.shapes))

@@ -15,6 +15,7 @@ from raychan.view.drawing import Drawing
 _SIZE = (2000, 1125)
 _MAP = "plasma"
 _POWER = "received power [dBm]"
+_LEAST_SPAN_DB = 4.0  # of the scale, so that no two of its labels read alike
 
 
 def screenshot(drawing: Drawing, path: str | Path) -> None:
@@ -63,6 +64,8 @@ def _plotter(drawing: Drawing, off_screen: bool) -> Any:
         np.array(places), names, font_size=22, text_color="#1a1a1a", shape_color="white", shape_opacity=0.75,
         show_points=False, always_visible=True, margin=4,
     )  # fmt: skip
+    if drawing.caption:
+        plotter.add_text(f"{drawing.title}\n{drawing.caption}", position="upper_right", font_size=12, color="#1a1a1a")
     _look(plotter, drawing)
     plotter.enable_anti_aliasing("ssaa")
     return plotter
@@ -102,7 +105,7 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
     if not drawing.rays:
         return
     powers = [ray.power for ray in drawing.rays]
-    limits = [min(powers), max(max(powers), min(powers) + 1.0)]
+    limits = [min(powers), max(max(powers), min(powers) + _LEAST_SPAN_DB)]
     for ray in drawing.rays:
         tube = pv.lines_from_points(ray.points).tube(radius=radius)
         tube.field_data["what"] = [f"{ray.name}: {ray.power:.1f} dBm {ray.label}"]

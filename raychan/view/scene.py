@@ -10,18 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from raychan.run.files import write_whole
-from raychan.run.result import Result
+from raychan.run.result import Explanation, Result
 from raychan.view import plain
 from raychan.view.drawing import Drawing, draw
 
 _PATIENCE_S = 180.0
 
 
-def drawing_of(scene: Any, result: Result | None = None) -> Drawing:
-    """Return the drawing of a scene, with the rays of its result if given."""
-    sensor = scene.sensor
-    boresight = sensor.boresight
-    return draw(scene.title, scene.facets(0.0), scene.points(0.0), sensor.position, boresight, result)
+def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | None = None) -> Drawing:
+    """Return the drawing of a scene, with the rays of its result if given, or with those of one cell of its map."""
+    sensor, title = scene.sensor, scene.title
+    if cell is not None:
+        where = f"{cell.range:.2f} m, {cell.speed:+.2f} m/s, {cell.label}"
+        title = f"{title}: {where}" if title else where
+    return draw(title, scene.facets(0.0), scene.points(0.0), sensor.position, sensor.boresight, result, cell)
 
 
 def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -28,9 +28,10 @@ _SIZES = (1e-3, 200.0)
 class Body:
     """A thing in the scene: `mesh` (Mesh, trimesh or a path) or built-in `shape` with `params`, one of both.
 
-    Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; `material` for all parts or `materials` by
-    part (patterns), a name or a Material. `rcs` [dBsm], a number or (azimuth_deg, dBsm) pairs relative to its heading,
-    makes it a point target at `rcs_point` (body frame [m]) whose mesh only blocks.
+    Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; spin_dps (3,) [deg/s] about its own axes;
+    `material` for all parts or `materials` by part (patterns), a name or a Material. `rcs` [dBsm], a number or
+    (azimuth_deg, dBsm) pairs relative to its heading, makes it a point target at `rcs_point` (body frame [m]) whose
+    mesh only blocks.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Body:
     roll_deg: float = 0.0
     velocity: Sequence[float] = (0.0, 0.0, 0.0)
     turn_rate_dps: float = 0.0
+    spin_dps: Sequence[float] = (0.0, 0.0, 0.0)
     rcs: float | Sequence[tuple[float, float]] | None = None
     rcs_point: Sequence[float] | None = None
     role: str | None = None
@@ -78,14 +80,22 @@ class Body:
         """Pose at time 0 and rates."""
         x, y, z = map(float, self.position)
         u, v, w = map(float, self.velocity)
-        angles = np.radians([self.yaw_deg, self.pitch_deg, self.roll_deg, self.turn_rate_dps])
+        angles = np.radians([self.yaw_deg, self.pitch_deg, self.roll_deg, self.turn_rate_dps, *self.spin_dps])
         values = [x, y, z, u, v, w, *angles]
         if not np.isfinite(values).all():
             raise SceneError(
                 "pose or motion holds NaN or infinity", key=self.name, value=values, allowed="finite numbers"
             )
-        yaw, pitch, roll, turn = map(float, angles)
-        return Motion((x, y, z), yaw, pitch, roll, (u, v, w), turn)
+        yaw, pitch, roll, turn, *spin = map(float, angles)
+        return Motion((x, y, z), yaw, pitch, roll, (u, v, w), turn, (spin[0], spin[1], spin[2]))
+
+    def at(self, time: float) -> Body:
+        """Return the body where it is at a time [s]; the mesh is shared."""
+        then = self.motion.at(time)
+        yaw, pitch, roll = (float(np.degrees(a)) for a in (then.yaw, then.pitch, then.roll))
+        moved = replace(self, position=then.position, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)
+        moved.__dict__.update(geometry=self.geometry, motion=then)
+        return moved
 
     @property
     def kind(self) -> int:

@@ -10,6 +10,12 @@ from typing import Any
 
 from raychan.world.errors import SceneError, nearest
 
+LATER = "# later by [s]: "
+"""Begins the line with which the text of a scene says that it is taken at another time than that of its poses."""
+
+_XYZ = ("x", "y", "z")
+_VECTORS = ("position", "velocity_mps", "rcs_point")
+
 
 def parsed(text: str, file: Any = None) -> dict[str, Any]:
     """Return the tables of TOML text; SceneError with the line where it is broken."""
@@ -22,7 +28,8 @@ def parsed(text: str, file: Any = None) -> dict[str, Any]:
 
 
 def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -> dict[str, Any]:
-    """Return a copy of a scene's tables with keys set, each change written 'dotted.key=value'; bodies go by name."""
+    """Return a copy of a scene's tables with keys set, each change written 'dotted.key=value'; bodies go by name, the
+    numbers of a vector by x, y, z."""
     out = deepcopy(dict(data))
     for change in changes:
         key, found, value = change.partition("=")
@@ -32,14 +39,26 @@ def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -
         at: Any = out
         for i, word in enumerate(words[:-1]):
             at = _step(at, word, ".".join(words[: i + 1]), file)
+        if _is_vector(at):
+            if words[-1] not in _XYZ:
+                raise SceneError(f"no number '{words[-1]}'", file=file, key=key, value=at, allowed="one of x, y, z")
+            at[_XYZ.index(words[-1])] = _value(value.strip())
+            continue
+        if words[-2:-1] and words[-2] in _VECTORS:
+            where, allowed = ".".join(words[:-1]), "all three numbers, as [0, 0, 0.5]; then each by its letter"
+            raise SceneError("is not set", file=file, key=where, allowed=allowed)
         if not isinstance(at, dict):
             raise SceneError("holds no keys", file=file, key=".".join(words[:-1]), value=at, allowed="a table")
         at[words[-1]] = _value(value.strip())
     return out
 
 
+def _is_vector(at: Any) -> bool:
+    return isinstance(at, list) and len(at) == 3 and not any(isinstance(x, dict | list) for x in at)
+
+
 def _step(at: Any, word: str, key: str, file: Any) -> Any:
-    if isinstance(at, list):
+    if isinstance(at, list) and not _is_vector(at):
         names = [b.get("name") for b in at if isinstance(b, dict)]
         if word not in names:
             raise SceneError(

@@ -1,13 +1,14 @@
-"""Where a body is and how it moves: constant velocity, constant turn about the vertical through its own origin."""
+"""Where a body is and how it moves: constant velocity, constant turn about the vertical through its own origin, and
+constant spin about an axis of its own, as of a wheel or a rotor."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import rotation
+from raychan.frames import rotation, yaw_pitch_roll
 
 Array = NDArray[np.float64]
 
@@ -17,7 +18,7 @@ class Motion:
     """Pose at time 0 and rates; the body's origin moves on a straight line.
 
     Args: position (3,) [m], yaw, pitch, roll [rad], velocity (3,) [m/s] world axes, turn_rate [rad/s] about world z
-    (positive turns left).
+    (positive turns left), own_spin (3,) [rad/s] about the body's own axes.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -26,6 +27,7 @@ class Motion:
     roll: float = 0.0
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn_rate: float = 0.0
+    own_spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def origin(self, time: float = 0.0) -> Array:
         """Return the body's origin (3,) [m] at a time [s]."""
@@ -37,12 +39,21 @@ class Motion:
 
     def rotation(self, time: float = 0.0) -> Array:
         """Return the matrix (3, 3) from body to world axes at a time [s]."""
-        return rotation(self.heading(time), self.pitch, self.roll)
+        turned = rotation(self.heading(time), self.pitch, self.roll)
+        return turned @ _about(time * np.asarray(self.own_spin)) if any(self.own_spin) else turned
 
-    @property
-    def spin(self) -> Array:
-        """Turn-rate vector (3,) [rad/s] about the origin."""
-        return np.array([0.0, 0.0, self.turn_rate])
+    def spin(self, time: float = 0.0) -> Array:
+        """Return the turn-rate vector (3,) [rad/s] about the origin, world axes, at a time [s]."""
+        turn = np.array([0.0, 0.0, self.turn_rate])
+        return turn + self.rotation(time) @ np.asarray(self.own_spin) if any(self.own_spin) else turn
+
+    def at(self, time: float) -> Motion:
+        """Return the same motion counted from a time [s]."""
+        x, y, z = map(float, self.origin(time))
+        if not any(self.own_spin):
+            return replace(self, position=(x, y, z), yaw=self.heading(time))
+        yaw, pitch, roll = yaw_pitch_roll(self.rotation(time))
+        return replace(self, position=(x, y, z), yaw=yaw, pitch=pitch, roll=roll)
 
     def to_world(self, point: Array, time: float = 0.0) -> Array:
         """Return world coordinates (..., 3) of body points (..., 3)."""
@@ -54,4 +65,15 @@ class Motion:
 
     def velocity_at(self, point: Array, time: float = 0.0) -> Array:
         """Return the velocity (..., 3) [m/s] of the body's matter at world points (..., 3)."""
-        return np.asarray(self.velocity, float) + np.cross(self.spin, np.asarray(point, float) - self.origin(time))
+        arm = np.asarray(point, float) - self.origin(time)
+        return np.asarray(self.velocity, float) + np.cross(self.spin(time), arm)
+
+
+def _about(turn: Array) -> Array:
+    """Return the matrix (3, 3) of a turn [rad] about the direction of a vector. Source: Rodrigues' formula."""
+    angle = float(np.linalg.norm(turn))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = turn / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross

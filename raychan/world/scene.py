@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -137,6 +138,28 @@ class Scene:
             raise SceneError("the scene has no radar", file=self.path, key="radar", allowed="a [radar] table")
         return sensor_of(self.radar, self.folder, self.path)
 
+    def at(self, time: float) -> Scene:
+        """Return the scene as it stands at a time [s]: bodies and radar moved on, meshes and materials shared.
+
+        Raises: SceneError where the radar would be inside a body by then.
+        """
+        if time == 0.0:
+            return self
+        moved = copy(self)
+        moved.bodies = tuple(b.at(time) for b in self.bodies)
+        if self.radar is not None:
+            there = np.asarray(self.radar.position) + time * np.asarray(self.radar.velocity_mps)
+            moved.radar = self.radar.model_copy(update={"position": there.tolist()})
+            moved.__dict__["sensor"] = self.sensor_at(time)
+        moved.__dict__.pop("warnings", None)
+        moved.text, moved._data = f"{self.text}\n{edit.LATER}{time!r}" if self.text else "", None
+        try:
+            check.radar_outside(moved)
+        except SceneError as e:
+            late = f"{e.problem} {time:g} s on"
+            raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
+        return moved
+
     def sensor_at(self, time: float) -> Any:
         """Return the radar.Sensor where its velocity has brought it at a time [s]."""
         s = self.sensor
@@ -193,7 +216,7 @@ class Scene:
             role=np.array([b.kind for b in self.bodies], np.int8),
             origin=np.array([b.motion.origin(time) for b in self.bodies]).reshape(-1, 3),
             velocity=np.array([b.motion.velocity for b in self.bodies], float).reshape(-1, 3),
-            spin=np.array([b.motion.spin for b in self.bodies]).reshape(-1, 3),
+            spin=np.array([b.motion.spin(time) for b in self.bodies]).reshape(-1, 3),
             materials=resolve(materials, self.frequency),
             body_names=tuple(b.name for b in self.bodies),
             part_names=tuple(parts),
@@ -235,6 +258,7 @@ def _body(t: BodyTable, folder: Path) -> Body:
         roll_deg=t.roll_deg,
         velocity=t.velocity_mps,
         turn_rate_dps=t.turn_rate_dps,
+        spin_dps=t.spin_dps,
         rcs=t.rcs_dbsm,
         rcs_point=t.rcs_point,
         role=t.role,

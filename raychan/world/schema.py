@@ -127,6 +127,9 @@ class Model(Table):
     max_bounces: Annotated[int, Field(strict=True, ge=1, le=12)] = 3
     tolerance_db: Positive = 0.5
     max_transmissions: Annotated[int, Field(strict=True, ge=0, le=16)] = 4
+    retrace: Literal["auto"] | Count = "auto"
+    """How often a frame is traced; auto: if bodies turn, as often as tolerance_db needs; 1: once, and paths keep the
+    rates of the frame's start; more: so often, and all that moves is carried on in between."""
     diffraction: bool = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
 
@@ -165,6 +168,8 @@ class BodyTable(Table):
     roll_deg: Number = 0.0
     velocity_mps: Vector = [0.0, 0.0, 0.0]
     turn_rate_dps: Number = 0.0
+    spin_dps: Vector = [0.0, 0.0, 0.0]
+    """About the body's own axes, as of a wheel: about its origin."""
     rcs_dbsm: Number | Annotated[list[Pair], Field(min_length=2)] | None = None
     """Makes the body a point target: a figure, or [azimuth_deg, dBsm] pairs seen from its heading."""
     rcs_point: Vector | None = None

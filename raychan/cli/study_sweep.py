@@ -1,0 +1,114 @@
+"""raychan study sweep: one body over varied scenes or over time: hidden or not, detected or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from raychan.cli import show
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from raychan.study.sweep import Step, Sweep
+    from raychan.study.visibility import Level
+
+
+def sweep(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)],
+    target: Annotated[str, typer.Option(help="The body to ask about.", metavar="BODY", show_default=False)],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Directory for table and figure; made if missing.", metavar="DIR")
+    ],
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Key of the scene file and its values, such as bodies.van.position.y=-4:0:9; twice for a grid.",
+            metavar="KEY=START:STOP:STEPS",
+        ),
+    ] = None,
+    times: Annotated[
+        str | None,
+        typer.Option(
+            help="Times in seconds to which all bodies and the radar move on, by their velocities.",
+            metavar="START:STOP:STEPS",
+        ),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Override a key of the scene file for all steps.", metavar="KEY=VALUE"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the noise, the same for all steps.", min=0)] = 0,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(help="Error in dB to refine the tubes to; the scene's own if not given.", metavar="DB", min=1e-3),
+    ] = None,
+    max_bounces: Annotated[
+        int | None, typer.Option(help="Interactions along a path; the scene's own if not given.", metavar="N", min=1)
+    ] = None,
+) -> None:
+    """Follow one body through varied scenes: how much of it is hidden, by whom, and whether it is detected.
+
+    Without --vary and --times the scene is taken as it is. The levels of the direct, the multipath and the diffracted
+    return of the body stand against the weakest that the radar reports. Writes sweep.csv and sweep.png.
+    """
+    from raychan.report.sweep_figures import sweep_picture
+    from raychan.run.files import staging
+    from raychan.study import sweep as study
+    from raychan.world.errors import SceneError
+    from raychan.world.scene import Scene
+
+    loaded = Scene.load(scene).override(set_ or [])
+    with staging(out) as stage, show.progress() as tell:
+        try:
+            axes = [study.Axis.of(text) for text in vary or ()]
+            axes += [study.Axis.time(times)] if times else []
+            done = study.sweep(loaded, target, axes, seed, tolerance, max_bounces, tell)
+        except SceneError:
+            raise
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+        study.write_csv(done, stage / "sweep.csv")
+        sweep_picture(done, stage / "sweep.png")
+    screen = show.console()
+    screen.print(_table(done))
+    found = sum(s.seen is not None for s in done.steps)
+    screen.print(f"{target} is detected in {found} of {len(done.steps)} steps")
+    screen.print(f"table and figure: {out / 'sweep.csv'}, {out / 'sweep.png'}", soft_wrap=True)
+
+
+def _table(done: Sweep) -> Table:
+    from raychan.study.visibility import WAYS
+
+    heads = [_head(a.key, a.unit) for a in done.axes]
+    heads += ["detected", "range\nm", "speed\nm/s", "SNR\ndB", "error\ndB", "blocked\n%", "by"]
+    heads += [f"{way}\ndB" for way in WAYS]
+    n = len(done.axes)
+    rows = [[*(f"{v:g}" for v in s.values), *_cells(s)] for s in done.steps]
+    title = f"{done.target}; levels are over the weakest that is reported"
+    return show.table(title, heads, rows, left=(n, n + 6))
+
+
+def _head(key: str, unit: str) -> str:
+    """Return a key over two lines, for it is longer than its values."""
+    words = key.removeprefix("bodies.").split(".")
+    return (
+        f"{'.'.join(words[:-2])}\n{'.'.join(words[-2:])} {unit}".strip() if len(words) > 2 else f"{key} {unit}".strip()
+    )
+
+
+def _cells(step: Step) -> list[str]:
+    seen, hidden = step.seen, step.found.occlusion
+    told = ["no", "", "", "", ""]
+    if seen is not None:
+        told = [seen.label, f"{seen.range:.2f}", f"{seen.speed:+.2f}", f"{seen.snr_db:.1f}", f"{seen.error_db:.2f}"]
+    share = "" if hidden.blocked is None else f"{100.0 * hidden.blocked:.1f}"
+    return [*told, share, ", ".join(name for name, _ in hidden.by), *map(_margin, step.found.levels.values())]
+
+
+def _margin(level: Level | None) -> str:
+    if level is None or level.margin_db is None:
+        return "unknown"
+    return f"{level.margin_db:+.1f}" if level.power > 0.0 else "none"

@@ -1,0 +1,87 @@
+"""raychan validate: the study's tables and claims, theirs beside ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from raychan.cli import show
+
+if TYPE_CHECKING:
+    from raychan.study.validation.validate import Validation
+
+
+def validate(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Directory for report and figures; made if missing.", metavar="DIR")
+    ] = Path("out/validation"),
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only",
+            help="Only this table or claim, as T10 or C023; may be repeated.",
+            metavar="ID",
+            show_default=False,
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="Error of the launches to aim at, in dB.", metavar="DB")
+    ] = 1.0,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data",
+            help="Folder of tables, claims and known differences; scenes/ beside it. By default the checkout's.",
+            metavar="DIR",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Hold every table and claim of the study against ours, and say what differs and why.
+
+    Writes report.md, report.html and figures. Exit code 1 if something differs that known_differences.toml does not
+    name, or if a difference that it names has healed.
+    """
+    from raychan.report.validation_page import page
+    from raychan.report.validation_report import markdown
+    from raychan.run.files import staging
+    from raychan.study.validation.sections import ablations, budgets, ghosts, turns
+    from raychan.study.validation.validate import validate as run
+
+    with staging(out) as stage, show.progress() as tell:
+        done = run(data, only or (), tolerance, tell)
+        sections, figures = None, {}
+        if done.whole:
+            from raychan.report.validation_figures import pictures
+
+            people, by_azimuth = budgets(done.bench, "street"), turns(done.bench)
+            sections = (ablations(done.bench), ghosts(done.bench), people, by_azimuth)
+            figures = {name: path.name for name, path in pictures(done, people, by_azimuth, stage).items()}
+        text = markdown(done, sections, figures)
+        (stage / "report.md").write_text(text, encoding="utf-8")
+        (stage / "report.html").write_text(page(text, stage, "raychan: validation"), encoding="utf-8")
+    _say(done, out)
+    if done.problems:
+        show.warn(done.problems)
+        raise typer.Exit(1)
+
+
+def _say(done: Validation, out: Path) -> None:
+    from raychan.study.validation.judge import AGREES, DIFFERS, UNTESTABLE, of_item, verdict
+
+    rows = []
+    for item in done.items:
+        checks = of_item(item, done.checks)
+        counts = [str(sum(c.verdict == v for c in checks)) for v in (AGREES, DIFFERS, UNTESTABLE)]
+        rows.append((item.id, item.title, *counts, verdict(checks)))
+    screen = show.console()
+    heads = ("", "table or claim", "agree", "differ", "not testable", "verdict")
+    screen.print(show.table("Validation", heads, rows, left=(0, 1, 5)))
+    counts = [sum(c.verdict == v for c in done.checks) for v in (AGREES, DIFFERS, UNTESTABLE)]
+    screen.print(
+        f"{len(done.checks)} figures: {counts[0]} agree, {counts[1]} differ, {counts[2]} cannot be tested as printed; "
+        f"{done.seconds:.0f} s; all of it: {out / 'report.md'}",
+        soft_wrap=True,
+    )

@@ -1,0 +1,217 @@
+"""Figures of the validation report: ranges and speeds, levels, the ghost, pedestrians' link budget, gain by azimuth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.report.canvas import PALETTE, Placer, figure, save, style
+from raychan.study.validation.data import POINT
+from raychan.study.validation.formulas import both_ways
+from raychan.study.validation.judge import DIFFERS, UNTESTABLE, Check
+from raychan.study.validation.sections import Budget, Turn
+from raychan.study.validation.validate import Validation
+from raychan.units import db
+
+_FACES = {"agrees": PALETTE[0], DIFFERS: PALETTE[7], UNTESTABLE: "#aaaaaa"}
+_GHOST_RUNS = ("occluded", "no_car", "no_truck", "two_interactions")
+
+
+def pictures(done: Validation, budgets: list[Budget], turns: list[Turn], folder: Path) -> dict[str, Path]:
+    """Draw the report's figures into a folder; return them by name."""
+    return {
+        "offs": _offs(done, folder / "report-offs.png"),
+        "levels": _levels(done, folder / "report-levels.png"),
+        "ghost": _ghost(done, folder / "report-ghost.png"),
+        "pedestrians": _pedestrians(done, budgets, folder / "report-pedestrians.png"),
+        "array": _array(turns, folder / "report-array.png"),
+    }
+
+
+def _offs(done: Validation, path: Path) -> Path:
+    """Draw ours less theirs of all detected ranges and speeds, in tolerances."""
+    with style():
+        made = figure(7.6, 3.4)
+        for axes, (measure, title) in zip(
+            made.subplots(1, 2, sharey=True), (("range", "Ranges"), ("speed", "Speeds")), strict=True
+        ):
+            tables: list[str] = []
+            for item in done.items:
+                rows = [c for c in done.checks if c.key.startswith(f"{item.id}/") and _is(c, measure)]
+                if rows and item.id.startswith("T"):
+                    _strip(axes, len(tables), rows)
+                    tables.append(item.id.replace("T", "table "))
+            axes.axvspan(-1.0, 1.0, color="#4477aa", alpha=0.1, lw=0)
+            axes.axvline(0.0, color="#666666", lw=0.7)
+            axes.set_yticks(np.arange(len(tables)), tables)
+            axes.set(xlabel="ours less theirs, in tolerances", title=title, xlim=(-2.2, 2.2))
+            axes.grid(axis="x", alpha=0.25, lw=0.5)
+        axes.invert_yaxis()
+        return save(made, path)
+
+
+def _strip(axes: Any, row: int, checks: list[Check]) -> None:
+    spread = np.linspace(-0.28, 0.28, len(checks)) if len(checks) > 1 else np.zeros(1)
+    for y, c in zip(spread, checks, strict=True):
+        colour = _FACES[c.verdict]
+        if c.difference is None:
+            axes.plot(2.1, row + y, "x", color=colour, ms=4, mew=1.2)
+        else:
+            axes.plot(np.clip(c.difference / (c.figure.within or 1.0), -2.1, 2.1), row + y, "o", color=colour, ms=3.5)
+
+
+def _is(check: Check, measure: str) -> bool:
+    names = (measure, "rate") if measure == "speed" else (measure,)
+    return check.figure.measure[0] in names and check.figure.within is not None
+
+
+def _levels(done: Validation, path: Path) -> Path:
+    """Draw our SNR over the printed one: pedestrians of given RCS, and bodies whose shape the study does not print."""
+    kinds = {
+        "pedestrians and ghost: RCS printed": (True, "o", PALETTE[0]),
+        "bodies: shape not printed": (False, "s", PALETTE[2]),
+    }
+    with style():
+        made = figure(4.6, 4.2)
+        axes = made.add_subplot()
+        low, high = 0.0, 60.0
+        axes.plot([low, high], [low, high], color="#666666", lw=0.8)
+        for name, (given, mark, colour) in kinds.items():
+            pairs = [(c.figure.theirs, *_ours(done, c)) for c in done.checks if _level_of(done, c) == given]
+            for seen in (True, False):
+                xy = np.array([(t, o) for t, o, s in pairs if s is seen and o is not None]).reshape(-1, 2)
+                label = name if seen else None
+                axes.plot(*xy.T, mark, color=colour, ms=4.5, mfc=colour if seen else "none", ls="none", label=label)
+        axes.axhline(20.0, color="#aa3333", lw=0.8, ls="--")
+        axes.annotate("least SNR of a detection", (1.0, 20.0), color="#aa3333", fontsize=7.5, va="bottom")
+        axes.set(
+            xlabel="SNR printed, patch [dB]", ylabel="SNR ours [dB]   (hollow: not detected, without noise)",
+            xlim=(low, high), ylim=(low, high), title="Levels, tables 10, 13 and 14",
+        )  # fmt: skip
+        axes.legend(loc="upper left")
+        axes.grid(alpha=0.25, lw=0.5)
+        return save(made, path)
+
+
+def _level_of(done: Validation, check: Check) -> bool | None:
+    """Say whether a check is a patch SNR of a target of given RCS (True), of a body (False), or something else."""
+    item, _, rest = check.key.partition("/")
+    target = rest.split("/")[0]
+    if item not in ("T10", "T13", "T14") or check.figure.measure[0] != "snr" or check.key.endswith("snr_1"):
+        return None
+    return done.study.targets[target].reference == POINT
+
+
+def _ours(done: Validation, check: Check) -> tuple[float | None, bool]:
+    if check.ours is not None:
+        return float(check.ours), True
+    _, run, target = check.figure.measure
+    return done.bench.level(run, target), False
+
+
+def _ghost(done: Validation, path: Path) -> Path:
+    """Draw the strongest cell at each range of the map, as the scene stands and without what makes the ghost."""
+    marks = [(done.bench.expected_range(t), name) for t, name in _MARKS.items()]
+    near, far = min(at for at, _ in marks) - 2.5, max(at for at, _ in marks) + 3.5
+    with style():
+        made = figure(7.6, 5.2)
+        panels = made.subplots(len(_GHOST_RUNS), 1, sharex=True, sharey=True)
+        for axes, run in zip(panels, _GHOST_RUNS, strict=True):
+            result = done.bench.run(run)
+            m = result.rdmap
+            keep = (m.range > near) & (m.range < far)
+            axes.plot(m.range[keep], db(m.power[:, keep].max(axis=0) / m.noise), lw=0.9, color="#225588")
+            axes.axhline(20.0, color="#aa3333", lw=0.7, ls="--")
+            for at, _ in marks:
+                axes.axvline(at, color="#999999", lw=0.7, ls=":")
+            d = result.detections
+            for i, why in enumerate(result.provenance):
+                if why.contributions and any(link.startswith("pedestrian") for link in why.contributions[0].chain):
+                    axes.plot(d.range[i], d.snr[i], "v", color=PALETTE[7], ms=6)
+            title = "as printed" if run == _GHOST_RUNS[0] else done.study.runs[run].title
+            axes.annotate(title, (0.995, 0.93), xycoords="axes fraction", ha="right", va="top", fontsize=9)
+            axes.set(ylim=(0.0, 45.0), xlim=(near, far))
+            axes.grid(alpha=0.2, lw=0.5)
+        for at, name in marks:
+            panels[0].annotate(
+                name, (at, 1.02), xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=8
+            )
+        panels[-1].set(xlabel="range [m]   (red: detections over the pedestrian)")
+        made.supylabel("SNR of the strongest cell [dB]", fontsize=9)
+        return save(made, path)
+
+
+_MARKS = {"pedestrian": "pedestrian", "one_sided": "one way over the truck", "ghost": "both ways over the truck"}
+
+
+def _pedestrians(done: Validation, budgets: list[Budget], path: Path) -> Path:
+    """Draw SNR over range: link budget, all paths, printed at both bandwidths."""
+    r = np.array([b.link["range"] for b in budgets])
+    with style():
+        made = figure(7.0, 3.8)
+        axes = made.add_subplot()
+        first = budgets[0].link
+        fine = np.linspace(r.min() - 1.0, r.max() + 1.0, 100)
+        axes.plot(
+            fine, first["snr_db"] - 40.0 * np.log10(fine / first["range"]), color="#999999", lw=1.0,
+            label="R$^{-4}$ from the nearest one's link budget",
+        )  # fmt: skip
+        axes.plot(r, [b.link["snr_db"] for b in budgets], "_", color="black", ms=10, mew=1.5, label="link budget")
+        for seen, face in ((True, PALETTE[0]), (False, "none")):
+            rows = [b for b in budgets if b.whole is not None and b.detected is seen]
+            label = "ours" if seen else "ours, not detected (without noise)"
+            axes.plot(
+                [b.link["range"] for b in rows], [b.whole for b in rows], "o", mec=PALETTE[0], mfc=face, ms=5,
+                ls="none", label=label,
+            )  # fmt: skip
+        for column, mark, name in (("snr_1", "^", "1 GHz"), ("snr_4", "v", "4 GHz")):
+            rows = [b for b in budgets if column in b.printed]
+            axes.plot(
+                [b.link["range"] for b in rows], [b.printed[column] for b in rows], mark, color=PALETTE[2], ms=5,
+                mfc="none", ls="none", label=f"printed, {name}",
+            )  # fmt: skip
+        axes.axhline(20.0, color="#aa3333", lw=0.8, ls="--")
+        axes.set(xlabel="range [m]", ylabel="SNR [dB]", title="Pedestrians of the living street, patch, 4 GHz")
+        axes.set_ylim(0.0, 42.0)
+        axes.legend(loc="lower left", ncols=2)
+        axes.grid(alpha=0.25, lw=0.5)
+        return save(made, path)
+
+
+def _array(turns: list[Turn], path: Path) -> Path:
+    """Draw the gain of array over patch against azimuth: the patterns, our simulation, the printed changes."""
+    angle = np.arange(0.0, 72.0, 0.02)
+    with style():
+        made = figure(7.6, 4.4)
+        axes = made.add_subplot()
+        axes.plot(angle, both_ways(angle), color="#999999", lw=0.8, label="patterns of table 7, both ways")
+        at = np.array([abs(t.azimuth) for t in turns])
+        for t, x in zip(turns, at, strict=True):
+            if t.ours is not None:
+                axes.plot([x, x], [t.printed, t.ours], color="#cccccc", lw=0.8, zorder=1)
+        for seen, face in ((True, PALETTE[0]), (False, "none")):
+            rows = [t for t in turns if t.detected is seen and t.ours is not None]
+            label = "ours" if seen else "ours, not detected with both (levels without noise)"
+            axes.plot(
+                [abs(t.azimuth) for t in rows], [t.ours for t in rows], "o", mec=PALETTE[0], mfc=face, ms=5, ls="none",
+                label=label,
+            )  # fmt: skip
+        axes.plot(at, [t.printed for t in turns], "D", color=PALETTE[2], ms=4.5, ls="none", label="printed, table 16")
+        axes.set_xscale("function", functions=(lambda x: np.sqrt(np.maximum(x, 0.0)), np.square))
+        axes.set_xticks([0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 40, 50, 60, 70])
+        axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+        axes.minorticks_off()
+        axes.set(xlabel="azimuth off boresight, inferred [deg]", ylabel="array less patch [dB]", ylim=(-45.0, 48.0))
+        axes.set_xlim(0.0, 72.0)
+        axes.set_title("What the array gains over the patch")
+        axes.legend(loc="lower left", frameon=True, edgecolor="none", framealpha=0.9)
+        axes.grid(alpha=0.25, lw=0.5)
+        placer = Placer(axes)
+        placer.settle()
+        placer.avoid(at, np.array([t.printed for t in turns]), 6.0)
+        placer.avoid(at, np.array([t.printed if t.ours is None else t.ours for t in turns]), 6.0)
+        for t, x in zip(turns, at, strict=True):
+            placer.label(x, t.printed, t.title.replace("pedestrian", "ped."), fontsize=6.5, color="#555555")
+        return save(made, path)

@@ -1,0 +1,161 @@
+"""Sequences: poses advance by their velocities and turn rates, frame by frame; one result each, none kept."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from raychan.channel.surface import Surface
+from raychan.run.chain import Channel, Clock, Progress, result_of, trace
+from raychan.run.files import StoreError, staging
+from raychan.run.result import Result
+from raychan.run.store import COLUMNS, rows, save_result
+from raychan.tables import Paths
+from raychan.world.scene import Scene
+
+HEAD = ("frame", "time_s", *COLUMNS)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of a sequence: `number` from 0, `time` [s] at which it begins."""
+
+    number: int
+    time: float
+    result: Result
+
+    @property
+    def name(self) -> str:
+        """Name of the frame's directory."""
+        return f"frame_{self.number:04d}"
+
+
+def frames(
+    scene: Scene,
+    count: int,
+    interval: float | None = None,
+    seed: int = 0,
+    tolerance_db: float | None = None,
+    max_bounces: int | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Frame]:
+    """Give the frames of a scene one after the other; frame k is `simulate(scene.at(k * interval), seed + k)`.
+
+    Args: count of frames; interval [s] from frame to frame (default the waveform's frame, without a pause); the rest
+    as for `simulate`. A scene in which nothing moves relative to the radar is traced once.
+    Raises: ValueError on a count, an interval or an override out of range; SceneError where the radar runs into a body.
+    """
+    if count < 1:
+        raise ValueError(f"count = {count}: must be at least 1")
+    step = scene.sensor.waveform.frame_duration if interval is None else interval
+    if not (math.isfinite(step) and step > 0.0):
+        raise ValueError(f"interval = {step:g} s: must be positive and finite")
+    for k in range(count):
+        scene.at(k * step)  # a radar that would run into a body is told before the first frame is computed
+    return _frames(scene, count, step, seed, tolerance_db, max_bounces, progress)
+
+
+def _frames(
+    scene: Scene,
+    count: int,
+    step: float,
+    seed: int,
+    tolerance_db: float | None,
+    max_bounces: int | None,
+    progress: Progress | None,
+) -> Iterator[Frame]:
+    once = carried(scene)
+    first: Channel | None = None
+    for k in range(count):
+        time, clock = k * step, Clock(progress)
+        now = scene.at(time)
+        if first is not None and once:
+            channel = _carried_on(first, now, time)
+        else:
+            channel = trace(now, tolerance_db, max_bounces, clock)
+            first = channel if once else None
+        yield Frame(k, time, result_of(now, channel, seed + k, clock))
+
+
+def carried(scene: Scene) -> bool:
+    """Tell whether all bodies move with the radar, so that its channel stays as it is."""
+    own = np.asarray(scene.sensor.velocity, float)
+    return all(np.array_equal(b.motion.velocity, own) and not b.motion.spin().any() for b in scene.bodies)
+
+
+def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
+    """Return the channel of a scene that has moved as one."""
+    shift = time * np.asarray(scene.sensor.velocity, float)
+
+    def moved(paths: Paths) -> Paths:
+        there: Paths = paths.replace(
+            vertices=(paths.vertices + shift).astype(np.float32), tx=paths.tx + shift, rx=paths.rx + shift
+        )
+        return there
+
+    facets, points = scene.facets(), scene.points()
+    stats = channel.stats | {"rays": 0, "tubes": 0}
+    return replace(
+        channel,
+        surface=Surface(facets),
+        points=points,
+        paths=moved(channel.paths),
+        others=moved(channel.others),
+        stats=stats,
+    )
+
+
+class Store:
+    """A directory of frames: frame_0000, frame_0001, ..., each as `raychan run` writes it, and detections.csv of all.
+
+    A frame is there whole or not at all, and detections.csv tells of those that are there. Frames that an earlier
+    sequence left go away. Raises: StoreError where the disk refuses.
+    """
+
+    def __init__(self, directory: str | Path) -> None:
+        self.directory = Path(directory).resolve()
+        self.count = 0
+
+    def add(self, frame: Frame, draw: Callable[[Result, Path], None] | None = None) -> None:
+        """Write a frame; `draw(result, directory)` adds pictures to it."""
+        place = self.directory / frame.name
+        if self.count == 0:
+            self._clear()
+        with staging(place) as stage:
+            save_result(frame.result, stage)
+            if draw is not None:
+                draw(frame.result, stage)
+        self._append(frame)
+        self.count += 1
+
+    def _clear(self) -> None:
+        """Remove what an earlier sequence left."""
+        try:
+            if self.directory.is_dir():
+                for old in self.directory.iterdir():
+                    if re.fullmatch(r"frame_\d{4,}", old.name) and (old / "result.nc").is_file():
+                        shutil.rmtree(old)
+                (self.directory / "detections.csv").unlink(missing_ok=True)
+        except OSError as error:
+            raise StoreError(f"{self.directory}: cannot be cleared: {error.strerror or error}") from error
+
+    def _append(self, frame: Frame) -> None:
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        if self.count == 0:
+            writer.writerow(HEAD)
+        writer.writerows((frame.number, f"{frame.time:.6f}", *row) for row in rows(frame.result))
+        path = self.directory / "detections.csv"
+        try:
+            with open(path, "ab") as file:
+                file.write(text.getvalue().encode())
+        except OSError as error:
+            raise StoreError(f"{path}: cannot write: {error.strerror or error}") from error

@@ -1,0 +1,174 @@
+"""Measures of closed forms and of the receiver alone: resolutions, ambiguities, thresholds, losses over free space."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.frames import angles, direction
+from raychan.process.cfar import factor
+from raychan.process.spectrum import range_doppler
+from raychan.radar.antenna import Antenna, preset
+from raychan.radar.pattern import gain_dbi
+from raychan.run.chain import noise_of_cell
+from raychan.signal.cube import synthesize
+from raychan.study.validation.bench import Bench
+from raychan.study.validation.measures import Seen, measure
+from raychan.tables import Paths, RangeDoppler
+from raychan.units import C0, db, dbm
+
+Floats = NDArray[np.float64]
+
+_FINE = 16  # map cells per resolution cell where a gap is measured
+_FAR = 30  # resolution cells to the lone point: clear of the map's edge
+_ALONE = 10.0 ** (0.5 / 20.0) - 1.0  # one point's response that moves the other by 0.5 dB at most, whatever the phase
+
+
+def _echo(bench: Bench, run: str, at: float, rate: float, window: str, pad: tuple[int, int], iq: bool = True) -> Any:
+    """Return the map of a lone point at a range [m] and range rate [m/s], without noise."""
+    given = bench.scene(run).sensor
+    wave = dataclasses.replace(given.waveform, complex_sampling=iq)
+    look, none = np.array([[1.0, 0.0, 0.0]]), np.full((1, 1), -1)
+    here = np.asarray(given.position)
+    path = Paths(
+        delay=np.array([2.0 * at / C0]),
+        amplitude=np.ones(1, complex),
+        rate=np.array([rate]),
+        departure=look,
+        arrival=look,
+        body=none,
+        part=none,
+        kind=0 * none,
+        vertices=np.broadcast_to(here.astype(np.float32), (1, 1, 3)),
+        body_names=(),
+        part_names=(),
+        tx=here,
+        rx=here,
+    )
+    cube = synthesize(path, dataclasses.replace(given, waveform=wave, noise=False))
+    return range_doppler(cube, wave, window, window, pad)
+
+
+def _top(made: RangeDoppler) -> tuple[int, int]:
+    row, column = np.unravel_index(np.argmax(made.power), made.power.shape)
+    return int(row), int(column)
+
+
+@measure
+def gap(bench: Bench, run: str, window: str) -> Seen:
+    """Return the least gap [m] at which two equal points both read their own power to 0.5 dB, whatever their phases."""
+    cell = bench.scene(run).sensor.waveform.range_resolution
+    made = _echo(bench, run, _FAR * cell, 0.0, window, (_FINE, 1))
+    row, column = _top(made)
+    return float(np.argmax(np.abs(made.spectrum[0, row, column:]) < _ALONE * np.sqrt(made.power.max())) * cell / _FINE)
+
+
+@measure
+def rate_gap(bench: Bench, run: str, window: str) -> Seen:
+    """Return the same gap [m/s] of two movers at one range."""
+    wave = bench.scene(run).sensor.waveform
+    made = _echo(bench, run, _FAR * wave.range_resolution, 0.0, window, (1, _FINE))
+    row, column = _top(made)
+    below = np.abs(made.spectrum[0, row:, column]) < _ALONE * np.sqrt(made.power.max())
+    return float(np.argmax(below) * wave.rate_resolution / _FINE)
+
+
+@measure
+def unambiguous_range(bench: Bench, run: str, iq: bool) -> Seen:
+    """Return the range [m] at which the beat folds, with I/Q or real samples."""
+    return float(dataclasses.replace(bench.scene(run).sensor.waveform, complex_sampling=iq).unambiguous_range)
+
+
+@measure
+def read_range(bench: Bench, run: str, at: float, iq: bool) -> Seen:
+    """Return the range [m] that a point at `at` [m] reads, with I/Q or real samples."""
+    made = _echo(bench, run, at, 0.0, "hann", (2, 1), iq)
+    return float(made.range[_top(made)[1]])
+
+
+@measure
+def read_rate(bench: Bench, run: str, rate: float) -> Seen:
+    """Return the range rate [m/s] that a point of range rate `rate` [m/s] reads."""
+    made = _echo(bench, run, 50.0, rate, "hann", (1, 2))
+    return float(made.rate[_top(made)[0]])
+
+
+@measure
+def threshold(bench: Bench, run: str, cells: float) -> Seen:
+    """Return the threshold [dB] over the mean of so many training cells for the run's false alarm probability."""
+    return float(db(factor(bench.scene(run).processing.pfa, cells)))
+
+
+@measure
+def point_loss(bench: Bench, run: str, at: float, rcs_dbsm: float) -> Seen:
+    """Return the loss [dB] to a target of given RCS [dBsm] at a range [m] and back, between isotropic antennas."""
+    wavelength = bench.scene(run).sensor.waveform.wavelength
+    return float(db((4.0 * np.pi) ** 3 * at**4 / wavelength**2) - rcs_dbsm)
+
+
+@measure
+def reach(bench: Bench, run: str, sensitivity_dbm: float, rcs_dbsm: float) -> Seen:
+    """Return the range [m] at which that loss is the greatest that the link budget allows, without receive gain."""
+    most = bench.scene(run).sensor.link_budget(sensitivity_dbm)["max_path_loss_db"]
+    return float(10.0 ** ((most - float(point_loss(bench, run, 1.0, rcs_dbsm) or 0.0)) / 40.0))
+
+
+@measure
+def spreading(bench: Bench, near: str, far: str) -> Seen:
+    """Return R^-4 [dB] between the places of two targets."""
+    return float(40.0 * np.log10(bench.place(far)[1] / bench.place(near)[1]))
+
+
+@measure
+def gain_change(bench: Bench, azimuth_deg: float) -> Seen:
+    """Return how much more [dB] the array gains than the patch, both ways, at an azimuth."""
+    return float(both_ways(np.array([azimuth_deg]))[0])
+
+
+@cache
+def _presets() -> tuple[Antenna, Antenna]:
+    return preset("study_array16"), preset("study_patch")
+
+
+def both_ways(azimuth_deg: Floats) -> Floats:
+    """Return the gain [dB] of the study's array over its patch, both ways, at azimuths (n,) [deg]."""
+    look = direction(np.radians(azimuth_deg))
+    array, patch = ((np.abs(a.field(look)) ** 2).sum(axis=1) for a in _presets())
+    return np.asarray(2.0 * (db(array) - db(patch)))
+
+
+def link_snr(bench: Bench, run: str, target: str) -> dict[str, float]:
+    """Return the link budget of a target of given RCS over free space: azimuth, RCS and gain there, power, SNR.
+
+    SNR = P G^2 lambda^2 sigma / ((4 pi)^3 R^4) over the noise k T0 F f_s of a cell, windows counted; gain by azimuth
+    and elevation, RCS by the aspect; the run's noise figure and nothing else enters.
+    """
+    scene = bench.scene(run)
+    sensor, points = scene.sensor, scene.points(0.0)
+    row = scene.facets(0.0).body_names.index(bench.target(target).parts[0])
+    k = int(np.flatnonzero(points.body == row)[0])
+    ray = points.position[k] - np.asarray(sensor.position)
+    distance = float(np.linalg.norm(ray))
+    azimuth, elevation = (float(a) for a in angles(ray))
+    back = (azimuth + np.pi - points.heading[k] + np.pi) % (2.0 * np.pi) - np.pi
+    sigma = float(np.interp(back, points.azimuth, points.sigma[k], period=2.0 * np.pi))
+    gain = gain_dbi(sensor.tx, azimuth - sensor.yaw, elevation)
+    loss = float(point_loss(bench, run, distance, float(db(sigma))) or 0.0)
+    snr = dbm(sensor.power) + 2.0 * gain - loss - dbm(noise_of_cell(sensor, scene.processing))
+    return {
+        "range": distance,
+        "azimuth_deg": float(np.degrees(azimuth)),
+        "rcs_dbsm": float(db(sigma)),
+        "gain_dbi": gain,
+        "snr_db": float(snr),
+    }
+
+
+@measure
+def budget_fall(bench: Bench, run: str, near: str, far: str) -> Seen:
+    """Return by how much [dB] the link budget over free space falls from one target of given RCS to another."""
+    return link_snr(bench, run, near)["snr_db"] - link_snr(bench, run, far)["snr_db"]

@@ -1,0 +1,146 @@
+"""What a radar can know of one body: how much of it is hidden, by whom, and what its returns are worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from raychan.channel.diffract import diffracted_paths
+from raychan.channel.legs import Leg
+from raychan.channel.occlusion import Occlusion, occlusion
+from raychan.channel.solve import join
+from raychan.channel.surface import Surface
+from raychan.process.spectrum import range_doppler
+from raychan.radar.sensor import Sensor
+from raychan.run.chain import noise_of_cell
+from raychan.run.provenance import Chains, chains, label_of
+from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
+from raychan.signal.cube import synthesize
+from raychan.tables import DIFFRACT, MIRROR, Facets, Paths, Points, take
+from raychan.units import db, undb
+
+DIFFRACTED = "diffracted"
+WAYS = (DIRECT, MULTIPATH, DIFFRACTED)
+
+_FINE = 4  # zero padding by which the strongest cell is within 0.2 dB of the peak
+_SLOTS = 8  # of a diffracted chain
+
+
+@dataclass(frozen=True)
+class Level:
+    """What the returns of one kind would show in a map without noise or other bodies."""
+
+    power: float
+    """Of the strongest cell [W]; 0 where there is no such path."""
+    margin_db: float | None
+    """Over the weakest power that is reported (the minimum SNR over thermal noise) [dB]; None without noise."""
+    range: float | None
+    """Of that cell [m]."""
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """One body as one radar sees it."""
+
+    target: str
+    occlusion: Occlusion
+    levels: dict[str, Level | None]
+    """By WAYS; None for what is not modelled: diffraction round edges to bodies that are meshes."""
+    detections: tuple[int, ...]
+    """Rows of the result's detections whose leading chain holds the body, strongest first."""
+
+
+def visibility(result: Result, target: str) -> Visibility:
+    """Return what a simulated radar can know of a body.
+
+    Args: result of a run whose scene is at hand; target a body's name. A path counts as direct or multipath by the
+    rule for the labels of detections; as diffracted where it met an edge, by the scene's model or, where that leaves
+    diffraction out, by single wedges (UTD).
+    Raises: ValueError for an unknown body, the ground, or the radar's own carrier.
+    """
+    scene = result.scene
+    check_target(scene, target)
+    facets, points, sensor = scene.facets(0.0), scene.points(0.0), scene.sensor
+    hidden = occlusion(facets, points, sensor.position, target, scene.model.max_transmissions)
+    return Visibility(target, hidden, _levels(result, facets, points, sensor, target), led_by(result, target))
+
+
+def check_target(scene: Any, target: str) -> None:
+    """Raise ValueError where a body is none of the scene's, or none that can be a target; scene None: not at hand."""
+    if scene is None:
+        raise ValueError("the scene of this result cannot be read again")
+    names = [b.name for b in scene.bodies]
+    if target not in names:
+        raise ValueError(f"no body '{target}'; there are {', '.join(names) or 'none'}")
+    body = scene.bodies[names.index(target)]
+    if is_background(body):
+        raise ValueError(f"'{target}' is the ground or the radar's own carrier, which is no target")
+
+
+def is_background(body: Any) -> bool:
+    """Tell whether a body is never a target (see run.chain.background)."""
+    return bool(body.kind == MIRROR or body.name.startswith("ego"))
+
+
+def led_by(result: Result, target: str) -> tuple[int, ...]:
+    """Return the detections (rows) whose leading chain holds a body: direct before multipath, then strongest first."""
+    rows = [i for i, why in enumerate(result.provenance) if why.contributions and _holds(why, target)]
+    return tuple(sorted(rows, key=lambda i: (result.provenance[i].label != DIRECT, -result.detections.power[i])))
+
+
+def _holds(why: Explanation, target: str) -> bool:
+    # Parts are written 'body.part', and no body's name holds a dot; layers passed stand in brackets.
+    return any(link.split(".")[0] == target for link in why.contributions[0].chain)
+
+
+def _levels(result: Result, facets: Facets, points: Points, sensor: Sensor, target: str) -> dict[str, Level | None]:
+    settings = result.scene.processing
+    weakest = noise_of_cell(sensor, settings) * float(undb(settings.min_snr_db))
+    kind = ways_of(result, chains(result.paths, result.receiver.background), target)
+    found: dict[str, Level | None] = {
+        name: _level(take(result.paths, kind == i), sensor, settings, weakest) for i, name in enumerate(WAYS)
+    }
+    if not (kind == WAYS.index(DIFFRACTED)).any():
+        found[DIFFRACTED] = _diffracted(facets, points, sensor, settings, weakest, target)
+    return found
+
+
+def ways_of(result: Result, known: Chains, target: str) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Return the place in WAYS of each path (n,) by which it met a body; -1 where it did not."""
+    paths, size = result.paths, np.abs(result.paths.amplitude)
+    kind = np.full(len(known.names), -1, np.int64)
+    order = np.lexsort((-size, known.part))
+    strongest = order[np.searchsorted(known.part[order], np.arange(len(known.names)))]
+    for g, (row, bodies) in enumerate(zip(strongest, known.bodies, strict=True)):
+        if target in bodies:
+            way = DIFFRACTED if (paths.kind[row] == DIFFRACT).any() else label_of(paths, row, bodies, result.receiver)
+            kind[g] = WAYS.index(way)
+    return kind[known.part]
+
+
+def _diffracted(
+    facets: Facets, points: Points, sensor: Sensor, settings: Any, weakest: float, target: str
+) -> Level | None:
+    mine = points.body == facets.body_names.index(target)
+    if not mine.any():
+        return None
+    row = {f: getattr(points, f)[mine] for f in ("position", "velocity", "body", "sigma", "heading")}
+    straight = [Leg(end=np.asarray(sensor.position))]
+    parts = diffracted_paths(Surface(facets), replace(points, **row), sensor, sensor.waveform.carrier, _SLOTS, straight)
+    return _level(join(parts), sensor, settings, weakest) if parts else _strength(0.0, None, weakest)
+
+
+def _level(paths: Paths, sensor: Sensor, settings: Any, weakest: float) -> Level:
+    if not len(paths.delay):
+        return _strength(0.0, None, weakest)
+    cube = synthesize(paths, replace(sensor, noise=False))
+    pad = (max(_FINE, settings.pad[0]), max(_FINE, settings.pad[1]))
+    rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, pad)
+    column = int(np.argmax(rdmap.power.max(axis=0)))
+    return _strength(float(rdmap.power[:, column].max()), float(rdmap.range[column]), weakest)
+
+
+def _strength(power: float, at: float | None, weakest: float) -> Level:
+    return Level(power, float(db(power / weakest)) if weakest > 0.0 else None, at if power > 0.0 else None)
