@@ -44,6 +44,8 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement
     shape = f.vertices, f.normals, surface.bulge
     ways = leg.image, leg.far, out.image, out.far
     facet = _seeds(surface, leg, bodies)
+    if not len(facet):
+        return stand(surface, leg, facet, np.zeros((0, 3, 3)), rule.slots)
     facet, bary = _cut_for_phase(facet, shape, ways, rule)
     facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
     if out != leg:
@@ -140,7 +142,9 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     seen.reshape(-1)[ray], block.reshape(-1)[ray] = view.seen, view.blocker
     source = np.broadcast_to(leg.image, (n, 3))
     partly = seen.any(axis=1) & matters
-    side = shadows_of(surface, leg).across(tubes.points, surface.normal[tubes.facet], partly, slack)
+    side = np.zeros((n, 3))
+    if partly.any():
+        side = shadows_of(surface, leg).across(tubes.points, surface.normal[tubes.facet], partly, slack)
     # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
     known = seen | (block >= 0)
     facet = np.where(block >= 0, block, tubes.facet[:, None])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,21 +22,15 @@ class Shadows:
     """The silhouette edges of all bodies as seen over one leg, in a grid of directions from the leg's last image."""
 
     def __init__(self, surface: Surface, leg: Leg) -> None:
-        self.image, self.far = leg.image, leg.far
         self.edges = _silhouette(surface, leg)
-        self._grid: Any = None
-        self._leg = leg
-
-    def _sorted(self) -> Any:
-        """Return the grid, made when first asked for: (first, index, low, cell, shape)."""
-        if self._grid is None:
-            a, b = (_directions(self.edges[:, i], self._leg) for i in range(2))
+        if len(self.edges):
+            a, b = (_directions(self.edges[:, i], leg) for i in range(2))
             low, high = np.minimum(a, b).min(axis=0), np.maximum(a, b).max(axis=0)
             cell = max(float((high - low).max()) / _CELLS, 1e-9)
             low -= 2.0 * cell
             shape = np.ceil((high - low) / cell).astype(np.int64) + 3
-            self._grid = *_fill(self.edges, self.image, self.far, low, cell, shape), low, cell, shape
-        return self._grid
+            self._grid = *_fill(self.edges, leg.image, leg.far, low, cell, shape), low, cell, shape
+        self._from = leg.image, leg.far
 
     def across(self, points: Floats, normal: Floats, wanted: NDArray[np.bool_], slack: Floats) -> Floats:
         """Return signed distances (n, 3) [m] of tubes' corners from the longest shadow edge on each; zeros: none.
@@ -45,9 +38,10 @@ class Shadows:
         Args: points (n, 4, 3) [m] corners and centres; normal (n, 3) of the planes they lie on; wanted (n,) which tubes
         to look at; slack (n,) [m] in front of the plane that still belongs to its own surface.
         """
-        if not len(self.edges) or not wanted.any():
+        if not len(self.edges):
             return np.zeros((len(points), 3))
-        return _across(points, normal, wanted, slack, self.image, self.far, self.edges, *self._sorted())
+        found: Floats = _across(points, normal, wanted, slack, *self._from, self.edges, *self._grid)
+        return found
 
 
 def shadows_of(surface: Surface, leg: Leg) -> Shadows:

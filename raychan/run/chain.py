@@ -21,15 +21,14 @@ from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
 from raychan.radar.windows import processing_gain, window
 from raychan.run.auto import Choice, choose
-from raychan.run.ledger import Entry, ledger
-from raychan.run.microdoppler import moving, needed, retraced
+from raychan.run.ledger import ledger
+from raychan.run.microdoppler import needed, retraced
 from raychan.run.pieces import Retraced, Traced
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
-from raychan.run.spread import claimed
+from raychan.run.spread import claimed, launch_share, motion, without
 from raychan.signal.cube import synthesize
 from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, Points, RangeDoppler, Routes
-from raychan.units import db
 from raychan.world.scene import Scene
 
 Progress = Callable[[str, float], None]
@@ -155,7 +154,14 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
     with clock.stage("receive"):
         cube, rdmap, detections = receive(paths, sensor, settings, noise_rng, channel.turned)
-        error = map_error(paths, channel.others, sensor, settings, channel.turned)
+        turned, others = channel.turned, channel.others
+        if turned is None:
+            error = map_error(paths, others, sensor, settings)
+        else:
+            brought, doubt = (quiet_map(x, sensor, settings) for x in (turned.turning, turned.error))
+            share = launch_share(paths, others, turned.turns, sensor)
+            still = map_error(without(paths, turned.turns), without(others, turned.turns), sensor, settings)
+            error = MapError(still.power + doubt + share * brought)
     receiver = Receiver(
         sensor.waveform,
         settings.range_window,
@@ -167,13 +173,11 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     with clock.stage("explain"):
         weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
         left_out = ledger(paths, channel.surface, channel.points, sensor, settings, channel.model, weakest)
-        if channel.turned:
-            left_out["intra-frame motion"] = motion(channel.turned)
+        if turned:
+            left_out["intra-frame motion"] = motion(turned)
         reasons = provenance(paths, rdmap, detections, receiver, error.power)
-        if channel.turned:
-            quiet = Cube(samples=channel.turned.turning.astype(np.complex64), noise_power=0.0)
-            brought = range_doppler(quiet, sensor.waveform, *_windows(settings)).power
-            reasons = claimed(reasons, paths, moving(scene), brought, error.power, detections, receiver)
+        if turned:
+            reasons = claimed(reasons, paths, turned.turns, brought, error.power, detections, receiver)
     return Result(
         paths=paths,
         profile=pdp,
@@ -239,29 +243,19 @@ def noise_of_cell(sensor: Sensor, settings: Any) -> float:
     return float(sensor.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
 
 
-def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any, turned: Retraced | None = None) -> MapError:
-    """Return the map of what two launches differ by: their difference sent through the same receiver, without noise;
-    to it comes what neighbouring tracings of turning bodies differ by."""
+def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any) -> MapError:
+    """Return the map of what two launches differ by: their difference sent through the same receiver, without noise."""
     difference = join([paths, others.replace(amplitude=-others.amplitude)])
-    cube = synthesize(difference, dataclasses.replace(sensor, noise=False))
-    windows = _windows(settings)
-    power = range_doppler(cube, sensor.waveform, *windows).power
-    if turned:
-        cube = Cube(samples=turned.error.astype(np.complex64), noise_power=0.0)
-        power = power + range_doppler(cube, sensor.waveform, *windows).power
-    return MapError(power)
+    return MapError(
+        quiet_map(synthesize(difference, dataclasses.replace(sensor, noise=False)).samples, sensor, settings)
+    )
 
 
-def motion(turned: Retraced) -> Entry:
-    """Return the ledger's entry of a frame that was traced more than once."""
-    level = float(db(max(turned.level(), 1e-30)))
-    ends = "" if turned.reached else "; more of them do not bring it under the tolerance"
-    how = f"traced {len(turned.times)} times within the frame; what they differ by, against the whole frame{ends}"
-    return Entry(level, "estimate", how)
-
-
-def _windows(settings: Any) -> tuple[str, str, tuple[int, int]]:
-    return settings.range_window, settings.rate_window, settings.pad
+def quiet_map(samples: Any, sensor: Sensor, settings: Any) -> Any:
+    """Return the powers (v, r) [W] of the map of samples (antenna, chirp, sample) without noise."""
+    cube = Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0)
+    windows = (settings.range_window, settings.rate_window, settings.pad)
+    return range_doppler(cube, sensor.waveform, *windows).power
 
 
 def background(facets: Facets) -> tuple[str, ...]:

@@ -154,7 +154,7 @@ class _Work:
         if not self.sensor.waveform.complex_sampling:
             samples, error = samples.real.astype(complex), error.real.astype(complex)
         times = tuple(sorted(self.times))
-        return Retraced(samples.sum(axis=0), samples[0], error.sum(axis=0), times, self.rays, self.reached)
+        return Retraced(samples.sum(axis=0), samples[0], self.turns, error.sum(axis=0), times, self.rays, self.reached)
 
     def key(self, chirp: int, known: Traced | None = None) -> Key:
         """Trace the scene at a chirp."""

@@ -27,6 +27,8 @@ class Retraced:
     """(antenna, chirp, sample) [sqrt(W)]."""
     turning: Samples
     """The part of them that turning bodies brought."""
+    turns: NDArray[np.bool_]
+    """Which bodies (b,) those are."""
     error: Samples
     """How wrong they may be, as neighbouring tracings differ."""
     times: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Spread: detections that a turning body brought away from where its paths were at the frame's start."""
+"""Spread: what turning bodies bring to a map beyond the rates that their paths have at the frame's start."""
 
 from __future__ import annotations
 
@@ -8,13 +8,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.rcs import stated_error
+from raychan.radar.sensor import Sensor
+from raychan.run.ledger import Entry
+from raychan.run.pieces import Retraced
 from raychan.run.provenance import chains, label_of
 from raychan.run.result import Contribution, Explanation, Receiver
-from raychan.tables import Detections, Paths
-from raychan.units import C0
+from raychan.signal.cube import synthesize
+from raychan.tables import Detections, Paths, take
+from raychan.units import C0, db
 
 Floats = NDArray[np.float64]
 _UNEXPLAINED = 0.1  # a cell to which turning bodies bring less than this share of its power is noise
+
+
+def meets(paths: Paths, turns: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which paths (n,) meet one of the bodies `turns` (b,)."""
+    return np.asarray((turns[np.maximum(paths.body, 0)] & (paths.kind > 0)).any(axis=1))
+
+
+def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
+    """Return the paths that do not meet the bodies `turns` (b,)."""
+    kept: Paths = take(paths, ~meets(paths, turns))
+    return kept
+
+
+def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], sensor: Sensor) -> float:
+    """Return by which share of their power two launches differ in what turning bodies bring to the first ramp."""
+    one = replace(sensor, noise=False, waveform=replace(sensor.waveform, n_chirps=1))
+    a, b = (synthesize(take(p, meets(p, turns)), one).samples for p in (paths, others))
+    power = float((np.abs(a) ** 2).sum())
+    return float((np.abs(a - b) ** 2).sum()) / power if power > 0.0 else 0.0
+
+
+def motion(turned: Retraced) -> Entry:
+    """Return the ledger's entry of a frame that was traced more than once."""
+    level = float(db(max(turned.level(), 1e-30)))
+    ends = "" if turned.reached else "; more of them do not bring it under the tolerance"
+    how = f"traced {len(turned.times)} times within the frame; what they differ by, against the whole frame{ends}"
+    return Entry(level, "estimate", how)
 
 
 def claimed(
@@ -27,7 +58,7 @@ def claimed(
     Args: turns (b,) which bodies turn; power, error (v, r) [W] of the map of what turning bodies brought, and how wrong
     it may be. Of several such bodies it is the one whose paths come nearest in range.
     """
-    rows = np.flatnonzero((turns[np.maximum(paths.body, 0)] & (paths.kind > 0)).any(axis=1))
+    rows = np.flatnonzero(meets(paths, turns))
     if not len(rows):
         return reasons
     known = chains(paths, receiver.background)

@@ -38,4 +38,4 @@ def whole(scene: rc.Scene, name: str, tolerance: float | None, repeats: int) -> 
     for stage in stages[0]:
         took = [t[stage] for t in stages]
         shares = [t[stage] / sum(t.values()) for t in stages]
-        yield Row("stage", f"{name}: {stage}", median(took), "whole frame", pairs[0][0], median(shares))
+        yield Row("stage", f"{name}: {stage}", median(took), "whole frame", row.seconds, median(shares))
