@@ -30,8 +30,8 @@ _STEPS = 6
 _LEAST_DB = 1e-4  # what rounding and the quadratic phase leave even where two launches agree
 _MAX_ERROR_DB = 60.0
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and a larger tube may miss them
-_COVER = 1.4
-_CURVED = 0.03  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
+_COVER = 1.3
+_CURVED = 0.025  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
 _NULL = 1e-4  # of the strongest polarisation: -80 dB
 _GROWTH = 2.0  # rays of the next refinement over those of all before it, about
 
@@ -118,7 +118,7 @@ def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iter
     edge = min(_FIRST_EDGE, surface.extent / 4.0)
     own = _typical_edge(surface)
     # Weak returns of shadows and mirrors add up; a body that hides nothing of itself has none.
-    relative = 0.03 if surface.convex_alone else 0.004
+    relative = 0.03 if surface.convex_alone else 0.01
     for i in range(steps):
         fine = 2.0**-i
         longest = edge if i == 0 else min(edge, 1.35 * own) * 0.6**i

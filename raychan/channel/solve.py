@@ -23,7 +23,7 @@ from raychan.channel.tubes import Refinement
 from raychan.tables import MIRROR, REFLECT, SCATTER, Facets, Paths, Points, Routes, take
 from raychan.units import C0
 
-APART = 2e-3  # m of path: what 4 GHz of bandwidth cannot tell from one delay at -26 dB
+_APART = 2e-3  # m of path: beyond it corners have delays and rates of their own
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -87,14 +87,13 @@ def solve(
     progress: Progress | None = None,
     diffraction: bool = False,
     each: Callable[[Routes], None] | None = None,
-    apart: float = APART,
 ) -> tuple[Paths, Stats]:
     """Return the paths of a scene seen by a monostatic radar, and what they cost.
 
     Args: facets, or the surface made of them, which serves many solutions;
     frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
     both ways counted; progress is told (stage, share done); diffraction adds single wedges on the ways to point
-    targets; each is given every set of routes; apart as for `paths_of`.
+    targets; each is given every set of routes.
     """
     stats = Stats()
     since = perf_counter()
@@ -106,7 +105,7 @@ def solve(
     parts: list[Paths] = []
 
     def carry(routes: Routes) -> None:
-        parts.append(paths_of(routes, facets, radar, frequency, apart))
+        parts.append(paths_of(routes, facets, radar, frequency))
         if each:
             each(routes)
 
@@ -185,9 +184,8 @@ def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes 
     )
 
 
-def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float, apart: float = APART) -> Paths:
-    """Return what routes carry for a radar; footprints longer than `apart` [m] of path become three paths, one a
-    corner."""
+def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> Paths:
+    """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
     a = transfer(
         routes,
         facets,
@@ -200,7 +198,7 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float, apa
     rate = rates(routes, facets, v, v)
     away, look = departures(routes)
     spans = routes.lengths[:, :3].max(axis=1) - routes.lengths[:, :3].min(axis=1)
-    long = (routes.kind == SCATTER).any(axis=1) & (spans > apart)
+    long = (routes.kind == SCATTER).any(axis=1) & (spans > _APART)
     whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
     index = np.concatenate([whole, np.repeat(rows, 3)])
     amplitude = np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])

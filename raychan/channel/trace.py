@@ -20,6 +20,7 @@ from raychan.channel.tubes import (
     that_count,
     vector_area,
 )
+from raychan.kernels.patch import landing_span
 from raychan.tables import REFLECT
 
 Floats = NDArray[np.float64]
@@ -55,8 +56,13 @@ def _fly(
         if not len(tubes):
             return
         k = mirrored(tubes)
-        matters = phases_of(surface, leg, out, tubes, first, rule).bound > least(rule, total)
-        hit, t = _cast(surface, tubes, k, start, matters)
+        area, doubt = phases_of(surface, leg, out, tubes, first, rule).area, least(rule, total)
+        hit, t = _cast(surface, tubes, k, start, area > doubt)
+        # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight back.
+        span = landing_span(
+            tubes.points, k, tubes.length, hit, surface.first, surface.normal, out.image, out.far, rule.wavenumber
+        )
+        matters = area > doubt * (1.0 + 0.5 * span)
         mid = hit[:, CENTRE]
         agree = _agree(surface, hit)
         side = _edges(surface, leg, tubes, k, hit, t, matters & (hit >= 0).any(axis=1))

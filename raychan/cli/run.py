@@ -25,7 +25,7 @@ def run(
     seed: Annotated[int, typer.Option(help="Seed of the noise; equal seeds give equal detections.", min=0)] = 0,
     tolerance: Annotated[
         float | None,
-        typer.Option(help="Error to refine the tubes to [dB]; the scene's own if not given.", metavar="DB", min=1e-3),
+        typer.Option(help="Error in dB to refine the tubes to; the scene's own if not given.", metavar="DB", min=1e-3),
     ] = None,
     max_bounces: Annotated[
         int | None, typer.Option(help="Interactions along a path; the scene's own if not given.", metavar="N", min=1)
@@ -45,7 +45,7 @@ def run(
     ] = None,
     frame_interval: Annotated[
         float | None,
-        typer.Option(help="From frame to frame [s]; without pause if not given.", metavar="S", min=1e-9),
+        typer.Option(help="Seconds from frame to frame; without pause if not given.", metavar="S", min=1e-9),
     ] = None,
 ) -> None:
     """Simulate a scene: paths, power-delay profile, I/Q cube, range-Doppler map, detections.

@@ -70,7 +70,7 @@ def _distance(p, q):  # type: ignore[no-untyped-def]
     return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def edge_to_cut(  # type: ignore[no-untyped-def]
     facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend
 ):  # fmt: skip
@@ -116,7 +116,7 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def halved(facet, bary, edge, jitter, level):  # type: ignore[no-untyped-def]
     """Return (facet, bary) of both halves of patches cut from a point of `edge` to the corner opposite.
 
@@ -155,7 +155,7 @@ def _lit(v, n, b, is_open, w, image, far, way_image, way_far, cosine, p, normal,
         cosine[q] = -sign * _dot(k, normal)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def lit_parts(facet, bary, v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
     """Return (facet, bary) of the parts of patches that face the end of a way, cut along the terminator.
 
@@ -212,7 +212,7 @@ def _twice_area(p):  # type: ignore[no-untyped-def]
     return math.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyped-def]
     """Return points (n, 4, 3) [m], directions (n, 4, 3), lengths (n, 4) [m] and normals (n, 4, 3) of four rays.
 
@@ -237,7 +237,7 @@ def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyp
     return p, k, length, normal
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def phases(  # type: ignore[no-untyped-def]
     points, k, length, normals, facet, bary, first, v, b, image, far, out_image, out_far, wavenumber,
     strength, spread, phase, turn, most_bend,
@@ -289,3 +289,35 @@ def phases(  # type: ignore[no-untyped-def]
             off = max(off, _distance(normals[i, c], normals[i, 3]) / turn)
         rough[i] = off / (1.0 + 0.5 * (high - low))
     return six, bend, bound, area, rough
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def landing_span(points, k, length, hit, first, normal, out_image, out_far, wavenumber):  # type: ignore[no-untyped-def]
+    """Return by how much (n,) [rad] the two-way phase of tubes runs where they land: the least over the planes met.
+
+    Args: k (n, 4, 3) directions after the mirror; hit (n, 4) facets met, -1 for none; first, normal (m, 3) of planes.
+    """
+    out = np.full(len(points), np.inf)
+    p = np.empty(3)
+    for i in range(len(points)):
+        for r in range(4):
+            f = hit[i, r]
+            if f < 0 or (r > 0 and f == hit[i, r - 1]):
+                continue
+            low, high = np.inf, -np.inf
+            for q in range(3):
+                height, slope = 0.0, 0.0
+                for c in range(3):
+                    height += (first[f, c] - points[i, q, c]) * normal[f, c]
+                    slope += k[i, q, c] * normal[f, c]
+                if height * slope <= 0.0:
+                    # Not all of the tube can land there: how much of it does is not known yet.
+                    low, high = 0.0, 0.0
+                    break
+                t = height / slope
+                for c in range(3):
+                    p[c] = points[i, q, c] + t * k[i, q, c]
+                phase = wavenumber * (length[i, q] + t + _length(p, out_image, out_far))
+                low, high = min(low, phase), max(high, phase)
+            out[i] = min(out[i], high - low)
+    return out

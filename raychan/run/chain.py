@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from raychan.channel.profile import profile
-from raychan.channel.solve import APART, join, refinement, solve
+from raychan.channel.solve import join, refinement, solve
 from raychan.channel.surface import Surface
 from raychan.frames import direction
 from raychan.process.detect import detect
@@ -99,7 +99,6 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     model = _changed(scene.model, changes)
     carrier = sensor.waveform.carrier
     floor = drowned(sensor, settings)
-    apart = APART * 4e9 / sensor.waveform.bandwidth
     with clock.stage("geometry"):
         surface, points = Surface(scene.facets(0.0)), scene.points(0.0)
     # The coarse launch comes first: it tells what is needed, and later how wrong the fine one may be.
@@ -107,9 +106,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     with clock.stage("check"):
         rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, jitter=0.13)
         everything = model.diffraction or model.mode == "auto"
-        others, more = solve(
-            surface, points, sensor, carrier, rule, model.max_bounces, diffraction=everything, apart=apart
-        )
+        others, more = solve(surface, points, sensor, carrier, rule, model.max_bounces, diffraction=everything)
         if model.mode == "auto":
             cell = noise_of_cell(sensor, settings)
             chosen = choose(others, sensor, settings, cell, model.tolerance_db)
@@ -127,12 +124,12 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         again = needed(scene, model.retrace, rule.max_edge)
         routes: list[Routes] = []
         each = routes.append if again else None
-        way = (model.max_bounces, clock.tell, model.diffraction, each, apart)
+        way = (model.max_bounces, clock.tell, model.diffraction, each)
         paths, stats = solve(surface, points, sensor, carrier, rule, *way)
     turned = None
     if again:
         with clock.stage("retrace"):
-            turned = retraced(scene, rule, model, Traced(paths, tuple(routes)), partial(clock.tell, "retrace"), apart)
+            turned = retraced(scene, rule, model, Traced(paths, tuple(routes)), partial(clock.tell, "retrace"))
     cost = {
         "rays": stats.rays + more.rays + (turned.rays if turned else 0),
         "tubes": stats.tubes,

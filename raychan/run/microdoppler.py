@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.advance import Poses, carried, strengths
 from raychan.channel.fields import departures
-from raychan.channel.solve import APART, solve
+from raychan.channel.solve import solve
 from raychan.channel.tubes import Refinement
 from raychan.kernels.beat import ramp_sums
 from raychan.radar.sensor import Sensor
@@ -78,15 +78,14 @@ def retraced(
     model: Any,
     first: Traced | None = None,
     progress: Callable[[float], None] | None = None,
-    apart: float = APART,
 ) -> Retraced:
     """Return the samples of a frame in which bodies turn.
 
     Args: rule how finely what does not turn is cut; model the scene's, whose `retrace` is "auto" or the number of
     tracings, when bodies that only move are carried on too; first the paths at the frame's start, if they are known;
-    progress is told the share done; apart as for `channel.solve.paths_of`.
+    progress is told the share done.
     """
-    work = _Work(scene, rule, model, progress, apart)
+    work = _Work(scene, rule, model, progress)
     last = scene.sensor.waveform.n_chirps - 1
     if model.retrace == "auto":
         return work.adaptive(last, first)
@@ -96,10 +95,8 @@ def retraced(
 class _Work:
     """One frame being put together."""
 
-    def __init__(
-        self, scene: Scene, rule: Refinement, model: Any, progress: Callable[[float], None] | None, apart: float
-    ) -> None:
-        self.scene, self.rule, self.model, self.progress, self.apart = scene, rule, model, progress, apart
+    def __init__(self, scene: Scene, rule: Refinement, model: Any, progress: Callable[[float], None] | None) -> None:
+        self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
         self.turns = turning(scene) if model.retrace == "auto" else moving(scene)
         self.sensor: Sensor = dataclasses.replace(scene.sensor, noise=False)
         wave = self.sensor.waveform
@@ -165,7 +162,7 @@ class _Work:
             found: list[Routes] = []
             paths, stats = solve(
                 now.facets(), now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
-                self.model.diffraction, found.append, self.apart,
+                self.model.diffraction, found.append,
             )  # fmt: skip
             self.rays += stats.rays
             known = Traced(paths, tuple(found))
