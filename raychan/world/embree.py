@@ -58,7 +58,6 @@ class Tracer:
         """Return the first triangle of each float32 ray, over two threads in chunks."""
         o = (origin - self._centre).astype(np.float32)
         d = direction.astype(np.float32)
-        self.rays += len(o)
         if len(o) <= _CHUNK:
             return self._scene.run(o, d)
         starts = range(0, len(o), _CHUNK)
@@ -66,6 +65,22 @@ class Tracer:
             run = self._scene.run
             parts = pool.map(lambda i: run(o[i : i + _CHUNK], d[i : i + _CHUNK]), starts)
             return np.concatenate(list(parts))
+
+    def _mend(self, hit: Ints, origin: Floats, direction: Floats, pace: Floats) -> None:
+        """Cast all rays again, a few float32 spacings to either side: what is nearer then counts.
+
+        Of rays aimed at corners Embree lets one in some hundreds through, of those aimed at edges one in a million, in
+        its robust mode too. A ray and its two companions count as one.
+        """
+        side = np.cross(direction, direction[:, [2, 0, 1]] + np.array([0.0, 0.3, -0.7]))
+        for turn in (1.0, -1.0):
+            other = self._ids(origin + turn * pace[:, None] * side, direction)
+            rows = np.flatnonzero((other != hit) & (other >= 0))
+            old, new = hit[rows], other[rows]
+            t_old = np.where(old >= 0, self.distance(old, origin[rows], direction[rows]), np.inf)
+            t_new = self.distance(new, origin[rows], direction[rows])
+            nearer = (t_new > 0.0) & (t_new < t_old - pace[rows])
+            hit[rows[nearer]] = new[nearer]
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
@@ -93,7 +108,10 @@ class Tracer:
         ahead = begin + np.where((skip >= 0) | (begin > 0), pace, 0.0)
         todo = np.arange(n)
         for _ in range(8):
-            hit = self._ids(origin[todo] + ahead[todo, None] * direction[todo], direction[todo])
+            at, d = origin[todo] + ahead[todo, None] * direction[todo], direction[todo]
+            hit = self._ids(at, d)
+            self.rays += len(hit)
+            self._mend(hit, at, d, pace[todo])
             found = hit >= 0
             rows, ids = todo[found], hit[found]
             t = self.distance(ids, origin[rows], direction[rows])
