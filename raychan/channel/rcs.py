@@ -32,7 +32,7 @@ _MAX_ERROR_DB = 60.0
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and a larger tube may miss them
 _COVER = 1.8  # of the change between two launches
 _COVER_ALONE = 1.3  # the same where a body hides nothing of itself, so that launches cannot both miss it
-_CURVED = 0.025  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
+_CURVED = 0.02  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
 _NULL = 1e-4  # of the strongest polarisation: -80 dB
 _GROWTH = 2.0  # rays of the next refinement over those of all before it, about
 
@@ -199,7 +199,9 @@ def _refined(
 def stated_error(value: complex, change: float, cover: float = _COVER) -> float:
     """Return the error [dB] of |value|^2 to state when two launches differ by `change` [unit of value].
 
-    Bodies alone: 1.3 times the change, with `_CURVED` where facets are curved, was chosen on 1500 random ones. SEEHERE
+    The factors and `_CURVED` were chosen on 2000 random bodies and 48 views of two cars (covered: 96 to 98 % and 94 %;
+    median ratio 3.3 and 3.6). On 210 other bodies it covers the true error in 96.7 %, in 93 % of those where that is
+    above 0.001 dB, at a median ratio of 2.8.
     """
     change = cover * change
     size = abs(value)

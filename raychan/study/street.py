@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from raychan.channel.legs import Leg, Mirror
 from raychan.channel.solve import refinement, solve
+from raychan.channel.surface import Surface
 from raychan.process.spectrum import range_doppler
+from raychan.run.chain import drowned
 from raychan.signal.cube import synthesize
 from raychan.study.cases import Street
 from raychan.study.lattice import Echo, Window, echoes
@@ -42,6 +44,7 @@ class Road:
         self.bounces = self.scene.model.max_bounces
         self.tolerance_db = float(self.scene.model.tolerance_db)
         self.facets = self.scene.facets(0.0)
+        self.floor = drowned(self.scene.sensor, self.scene.processing)
         curved = [b.name for b in self.scene.bodies if b.name and self._takes_sag(b)]
         changes = [f"bodies.{name}.params.max_sag={_FINE_SAG}" for name in curved]
         self.fine = (self.scene.override(changes) if changes else self.scene).facets(0.0)
@@ -89,18 +92,22 @@ class Road:
         return (facets.role[facets.body] == SCATTERER) & ~own[facets.body]
 
 
-def tubes(road: Road, tolerance_db: float, jitter: float = 0.0, checked: bool = True) -> Run:
+def tubes(road: Road, tolerance_db: float, checked: bool = True) -> Run:
     """Return the map by adaptive tubes as `raychan run` does: cut for a tolerance, and once more to state the error."""
     since = perf_counter()
-    f, s = road.frequency, road.sensor
-    points = road.scene.points(0.0)
-    rule = dataclasses.replace(refinement(f, tolerance_db), jitter=jitter)
-    paths, stats = solve(road.facets, points, s, f, rule, road.bounces)
-    rays = stats.rays
+    f, s, points, surface = road.frequency, road.sensor, road.scene.points(0.0), Surface(road.facets)
+    rules = [refinement(f, tolerance_db, road.floor)]
     if checked:
-        rule = dataclasses.replace(refinement(f, 3.0 * tolerance_db), jitter=0.13)
-        rays += solve(road.facets, points, s, f, rule, road.bounces)[1].rays
-    return Run(road.map_of(paths), rays, perf_counter() - since)
+        rules.append(refinement(f, 3.0 * tolerance_db, road.floor, jitter=0.13))
+    paths = [solve(surface, points, s, f, rule, road.bounces)[0] for rule in rules]
+    return Run(road.map_of(paths[0]), surface.rays, perf_counter() - since)
+
+
+def converged(road: Road, tolerance_db: float) -> Floats:
+    """Return the map of a launch that knows no noise, on a lattice of cuts of its own: never that of a method."""
+    rule = refinement(road.frequency, tolerance_db, jitter=0.2)
+    paths, _ = solve(road.facets, road.scene.points(0.0), road.sensor, road.frequency, rule, road.bounces)
+    return road.map_of(paths)
 
 
 def lattice(road: Road, rays: int, phased: bool) -> Run:
@@ -202,4 +209,4 @@ def efforts(default_db: float, quick: bool) -> list[Effort]:
     return made
 
 
-__all__ = ["Road", "efforts", "error_db", "lattice", "tubes"]
+__all__ = ["Road", "converged", "efforts", "error_db", "lattice", "tubes"]
