@@ -75,7 +75,9 @@ def test_unknown_regime_is_told_with_the_known_ones():
         study.stability(only=["nonsense"])
 
 
-@pytest.mark.parametrize("key", ["grazing", "edge_on", "brewster", "layers", "vacuum", "folding", "dynamic", "split"])
+@pytest.mark.parametrize(
+    "key", ["grazing", "edge_on", "brewster", "total", "layers", "vacuum", "folding", "dynamic", "split"]
+)
 def test_regimes_with_an_exact_truth_stand(key):
     (tried,) = study.stability(quick=True, only=[key])
     assert not tried.failed, [(r.name, r.expected, r.seen, r.note) for r in tried.failed]

@@ -16,7 +16,6 @@ from raychan.world.scene import Scene
 SCENE = Path(__file__).parents[1] / "scenes" / "living_street.toml"
 WITHIN = {1000: 0.15, 4000: 0.075}  # m, by bandwidth [MHz]: a Hann window's range cell is twice that
 SPEED = 0.15  # m/s
-TOLERANCE_DB = 3.0  # coarser than the scene's own, for speed
 BIN = {1000: 0.15, 4000: 0.0375}  # m: c / 2B
 
 # Tables 5 and 13: range [m], speed detected [m/s]. Bench 1 and pedestrian 10 stay below 20 dB: see known_differences.
@@ -40,7 +39,7 @@ DETECTED = {
 @pytest.fixture(scope="module", params=[1000, 4000])
 def run(request):
     scene = Scene.load(SCENE).override([f"radar.waveform.bandwidth_mhz={request.param}"])
-    return request.param, simulate(scene, seed=0, tolerance_db=TOLERANCE_DB)
+    return request.param, simulate(scene, seed=0)
 
 
 def led_by(result, body):

@@ -12,7 +12,8 @@ from raychan.cli import invoke
 from raychan.study import cases, methods
 from raychan.study.lattice import Window, echoes
 from raychan.study.specular import glints
-from raychan.study.tradeoff import Row, beaten_by, marked, write_csv
+from raychan.study.tradeoff import Row, beaten_by, marked, read_csv, write_csv
+from raychan.study.verdicts import verdicts
 from raychan.world.embree import Tracer
 from raychan.world.shapes import build
 
@@ -89,6 +90,49 @@ def test_csv_has_a_line_a_row(tmp_path):
     with write_csv(rows, tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
         read = list(csv.DictReader(file))
     assert [r["method"] for r in read] == ["a, b", "b"] and float(read[1]["error_db"]) == 0.04
+
+
+def test_table_comes_back_as_it_was_written_and_another_file_is_refused(tmp_path):
+    rows = marked([row("a, b", 10.0, 1.0, 3.0), row("b", 20.0, 2.0, 0.04, default=True)])
+    assert read_csv(write_csv(rows, tmp_path / "t.csv")) == rows
+    text = (tmp_path / "t.csv").read_text()
+    (tmp_path / "cut.csv").write_text(text[:-20])
+    with pytest.raises(ValueError, match="line 3 is not one"):
+        read_csv(tmp_path / "cut.csv")
+    (tmp_path / "other.csv").write_text(text.replace("rays", "tubes"))
+    with pytest.raises(ValueError, match="column 'rays' is missing"):
+        read_csv(tmp_path / "other.csv")
+    assert invoke(["study", "tradeoff", "--beside", str(tmp_path / "none.csv"), "--out", str(tmp_path / "o")]) == 2
+
+
+def test_verdict_names_what_beats_the_default_and_where_that_fails():
+    def on(case, method, rays, seconds, error, default=False, setting="s"):
+        return Row(case, case, "t", 0.01, method, setting, default, rays, seconds, error)
+
+    rows = [
+        on("plate", methods.ADAPTIVE, 100.0, 1.0, 0.1, default=True),
+        on("plate", methods.ADAPTIVE, 40.0, 0.4, 0.1, setting="launch 1"),
+        on("plate", methods.MIRRORS, 3.0, 2.0, 0.05),
+        on("dihedral", methods.MIRRORS, 3.0, 2.0, 40.0),
+    ]
+    title, rays, seconds = verdicts(rows)
+    assert title == "default on plate: 0.10 dB, 100 rays, 1 s"
+    assert "beaten by mirror paths only, s (0.05 dB, 3 rays, 2 s, but 40.00 dB off on dihedral)" in rays
+    assert "on the front but for single launches of its own, which state no error (0.10 dB, 40 rays" in seconds
+
+
+@pytest.mark.parametrize(
+    ("errors", "told"),
+    [
+        ((3.0, 0.2, 0.6), "never, 0.60 dB at 3,000 rays: 30 times the rays and 300 times the time"),
+        ((3.0, 0.2, 0.4), "from 2,000 rays on: 20 times the rays and 200 times the time"),
+    ],
+)
+def test_point_samples_reach_a_level_only_where_they_stay_below_it(errors, told):
+    rows = [Row("sphere", "c", "t", 0.01, methods.ADAPTIVE, "s", True, 100.0, 0.01, 0.1)]
+    for i, error in enumerate(errors, 1):
+        rows.append(Row("sphere", "c", "t", 0.01, methods.POINT, str(i), False, 1000.0 * i, float(i), error))
+    assert told in verdicts(rows)[-1] and verdicts(rows)[-1].startswith("point samples within 0.5 dB on sphere")
 
 
 def test_command_writes_figures_and_table_and_says_where_the_default_stands(tmp_path, capsys):

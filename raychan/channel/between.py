@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.edges import above, cross_into, dot, inside
 from raychan.channel.surface import Surface
+from raychan.tables import MIRROR
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -15,6 +16,8 @@ Bools = NDArray[np.bool_]
 
 _MOST_CELLS = 2_000_000
 _LEAST_CELL = 0.02  # m
+_BLOCK = 8  # cells a side that are passed over at once where they hold no edge
+_WIDE = 1000  # cells abreast beyond which a tube is halved before anyone asks what stands in it
 _CLEAR = 1e-5  # m: what lies nearer to a surface belongs to it
 
 
@@ -30,6 +33,13 @@ class Between:
         self.low = low - self.cell
         self.shape = np.ceil((high - self.low) / self.cell).astype(np.int64) + 2
         self.first, self.index = _fill(ends, self.low, self.cell, self.shape)
+        held = np.flatnonzero(np.diff(self.first))
+        blocks = np.stack(np.unravel_index(held, tuple(self.shape))) // _BLOCK
+        self.crowd = np.zeros(tuple(self.shape // _BLOCK + 1), np.bool_)
+        self.crowd[tuple(blocks)] = True
+        centre, radius, empty = surface.balls
+        solid = ~empty & (surface.facets.role != MIRROR)
+        self.centre, self.radius = centre[solid], radius[solid]
 
     def across(
         self,
@@ -46,12 +56,13 @@ class Between:
         """Fill in rows of side (n, 3) that are zero: corners' distances [m] from the longest shadow edge on a tube.
 
         Args: points (n, 4, 3) [m] footprints; k (n, 4, 3) directions after reflection, from a source (n, 3) [m] where
-        all mirrors were flat (n,); hit (n,) facet on which the centre lands, after reach (n,) [m]; wanted (n,).
+        all mirrors were flat (n,); hit (n,) facet on which the centre lands, -1 for none, after reach (n,) [m];
+        wanted (n,).
         """
         s = self.surface
         _across(
             points, k, source, far, flat, hit, reach, wanted, s.edge_ends, s.edge_faces, s.first, s.normal,
-            self.first, self.index, self.low, self.cell, self.shape, side,
+            self.first, self.index, self.low, self.cell, self.shape, self.crowd, self.centre, self.radius, side,
         )  # fmt: skip
 
 
@@ -112,6 +123,59 @@ def _outline(faces, source, k, far, first, normal):  # type: ignore[no-untyped-d
     return front == 1
 
 
+@njit(cache=True, inline="always")
+def _span(points, ks, reach, ball, radius):  # type: ignore[no-untyped-def]
+    """Return from where to where (to `reach`) a tube passes through the balls about bodies; equal: nowhere."""
+    wide, spread = 0.0, 0.0
+    for q in range(3):
+        a, b = 0.0, 0.0
+        for c in range(3):
+            a += (points[q, c] - points[3, c]) ** 2
+            b += (ks[q, c] - ks[3, c]) ** 2
+        wide, spread = max(wide, a), max(spread, b)
+    wide, spread = np.sqrt(wide), np.sqrt(spread)
+    begin, end = np.inf, 0.0
+    for j in range(len(ball)):
+        along, apart = 0.0, 0.0
+        for c in range(3):
+            d = ball[j, c] - points[3, c]
+            along += d * ks[3, c]
+            apart += d * d
+        size = radius[j] + wide + spread * max(along, 0.0)
+        room = size * size - (apart - along * along)
+        if room <= 0.0:
+            continue
+        half = np.sqrt(room)
+        if along + half <= 0.0:
+            continue
+        begin, end = min(begin, max(along - half, 0.0)), max(end, along + half)
+    end = min(end, reach)
+    return (begin, end) if begin < end else (0.0, 0.0)
+
+
+@njit(cache=True, inline="always")
+def _cells(points, ks, near, far_off, low, cell, shape, begin, end):  # type: ignore[no-untyped-def]
+    """Write the box of cells that a tube passes from `near` to `far_off` along its rays."""
+    for c in range(3):
+        least, most = np.inf, -np.inf
+        for q in range(4):
+            x, y = points[q, c] + near * ks[q, c], points[q, c] + far_off * ks[q, c]
+            least, most = min(least, x, y), max(most, x, y)
+        begin[c] = max(int((least - 0.25 * cell - low[c]) / cell), 0)
+        end[c] = min(int((most + 0.25 * cell - low[c]) / cell) + 1, shape[c])
+
+
+@njit(cache=True, inline="always")
+def _crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
+    """Tell whether any block of a box of cells holds an edge."""
+    for i in range(begin[0] // _BLOCK, (end[0] + _BLOCK - 1) // _BLOCK):
+        for j in range(begin[1] // _BLOCK, (end[1] + _BLOCK - 1) // _BLOCK):
+            for k in range(begin[2] // _BLOCK, (end[2] + _BLOCK - 1) // _BLOCK):
+                if crowd[i, j, k]:
+                    return True
+    return False
+
+
 @njit(cache=True, nogil=True)
 def _across(  # type: ignore[no-untyped-def]
     points,
@@ -131,30 +195,42 @@ def _across(  # type: ignore[no-untyped-def]
     low,
     cell,
     shape,
+    crowd,
+    ball,
+    radius,
     out,
 ):
     tried = np.full(len(ends), -1, np.int64)
     side, m, work, k = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    least, most, section = np.empty(3), np.empty(3), np.empty((4, 3))
+    section = np.empty((4, 3))
     begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
     for i in range(len(points)):
         if not wanted[i] or out[i].any():
             continue
         centre = points[i, 3]
         k[:] = ks[i, 3]
-        plane, at_plane = normal[hit[i]], first_point[hit[i]]
+        plane, at_plane = normal[max(hit[i], 0)], first_point[max(hit[i], 0)]
         sign = -1.0 if dot(k, plane) > 0.0 else 1.0
-        steps = int(reach[i] / cell) + 1
+        begin_at, end_at = _span(points[i], ks[i], reach[i], ball, radius)
+        steps = int((end_at - begin_at) / cell) + 1 if end_at > begin_at else 0
         best = 0.0
+        step = (end_at - begin_at) / max(steps, 1)
+        clear_until = 0
         for s in range(steps):
+            if s < clear_until:
+                continue
+            near = begin_at + s * step
+            if s % _BLOCK == 0:
+                _cells(points[i], ks[i], near, near + _BLOCK * step, low, cell, shape, begin_cell, end_cell)
+                if not _crowded(crowd, begin_cell, end_cell):
+                    clear_until = s + _BLOCK
+                    continue
+            _cells(points[i], ks[i], near, near + step, low, cell, shape, begin_cell, end_cell)
+            room = 1
             for c in range(3):
-                least[c], most[c] = np.inf, -np.inf
-                for q in range(4):
-                    for t in (s / steps * reach[i], (s + 1) / steps * reach[i]):
-                        x = points[i, q, c] + t * ks[i, q, c]
-                        least[c], most[c] = min(least[c], x), max(most[c], x)
-                begin_cell[c] = max(int((least[c] - 0.25 * cell - low[c]) / cell), 0)
-                end_cell[c] = min(int((most[c] + 0.25 * cell - low[c]) / cell) + 1, shape[c])
+                room *= max(end_cell[c] - begin_cell[c], 0)
+            if room > _WIDE:
+                break
             for ci in range(begin_cell[0], end_cell[0]):
                 for cj in range(begin_cell[1], end_cell[1]):
                     row = (ci * shape[1] + cj) * shape[2]
@@ -176,7 +252,7 @@ def _across(  # type: ignore[no-untyped-def]
                             ha += sign * (a[c] - at_plane[c]) * plane[c]
                             hb += sign * (b[c] - at_plane[c]) * plane[c]
                         begin, end = above(da, db)
-                        low_end, high_end = above(ha, hb)
+                        low_end, high_end = above(ha, hb) if hit[i] >= 0 else (0.0, 1.0)
                         begin, end = max(begin, low_end), min(end, high_end)
                         if begin >= end:
                             continue

@@ -58,7 +58,8 @@ def tube_routes(
         if not len(tubes) or surface.convex_alone:
             return
         before = tubes
-        tubes = bounce(surface, leg, direct, before, first, total, rule)
+        last = int(before.bounces[0]) + 1 >= bounces
+        tubes = bounce(surface, leg, direct, before, first, last, total, rule)
         if first and len(tubes):
             # From a plane mirror to another body: the legs over mirrors have these.
             previous = tubes.facets[np.arange(len(tubes)), _last_bounce(tubes)]

@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from raychan.kernels.fresnel import coefficients_array
-from raychan.tables import Facets
+from raychan.tables import MIRROR, Facets
 from raychan.world.embree import Tracer
 
 Floats = NDArray[np.float64]
@@ -121,6 +121,10 @@ class Surface(Tracer):
         v = self.facets.vertices
         height = np.einsum("ij,ij->i", v[b, (eb % 3 + 2) % 3] - v[a, ea % 3], self.normal[a])
         bent = height < -1e-9 * np.sqrt(self.area[b])
+        # The ground ends where nobody looks, and its far rim would stretch every grid.
+        solid = self.facets.role[self.facets.body] != MIRROR
+        bent &= solid[a]
+        rim = rim[solid[rim // 3]]
         pick = np.concatenate([ea[bent], rim])
         self.edge_ends = np.stack([v[pick // 3, pick % 3], v[pick // 3, (pick % 3 + 1) % 3]], axis=1)
         beyond = np.concatenate([b[bent], np.full(len(rim), -1)])

@@ -30,26 +30,29 @@ Bools = NDArray[np.bool_]
 _ALIKE = 0.98  # cosine within which normals of one smooth patch may differ over a tube
 
 
-def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, total: float, rule: Refinement) -> Tubes:
+def bounce(
+    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, last: bool, total: float, rule: Refinement
+) -> Tubes:
     """Return the tubes after one more reflection, standing where they land.
 
-    Args: out the way back used to weigh tubes; first whether `tubes` stand on their first surface; total [1/m] the
-    scattered field found so far, against which `rule.relative` counts.
+    Args: out the way back used to weigh tubes; first, last whether `tubes` stand on their first surface, or land on
+    their last; total [1/m] the scattered field found so far, against which `rule.relative` counts.
     """
     landed: list[Tubes] = []
     room = tubes.slots < rule.slots - 2
     start = np.zeros((int(room.sum()), 4))
     through = np.full((int(room.sum()), rule.layers), -1, np.int32)
-    _fly(surface, leg, out, tubes.take(room), start, through, 0, first, total, rule, landed)
+    _fly(surface, leg, out, tubes.take(room), start, through, 0, first, last, total, rule, landed)
     if not landed:
         return tubes.take(np.zeros(len(tubes), bool))
     after = Tubes.join(landed)
-    return after.take(that_count(phases_of(surface, leg, out, after, False, rule).bound, least(rule, total)))
+    ph = phases_of(surface, leg, out, after, False, rule)
+    return after.take(that_count(ph.bound if last else ph.area, least(rule, total)))
 
 
 def _fly(
     surface: Surface, leg: Leg, out: Leg, tubes: Tubes, start: Floats, through: Ints, layer: int,
-    first: bool, total: float, rule: Refinement, landed: list[Tubes],
+    first: bool, last: bool, total: float, rule: Refinement, landed: list[Tubes],
 ) -> None:  # fmt: skip
     """Cast, land what agrees, cut what does not; then go on behind the thin layers that were hit."""
     for level in range(rule.levels + 1):
@@ -58,14 +61,16 @@ def _fly(
         k = mirrored(tubes)
         area, doubt = phases_of(surface, leg, out, tubes, first, rule).area, least(rule, total)
         hit, t = _cast(surface, tubes, k, start, area > doubt)
-        # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight back.
-        span = landing_span(
-            tubes.points, k, tubes.length, hit, surface.first, surface.normal, out.image, out.far, rule.wavenumber
-        )
-        matters = area > doubt * (1.0 + 0.5 * span)
+        matters = area > doubt
+        if last:
+            # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
+            # back. Before more mirrors nobody knows.
+            span = _landing_span(surface, out, tubes, k, hit, rule)
+            # A tube of which no ray meets anything may still hold a small body between its rays.
+            matters &= (area > doubt * (1.0 + 0.5 * span)) | (hit < 0).all(axis=1)
         mid = hit[:, CENTRE]
         agree = _agree(surface, hit)
-        side = _edges(surface, leg, tubes, k, hit, t, matters & (hit >= 0).any(axis=1))
+        side = _edges(surface, leg, tubes, k, hit, t, matters)
         mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
         split = mixed & matters & (level < rule.levels)
         ready = np.flatnonzero(~split & (mid >= 0))
@@ -77,7 +82,7 @@ def _fly(
             centre = beyond[:, CENTRE:].repeat(4, axis=1)
             beyond = np.where(np.isfinite(beyond), beyond, centre) + 1e-6
             passed[:, layer] = mid[behind]
-            _fly(surface, leg, out, tubes.take(behind), beyond, passed, layer + 1, first, total, rule, landed)
+            _fly(surface, leg, out, tubes.take(behind), beyond, passed, layer + 1, first, last, total, rule, landed)
         if not split.any():
             return
         rows = np.flatnonzero(split)
@@ -90,7 +95,7 @@ def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, t: Fl
     """Return the sides (n, 3) of an edge that runs through each tube; zeros where none does."""
     flat = tubes.flat & ~surface.curved[tubes.facet]
     mid = k[:, CENTRE]
-    reach = np.where(hit[:, CENTRE] >= 0, t[:, CENTRE], 0.0)
+    reach = np.where(hit[:, CENTRE] >= 0, t[:, CENTRE], surface.extent)
     # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the section that the
     # tube has where it lands.
     spread = np.where(flat, 0.0, reach)[:, None, None] * (k - mid[:, None])
@@ -103,12 +108,25 @@ def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, t: Fl
         meeting_lines(
             at, source[rows], mid[rows], far, plane[rows], hit[rows], surface.first, surface.normal, mid[rows], found
         )
-        lands = wanted[rows] & (hit[rows, CENTRE] >= 0)
         between(surface).across(
-            tubes.points[rows], k[rows], source[rows], far, flat[rows], hit[rows, CENTRE], reach[rows], lands, found
+            tubes.points[rows],
+            k[rows],
+            source[rows],
+            far,
+            flat[rows],
+            hit[rows, CENTRE],
+            reach[rows],
+            wanted[rows],
+            found,
         )
         side[rows] = found
     return side
+
+
+def _landing_span(surface: Surface, out: Leg, tubes: Tubes, k: Floats, hit: Ints, rule: Refinement) -> Floats:
+    ways = surface.first, surface.normal, out.image, out.far
+    span: Floats = landing_span(tubes.points, k, tubes.length, hit, *(*ways, rule.wavenumber))
+    return span
 
 
 def mirrored(tubes: Tubes) -> Floats:

@@ -37,6 +37,12 @@ def tradeoff(
     quick: Annotated[
         bool, typer.Option("--quick", help="Fewer settings and a coarser truth for the heavy cases.")
     ] = False,
+    beside: Annotated[
+        Path | None,
+        typer.Option(
+            "--beside", help="Draw the front of an earlier run into the summary.", metavar="OLD.csv", show_default=False
+        ),
+    ] = None,
 ) -> None:
     """Chart error against seconds and rays: five methods on six cases.
 
@@ -44,8 +50,13 @@ def tradeoff(
     """
     from raychan.report.tradeoff_figures import case_picture, summary_picture
     from raychan.run.files import staging
-    from raychan.study.tradeoff import tradeoff, write_csv
+    from raychan.study.tradeoff import read_csv, tradeoff, write_csv
+    from raychan.study.verdicts import verdicts
 
+    try:
+        earlier = read_csv(beside) if beside else []
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--beside") from None
     with staging(out) as stage, show.progress() as tell:
         try:
             rows = tradeoff(case or (), quick=quick, progress=tell)
@@ -54,11 +65,11 @@ def tradeoff(
         write_csv(rows, stage / "tradeoff.csv")
         for name in dict.fromkeys(r.case for r in rows):
             case_picture([r for r in rows if r.case == name], stage / f"tradeoff_{name}.png")
-        summary_picture(rows, stage / "tradeoff.png")
+        summary_picture(rows, stage / "tradeoff.png", earlier)
     screen = show.console()
     heads = ["case", "method", "setting", "rays", "seconds", "rms error dB", "on the front"]
     screen.print(show.table("Error against effort", heads, [_cells(r) for r in rows], left=(0, 1, 2, 6)))
-    for line in _verdicts(rows):
+    for line in verdicts(rows):
         screen.print(line, soft_wrap=True)
     screen.print(f"figures and table: {out}", soft_wrap=True)
 
@@ -73,20 +84,3 @@ def _cells(r: Row) -> list[str]:
     return [
         r.case, r.method, setting, f"{r.rays:,.0f}", f"{r.seconds:.3f}", f"{r.error_db:.2f}", ", ".join(fronts),
     ]  # fmt: skip
-
-
-def _verdicts(rows: list[Row]) -> list[str]:
-    """Say for each case whether the default lies on the front of error against seconds, and what beats it if not."""
-    from raychan.study.tradeoff import beaten_by
-
-    lines = []
-    for row in (r for r in rows if r.default):
-        better = sorted(beaten_by(rows, row), key=lambda b: b.seconds)
-        # One launch of our own is half of the default: it gives the value, but cannot say how wrong it is.
-        halves = [b for b in better if b.method == row.method and "launch" in b.setting]
-        others = list(dict.fromkeys(f"{b.method}, {b.setting}" for b in better if b not in halves))
-        verdict = "beaten by " + "; ".join(others[:3]) if others else "on the front"
-        if halves and not others:
-            verdict += f" but for single launches of its own, which state no error (from {halves[0].seconds:.2f} s)"
-        lines.append(f"default on {row.case}: {row.error_db:.2f} dB in {row.seconds:.2f} s, {verdict}")
-    return lines

@@ -16,9 +16,16 @@ PEC, HALF_SPACE, LAYER = 0, 1, 2
 
 
 @njit(cache=True)
+def _root(cos_i: float, eps: complex) -> complex:
+    """Return the normal wave number inside over k, of the wave that fades away from the face."""
+    root = cmath.sqrt(eps - (1.0 - cos_i * cos_i))
+    return -root if root.imag > 0.0 else root
+
+
+@njit(cache=True)
 def half_space(cos_i: float, eps: complex) -> tuple[complex, complex]:
     """Return Fresnel (R_s, R_p) of a half space of complex permittivity eps (ITU-R P.2040-3, eqs. 36-37)."""
-    root = cmath.sqrt(eps - (1.0 - cos_i * cos_i))
+    root = _root(cos_i, eps)
     r_s = (cos_i - root) / (cos_i + root)
     r_p = (eps * cos_i - root) / (eps * cos_i + root)
     return r_s, r_p
@@ -31,7 +38,7 @@ def layer(cos_i: float, eps: complex, thickness: float, k: float) -> tuple[compl
     R refers to the front face. T is the wave behind the slab over the wave that free space would
     have given there: the slab's own T times exp(+j k d cos_i).
     """
-    root = cmath.sqrt(eps - (1.0 - cos_i * cos_i))
+    root = _root(cos_i, eps)
     r_s, r_p = half_space(cos_i, eps)
     once = cmath.exp(-1j * k * thickness * root)
     twice = once * once

@@ -39,8 +39,9 @@ def case_picture(rows: Sequence[Row], path: Path) -> Path:
         return save(made, path)
 
 
-def summary_picture(rows: Sequence[Row], path: Path) -> Path:
-    """Draw all cases, error against seconds, with the front of settings that none beats."""
+def summary_picture(rows: Sequence[Row], path: Path, earlier: Sequence[Row] = ()) -> Path:
+    """Draw all cases, error against seconds, with the front of settings that none beats, and that of an `earlier`
+    run."""
     cases = list(dict.fromkeys(r.case for r in rows))
     across = min(3 if len(cases) <= 6 else 4, len(cases))
     down = -(-len(cases) // across)
@@ -49,10 +50,10 @@ def summary_picture(rows: Sequence[Row], path: Path) -> Path:
         grid = np.atleast_1d(made.subplots(down, across, sharey=True, squeeze=False)).ravel()
         for axes, name in zip(grid, cases, strict=False):
             mine = [r for r in rows if r.case == name]
-            front = sorted((r for r in mine if r.front_seconds), key=lambda r: r.seconds)
-            x = [max(r.seconds, 1e-5) for r in front]
-            y = [_shown(max(r.error_db, r.truth_db)) for r in front]
-            axes.step([*x, 1e3], [*y, y[-1]], where="post", color="#bbbbbb", lw=5, alpha=0.6, zorder=1, label="front")
+            _front(axes, mine, color="#bbbbbb", lw=5, alpha=0.6, zorder=1, label="front")
+            old = [r for r in earlier if r.case == name]
+            _front(axes, old, color="#555555", lw=1.2, ls="--", zorder=2, label="front of the earlier run")
+            _defaults(axes, old, "seconds", mfc="none", mew=1.2, label="its default setting")
             _lines(axes, mine, "seconds")
             axes.set_title(mine[0].title, fontsize=9)
         for axes in grid[len(cases) :]:
@@ -62,9 +63,25 @@ def summary_picture(rows: Sequence[Row], path: Path) -> Path:
                 axes.set_ylabel("rms error [dB]")
             if i + across >= len(cases):
                 axes.set_xlabel("seconds, all views")
-        handles, names = grid[0].get_legend_handles_labels()
-        made.legend(handles, names, loc="outside lower center", ncols=4)
+        # An earlier run may lack the first case.
+        known = {name: handle for axes in grid for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
+        made.legend(known.values(), known.keys(), loc="outside lower center", ncols=min(across + 1, 4))
         return save(made, path)
+
+
+def _front(axes: Any, rows: Sequence[Row], **look: Any) -> None:
+    """Draw the front of error against seconds as steps."""
+    front = sorted((r for r in rows if r.front_seconds), key=lambda r: r.seconds)
+    if front:
+        x, y = [max(r.seconds, 1e-5) for r in front], [_shown(max(r.error_db, r.truth_db)) for r in front]
+        axes.step([*x, 1e3], [*y, y[-1]], where="post", **look)
+
+
+def _defaults(axes: Any, rows: Sequence[Row], key: str, label: str, **look: Any) -> None:
+    """Mark the default settings by stars."""
+    for i, r in enumerate(r for r in rows if r.default):
+        x, y = max(float(getattr(r, key)), 1e-5), _shown(r.error_db)
+        axes.plot(x, y, "*", ms=15, mec="black", ls="none", zorder=5, label=label if i == 0 else None, **look)
 
 
 def _shown(error: float) -> float:
@@ -78,11 +95,7 @@ def _lines(axes: Any, rows: Sequence[Row], key: str) -> None:
         x = [max(float(getattr(r, key)), 1e-5) for r in mine]
         mark, colour = _LOOK[method]
         axes.plot(x, [_shown(r.error_db) for r in mine], marker=mark, color=colour, ms=5, lw=1.2, label=method)
-    for i, r in enumerate(r for r in rows if r.default):
-        axes.plot(
-            max(float(getattr(r, key)), 1e-5), _shown(r.error_db), "*", ms=15, mfc="#ffd54a", mec="black", mew=0.8,
-            ls="none", zorder=5, label="default setting" if i == 0 else None,
-        )  # fmt: skip
+    _defaults(axes, rows, key, mfc="#ffd54a", mew=0.8, label="default setting")
     axes.axhspan(_LOW / 2, rows[0].truth_db, color="#eeeeee", lw=0, zorder=0, label="closer than the truth is known")
     axes.set(xscale="log", yscale="log", ylim=(_LOW * 0.8, _HIGH * 1.3))
     axes.set_xlim(*_span([max(float(getattr(r, key)), 1e-5) for r in rows]))

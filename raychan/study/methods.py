@@ -31,8 +31,7 @@ POINT, UNIFORM, ADAPTIVE, MIRRORS, POINTS = (
 METHODS = (ADAPTIVE, UNIFORM, POINT, MIRRORS, POINTS)
 DEFAULT_TOLERANCE_DB = 0.25
 """The default of `raychan.rcs`."""
-MOST_RAYS = 2_000_000
-"""Rays at which methods that get no better are stopped."""
+_MOST_POINTS = 2_000_000  # a view, for hard targets
 
 
 @dataclass(frozen=True)
@@ -128,8 +127,9 @@ class Effort:
     run: Callable[[Target], Run]
 
 
-def efforts(quick: bool, heavy: bool = False) -> list[Effort]:
-    """Return all settings of all methods for targets; fewer when quick, fewer fine ones when the target is heavy."""
+def efforts(quick: bool, heavy: bool = False, hard: bool = False) -> list[Effort]:
+    """Return all settings of all methods for targets; fewer when quick, fewer fine ones when the target is heavy, more
+    point samples when it is hard."""
     counts = (1_000, 16_000, 128_000) if quick else (1_000, 4_000, 16_000, 64_000, 256_000, 700_000)
     tolerances = (DEFAULT_TOLERANCE_DB,) if quick or heavy else (1.0, DEFAULT_TOLERANCE_DB, 0.1)
     made = []
@@ -140,7 +140,7 @@ def efforts(quick: bool, heavy: bool = False) -> list[Effort]:
             Effort(ADAPTIVE, f"{t:g} dB", t == DEFAULT_TOLERANCE_DB, lambda case, t=t: adaptive(case, t))  # type: ignore[misc]
         )
     for method, tubes in ((UNIFORM, True), (POINT, False)):
-        for n in counts:
+        for n in (*counts, _MOST_POINTS) if hard and not quick and not tubes else counts:
             made.append(Effort(method, f"{n} a view", False, lambda case, n=n, tubes=tubes: lattice(case, n, tubes)))  # type: ignore[misc]
     for i, mesh in enumerate(("plain mesh", "fine mesh")):
         made.append(Effort(MIRRORS, mesh, False, lambda case, i=i: mirrors(case, i)))  # type: ignore[misc]

@@ -21,6 +21,7 @@ Ints = NDArray[np.int32]
 _CHUNK = 1 << 16
 _MISS = np.int32(-1)
 _SLACK = 2e-6  # of a coordinate: a few float32 spacings
+_EDGE = 0.15  # of the pace: what float32 may move a ray aside
 _TOUCH = 2e-5  # m: surfaces nearer than this lie on each other
 _NEAREST = 1e-6  # m: a hit closer than this is the surface the ray leaves
 
@@ -80,7 +81,17 @@ class Tracer:
             t_old = np.where(old >= 0, self.distance(old, origin[rows], direction[rows]), np.inf)
             t_new = self.distance(new, origin[rows], direction[rows])
             nearer = (t_new > 0.0) & (t_new < t_old - pace[rows])
-            hit[rows[nearer]] = new[nearer]
+            rows, new = rows[nearer], new[nearer]
+            real = self._holds(new, origin[rows] + t_new[nearer, None] * direction[rows], _EDGE * pace[rows])
+            hit[rows[real]] = new[real]
+
+    def _holds(self, facet: Ints, point: Floats, margin: Floats) -> NDArray[np.bool_]:
+        """Tell whether points (n, 3) of facets' planes lie on the facets, or within a margin (n,) [m] of them."""
+        v, n = self.facets.vertices[facet], self.normal[facet]
+        side = np.roll(v, -1, axis=1) - v
+        inward = np.cross(n[:, None], side)
+        depth = np.einsum("nij,nij->ni", point[:, None] - v, inward)
+        return np.asarray((depth > -margin[:, None] * np.linalg.norm(side, axis=2)).all(axis=1))
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
