@@ -34,7 +34,7 @@ _COVER = 1.8  # of the change between two launches
 _COVER_ALONE = 1.2  # the same where a body hides nothing of itself, so that launches cannot both miss it
 _CURVED = 0.02  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
 _NULL = 1e-4  # of the strongest polarisation: -80 dB
-_GROWTH = 2.0  # rays of the next refinement over those of all before it, about
+_GROWTH = 2.6  # rays of the next refinement over those of all before it, about
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,6 @@ def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iter
     again."""
     edge = min(_FIRST_EDGE, surface.extent / 4.0)
     own = _typical_edge(surface)
-    # Weak returns of shadows and mirrors add up; a body that hides nothing of itself has none.
-    relative = 0.03 if surface.convex_alone else 0.01
     for i in range(steps):
         fine = 2.0**-i
         longest = edge if i == 0 else min(edge, 1.35 * own) * 0.6**i
@@ -127,7 +125,7 @@ def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iter
             wavenumber=2.0 * np.pi * frequency / C0,
             phase=0.2 * fine,
             turn=0.3 * fine,
-            relative=relative * fine,
+            relative=0.03 * fine,
             max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
         )

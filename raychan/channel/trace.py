@@ -20,7 +20,7 @@ from raychan.channel.tubes import (
     that_count,
     vector_area,
 )
-from raychan.kernels.patch import landing_span
+from raychan.kernels.landing import landing_span
 from raychan.tables import REFLECT
 
 Floats = NDArray[np.float64]

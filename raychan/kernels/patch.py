@@ -52,7 +52,7 @@ def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _length(p, image, far):  # type: ignore[no-untyped-def]
+def length_to(p, image, far):  # type: ignore[no-untyped-def]
     if far:
         return -_dot(p, image)
     return math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
@@ -95,7 +95,7 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         _face(n[f], x, y, z, normal[3])
         low, high = np.inf, -np.inf
         for q in range(7):
-            total[q] = wavenumber * (_length(p[q], image, far) + _length(p[q], out_image, out_far))
+            total[q] = wavenumber * (length_to(p[q], image, far) + length_to(p[q], out_image, out_far))
             if q < 6:
                 low, high = min(low, total[q]), max(high, total[q])
         bend0 = total[3] - 0.5 * (total[0] + total[1])
@@ -255,7 +255,7 @@ def phases(  # type: ignore[no-untyped-def]
     for i in range(m):
         low, high = np.inf, -np.inf
         for c in range(3):
-            six[i, c] = wavenumber * (length[i, c] + _length(points[i, c], out_image, out_far))
+            six[i, c] = wavenumber * (length[i, c] + length_to(points[i, c], out_image, out_far))
             low, high = min(low, six[i, c]), max(high, six[i, c])
         span = high - low
         for c in range(3):
@@ -264,17 +264,17 @@ def phases(  # type: ignore[no-untyped-def]
                 w, f = bary[i], facet[i]
                 x, y, z = 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2])
                 _place(v[f], b[f], x, y, z, middle)
-                way = _length(middle, image, far)
+                way = length_to(middle, image, far)
             else:
                 turned = 0.0
                 for x in range(3):
                     middle[x] = 0.5 * (points[i, c, x] + points[i, d, x])
                     turned += (k[i, c, x] - k[i, d, x]) * (points[i, d, x] - points[i, c, x])
                 way = 0.5 * (length[i, c] + length[i, d]) + 0.125 * turned
-            six[i, 3 + c] = wavenumber * (way + _length(middle, out_image, out_far))
+            six[i, 3 + c] = wavenumber * (way + length_to(middle, out_image, out_far))
             bend[i, c] = six[i, 3 + c] - 0.5 * (six[i, c] + six[i, d])
             low, high = min(low, six[i, 3 + c]), max(high, six[i, 3 + c])
-        back = _length(points[i, 3], out_image, out_far)
+        back = length_to(points[i, 3], out_image, out_far)
         miss = wavenumber * (length[i, 3] + back) - (six[i, 0] + six[i, 1] + six[i, 2]) / 3.0
         miss -= (bend[i, 0] + bend[i, 1] + bend[i, 2]) * (4.0 / 9.0)
         p, q, r = points[i, 0], points[i, 1], points[i, 2]
@@ -289,35 +289,3 @@ def phases(  # type: ignore[no-untyped-def]
             off = max(off, _distance(normals[i, c], normals[i, 3]) / turn)
         rough[i] = off / (1.0 + 0.5 * (high - low))
     return six, bend, bound, area, rough
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def landing_span(points, k, length, hit, first, normal, out_image, out_far, wavenumber):  # type: ignore[no-untyped-def]
-    """Return by how much (n,) [rad] the two-way phase of tubes runs where they land: the least over the planes met.
-
-    Args: k (n, 4, 3) directions after the mirror; hit (n, 4) facets met, -1 for none; first, normal (m, 3) of planes.
-    """
-    out = np.full(len(points), np.inf)
-    p = np.empty(3)
-    for i in range(len(points)):
-        for r in range(4):
-            f = hit[i, r]
-            if f < 0 or (r > 0 and f == hit[i, r - 1]):
-                continue
-            low, high = np.inf, -np.inf
-            for q in range(3):
-                height, slope = 0.0, 0.0
-                for c in range(3):
-                    height += (first[f, c] - points[i, q, c]) * normal[f, c]
-                    slope += k[i, q, c] * normal[f, c]
-                if height * slope <= 0.0:
-                    # Not all of the tube can land there: how much of it does is not known yet.
-                    low, high = 0.0, 0.0
-                    break
-                t = height / slope
-                for c in range(3):
-                    p[c] = points[i, q, c] + t * k[i, q, c]
-                phase = wavenumber * (length[i, q] + t + _length(p, out_image, out_far))
-                low, high = min(low, phase), max(high, phase)
-            out[i] = min(out[i], high - low)
-    return out
