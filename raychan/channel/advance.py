@@ -163,7 +163,7 @@ def _corner_ways(  # type: ignore[no-untyped-def]
             out[t, i, :] = now[:3]
 
 
-_APART = 2e-3  # m of path: footprints longer than this in range give each corner its own delay
+APART = 2e-3  # m of path: footprints longer than this in range give each corner its own delay
 
 
 @njit(cache=True, parallel=True)
@@ -200,7 +200,7 @@ def _carry(  # type: ignore[no-untyped-def]
                     out_lengths[t, i, c] = way
                     low, high = min(low, way), max(high, way)
             triangle_terms(phases, _LINEAR, terms)
-            if high - low > _APART:
+            if high - low > APART:
                 for c in range(3):
                     out[t, i, c] = strength[i] * taper[i, c] * terms[c]
             else:

@@ -92,6 +92,14 @@ def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type
     return side.min() < 0.0 and side.max() > 0.0
 
 
+@njit(cache=True)
+def starts_again(first):  # type: ignore[no-untyped-def]
+    """Put the starts of each cell's entries back in place after filling has moved each to its end."""
+    for at in range(len(first) - 1, 0, -1):
+        first[at] = first[at - 1]
+    first[0] = 0
+
+
 @njit(cache=True, nogil=True)
 def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side):  # type: ignore[no-untyped-def]
     """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into

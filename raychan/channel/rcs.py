@@ -197,9 +197,8 @@ def _refined(
 def stated_error(value: complex, change: float, cover: float = _COVER) -> float:
     """Return the error [dB] of |value|^2 to state when two launches differ by `change` [unit of value].
 
-    The factors and `_CURVED` were chosen on 2000 random bodies and 48 views of two cars (covered: 96 to 98 % and 94 %;
-    median ratio 3.3 and 3.6). On 210 other bodies it covers the true error in 96.7 %, in 93 % of those where that is
-    above 0.001 dB, at a median ratio of 2.8.
+    The factors were chosen on some 3000 random bodies. On 210 others it covers the true error in 98.6 %, in 96 % of
+    those where that is above 0.001 dB, at a median ratio of 2.8; other sets of 210 gave 95 to 99 % and 2.7 to 4.7.
     """
     change = cover * change
     size = abs(value)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from raychan.channel.edges import above, cross_into, dot, inside
+from raychan.channel.edges import above, cross_into, dot, inside, starts_again
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 
@@ -124,9 +124,7 @@ def _fill(edges, image, far, low, cell, shape):  # type: ignore[no-untyped-def]
         if fill == 0:
             first = np.cumsum(first)
             index = np.empty(first[-1], np.int32)
-    for at in range(total, 0, -1):
-        first[at] = first[at - 1]
-    first[0] = 0
+    starts_again(first)
     return first, index
 
 

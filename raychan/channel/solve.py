@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.advance import corner_rates
+from raychan.channel.advance import APART, corner_rates
 from raychan.channel.diffract import diffracted_paths
 from raychan.channel.fields import departures, rates, transfer
 from raychan.channel.legs import Leg
@@ -22,8 +22,6 @@ from raychan.channel.surface import Surface
 from raychan.channel.tubes import Refinement
 from raychan.tables import MIRROR, REFLECT, SCATTER, Facets, Paths, Points, Routes, take
 from raychan.units import C0
-
-_APART = 2e-3  # m of path: beyond it corners have delays and rates of their own
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -198,7 +196,7 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> 
     rate = rates(routes, facets, v, v)
     away, look = departures(routes)
     spans = routes.lengths[:, :3].max(axis=1) - routes.lengths[:, :3].min(axis=1)
-    long = (routes.kind == SCATTER).any(axis=1) & (spans > _APART)
+    long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
     whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
     index = np.concatenate([whole, np.repeat(rows, 3)])
     amplitude = np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])
