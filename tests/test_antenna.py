@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from raychan.frames import direction
-from raychan.radar.antenna import PRESETS, Antenna, CosinePattern, Isotropic, UniformArray, preset
+from raychan.radar.antenna import Antenna, CosinePattern, Isotropic, UniformArray
 from raychan.radar.pattern import MeasuredPattern, PatternError, characteristics, gain_dbi
 from raychan.radar.windows import window
+from raychan.world.mount import antenna_of
+from raychan.world.schema import AntennaTable
 
+SCENES = Path(__file__).parents[1] / "scenes"
 AHEAD = np.array([[1.0, 0.0, 0.0]])
 EVERY = {
     "isotropic": Isotropic(),
@@ -88,33 +93,53 @@ def test_figures_of_merit_turn_with_the_pattern_and_know_what_is_not_there():
     assert gain_dbi(Isotropic(front=True), np.pi) == -math.inf
 
 
-def test_c047_c048_16x16_beam_widths_and_side_lobe_of_the_study():
-    found = characteristics(preset("study_array16"))
-    assert found.hpbw_v_deg == pytest.approx(6.3, abs=0.1)
-    assert found.sll_v_db == pytest.approx(-13.2, abs=0.3)
-    assert found.hpbw_h_deg == pytest.approx(3.46, abs=0.1)
+def mounted(name, polarization="V"):
+    return antenna_of(f"antennas/{name}.toml", polarization, SCENES, "antenna")
 
 
-def test_c049_2x2_beam_widths_of_the_study():
-    found = characteristics(preset("study_2x2"))
-    assert found.hpbw_h_deg == pytest.approx(27.6, abs=0.5)
-    assert found.hpbw_v_deg == pytest.approx(54.7, abs=0.5)
+def published(name):
+    return tomllib.loads((SCENES / "antennas" / f"{name}.toml").read_text())["published"]
 
 
-def test_patch_beam_widths_of_the_study():
-    found = characteristics(preset("study_patch"))
-    assert (found.hpbw_h_deg, found.hpbw_v_deg) == pytest.approx((86.0, 86.27), abs=1e-3)
+@pytest.mark.parametrize(("name", "within"), [("patch", 1e-3), ("array_2x2", 0.5), ("array_16x16", 0.1)])
+def test_c047_c048_c049_beam_widths_of_the_study(name, within):
+    found, printed = characteristics(mounted(name)), published(name)
+    assert found.hpbw_h_deg == pytest.approx(printed["hpbw_h_deg"], abs=within)
+    assert found.hpbw_v_deg == pytest.approx(printed["hpbw_v_deg"], abs=within)
+
+
+def test_c047_side_lobe_of_16_elements_in_phase():
+    assert characteristics(mounted("array_16x16")).sll_v_db == pytest.approx(
+        published("array_16x16")["sll_v_db"], abs=0.3
+    )
 
 
 @pytest.mark.parametrize("polarization", ["V", "H"])
-def test_presets_have_the_printed_gain_and_polarisation(polarization):
-    assert set(PRESETS) == {"study_2x2", "study_patch", "study_array16"}
-    for name, printed in (("study_2x2", 10.36), ("study_patch", 7.06), ("study_array16", 28.75)):
-        field = preset(name, polarization).field(AHEAD)[0]
-        assert 20.0 * math.log10(abs(field["VH".index(polarization)])) == pytest.approx(printed, abs=1e-9)
-        assert field["HV".index(polarization)] == 0.0
-    with pytest.raises(ValueError, match="study_2x2"):
-        preset("study_3x3")
+@pytest.mark.parametrize("name", ["patch", "array_2x2", "array_16x16"])
+def test_an_antenna_file_has_the_gain_it_asks_for_and_the_polarisation(name, polarization):
+    field = mounted(name, polarization).field(AHEAD)[0]
+    wanted = published(name)["gain_dbi"]
+    assert 20.0 * math.log10(abs(field["VH".index(polarization)])) == pytest.approx(wanted, abs=1e-9)
+    assert field["HV".index(polarization)] == 0.0
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"kind": "isotropic", "front": True},
+        {"kind": "cosine", "hpbw_h_deg": 80.0, "hpbw_v_deg": 60.0},
+        {"kind": "array", "ny": 3, "nz": 2},
+        {"kind": "measured", "file": "pattern.csv"},
+    ],
+)
+def test_gain_dbi_scales_any_antenna_and_keeps_its_shape(given, tmp_path):
+    written(tmp_path, "plane,angle_deg,gain_dbi\naz,-90,-3\naz,0,0\naz,90,-5\nel,-90,-2\nel,0,0\nel,90,-2\n")
+    plain, scaled = (
+        antenna_of(AntennaTable(**given, **more), "V", tmp_path, "antenna") for more in ({}, {"gain_dbi": 7.25})
+    )
+    d = fibonacci_sphere(300)
+    assert gain_dbi(scaled) == pytest.approx(7.25, abs=1e-9)
+    np.testing.assert_allclose(gain(scaled, d), gain(plain, d) * 10.0 ** (0.1 * (7.25 - gain_dbi(plain))), rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 from records import paths, result
+from texts import ISOTROPIC, upright, walker
 
 from raychan.cli import invoke
 from raychan.run.provenance import explain
@@ -22,36 +23,11 @@ GROUND, SUV, TRUCK, WALKER = range(4)
 TAIL = [(SUV, SCATTER)]
 GHOST = [(TRUCK, REFLECT), (WALKER, POINT), (TRUCK, REFLECT)]
 
-SCENE = """
-[scene]
-title = "A ghost"
-[radar]
-position = [0.0, 0.0, 1.0]
-power_dbm = 40.0
-antenna = { kind = "isotropic" }
-[radar.waveform]
-bandwidth_mhz = 1000.0
-chirp_us = 30.0
-chirps = 32
-samples = 256
-[model]
-tolerance_db = 3.0
-[[bodies]]
-name = "house"
-shape = "plate"
-params = { width = 3.0, height = 3.0 }
-position = [13.5, 0.5, 1.0]
-yaw_deg = 180.0
-[[bodies]]
-name = "walker"
-shape = "box"
-params = { length = 0.2, width = 0.5, height = 1.8 }
-position = [10.0, 1.0, 0.1]
-rcs_dbsm = 0.0
+SCENE = f"""{ISOTROPIC}{upright("house", 13.5, 0.5)}{walker(10.0, 1.0)}
 [[bodies]]
 name = "post"
 shape = "box"
-params = { length = 0.1, width = 0.1, height = 2.0 }
+params = {{ length = 0.1, width = 0.1, height = 2.0 }}
 position = [5.0, -3.0, 0.0]
 """
 

@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
 import pytest
+from texts import PLATE
 
 from raychan.cli import invoke
-
-SCENE = """
-[scene]
-title = "A plate ahead"
-[radar]
-position = [0.0, 0.0, 1.0]
-velocity_mps = [5.0, 0.0, 0.0]
-[radar.waveform]
-bandwidth_mhz = 500.0
-chirp_us = 30.0
-chirps = 32
-samples = 64
-[model]
-max_bounces = 1
-[[bodies]]
-name = "sign"
-shape = "plate"
-position = [9.0, 0.0, 1.0]
-yaw_deg = 180.0
-"""
 
 
 @pytest.fixture
 def scene(tmp_path):
     file = tmp_path / "plate.toml"
-    file.write_text(SCENE)
+    file.write_text(PLATE)
     return file
 
 
@@ -90,8 +72,14 @@ def test_info_tells_of_scenes_and_of_meshes(scene, tmp_path, capsys):
     trimesh = pytest.importorskip("trimesh")
     assert invoke(["info", str(scene)]) == 0
     said = capsys.readouterr().out
-    for word in ("sign", "study_2x2", "EIRP", "22.36 dBm", "unambiguous range", "published"):
+    for word in ("sign", "isotropic", "EIRP", "15.01 dBm", "unambiguous range", "computed"):
         assert word in said
+    patch = tmp_path / "patch.toml"
+    patch.write_text('kind = "cosine"\nhpbw_h_deg = 80.0\nhpbw_v_deg = 60.0\n[published]\nhpbw_v_deg = 59.5\n')
+    assert invoke(["info", str(patch)]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"width, elevation \[deg\] +60.00 +59.5 *\n", said)
+    assert re.search(r"width, azimuth \[deg\] +80.00 *\n", said)
     box = tmp_path / "box.stl"
     trimesh.creation.box((1.0, 2.0, 3.0)).export(box)
     assert invoke(["info", str(box)]) == 0
@@ -111,6 +99,8 @@ def test_info_tells_of_scenes_and_of_meshes(scene, tmp_path, capsys):
         (["view", "{scene}", "--html", "no/such/place.html"], "no/such/place.html"),
         (["view", "{scene}", "--screenshot", "x.jpg"], ".png"),
         (["info", "nothing.stl"], "nothing.stl"),
+        (["run", "{scene}", "--out", "o", "--set", "radar.antenna=horn.toml"], "no antenna file"),
+        (["run", "{scene}", "--out", "o", "--set", "radar.antenna={{kind='array', gain=3}}"], "gain_dbi"),
         (["sing"], "sing"),
     ],
 )
@@ -148,6 +138,20 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [scene.name]
 
 
+_STOPPED_IN_C = """
+import ctypes, os, signal, time
+import raychan.channel.solve, raychan.cli
+stop = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))
+raychan.channel.solve.solve = lambda *a, **k: (stop(), time.sleep(50))
+raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
+"""
+
+
+def test_ctrl_c_is_not_lost_in_a_callback_from_c(scene, tmp_path):
+    done = python(_STOPPED_IN_C.format(scene=str(scene), out=str(tmp_path / "out")))
+    assert (done.returncode, done.stderr) == (130, "raychan: interrupted; nothing was written\n")
+
+
 _HELP = """
 import sys, raychan.cli
 code = raychan.cli.invoke(["--help"])
@@ -176,3 +180,18 @@ def test_pictures_are_drawn_even_of_a_map_without_detections(scene, tmp_path, mo
         assert invoke(command) == 0
         for picture in ("scene.png", "profile.png", "rdmap.png"):
             assert (tmp_path / name / picture).stat().st_size > 5000
+
+
+def options(group):
+    for command in group.commands.values():
+        yield from options(command) if hasattr(command, "commands") else ((command.name, p) for p in command.params)
+
+
+def test_help_has_no_bracketed_word_that_typer_would_swallow_as_a_style():
+    from typer.main import get_command
+
+    from raychan.cli import app
+
+    told = [(name, p.help) for name, p in options(get_command(app)) if getattr(p, "help", "")]
+    assert len(told) > 40
+    assert not [(name, text) for name, text in told if re.search(r"\[/?[a-zA-Z]", text)]

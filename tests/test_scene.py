@@ -14,6 +14,7 @@ from raychan.world.check import folded_range, nearest_point
 from raychan.world.scene import Body, Scene, SceneError
 
 URBAN = Path(__file__).parents[1] / "scenes" / "urban.toml"
+PATCH = URBAN.parent / "antennas" / "patch.toml"
 RADAR = """
 [radar]
 [radar.waveform]
@@ -140,7 +141,7 @@ def test_sensor_of_a_file():
 @pytest.mark.parametrize(
     "antenna",
     [
-        '"study_array16"',
+        f'"{PATCH}"',
         '{ kind = "isotropic", front = true }',
         '{ kind = "cosine", hpbw_h_deg = 80.0, hpbw_v_deg = 60.0 }',
         '{ kind = "array", ny = 4, element = { kind = "cosine", hpbw_h_deg = 90.0, hpbw_v_deg = 90.0 } }',
@@ -153,10 +154,55 @@ def test_antennas_of_a_file(antenna):
     assert abs(ahead[2]) == pytest.approx(np.linalg.norm(ahead))
 
 
+def test_a_radar_without_an_antenna_is_isotropic_ahead():
+    sensor = Scene.from_text(RADAR).sensor
+    ahead, behind = np.linalg.norm(sensor.tx_field(np.array([[1.0, 0, 0], [-1.0, 0, 0]])), axis=1)
+    assert ahead**2 == pytest.approx(2.0) and behind == 0.0
+
+
+def test_antenna_files_are_named_from_the_scene_file(tmp_path):
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "cuts.csv").write_text("plane,angle_deg,gain_dbi\naz,0,0\naz,9,-3\nel,0,0\nel,9,-3\n")
+    (tmp_path / "own" / "horn.toml").write_text('kind = "measured"\nfile = "cuts.csv"\ngain_dbi = 20.0\n')
+    file = tmp_path / "street.toml"
+    file.write_text(RADAR.replace("[radar]", '[radar]\nantenna = "own/horn.toml"'))
+    scene = Scene.load(file)
+    assert np.linalg.norm(scene.sensor.tx_field(np.array([[1.0, 0, 0]]))) == pytest.approx(10.0)
+    assert scene.override(["radar.tx_antenna={kind='isotropic', gain_dbi=6}"]).sensor.rx != scene.sensor.tx
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("own/patsch.toml", "", "did you mean 'own/patch.toml'"),
+        ("patch", "", "no antenna file"),
+        ("own", "", "no antenna file"),
+        ("own/patch.toml", "kind = ", "patch.toml:1: not valid TOML"),
+        ("own/patch.toml", 'kind = "cosine"\nhpbw_h = 3.0', "patch.toml: hpbw_h: unknown key 'hpbw_h'"),
+        ("own/patch.toml", 'kind = "cosine"\nhpbw_h_deg = 80.0', "patch.toml: keys do not fit"),
+        ("own/patch.toml", 'kind = "cosine"\nhpbw_h_deg = 80.0\nhpbw_v_deg = 180.0', "patch.toml: a half-power"),
+        ("own/patch.toml", 'kind = "measured"\nfile = "none.csv"', "none.csv"),
+        ("own/patch.toml", 'kind = "array"\nny = 2\ntaper_y = "hamm"', "patch.toml"),
+        ("own/patch.toml", "ny = 2", "patch.toml: kind: key is missing"),
+        (
+            "own/patch.toml",
+            'kind = "array"\nny = 2\nspacing_y = 0.5\ngain_dbi = 5.0\n[element]\nkind = "measured"\nfile = "no.csv"',
+            "patch.toml: element",
+        ),
+    ],
+)
+def test_a_bad_antenna_file_is_named_with_its_key(tmp_path, name, content, says):
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "patch.toml").write_text(content)
+    with pytest.raises(SceneError) as caught:
+        Scene.from_text(RADAR.replace("[radar]", f'[radar]\nantenna = "{name}"'), tmp_path / "street.toml")
+    assert says in str(caught.value)
+
+
 def test_override_changes_keys_and_keeps_the_file():
     scene = Scene.load(URBAN)
     new = scene.override(
-        ["radar.power_dbm=10", "bodies.suv.position=[20, 0, 0]", "radar.antenna=study_patch", "scene.title=x"]
+        ["radar.power_dbm=10", "bodies.suv.position=[20, 0, 0]", "radar.antenna=antennas/patch.toml", "scene.title=x"]
     )
     assert new.sensor.power == pytest.approx(0.01) and new.title == "x"
     suv = next(b for b in new.bodies if b.name == "suv")
@@ -192,7 +238,15 @@ def test_bad_overrides_are_named(change, key, says):
         (RADAR.replace("[radar]", "[radar]\nvelocity_kmh = [7.0, 0.0, 0.0]"), "radar.velocity_kmh", "velocity_mps"),
         (RADAR.replace("[radar]", "[radar]\npositon = [0, 0, 1]"), "radar.positon", "position"),
         (RADAR.replace("[radar]", "[radar]\nposition = [0.0, 1.0]"), "radar.position", "3"),
-        (RADAR.replace("[radar]", '[radar]\nantenna = "study_2x3"'), "radar.tx_antenna", "study_2x2"),
+        (RADAR.replace("[radar]", '[radar]\nantenna = "patch.tml"'), "radar.antenna", "no antenna file"),
+        (RADAR.replace("[radar]", '[radar]\nrx_antenna = "patch.tml"'), "radar.rx_antenna", "no antenna file"),
+        (RADAR.replace("[radar]", '[radar]\nantenna = { kind = "cosin" }'), "radar.antenna.kind", "'cosine'"),
+        (RADAR.replace("[radar]", '[radar]\nantenna = { kind = "isotropic", ny = 2 }'), "radar.antenna", "front"),
+        (
+            RADAR.replace("[radar]", '[radar]\nantenna = { kind = "isotropic", gain_dbi = 3.0, loss_db = 1.0 }'),
+            "radar.antenna",
+            "either gain_dbi or loss_db",
+        ),
         (RADAR.replace("[radar]", '[radar]\nantenna = { kind = "cosine" }'), "radar.antenna", "hpbw"),
         (RADAR.replace("[radar]", '[radar]\nantenna = { kind = "array", nx = 2 }'), "radar.antenna.nx", "ny"),
         (RADAR.replace("[radar]", "[radar]\nnoise_figure_db = inf"), "radar.noise_figure_db", "finite"),

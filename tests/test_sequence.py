@@ -9,29 +9,14 @@ import sys
 
 import numpy as np
 import pytest
+from texts import PLATE
 
 import raychan as rc
 from raychan.cli import invoke
 from raychan.run.sequence import Store, carried, frames
 from raychan.run.store import load_result
 
-SCENE = """
-[radar]
-position = [0.0, 0.0, 1.0]
-velocity_mps = [5.0, 0.0, 0.0]
-[radar.waveform]
-bandwidth_mhz = 500.0
-chirp_us = 30.0
-chirps = 32
-samples = 64
-[model]
-max_bounces = 1
-tolerance_db = 3.0
-[[bodies]]
-name = "sign"
-shape = "plate"
-position = [9.0, 0.0, 1.0]
-yaw_deg = 180.0
+SCENE = f"""{PLATE}
 [[bodies]]
 name = "box"
 shape = "box"

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from texts import ISOTROPIC, upright, walker
 from truth import tworay
 
 from raychan.cli import invoke
@@ -23,43 +24,10 @@ WALL = 6.0
 """Distance of the screen, whose left edge stands straight ahead of the radar [m]."""
 FACE = 13.5
 """Distance of the mirror behind the walker [m]."""
-TEXT = f"""
-[scene]
-title = "A screen and a walker"
-[radar]
-position = [0.0, 0.0, 1.0]
-power_dbm = 30.0
-antenna = {{ kind = "isotropic" }}
-[radar.waveform]
-bandwidth_mhz = 1000.0
-chirp_us = 30.0
-chirps = 32
-samples = 256
-[model]
-max_bounces = 3
-tolerance_db = 3.0
-[[bodies]]
-name = "screen"
-shape = "plate"
-params = {{ width = 3.0, height = 3.0 }}
-position = [{WALL}, -1.5, 1.0]
-yaw_deg = 180.0
-[[bodies]]
-name = "walker"
-shape = "box"
-params = {{ length = 0.2, width = 0.5, height = 1.8 }}
-position = [10.0, -1.0, 0.1]
+TEXT = f"""{ISOTROPIC}{upright("screen", WALL, -1.5)}{walker(10.0, -1.0)}
 velocity_mps = [0.0, 2.0, 0.0]
-rcs_dbsm = 0.0
 """
-HOUSE = f"""
-[[bodies]]
-name = "house"
-shape = "plate"
-params = {{ width = 3.0, height = 3.0 }}
-position = [{FACE}, 0.5, 1.0]
-yaw_deg = 180.0
-"""
+HOUSE = upright("house", FACE, 0.5)
 F, N, M, FS = 77e9, 256, 32, 256 / 30e-6
 
 

@@ -10,9 +10,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from raychan.cli import invoke
 from raychan.report.validation_page import page
+from raychan.report.validation_report import _difference, table
 from raychan.run.result import MULTIPATH
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.data import HERE, Figure, Known, load
@@ -184,23 +186,29 @@ def test_formulas_are_those_of_the_books(formulas):
     assert ours["C051/threshold_noise_known"] == pytest.approx(10 * math.log10(7 * math.log(10)), abs=1e-3)
 
 
-def test_gain_of_array_over_patch_is_that_of_16_elements_in_a_row_over_a_power_of_the_cosine():
+@pytest.fixture(scope="module")
+def patterns(study):
+    """A bench of which only the antennas are asked."""
+    return Bench(study, TOLERANCE_DB, 0, lambda stage, share: None)
+
+
+def test_gain_of_array_over_patch_is_that_of_16_elements_in_a_row_over_a_power_of_the_cosine(patterns):
     angle = np.radians([0.0, 1.6, 2.6, 5.0, 10.0, 39.0])
     x = np.pi * 0.917 * np.sin(angle)
     row = np.sin(16 * x[1:]) / (16 * np.sin(x[1:]))
     exponent = math.log(0.5) / math.log(math.cos(math.radians(43.0)))
     wanted = 2 * (28.75 - 7.06) + 20 * np.log10(row**2) - 20 * exponent * np.log10(np.cos(angle[1:]))
-    found = both_ways(np.degrees(angle))
+    found = both_ways(patterns, np.degrees(angle))
     assert found[0] == pytest.approx(43.38, abs=1e-6)
     assert found[1:] == pytest.approx(wanted, abs=1e-6)
 
 
-def test_beam_angle_is_the_first_at_which_the_patterns_give_no_more_than_the_change():
+def test_beam_angle_is_the_first_at_which_the_patterns_give_no_more_than_the_change(patterns):
     for change in (28.0, 11.0, -9.0):
-        at = beam_angle(change)
-        nearer = both_ways(np.linspace(0.0, at - 0.01, 500))
-        assert nearer.min() > change >= both_ways(np.array([at]))[0]
-    assert beam_angle(-1e9) is None
+        at = beam_angle(patterns, change)
+        nearer = both_ways(patterns, np.linspace(0.0, at - 0.01, 500))
+        assert nearer.min() > change >= both_ways(patterns, np.array([at]))[0]
+    assert beam_angle(patterns, -1e9) is None
 
 
 # Against the scenes
@@ -341,11 +349,26 @@ def test_ctrl_c_leaves_nothing(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_page_holds_its_pictures(tmp_path):
-    (tmp_path / "dot.png").write_bytes(b"\x89PNG")
-    made = page("# Title\n\n### T1\n\n![dot](dot.png)\n\n| a |\n| --- |\n| differs (why) |\n", tmp_path, "t")
-    assert 'src="data:image/png;base64,' in made and "dot.png" not in made
+def test_a_page_shows_the_pictures_beside_it_and_its_links_lead_somewhere(tmp_path):
+    Image.new("RGB", (1000, 10)).save(tmp_path / "dot.png")
+    text = "# Title\n\n[a](#the-array-by-azimuth)\n\n## The array, by azimuth\n\n### T1\n\n![dot](dot.png)\n\n"
+    made = page(text + "| a |\n| --- |\n| differs (why) |\n", tmp_path, "t")
+    assert '<img src="dot.png" width="600"' in made
     assert '<td class="differs">differs (why)' in made and '<h3 id="t1">' in made
+    assert set(re.findall(r'href="#([^"]+)"', made)) <= set(re.findall(r'id="([^"]+)"', made))
+
+
+def test_columns_of_numbers_are_set_flush_right():
+    lines = table(("", "n", "said"), [("a", "1,024", "+1 dB"), ("b", "", "-2.5"), ("c", "-0.3", "")])
+    assert lines[1] == "| --- | ---: | --- |"
+
+
+@pytest.mark.parametrize(
+    ("off", "text"),
+    [(0.0, "0"), (4e-5, "0"), (0.000651, "+0.0007"), (-0.0123, "-0.012"), (-12.04, "-12"), (759164.0, "+759,164")],
+)
+def test_differences_are_told_with_two_digits_that_count(off, text):
+    assert _difference(off) == text
 
 
 # The copy in the repository
@@ -361,4 +384,5 @@ def test_the_report_in_the_repository_is_of_these_data(study):
     assert "What is wrong" not in text
     for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert (HERE / picture).is_file()
-    assert sum(f.stat().st_size for f in HERE.glob("report*")) < 2_000_000
+    assert "inf dB" not in text and "nan" not in text
+    assert sum(f.stat().st_size for f in HERE.iterdir()) < 1_500_000

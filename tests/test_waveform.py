@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from raychan.frames import rotation
-from raychan.radar.antenna import CosinePattern, Isotropic, UniformArray, preset
+from raychan.radar.antenna import CosinePattern, Isotropic, UniformArray
 from raychan.radar.sensor import Sensor
 from raychan.radar.waveform import Waveform
 from raychan.units import watt
+from raychan.world.mount import antenna_of
 
+SCENES = Path(__file__).parents[1] / "scenes"
 URBAN = Waveform(77e9, 568.62e6, 61.02e-6, 61.02e-6, 128, 512)
 NARROW = Waveform(77e9, 1e9, 40e-6, 40e-6, 128, 1024)
 WIDE = Waveform(77e9, 4e9, 40e-6, 40e-6, 128, 1024)
@@ -59,10 +62,11 @@ def test_c008_unambiguous_rate():
 
 @pytest.mark.parametrize(
     ("name", "dbm", "eirp", "loss"),
-    [("study_2x2", 12.0, 22.36, 142.36), ("study_patch", 10.0, 17.06, 137.06), ("study_array16", 10.0, 38.75, 158.75)],
+    [("array_2x2", 12.0, 22.36, 142.36), ("patch", 10.0, 17.06, 137.06), ("array_16x16", 10.0, 38.75, 158.75)],
 )
 def test_c009_eirp_and_greatest_path_loss(name, dbm, eirp, loss):
-    budget = sensor(tx=preset(name), power=float(watt(dbm))).link_budget(sensitivity_dbm=-120.0)
+    tx = antenna_of(f"antennas/{name}.toml", "V", SCENES, "antenna")
+    budget = sensor(tx=tx, power=float(watt(dbm))).link_budget(sensitivity_dbm=-120.0)
     assert budget["eirp_dbm"] == pytest.approx(eirp, abs=0.01)
     assert budget["max_path_loss_db"] == pytest.approx(loss, abs=0.01)
 

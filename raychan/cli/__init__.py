@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import _thread
 import os
 import sys
+import threading
 
 import typer
 
 from raychan.cli.explain import explain
 from raychan.cli.info import info
+from raychan.cli.options import help_of
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
 from raychan.cli.show import Interrupted
@@ -18,7 +21,7 @@ from raychan.cli.view import view
 
 _HELP = """A street becomes a range-Doppler map, and every detection names the bodies it came from.
 
-A scene file (TOML) says which bodies stand where, of what they are made, how they move, and what radar looks at them.
+A scene file (TOML) says which bodies stand where, of what they are made, how they move, and what radar looks at them. \
 raychan traces the waves over them, synthesises what the receiver samples, and processes it as a radar would.
 
 [bold]raychan info scenes/urban.toml[/]
@@ -31,8 +34,11 @@ raychan traces the waves over them, synthesises what the receiver samples, and p
   [dim]the scene and its rays, to turn and to pick[/]
 
 Ranges are in metres, speeds in m/s; a positive range rate recedes.
-Exit code 0: done; 1: validate found a difference that is not known, or one that healed; 2: the input is wrong, and
-the message says where; 130: interrupted, nothing written."""
+
+Exit code 0: done
+  1: validate found an unknown or a healed difference
+  2: the input is wrong, and the message says where
+  130: interrupted; it says what was written"""
 
 _STOPPED = "interrupted; nothing was written"
 
@@ -62,13 +68,22 @@ def _top(
 
 
 for command in (run, info, rcs, explain, view, validate):
-    app.command()(command)
+    app.command(help=help_of(command))(command)
 app.add_typer(study, name="study")
 
 
 def main(argv: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
+    sys.unraisablehook = _interrupt_again
     sys.exit(invoke(sys.argv[1:] if argv is None else argv))
+
+
+def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
+    """Repeat a Ctrl-C that was lost in a callback from C, such as numba's when it loads compiled code."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        threading.Timer(0.05, _thread.interrupt_main).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def invoke(argv: list[str]) -> int:

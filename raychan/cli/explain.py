@@ -14,11 +14,11 @@ def explain(
     directory: Annotated[
         Path, typer.Argument(help="Directory that `raychan run` wrote.", metavar="DIR", show_default=False)
     ],
-    range: Annotated[float, typer.Option("--range", help="Range of the cell [m].", metavar="M", show_default=False)],
+    range: Annotated[float, typer.Option("--range", help="Range of the cell in m.", metavar="M", show_default=False)],
     speed: Annotated[
         float | None,
         typer.Option(
-            help="Speed as the detections print it [m/s]; the strongest at that range if not given.", metavar="M/S"
+            help="Speed in m/s as the detections print it; the strongest at that range if not given.", metavar="M/S"
         ),
     ] = None,
 ) -> None:

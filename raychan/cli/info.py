@@ -20,37 +20,46 @@ _WORDS = {
     "coherent_gain": "gain of chirps x samples",
     "sensitivity": "noise in a cell of the map (rectangular windows)",
 }
-_FIGURES = (
-    "gain [dBi]",
-    "half-power width, azimuth [deg]",
-    "half-power width, elevation [deg]",
-    "highest side lobe, azimuth [dB]",
-    "highest side lobe, elevation [dB]",
-)
-# Tables 1 and 7 of the study whose antennas the presets are: gain, widths, side lobes.
-_PUBLISHED = {
-    "study_2x2": (10.36, 27.63, 54.7, -0.35, -16.03),
-    "study_patch": (7.06, 86.0, 86.27, -0.06, -18.62),
-    "study_array16": (28.75, 3.46, 6.3, -0.63, -13.18),
+_FIGURES = {
+    "gain_dbi": "gain [dBi]",
+    "hpbw_h_deg": "half-power width, azimuth [deg]",
+    "hpbw_v_deg": "half-power width, elevation [deg]",
+    "sll_h_db": "highest side lobe, azimuth [dB]",
+    "sll_v_db": "highest side lobe, elevation [dB]",
 }
 
 
 def info(
     source: Annotated[
         Path,
-        typer.Argument(help="Scene file, or a mesh (GLB, OBJ, PLY, STL).", metavar="SCENE|MESH", show_default=False),
+        typer.Argument(
+            help="Scene file, antenna file, or a mesh (GLB, OBJ, PLY, STL).",
+            metavar="SCENE|ANTENNA|MESH",
+            show_default=False,
+        ),
     ],
     unit: Annotated[str, typer.Option(help="Unit of a mesh file: m, cm, mm, inch, ft.")] = "m",
 ) -> None:
-    """Say what is in a scene or a mesh: bodies, parts, materials, link budget, resolutions, mesh health."""
+    """Say what is in a scene, an antenna or a mesh.
+
+    Of a scene: bodies, parts, materials, link budget, resolutions, and the figures of its antennas; of an antenna its
+    figures, computed from its pattern, beside the published ones if its file has them; of a mesh its health.
+    """
     from raychan.world.meshfile import SUFFIXES, load
 
     if source.suffix.lower() in SUFFIXES:
         _mesh(load(source, unit=unit), source)
-    else:
-        from raychan.world.scene import Scene
+        return
+    from raychan.world.mount import antenna_of, antenna_table, is_antenna
 
-        _scene(Scene.load(source))
+    if is_antenna(source):
+        table, _ = antenna_table(source.name, source.parent, "")
+        made = antenna_of(source.name, "V", source.parent, "")
+        show.console().print(_antenna(str(source), made, table))
+        return
+    from raychan.world.scene import Scene
+
+    _scene(Scene.load(source))
 
 
 def _mesh(mesh: Any, source: Path) -> None:
@@ -77,7 +86,7 @@ def _mesh(mesh: Any, source: Path) -> None:
 def _scene(scene: Any) -> None:
     screen = show.console()
     screen.print(f"[bold]{scene.title}[/]", markup=True)
-    for made in (_bodies(scene), _parts(scene), *_radar(scene.sensor)):
+    for made in (_bodies(scene), _parts(scene), *_radar(scene.sensor), *_antennas(scene)):
         screen.print(made)
     show.warn(scene.warnings)
 
@@ -140,12 +149,10 @@ def _radar(sensor: Any) -> list[Table]:
         figure = f"{1e3 * value:.4g} mm" if unit == "m" else f"{value:.2f} {units[unit]}"
         budget.append((_WORDS.get(name, name.replace("_", " ")), figure))
     chirp_rows = _chirp(w)
-    tables = [
+    return [
         show.table("Radar", ("link budget", ""), budget, left=(0,)),
         show.table("", ("waveform", ""), chirp_rows, left=(0,)),
     ]
-    shown = {"transmit": sensor.tx} | ({"receive": sensor.rx} if sensor.rx != sensor.tx else {})
-    return tables + [_antenna(name, antenna) for name, antenna in shown.items()]
 
 
 def _chirp(w: Any) -> list[tuple[str, str]]:
@@ -161,19 +168,34 @@ def _chirp(w: Any) -> list[tuple[str, str]]:
     ]
 
 
-def _antenna(use: str, antenna: Any) -> Table:
-    """Return the computed figures of an antenna, beside the published ones where it is a preset."""
+def _antennas(scene: Any) -> list[Table]:
+    """Return the figures of the antennas: of one if transmitter and receiver share it, else of each."""
+    from raychan.world.mount import antenna_table, mounted
+
+    (key, sent), (other, gathered) = mounted(scene.radar)
+    uses = [("transmit and receive", key, sent, scene.sensor.tx)]
+    if other != key:
+        uses = [("transmit", key, sent, scene.sensor.tx), ("receive", other, gathered, scene.sensor.rx)]
+    made = []
+    for use, where, given, antenna in uses:
+        table, _ = antenna_table(given, scene.folder, where)
+        made.append(_antenna(f"{given if isinstance(given, str) else table.kind}, {use}", antenna, table))
+    return made
+
+
+def _antenna(title: str, antenna: Any, table: Any) -> Table:
+    """Return the figures computed from an antenna's pattern, beside the published ones where its table has them."""
     import math
 
-    from raychan.radar.antenna import PRESETS, preset
     from raychan.radar.pattern import characteristics
 
-    found = vars(characteristics(antenna)).values()
-    name = next((n for n in PRESETS for p in "VH" if preset(n, p) == antenna), "")
-    published = _PUBLISHED.get(name, ("",) * 5)
-    rows = [
-        (quantity, "none" if math.isnan(x) else f"{x:.2f}", str(y))
-        for quantity, x, y in zip(_FIGURES, found, published, strict=True)
-    ]
-    title = f"{name or type(antenna).__name__}, {use}"
-    return show.table("", (f"antenna: {title}", "computed", "published" if name else ""), rows)
+    found, rows = characteristics(antenna), []
+    for name, words in _FIGURES.items():
+        value = getattr(found, name)
+        cells = [words, "none" if math.isnan(value) else f"{round(value, 2) + 0.0:.2f}"]
+        if table.published:
+            printed = getattr(table.published, name)
+            cells.append("" if printed is None else f"{printed:g}")
+        rows.append(cells)
+    heads = (f"antenna: {title}", "computed", *(["published"] if table.published else []))
+    return show.table("", heads, rows)

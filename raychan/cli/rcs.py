@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,18 +33,18 @@ def rcs(
     shape: Annotated[
         str | None, typer.Option(help="Built-in shape instead of a mesh: plate, sphere, trihedral, car...")
     ] = None,
-    frequency_ghz: Annotated[float, typer.Option(help="Frequency [GHz].", metavar="GHZ")] = 77.0,
+    frequency_ghz: Annotated[float, typer.Option(help="Frequency in GHz.", metavar="GHZ")] = 77.0,
     azimuth: Annotated[
         str,
-        typer.Option(help="Azimuth from the target to the radar [deg]: one, or first:last:step.", metavar="A[:B:STEP]"),
+        typer.Option(help="Azimuth in degrees from target to radar: one, or first:last:step.", metavar="A[:B:STEP]"),
     ] = "0",
-    elevation: Annotated[str, typer.Option(help="Elevation [deg], likewise.", metavar="A[:B:STEP]")] = "0",
+    elevation: Annotated[str, typer.Option(help="Elevation in degrees, likewise.", metavar="A[:B:STEP]")] = "0",
     polarization: Annotated[str, typer.Option(help="Receive then transmit: VV, VH, HV or HH.")] = "VV",
     distance: Annotated[
-        str, typer.Option(help="Radar's distance from the target's origin [m], or inf.", metavar="M")
+        str, typer.Option(help="Radar's distance from the target's origin in metres, or inf.", metavar="M")
     ] = "inf",
     material: Annotated[str, typer.Option(help="What all of it is made of, such as pec or glass.")] = "pec",
-    tolerance: Annotated[float, typer.Option(help="Error to refine to [dB].", metavar="DB")] = 0.25,
+    tolerance: Annotated[float, typer.Option(help="Error in dB to refine to.", metavar="DB")] = 0.25,
     max_bounces: Annotated[int, typer.Option(help="Bounces along a path.", metavar="N")] = 3,
     unit: Annotated[str, typer.Option(help="Unit of the mesh file: m, cm, mm, inch, ft.")] = "m",
     up: Annotated[
@@ -130,6 +131,8 @@ def _writable(file: Path | None, endings: tuple[str, ...]) -> None:
         raise typer.BadParameter(f"{file}: must end in {' or '.join(endings)}")
     if not file.parent.is_dir():
         raise typer.BadParameter(f"{file}: there is no directory {file.parent}")
+    if not os.access(file.parent, os.W_OK):
+        raise typer.BadParameter(f"{file}: the directory {file.parent} cannot be written to")
 
 
 def _target(source: list[str], shape: str | None, unit: str, up: str | None, scale: float) -> tuple[Mesh, str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance
 
 if TYPE_CHECKING:
     from raychan.run.result import Result
@@ -18,24 +19,14 @@ PICTURES = ("scene.png", "profile.png", "rdmap.png")
 
 
 def run(
-    scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)],
+    scene: SceneFile,
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR")
     ],
-    seed: Annotated[int, typer.Option(help="Seed of the noise; equal seeds give equal detections.", min=0)] = 0,
-    tolerance: Annotated[
-        float | None,
-        typer.Option(help="Error in dB to refine the tubes to; the scene's own if not given.", metavar="DB", min=1e-3),
-    ] = None,
-    max_bounces: Annotated[
-        int | None, typer.Option(help="Interactions along a path; the scene's own if not given.", metavar="N", min=1)
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", help="Override a key of the scene file, such as bodies.van.position=[30,3,0].", metavar="KEY=VALUE"
-        ),
-    ] = None,
+    seed: Seed = 0,
+    tolerance: Tolerance = None,
+    max_bounces: MaxBounces = None,
+    set_: Changes = None,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no pictures.")] = False,
     frames: Annotated[
         int | None,
@@ -60,9 +51,7 @@ def run(
 
     if frame_interval is not None and frames is None:
         raise typer.BadParameter("it needs --frames", param_hint="--frame-interval")
-    loaded = Scene.load(scene)
-    if set_:
-        loaded = loaded.override(set_)
+    loaded = Scene.load(scene).override(set_ or [])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
     if frames is None:
         _single(loaded, out, options, not no_pictures)

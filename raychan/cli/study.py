@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
+from raychan.cli.options import help_of
 from raychan.cli.study_stability import stability
 from raychan.cli.study_sweep import sweep
 
@@ -25,7 +26,6 @@ def _top() -> None:
     pass
 
 
-@study.command()
 def tradeoff(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Directory for figures and CSV; made if missing.", metavar="DIR")
@@ -74,8 +74,8 @@ def tradeoff(
     screen.print(f"figures and table: {out}", soft_wrap=True)
 
 
-study.command()(stability)
-study.command()(sweep)
+for command in (tradeoff, stability, sweep):
+    study.command(help=help_of(command))(command)
 
 
 def _cells(r: Row) -> list[str]:

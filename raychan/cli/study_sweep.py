@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    scene: Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)],
+    scene: SceneFile,
     target: Annotated[str, typer.Option(help="The body to ask about.", metavar="BODY", show_default=False)],
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Directory for table and figure; made if missing.", metavar="DIR")
@@ -36,18 +37,10 @@ def sweep(
             metavar="START:STOP:STEPS",
         ),
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Override a key of the scene file for all steps.", metavar="KEY=VALUE"),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the noise, the same for all steps.", min=0)] = 0,
-    tolerance: Annotated[
-        float | None,
-        typer.Option(help="Error in dB to refine the tubes to; the scene's own if not given.", metavar="DB", min=1e-3),
-    ] = None,
-    max_bounces: Annotated[
-        int | None, typer.Option(help="Interactions along a path; the scene's own if not given.", metavar="N", min=1)
-    ] = None,
+    set_: Changes = None,
+    seed: Seed = 0,
+    tolerance: Tolerance = None,
+    max_bounces: MaxBounces = None,
 ) -> None:
     """Follow one body through varied scenes: how much of it is hidden, by whom, and whether it is detected.
 

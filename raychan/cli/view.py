@@ -25,11 +25,11 @@ def view(
     ] = None,
     range: Annotated[
         float | None,
-        typer.Option("--range", help="Show only the rays that make the cell at this range [m].", metavar="M"),
+        typer.Option("--range", help="Show only the rays that make the cell at this range in metres.", metavar="M"),
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option(help="Speed of that cell [m/s]; the strongest at that range if not given.", metavar="M/S"),
+        typer.Option(help="Speed of that cell in m/s; the strongest at that range if not given.", metavar="M/S"),
     ] = None,
 ) -> None:
     """Show a scene, and the rays of a result coloured by the power they bring.
@@ -48,7 +48,8 @@ def view(
     if source.is_dir() or source.suffix == ".nc":
         result = load_result(source)
         if result.scene is None:
-            raise StoreError(f"{source}: its scene cannot be read again (a mesh file moved, or it was made in Python)")
+            why = "a mesh or antenna file moved, or it was made in Python"
+            raise StoreError(f"{source}: its scene cannot be read again ({why})")
         try:
             cell = None if range is None else explain(result, range, speed)
         except ValueError as error:

@@ -175,30 +175,3 @@ def mean_over_sphere(power: Callable[[Floats], Floats], extent: float) -> float:
         d = np.stack([x, off * np.tile(np.cos(around), n), off * np.tile(np.sin(around), n)], axis=1)
         total += float(power(d).reshape(n, -1).mean(axis=1) @ weights) / 4.0
     return total
-
-
-# Geometry from the published beam widths; a loss then brings the computed peak gain to the published one, which is an
-# input of the study. For study_2x2 that loss is negative: its printed gain exceeds the directivity of its printed beam.
-_STUDY = {"study_2x2": 10.36, "study_patch": 7.06, "study_array16": 28.75}
-PRESETS = tuple(_STUDY)
-
-
-def preset(name: str, polarization: str = "V") -> Antenna:
-    """Return a named antenna of the urban study (its Tables 1 and 7), scaled by a loss to the printed peak gain.
-
-    Raises: ValueError on an unknown name.
-    """
-    if name not in _STUDY:
-        raise ValueError(f"antenna {name!r}: must be one of {', '.join(PRESETS)}")
-    element = Isotropic(polarization, front=True)
-    ahead = np.array([[1.0, 0.0, 0.0]])
-
-    def made(loss_db: float) -> Antenna:
-        if name == "study_patch":
-            return CosinePattern(86.0, 86.27, polarization, loss_db)
-        if name == "study_2x2":
-            return UniformArray(2, 2, 1.047, 0.544, element=element, loss_db=loss_db)
-        return UniformArray(16, 16, 0.917, 0.5036, element=element, loss_db=loss_db)
-
-    gain = float((np.abs(made(0.0).field(ahead)) ** 2).sum())
-    return made(10.0 * math.log10(gain) - _STUDY[name])

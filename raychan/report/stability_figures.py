@@ -58,7 +58,7 @@ def _overview(done: Sequence[Tried], path: Path) -> Path:
         axes.grid(axis="x", alpha=0.25, lw=0.5)
         axes.set_xlabel("error over tolerance (at the edges: less than 1e-6, more than 1e4)")
         axes.set_title("Every check: passed left of the line, failed (X) right of it")
-        return save(made, path)
+        return save(made, path, flat=True)
 
 
 def _grazing(c: dict[str, Any], path: Path) -> Path:
@@ -75,7 +75,7 @@ def _grazing(c: dict[str, Any], path: Path) -> Path:
     )
     axes.legend()
     axes.grid(alpha=0.25, lw=0.5)
-    return save(made, path)
+    return save(made, path, flat=True)
 
 
 def _sizes(c: dict[str, Any], path: Path) -> Path:
@@ -99,7 +99,7 @@ def _sizes(c: dict[str, Any], path: Path) -> Path:
     axes.set_title("Error against facet size")
     axes.legend(loc="center right")
     axes.grid(alpha=0.25, lw=0.5)
-    return save(made, path)
+    return save(made, path, flat=True)
 
 
 def _leaks(c: dict[str, Any], path: Path) -> Path:
@@ -123,7 +123,7 @@ def _leaks(c: dict[str, Any], path: Path) -> Path:
     axes.set_xlabel("leaks per million rays   (X: seen; <: none seen, 95 % bound)")
     made.suptitle("Rays that pass between faces", fontweight="bold", fontsize=10)
     made.legend(loc="outside lower center", ncols=3)
-    return save(made, path)
+    return save(made, path, flat=True)
 
 
 def _bounces(c: dict[str, Any], path: Path) -> Path:
@@ -136,7 +136,7 @@ def _bounces(c: dict[str, Any], path: Path) -> Path:
     axes.set(yscale="log", xlabel="bounces", ylabel="sum of |gain| of that order", title="Between parallel mirrors")
     axes.legend()
     axes.grid(alpha=0.25, lw=0.5)
-    return save(made, path)
+    return save(made, path, flat=True)
 
 
 def _layers(c: dict[str, Any], path: Path) -> Path:
@@ -151,7 +151,7 @@ def _layers(c: dict[str, Any], path: Path) -> Path:
     axes.set_title("A glass layer from nothing to a kilometre")
     axes.legend(ncols=2)
     axes.grid(alpha=0.25, lw=0.5)
-    return save(made, path)
+    return save(made, path, flat=True)
 
 
 def _paths(c: dict[str, Any], path: Path) -> Path:
@@ -163,7 +163,7 @@ def _paths(c: dict[str, Any], path: Path) -> Path:
         axes.set(xscale="log", yscale="log", xlabel="paths", ylabel=label)
         axes.grid(alpha=0.25, lw=0.5)
     made.suptitle("Cube of 128 chirps by 512 samples against path count", fontweight="bold", fontsize=10)
-    return save(made, path)
+    return save(made, path, flat=True)
 
 
 def _dynamic(c: dict[str, Any], path: Path) -> Path:
@@ -208,4 +208,4 @@ def _array(c: dict[str, Any], path: Path) -> Path:
     axes.set_title("A target in the near field of a receiving array")
     axes.legend()
     axes.grid(alpha=0.25, lw=0.5)
-    return save(made, path)
+    return save(made, path, flat=True)

@@ -36,7 +36,7 @@ def case_picture(rows: Sequence[Row], path: Path) -> Path:
         left.set_title(f"truth: {rows[0].truth}", fontsize=7, loc="left", fontweight="normal", color="#555555")
         handles, names = left.get_legend_handles_labels()
         made.legend(handles, names, loc="outside lower center", ncols=4)
-        return save(made, path)
+        return save(made, path, flat=True)
 
 
 def summary_picture(rows: Sequence[Row], path: Path, earlier: Sequence[Row] = ()) -> Path:
@@ -66,7 +66,7 @@ def summary_picture(rows: Sequence[Row], path: Path, earlier: Sequence[Row] = ()
         # An earlier run may lack the first case.
         known = {name: handle for axes in grid for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
         made.legend(known.values(), known.keys(), loc="outside lower center", ncols=min(across + 1, 4))
-        return save(made, path)
+        return save(made, path, flat=True)
 
 
 def _front(axes: Any, rows: Sequence[Row], **look: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from raychan.report.canvas import PALETTE, Placer, figure, save, style
+from raychan.report.canvas import PALETTE, Placer, figure, outlined, save, style
 from raychan.study.validation.data import POINT
 from raychan.study.validation.formulas import both_ways
 from raychan.study.validation.judge import DIFFERS, UNTESTABLE, Check
@@ -26,7 +26,7 @@ def pictures(done: Validation, budgets: list[Budget], turns: list[Turn], folder:
         "levels": _levels(done, folder / "report-levels.png"),
         "ghost": _ghost(done, folder / "report-ghost.png"),
         "pedestrians": _pedestrians(done, budgets, folder / "report-pedestrians.png"),
-        "array": _array(turns, folder / "report-array.png"),
+        "array": _array(done, turns, folder / "report-array.png"),
     }
 
 
@@ -49,7 +49,7 @@ def _offs(done: Validation, path: Path) -> Path:
             axes.set(xlabel="ours less theirs, in tolerances", title=title, xlim=(-2.2, 2.2))
             axes.grid(axis="x", alpha=0.25, lw=0.5)
         axes.invert_yaxis()
-        return save(made, path)
+        return save(made, path, flat=True)
 
 
 def _strip(axes: Any, row: int, checks: list[Check]) -> None:
@@ -84,15 +84,25 @@ def _levels(done: Validation, path: Path) -> Path:
                 xy = np.array([(t, o) for t, o, s in pairs if s is seen and o is not None]).reshape(-1, 2)
                 label = name if seen else None
                 axes.plot(*xy.T, mark, color=colour, ms=4.5, mfc=colour if seen else "none", ls="none", label=label)
-        axes.axhline(20.0, color="#aa3333", lw=0.8, ls="--")
-        axes.annotate("least SNR of a detection", (1.0, 20.0), color="#aa3333", fontsize=7.5, va="bottom")
+        _threshold(axes, done, "street")
         axes.set(
             xlabel="SNR printed, patch [dB]", ylabel="SNR ours [dB]   (hollow: not detected, without noise)",
             xlim=(low, high), ylim=(low, high), title="Levels, tables 10, 13 and 14",
         )  # fmt: skip
         axes.legend(loc="upper left")
         axes.grid(alpha=0.25, lw=0.5)
-        return save(made, path)
+        return save(made, path, flat=True)
+
+
+def _threshold(axes: Any, done: Validation, run: str, label: bool = True) -> None:
+    """Draw the least SNR that a run's receiver reports."""
+    least = done.bench.scene(run).processing.min_snr_db
+    axes.axhline(least, color="#aa3333", lw=0.8, ls="--")
+    if label:
+        where = axes.get_yaxis_transform()
+        axes.annotate(
+            "least SNR of a detection", (0.01, least), xycoords=where, color="#aa3333", fontsize=7.5, va="bottom"
+        )
 
 
 def _level_of(done: Validation, check: Check) -> bool | None:
@@ -123,7 +133,7 @@ def _ghost(done: Validation, path: Path) -> Path:
             m = result.rdmap
             keep = (m.range > near) & (m.range < far)
             axes.plot(m.range[keep], db(m.power[:, keep].max(axis=0) / m.noise), lw=0.9, color="#225588")
-            axes.axhline(20.0, color="#aa3333", lw=0.7, ls="--")
+            _threshold(axes, done, run, label=axes is panels[0])
             for at, _ in marks:
                 axes.axvline(at, color="#999999", lw=0.7, ls=":")
             d = result.detections
@@ -140,7 +150,7 @@ def _ghost(done: Validation, path: Path) -> Path:
             )
         panels[-1].set(xlabel="range [m]   (red: detections over the pedestrian)")
         made.supylabel("SNR of the strongest cell [dB]", fontsize=9)
-        return save(made, path)
+        return save(made, path, flat=True)
 
 
 _MARKS = {"pedestrian": "pedestrian", "one_sided": "one way over the truck", "ghost": "both ways over the truck"}
@@ -172,21 +182,21 @@ def _pedestrians(done: Validation, budgets: list[Budget], path: Path) -> Path:
                 [b.link["range"] for b in rows], [b.printed[column] for b in rows], mark, color=PALETTE[2], ms=5,
                 mfc="none", ls="none", label=f"printed, {name}",
             )  # fmt: skip
-        axes.axhline(20.0, color="#aa3333", lw=0.8, ls="--")
+        _threshold(axes, done, "street")
         axes.set(xlabel="range [m]", ylabel="SNR [dB]", title="Pedestrians of the living street, patch, 4 GHz")
         axes.set_ylim(0.0, 42.0)
         axes.legend(loc="lower left", ncols=2)
         axes.grid(alpha=0.25, lw=0.5)
-        return save(made, path)
+        return save(made, path, flat=True)
 
 
-def _array(turns: list[Turn], path: Path) -> Path:
+def _array(done: Validation, turns: list[Turn], path: Path) -> Path:
     """Draw the gain of array over patch against azimuth: the patterns, our simulation, the printed changes."""
     angle = np.arange(0.0, 72.0, 0.02)
     with style():
         made = figure(7.6, 4.4)
         axes = made.add_subplot()
-        axes.plot(angle, both_ways(angle), color="#999999", lw=0.8, label="patterns of table 7, both ways")
+        axes.plot(angle, both_ways(done.bench, angle), color="#999999", lw=0.8, label="patterns of table 7, both ways")
         at = np.array([abs(t.azimuth) for t in turns])
         for t, x in zip(turns, at, strict=True):
             if t.ours is not None:
@@ -206,12 +216,15 @@ def _array(turns: list[Turn], path: Path) -> Path:
         axes.set(xlabel="azimuth off boresight, inferred [deg]", ylabel="array less patch [dB]", ylim=(-45.0, 48.0))
         axes.set_xlim(0.0, 72.0)
         axes.set_title("What the array gains over the patch")
-        axes.legend(loc="lower left", frameon=True, edgecolor="none", framealpha=0.9)
+        axes.legend(loc="upper center", frameon=True, edgecolor="none", framealpha=0.9)
         axes.grid(alpha=0.25, lw=0.5)
         placer = Placer(axes)
         placer.settle()
         placer.avoid(at, np.array([t.printed for t in turns]), 6.0)
         placer.avoid(at, np.array([t.printed if t.ours is None else t.ours for t in turns]), 6.0)
         for t, x in zip(turns, at, strict=True):
-            placer.label(x, t.printed, t.title.replace("pedestrian", "ped."), fontsize=6.5, color="#555555")
-        return save(made, path)
+            placer.label(
+                x, t.printed, t.title.replace("pedestrian", "ped."), fontsize=7.5, color="#333333",
+                path_effects=outlined(2.0, "white"),
+            )  # fmt: skip
+        return save(made, path, flat=True)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from raychan import __version__
-from raychan.study.validation.formulas import both_ways
+from raychan.radar.pattern import characteristics
+from raychan.report.validation_page import anchor
+from raychan.study.validation.formulas import ARRAY, both_ways
 from raychan.study.validation.judge import AGREES, DIFFERS, UNTESTABLE, Check, of_item, shown, verdict
-from raychan.study.validation.parameters import figures_of
 from raychan.study.validation.sections import Ablation, Budget, Ghost, Turn
 from raychan.study.validation.validate import Validation
 
@@ -26,21 +29,32 @@ def markdown(
 
     Args: sections beyond tables and claims, or None where only some items were tested; figures, file names by name.
     """
-    lines = [*_head(done), *_overview(done)]
+    lines = [*_overview(done)]
     if sections:
         made, ghosts, budgets, turns = sections
         lines += [*_ablations(made, figures), *_ghosts(done, ghosts), *_budgets(budgets, figures)]
-        lines += _turns(turns, figures)
+        lines += _turns(done, turns, figures)
     lines += [*_tables(done, figures), *_claims(done), *_known(done)]
     if done.bench.results:
         lines += _runs(done)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*_head(done), *_contents(lines), *lines]) + "\n"
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a Markdown table, with an empty line after it."""
-    lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    rows = list(rows)
+    sides = [" ---: |" if rows and all(map(_numeric, column)) else " --- |" for column in zip(*rows, strict=True)]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "".join(sides or [" --- |"] * len(heads))]
     return [*lines, *("| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in rows), ""]
+
+
+def _numeric(cell: str) -> bool:
+    return re.fullmatch(r"([+-]?[\d,.]+)?", cell) is not None
+
+
+def _contents(lines: Sequence[str]) -> list[str]:
+    heads = [line.removeprefix("## ") for line in lines if line.startswith("## ")]
+    return [" · ".join(f"[{head}](#{anchor(head)})" for head in heads), ""]
 
 
 def _head(done: Validation) -> list[str]:
@@ -85,9 +99,16 @@ def _cells(check: Check) -> tuple[str, ...]:
         ours = "none"
     if check.note and check.verdict != UNTESTABLE:
         ours += f" ({check.note})"
-    off = "" if check.difference is None else f"{check.difference:+.2g}"
+    off = "" if check.difference is None else _difference(check.difference)
     said = check.verdict + (f" ({check.known})" if check.known else "")
     return f"{_theirs(f.theirs)} {f.unit}".strip(), ours, off, _tolerance(check), said
+
+
+def _difference(off: float) -> str:
+    """Return two digits that count, but no more than four decimals: '+0.012', '-12', '+759,164'."""
+    if abs(off) < 0.5e-4:
+        return "0"
+    return f"{off:+,.{min(4, max(0, 1 - math.floor(math.log10(abs(off)))))}f}"
 
 
 def _theirs(value: object) -> str:
@@ -121,8 +142,8 @@ def _tables(done: Validation, figures: dict[str, str]) -> list[str]:
     if items and "offs" in figures:
         lines += [
             f"![Ranges and speeds]({figures['offs']})", "",
-            "All detected ranges and speeds of the tables, ours less theirs, in tolerances (shaded: agrees; a cross at "
-            "the right edge: not detected).", "",
+            "All detected ranges and speeds of the tables, ours less theirs, in tolerances (shaded: agrees; at the "
+            "right edge: a cross, not detected; a dot, beyond the axis).", "",
             f"![Levels]({figures['levels']})", "",
         ]  # fmt: skip
     for item in items:
@@ -212,9 +233,9 @@ def _gained(turn: Turn) -> str:
     return f"{turn.ours:+.1f}" + ("" if turn.detected else " (level, not detected with both)")
 
 
-def _turns(turns: Sequence[Turn], figures: dict[str, str]) -> list[str]:
-    edge = 0.5 * figures_of("study_array16").hpbw_h_deg
-    most, at_edge = both_ways(np.array([0.0, edge]))
+def _turns(done: Validation, turns: Sequence[Turn], figures: dict[str, str]) -> list[str]:
+    edge = 0.5 * characteristics(done.bench.scene(ARRAY).sensor.tx).hpbw_h_deg
+    most, at_edge = both_ways(done.bench, np.array([0.0, edge]))
     rows = [
         (t.title, f"{t.azimuth:.1f}", f"{t.pattern:+.1f}", _gained(t), f"{t.printed:+g}",
          "" if t.needs is None else f"{t.needs:.2f}")

@@ -40,7 +40,7 @@ class Contribution:
     paths: int
 
     def text(self) -> str:
-        """Return 'radar > truck.tail > pedestrian > truck.tail > radar, 3 interactions, 22.50 m, 81 %'."""
+        """Return 'radar > truck.tail > pedestrian > truck.tail > radar, 3 interactions, 14.20 m, 81 %'."""
         way = " > ".join(["radar", *self.chain, "radar"])
         plural = "" if self.interactions == 1 else "s"
         return f"{way}, {self.interactions} interaction{plural}, {self.range:.2f} m, {100.0 * self.share:.0f} %"

@@ -113,10 +113,11 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
         plotter.add_mesh(
             tube, scalars=_POWER, cmap=_MAP, clim=limits, show_scalar_bar=False, lighting=False,
         )  # fmt: skip
-    plotter.add_scalar_bar(
-        _POWER, vertical=False, position_x=0.03, position_y=0.88, width=0.28, height=0.07, color="#1a1a1a",
+    bar = plotter.add_scalar_bar(
+        _POWER, vertical=False, position_x=0.03, position_y=0.86, width=0.28, height=0.1, color="#1a1a1a",
         title_font_size=24, label_font_size=22, fmt="%.0f", n_labels=5,
     )  # fmt: skip
+    bar.SetTextPositionToPrecedeScalarBar()  # below it; above it the title sits on the labels
 
 
 def _look(plotter: Any, drawing: Drawing) -> None:

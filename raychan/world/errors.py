@@ -26,7 +26,9 @@ class SceneError(ValueError):
         )
         where = f"{file}:{line}" if file and line else str(file or "")
         head = ": ".join(x for x in (where, key, problem) if x)
-        super().__init__(f"{head}; allowed: {allowed}" if allowed else head)
+        # What `nearest` found is a question, not a list of what is allowed.
+        hint = allowed if allowed.endswith("?") else f"allowed: {allowed}"
+        super().__init__(f"{head}; {hint}" if allowed else head)
 
     def at(self, *, file: Any = None, key: str = "") -> SceneError:
         """Return the same error with its file or the front of its key added."""

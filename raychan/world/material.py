@@ -93,12 +93,8 @@ _ITU = {
     "wet_ground": _Law(30.0, -0.4, 0.15, 1.30, 1, 10),
 }
 
-_STUDY = "ray-tracing study of 77 GHz radar in urban traffic, table 6"
 _ROUGH_GUESS = "engineering value, not measured for this project: expect +-20 % in eps_r and a factor 2 in sigma"
 _FIXED = {
-    "study_metal": Material(1.0, 2e6, source=_STUDY),
-    "study_wood": Material(1.8, 1.25, source=_STUDY),
-    "study_plastic": Material(4.25, 0.54, source=_STUDY),
     "asphalt": Material(
         3.18,
         0.52,

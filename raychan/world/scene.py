@@ -71,7 +71,8 @@ class Scene:
         except FileNotFoundError:
             raise SceneError("file not found", file=file, allowed="a scene file that exists") from None
         except (OSError, UnicodeDecodeError) as e:
-            raise SceneError(f"cannot be read ({e})", file=file, allowed="a text file in TOML") from e
+            reason = getattr(e, "strerror", None) or e
+            raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e
         return cls.from_text(text, file)
 
     @classmethod

@@ -31,11 +31,26 @@ class Header(Table):
     """Frequency of the materials; default the radar's carrier, or 77 GHz without a radar."""
 
 
-class AntennaTable(Table):
-    """An antenna: a preset, a kind with its sizes, or a file with a measured pattern."""
+class PublishedTable(Table):
+    """[published] of an antenna: what its source prints of it; `raychan info` sets it beside the computed figures."""
 
-    preset: str | None = None
-    kind: Literal["isotropic", "cosine", "array", "measured"] | None = None
+    gain_dbi: Number | None = None
+    hpbw_h_deg: Number | None = None
+    hpbw_v_deg: Number | None = None
+    sll_h_db: Number | None = None
+    sll_v_db: Number | None = None
+
+
+class AntennaTable(Table):
+    """An antenna: a kind with what that kind takes, in a scene or in a TOML file of its own."""
+
+    kind: Literal["isotropic", "cosine", "array", "measured"]
+    source: str = ""
+    published: PublishedTable | None = None
+    gain_dbi: Number | None = None
+    """At boresight; the loss follows."""
+    loss_db: Number | None = None
+    """Default 0 dB."""
     hpbw_h_deg: Positive | None = None
     hpbw_v_deg: Positive | None = None
     ny: Count = 1
@@ -46,19 +61,32 @@ class AntennaTable(Table):
     taper_y: str = "rect"
     taper_z: str = "rect"
     element: AntennaTable | None = None
+    """Default: isotropic ahead."""
     front: bool = False
-    loss_db: Number = 0.0
     file: str | None = None
 
     @model_validator(mode="after")
-    def _one_of(self) -> AntennaTable:
-        if (self.preset is None) == (self.kind is None):
-            raise ValueError("either preset or kind")
+    def _fits(self) -> AntennaTable:
+        own = _OF_KIND[self.kind]
+        if strange := sorted(self.model_fields_set - own - _OF_ANY):
+            known = ", ".join(sorted(own | _OF_ANY))
+            raise ValueError(f"{strange[0]} is no key of kind = '{self.kind}', which takes {known}")
+        if self.gain_dbi is not None and self.loss_db is not None:
+            raise ValueError("either gain_dbi or loss_db")
         if self.kind == "cosine" and (self.hpbw_h_deg is None or self.hpbw_v_deg is None):
             raise ValueError("hpbw_h_deg and hpbw_v_deg for kind = 'cosine'")
         if self.kind == "measured" and self.file is None:
             raise ValueError("file for kind = 'measured'")
         return self
+
+
+_OF_KIND = {
+    "isotropic": {"front"},
+    "cosine": {"hpbw_h_deg", "hpbw_v_deg"},
+    "array": {"ny", "nz", "spacing_y", "spacing_z", "taper_y", "taper_z", "element"},
+    "measured": {"file"},
+}
+_OF_ANY = {"kind", "source", "published", "gain_dbi", "loss_db"}
 
 
 class WaveformTable(Table):
@@ -94,8 +122,8 @@ class RadarTable(Table):
     power_dbm: Number = 12.0
     noise_figure_db: NotNegative = 15.0
     noise: bool = True
-    antenna: str | AntennaTable = "study_2x2"
-    """Of transmitter and receiver; a text names a preset."""
+    antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
+    """Of transmitter and receiver; a text names an antenna file, relative to the scene's."""
     tx_antenna: str | AntennaTable | None = None
     rx_antenna: str | AntennaTable | None = None
     polarization: Literal["V", "H"] = "V"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -127,7 +128,10 @@ class Bench:
         at = self.expected_range(target)
         # Paths of another length, folded ones among them, would show there by the side lobes of the window only.
         ways = over(result, given.parts, given.over) & (np.abs(0.5 * C0 * result.paths.delay - at) <= _ROOM)
-        return peak_snr(result, ways, at, _ROOM) if ways.any() else None
+        if not ways.any():
+            return None
+        top = peak_snr(result, ways, at, _ROOM)
+        return top if math.isfinite(top) else None  # all of its paths are blocked
 
     def strength(self, run: str, target: str) -> float | None:
         """Return the SNR [dB] of a target's detection or, where there is none, its level without noise."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from raychan.frames import angles, direction
 from raychan.process.cfar import factor
 from raychan.process.spectrum import range_doppler
-from raychan.radar.antenna import Antenna, preset
 from raychan.radar.pattern import gain_dbi
 from raychan.run.chain import noise_of_cell
 from raychan.signal.cube import synthesize
@@ -22,6 +20,9 @@ from raychan.tables import Paths, RangeDoppler
 from raychan.units import C0, db, dbm
 
 Floats = NDArray[np.float64]
+
+PATCH, ARRAY = "street", "street_array"
+"""Runs of one scene with either antenna."""
 
 _FINE = 16  # map cells per resolution cell where a gap is measured
 _FAR = 30  # resolution cells to the lone point: clear of the map's edge
@@ -124,20 +125,15 @@ def spreading(bench: Bench, near: str, far: str) -> Seen:
 
 
 @measure
-def gain_change(bench: Bench, azimuth_deg: float) -> Seen:
-    """Return how much more [dB] the array gains than the patch, both ways, at an azimuth."""
-    return float(both_ways(np.array([azimuth_deg]))[0])
+def gain_change(bench: Bench, azimuth_deg: float, first: str = PATCH, later: str = ARRAY) -> Seen:
+    """Return how much more [dB] the antenna of one run gains than that of another, both ways, at an azimuth."""
+    return float(both_ways(bench, np.array([azimuth_deg]), first, later)[0])
 
 
-@cache
-def _presets() -> tuple[Antenna, Antenna]:
-    return preset("study_array16"), preset("study_patch")
-
-
-def both_ways(azimuth_deg: Floats) -> Floats:
-    """Return the gain [dB] of the study's array over its patch, both ways, at azimuths (n,) [deg]."""
+def both_ways(bench: Bench, azimuth_deg: Floats, first: str = PATCH, later: str = ARRAY) -> Floats:
+    """Return the gain [dB] of a run's antenna over that of another, both ways, at azimuths (n,) [deg]."""
     look = direction(np.radians(azimuth_deg))
-    array, patch = ((np.abs(a.field(look)) ** 2).sum(axis=1) for a in _presets())
+    patch, array = ((np.abs(bench.scene(run).sensor.tx.field(look)) ** 2).sum(axis=1) for run in (first, later))
     return np.asarray(2.0 * (db(array) - db(patch)))
 
 

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from raychan.radar.antenna import PRESETS, preset
 from raychan.radar.pattern import Characteristics, characteristics
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure
 from raychan.world.errors import SceneError, nearest
 from raychan.world.material import material
+from raychan.world.mount import antenna_of
 
 
 @cache
-def figures_of(name: str) -> Characteristics:
-    """Return the figures of merit of an antenna of the study, from its pattern; SceneError on an unknown one."""
-    if name not in PRESETS:
-        raise SceneError(f"no antenna '{name}'", key="antenna", value=name, allowed=nearest(name, PRESETS))
-    return characteristics(preset(name))
+def _figures_of(name: str, scenes: Path) -> Characteristics:
+    """Return the figures of merit of an antenna file beside the scenes, from its pattern; SceneError without one."""
+    return characteristics(antenna_of(f"antennas/{name}.toml", "V", scenes, "antenna"))
 
 
 def _figure(record: Any, name: str) -> float:
@@ -35,8 +34,8 @@ def _figure(record: Any, name: str) -> float:
 @measure
 def antenna(bench: Bench, name: str, figure: str) -> Seen:
     """Return a figure of merit of an antenna [dBi, deg, dB]; None for a side lobe that its pattern does not have."""
-    value = _figure(figures_of(name), figure)
-    return None if np.isnan(value) else value
+    value = _figure(_figures_of(name, bench.study.scenes), figure)
+    return None if np.isnan(value) else round(value, 6) + 0.0  # a grating lobe is as high as the beam but for rounding
 
 
 @measure
@@ -102,4 +101,5 @@ def ground_speed(bench: Bench, target: str) -> Seen:
 @measure
 def material_of(bench: Bench, run: str, name: str, figure: str) -> Seen:
     """Return a figure of a material at the run's frequency [-, S/m]."""
-    return _figure(material(name, bench.scene(run).frequency), figure)
+    scene = bench.scene(run)
+    return _figure(scene.materials.get(name) or material(name, scene.frequency), figure)

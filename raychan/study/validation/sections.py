@@ -10,7 +10,7 @@ from raychan.run.chain import noise_of_cell
 from raychan.run.result import MULTIPATH
 from raychan.study.validation.bench import Bench, over
 from raychan.study.validation.data import POINT, Item
-from raychan.study.validation.formulas import both_ways, link_snr
+from raychan.study.validation.formulas import ARRAY, PATCH, both_ways, link_snr
 from raychan.units import db
 
 ECHOES = ("ghost", "pedestrian", "one_sided")
@@ -154,7 +154,7 @@ class Turn:
     """Azimuth within the main beam at which the patterns give what is printed; None if they give it nowhere there."""
 
 
-def turns(bench: Bench, first: str = "street", later: str = "street_array") -> list[Turn]:
+def turns(bench: Bench, first: str = PATCH, later: str = ARRAY) -> list[Turn]:
     """Return the targets of table 16 by azimuth, off boresight first."""
     made = []
     for target, row in _printed(bench.study.items, "T16").items():
@@ -167,20 +167,20 @@ def turns(bench: Bench, first: str = "street", later: str = "street_array") -> l
                 target,
                 bench.study.targets[target].title,
                 azimuth,
-                float(both_ways(np.array([azimuth]))[0]),
+                float(both_ways(bench, np.array([azimuth]), first, later)[0]),
                 change,
                 bench.found(first, target) is not None and bench.found(later, target) is not None,
                 row["change"],
-                beam_angle(row["change"]),
+                beam_angle(bench, row["change"], first, later),
             )
         )
     return sorted(made, key=lambda t: -abs(t.azimuth))
 
 
-def beam_angle(change_db: float) -> float | None:
+def beam_angle(bench: Bench, change_db: float, first: str = PATCH, later: str = ARRAY) -> float | None:
     """Return the least azimuth [deg] at which the array gains `change_db` over the patch, both ways."""
     angles = np.arange(0.0, 90.0, 0.01)
-    below = np.flatnonzero(both_ways(angles) <= change_db)
+    below = np.flatnonzero(both_ways(bench, angles, first, later) <= change_db)
     return float(angles[below[0]]) if len(below) else None
 
 

@@ -22,28 +22,18 @@ def _less(later: float | None, first: float | None) -> float | None:
     return None if later is None or first is None else later - first
 
 
-@measure
-def range(bench: Bench, run: str, target: str) -> Seen:
-    """Return the range [m] at which a target is detected."""
-    return _of(bench, run, target, "range")
+def _of_detection(column: str) -> Callable[..., Seen]:
+    """Register the measure of a column of the detections [m, m/s, dB] where a target is detected, by its name."""
+
+    def read(bench: Bench, run: str, target: str) -> Seen:
+        return _of(bench, run, target, column)
+
+    read.__name__ = column
+    return measure(read)
 
 
-@measure
-def rate(bench: Bench, run: str, target: str) -> Seen:
-    """Return its range rate [m/s], receding positive."""
-    return _of(bench, run, target, "rate")
-
-
-@measure
-def speed(bench: Bench, run: str, target: str) -> Seen:
-    """Return its speed [m/s], own speed taken out."""
-    return _of(bench, run, target, "speed")
-
-
-@measure
-def snr(bench: Bench, run: str, target: str) -> Seen:
-    """Return its SNR [dB]."""
-    return _of(bench, run, target, "snr")
+for _column in ("range", "rate", "speed", "snr"):
+    _of_detection(_column)
 
 
 @measure

@@ -1,0 +1,33 @@
+"""What commands share: options that several take, and how their help reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+# typer takes [m] for a style of its own and swallows it: in help, units are words.
+SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
+Seed = Annotated[int, typer.Option(help="Seed of the noise; equal seeds give equal detections.", min=0)]
+Tolerance = Annotated[
+    float | None,
+    typer.Option(help="Error in dB to refine the tubes to; the scene's own if not given.", metavar="DB", min=1e-3),
+]
+MaxBounces = Annotated[
+    int | None, typer.Option(help="Interactions along a path; the scene's own if not given.", metavar="N", min=1)
+]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Override a key of the scene file, such as bodies.van.position=[30,3,0]; may be repeated.",
+        metavar="KEY=VALUE",
+    ),
+]
+
+
+def help_of(command: Callable[..., None]) -> str:
+    """Return a command's docstring with a line for each paragraph: typer would keep the line ends of the source."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in (command.__doc__ or "").split("\n\n"))
