@@ -92,14 +92,31 @@ def test_mean_over_a_triangle_of_quadratic_phase_is_its_quadrature(slope, bend):
 
 
 def test_pieces_of_a_quadratic_phase_close_in_with_the_square_of_their_size():
-    phases = np.array([0.0, 3.0, -2.0, 3.0, 1.0, -4.0])
+    # Too bent for a Gauss rule, and running in no direction: cut in pieces.
+    phases = np.array([0.0, 3.0, -2.0, 12.0, 9.0, -11.0])
     exact = WEIGHTS @ np.exp(-1j * quadratic(phases, BARY))
     out = np.empty(3, complex)
     errors = []
-    for linear in (0.1, 0.1 / 4, 0.1 / 16):
+    for linear in (0.4, 0.4 / 4, 0.4 / 16):
         triangle_terms(phases, linear, out)
         errors.append(abs(out.sum() - exact))
     assert errors[2] < errors[0] / 8 and errors[2] < 1e-3
+
+
+def test_mean_of_a_quadratic_phase_hangs_on_no_setting_where_it_is_not_cut_in_pieces():
+    """Phases that stand still, that run along all edges, and along one only: 2e-5, though `linear` is coarse."""
+    out = np.empty(3, complex)
+    still = np.array([0.0, 3.0, -2.0, 3.0, 1.0, -4.0])
+    all_edges = linear_phases(np.array([0.0, 60.0, 150.0])) + np.array([0.0, 0.0, 0.0, 1.5, -1.0, 0.7])
+    one_edge = linear_phases(np.array([0.0, 0.4, 90.0])) + np.array([0.0, 0.0, 0.0, 1.5, -1.0, 0.7])
+    along = linear_phases(np.array([0.0, 90.0, 88.0])) + np.array([0.0, 0.0, 0.0, -2.0, 3.0, 1.0])
+    for phases in (still, all_edges, one_edge, along):
+        for turn in range(3):
+            turned = np.concatenate([np.roll(phases[:3], turn), np.roll(phases[3:], turn)])
+            triangle_terms(turned, 0.1, out)
+            e = WEIGHTS * np.exp(-1j * quadratic(turned, BARY))
+            assert out.sum() == pytest.approx(e.sum(), abs=2e-5)
+            assert out == pytest.approx(e @ BARY, abs=5e-4)
 
 
 # --- no ray is lost at an edge ------------------------------------------------------------------------------------

@@ -65,10 +65,15 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
 
 
 def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
-    """Return the mean obliquity times spreading at the corners over that at the centre (n, 3); zero beyond the
-    terminator."""
+    """Return the mean obliquity times spreading at the corners over that at the centre (n, 3), for areas of the flat
+    footprint; zero beyond the terminator."""
     cosine = -0.5 * np.einsum("nij,nij->ni", tubes.normals, tubes.k + back_k)
     strength = np.maximum(cosine, 0.0)
+    # Where the true surface turns away from the flat one there is more of it.
+    flat = vector_area(tubes.points)
+    flat /= np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
+    turned = np.abs(np.einsum("nij,nj->ni", tubes.normals[:, :3], flat))
+    strength[:, :3] /= np.maximum(turned, 0.5)
     if not far:
         strength = strength / (tubes.length * back)
     centre = strength[:, CENTRE:]

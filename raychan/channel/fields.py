@@ -4,7 +4,6 @@ routes."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from raychan.kernels.fresnel import coefficients
 from raychan.kernels.po import huygens, triangle_terms
 from raychan.kernels.polar import dot, reflect, transmit
+from raychan.kernels.rows import in_two
 from raychan.tables import POINT, TRANSMIT, Facets, Materials, Routes
 from raychan.units import C0
 
@@ -52,7 +52,7 @@ def transfer(
     m: Materials = facets.materials
     material = facets.material[np.maximum(routes.facet, 0)].astype(np.int64) if len(facets.material) else routes.facet
     k = 2.0 * np.pi * frequency / C0
-    out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3), np.complex128)
+    out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3 if corners else 1), np.complex128)
     columns = (
         routes.vertices, routes.normals, routes.kind, material, routes.scatter, routes.lengths, routes.length,
         routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma, e_tx, e_rx, out,
@@ -64,16 +64,7 @@ def transfer(
         )
 
     in_two(len(out), some)
-    return out if corners else out.sum(axis=3)
-
-
-def in_two(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
-    """Do the work on rows 0 to n, on two threads when there are many: each must release the interpreter's lock."""
-    if n < least:
-        work(slice(0, n))
-        return
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(work, (slice(0, n // 2), slice(n // 2, n))))
+    return out if corners else out[..., 0]
 
 
 @njit(cache=True)
@@ -101,74 +92,76 @@ def _transfer(  # type: ignore[no-untyped-def]
     taper, area, spread_in, spread_out, caustics, sigma, e_tx, e_rx, out,
 ):  # fmt: skip
     n, d = kind.shape
-    terms = np.empty(3, np.complex128)
-    phases = np.empty(6)
+    ins, outs, apart = e_tx.shape[1], e_rx.shape[1], out.shape[3] == 3
+    terms, phases = np.empty(3, np.complex128), np.empty(6)
+    arriving, leaving = np.empty((ins, 3), np.complex128), np.empty((outs, 3), np.complex128)
     wavelength_4pi = 0.5 / k
     for i in range(n):
         used = 0
         while used < d and kind[i, used] > 0:
             used += 1
         at = scatter[i] if scatter[i] >= 0 else used
-        for p in range(e_tx.shape[1]):
-            for q in range(e_rx.shape[1]):
-                e = _vec(e_tx[i, p])
-                g = _vec(e_rx[i, q])
-                # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
-                k_in = (-tx[0], -tx[1], -tx[2])
-                if not far:
-                    k_in = _heading(tx, vertices[i, 0]) if used > 0 else _heading(tx, rx)
-                for j in range(at):
-                    normal = _vec(normals[i, j])
-                    mat = material[i, j]
-                    c = coefficients(
-                        m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k
-                    )  # fmt: skip
-                    if kind[i, j] == TRANSMIT:
-                        e = transmit(e, k_in, normal, c[2], c[3])
-                    else:
-                        e = reflect(e, k_in, normal, c[0], c[1])
-                    k_in = _heading(vertices[i, j], vertices[i, j + 1] if j + 1 < used else rx)
-                if at == used:
-                    whole = wavelength_4pi * spread_in[i] * dot(g, e) * np.exp(-1j * k * length[i])
-                    out[i, q, p, 0], out[i, q, p, 1], out[i, q, p, 2] = whole, 0j, 0j
-                    continue
-                # Out: the receiver's field by reciprocity, over the rest of the chain backwards.
-                k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
-                for j in range(used - 1, at, -1):
-                    normal = _vec(normals[i, j])
-                    mat = material[i, j]
-                    c = coefficients(
-                        m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k
-                    )  # fmt: skip
-                    if kind[i, j] == TRANSMIT:
-                        g = transmit(g, k_out, normal, c[2], c[3])
-                    else:
-                        g = reflect(g, k_out, normal, c[0], c[1])
-                    k_out = _heading(vertices[i, j], vertices[i, j - 1])
-                if kind[i, at] == POINT:
-                    whole = (
-                        wavelength_4pi
-                        * (sigma[i] / (4.0 * np.pi)) ** 0.5
-                        * spread_in[i]
-                        * spread_out[i]
-                        * dot(g, e)
-                        * np.exp(-1j * k * length[i])
-                    )
-                    out[i, q, p, 0], out[i, q, p, 1], out[i, q, p, 2] = whole, 0j, 0j
-                    continue
-                normal = _vec(normals[i, at])
-                mat = material[i, at]
-                ci = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k)
-                co = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k)
+        # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
+        k_in = (-tx[0], -tx[1], -tx[2])
+        if not far:
+            k_in = _heading(tx, vertices[i, 0]) if used > 0 else _heading(tx, rx)
+        for p in range(ins):
+            arriving[p] = e_tx[i, p]
+        for j in range(at):
+            mat = material[i, j]
+            c = coefficients(
+                m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normals[i, j]), k
+            )  # fmt: skip
+            _passed(arriving, k_in, _vec(normals[i, j]), c, kind[i, j] == TRANSMIT)
+            k_in = _heading(vertices[i, j], vertices[i, j + 1] if j + 1 < used else rx)
+        if at == used or kind[i, at] == POINT:
+            whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
+        if at == used:
+            for p in range(ins):
+                for q in range(outs):
+                    out[i, q, p, 0] = whole * dot(_vec(e_rx[i, q]), _vec(arriving[p]))
+            continue
+        # Out: the receiver's field by reciprocity, over the rest of the chain backwards.
+        k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
+        for q in range(outs):
+            leaving[q] = e_rx[i, q]
+        for j in range(used - 1, at, -1):
+            mat = material[i, j]
+            c = coefficients(
+                m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normals[i, j]), k
+            )  # fmt: skip
+            _passed(leaving, k_out, _vec(normals[i, j]), c, kind[i, j] == TRANSMIT)
+            k_out = _heading(vertices[i, j], vertices[i, j - 1])
+        if kind[i, at] == POINT:
+            whole *= (sigma[i] / (4.0 * np.pi)) ** 0.5 * spread_out[i]
+            for p in range(ins):
+                for q in range(outs):
+                    out[i, q, p, 0] = whole * dot(_vec(leaving[q]), _vec(arriving[p]))
+            continue
+        normal = _vec(normals[i, at])
+        mat = material[i, at]
+        ci = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k)
+        co = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k)
+        scale = wavelength_4pi * (-0.25j * k / np.pi) * area[i] * spread_in[i] * spread_out[i]
+        for _ in range(caustics[i]):
+            scale *= 1j
+        for c6 in range(6):
+            phases[c6] = k * lengths[i, c6]
+        triangle_terms(phases, _LINEAR, terms)
+        for p in range(ins):
+            for q in range(outs):
+                e, g = _vec(arriving[p]), _vec(leaving[q])
                 couple = huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
-                scale = wavelength_4pi * (-0.25j * k / np.pi) * couple * area[i] * spread_in[i] * spread_out[i]
-                for _ in range(caustics[i]):
-                    scale *= 1j
-                for c6 in range(6):
-                    phases[c6] = k * lengths[i, c6]
-                triangle_terms(phases, _LINEAR, terms)
                 for c3 in range(3):
-                    out[i, q, p, c3] = scale * taper[i, c3] * terms[c3]
+                    out[i, q, p, c3 if apart else 0] += scale * couple * taper[i, c3] * terms[c3]
+
+
+@njit(cache=True)
+def _passed(e, k, normal, c, through):  # type: ignore[no-untyped-def]
+    """Send fields e (p, 3) that travel along k through a layer or off a mirror, in place."""
+    for p in range(len(e)):
+        after = transmit(_vec(e[p]), k, normal, c[2], c[3]) if through else reflect(_vec(e[p]), k, normal, c[0], c[1])
+        e[p, 0], e[p, 1], e[p, 2] = after
 
 
 def rates(routes: Routes, facets: Facets, tx_velocity: Floats, rx_velocity: Floats) -> Floats:

@@ -26,13 +26,15 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _POLARIZATIONS = {"VV": (0, 0), "VH": (0, 1), "HV": (1, 0), "HH": (1, 1)}
-_STEPS = 6
+_STEPS = 12  # halvings of the phase: rays run out before
 _LEAST_DB = 1e-4  # what rounding and the quadratic phase leave even where two launches agree
 _MAX_ERROR_DB = 60.0
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and a larger tube may miss them
+_EDGE_ALONE = 0.3  # m: the same where nothing is hidden; a larger tube may bend more than its integral follows
+_RAYS = 200.0  # of two launches over a flat body, about, for an area of max_edge squared
 _COVER = 1.8  # of the change between two launches
-_COVER_ALONE = 1.2  # the same where a body hides nothing of itself, so that launches cannot both miss it
-_CURVED = 0.02  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
+_COVER_ALONE = 1.05  # the same where a body hides nothing of itself, so that launches cannot both miss it
+_CURVED = 0.01  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
 _NULL = 1e-4  # of the strongest polarisation: -80 dB
 _GROWTH = 2.6  # rays of the next refinement over those of all before it, about
 
@@ -113,10 +115,12 @@ def facets_of(mesh: Any, material: str | Material, frequency: float) -> Facets:
     )
 
 
-def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iterator[Refinement]:
+def refinements(
+    surface: Surface, frequency: float, steps: int = _STEPS, max_rays: float = np.inf
+) -> Iterator[Refinement]:
     """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets
-    again."""
-    edge = min(_FIRST_EDGE, surface.extent / 4.0)
+    again. The first two keep to max_rays, about, where curvature and edges allow."""
+    edge = _first_edge(surface) * _stretch(surface, max_rays)
     own = _typical_edge(surface)
     for i in range(steps):
         fine = 2.0**-i
@@ -129,6 +133,17 @@ def refinements(surface: Surface, frequency: float, steps: int = _STEPS) -> Iter
             max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
         )
+
+
+def _first_edge(surface: Surface) -> float:
+    """Return the longest edge [m] of tubes at first."""
+    return min(_EDGE_ALONE if surface.convex_alone else _FIRST_EDGE, surface.extent / 4.0)
+
+
+def _stretch(surface: Surface, max_rays: float) -> float:
+    """Return how many times longer than usual the first tubes are, so that max_rays do."""
+    edge = _first_edge(surface)
+    return max(1.0, float(np.sqrt(_RAYS * surface.area.sum() / max_rays)) / edge) if edge > 0.0 else 1.0
 
 
 def _typical_edge(surface: Surface) -> float:
@@ -173,7 +188,9 @@ def _refined(
     rays, error_db, value, by_bounce = surface.rays, _MAX_ERROR_DB, 0j, np.zeros(bounces, complex)
     shared = _CURVED if surface.curved.any() else 0.0
     cover = _COVER_ALONE if surface.convex_alone else _COVER
-    for step in refinements(surface, frequency):
+    # Long tubes may miss the same in two launches.
+    cover *= np.sqrt(_stretch(surface, max_rays))
+    for step in refinements(surface, frequency, max_rays=max_rays):
         rule = replace(step, max_tubes=max(1000, max_rays // 4))
         s = scattering(surface, leg, out, frequency, bounces, rule)
         if out != leg:
@@ -183,7 +200,7 @@ def _refined(
         value = complex(by_bounce.sum())
         if before is not None:
             change = abs(value - before)
-            error_db = stated_error(value, float(np.hypot(change, shared * rule.phase * abs(value))), cover)
+            error_db = stated_error(value, change + shared * rule.phase * abs(value), cover)
             spent = (surface.rays - rays) * _GROWTH > max_rays
             # In a null of this polarisation nothing is left to find.
             null = change < _NULL * np.abs(s.sum(axis=0)).max()
@@ -197,8 +214,8 @@ def _refined(
 def stated_error(value: complex, change: float, cover: float = _COVER) -> float:
     """Return the error [dB] of |value|^2 to state when two launches differ by `change` [unit of value].
 
-    The factors were chosen on some 3000 random bodies. On 210 others it covers the true error in 98.6 %, in 96 % of
-    those where that is above 0.001 dB, at a median ratio of 2.8; other sets of 210 gave 95 to 99 % and 2.7 to 4.7.
+    The factors were chosen on 1260 random bodies. On 1260 others it covers the true error in 98 %, in 96 % of those
+    where that is above 0.001 dB; the median ratio was 3.6, 3.8 and 4.4 in three sets of 420.
     """
     change = cover * change
     size = abs(value)

@@ -83,11 +83,17 @@ class Surface(Tracer):
         soft = (np.einsum("ij,ij->i", na0, nb0) > 1 - 1e-6) & (np.einsum("ij,ij->i", na1, nb1) > 1 - 1e-6)
         self.smooth = _components(a[soft], b[soft], n)
         one_sheet = bool((self.plane == self.plane[0]).all())
+        if one_sheet:
+            # Two sheets upon each other share every edge twice, yet have no inside.
+            self.closed[:], self.open_facet[:] = False, True
         convex = one_sheet or (bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same]))
         self.convex_alone = len(f.role) == 1 and convex
+        self.hides_nothing = self.convex_alone and bool(self.closed[0])
         every = order[:-1][same], order[1:][same]
         self._wedges(*every, order[odd])
-        self._list_edges(*every, order[odd])
+        if not self.convex_alone:
+            # No shadow falls on a body that hides nothing of itself.
+            self._list_edges(*every, order[odd])
         inner = flat | soft
         self._outline(np.concatenate([ea[inner], eb[inner]]))
 

@@ -104,11 +104,17 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         miss = total[6] - (total[0] + total[1] + total[2]) / 3.0 - (bend0 + bend1 + bend2) * (4.0 / 9.0)
         bend0, bend1, bend2 = abs(bend0), abs(bend1), abs(bend2)
         off = max(abs(miss) / phase, max(bend0, bend1, bend2) / most_bend)
+        turned = 0.0
         for c in range(3):
-            off = max(off, _distance(normal[c], normal[3]) / turn)
+            turned = max(turned, _distance(normal[c], normal[3]) / turn)
         e0, e1, e2 = _distance(p[0], p[1]), _distance(p[1], p[2]), _distance(p[2], p[0])
-        if off > 1.0 + 0.5 * (high - low):
+        limit = 1.0 + 0.5 * (high - low)
+        if off > limit:
             out[i] = _largest(bend0, bend1, bend2)
+        elif turned > limit:
+            # Where the phase bends no more, only a cut across the turn brings it down.
+            n0, n1 = _distance(normal[0], normal[1]), _distance(normal[1], normal[2])
+            out[i] = _largest(n0, n1, _distance(normal[2], normal[0]))
         elif max(e0, e1, e2) > max_edge:
             out[i] = _largest(e0, e1, e2)
         else:

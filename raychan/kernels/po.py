@@ -102,30 +102,111 @@ def _corner_terms(
 
 
 _MOST = 20  # pieces along an edge: enough for the most that a tube which counts may bend
+_FINE = 1e-5  # of the mean over a triangle in phase: what may be left out
+_PANEL = 6.0  # rad that the Gauss rule follows to 1e-6
+_PANELS = 3  # along an edge, beyond which pieces are cheaper
+_CALM = 2.5  # rad that one of four points follows to 1e-6
+_SIX = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
+_FOUR = np.stack(np.polynomial.legendre.leggauss(4)) * 0.5 + np.array([[0.5], [0.0]])
+
+
+@njit(cache=True, inline="always")
+def _inner(w: float, c: float) -> complex:
+    """Return the share of one end in the integral of exp(-j phi) along a line, over its exp(-j phi): there phi' = w,
+    and phi'' = c everywhere."""
+    x = c / (w * w)
+    return 1j / w * complex(1.0 - 3.0 * x * x, x)
 
 
 @njit(cache=True)
-def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untyped-def]
-    """Integrate exp(-j phi) over a triangle on which phi is quadratic; return how many pieces it took.
+def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
+    """Integrate `_inner` exp(-j phi) along an edge; return the parts of its two ends.
 
-    Args: phases (6,) [rad] at the corners 0, 1, 2 and the middles of edges 01, 12, 20; linear [rad] how far a piece's
-    phase may bend from linear. out (3,) receives the mean's parts that belong to each corner (their sum is the mean),
-    so that each may be given its own delay. The triangle is cut in m^2 equal pieces, linear on each, with
-    the mean bend of a piece put in its phase.
+    Args: pa, pm, pb phases [rad] at ends and middle; wa, wb, c slopes at the ends and bend across the edge.
     """
-    d01 = phases[3] - 0.5 * (phases[0] + phases[1])
-    d12 = phases[4] - 0.5 * (phases[1] + phases[2])
-    d20 = phases[5] - 0.5 * (phases[2] + phases[0])
-    bend = max(abs(d01), abs(d12), abs(d20))
-    m = min(max(1, math.ceil(math.sqrt(bend / linear))), _MOST)
+    s, d = pb - pa, pm - 0.5 * (pa + pb)
+    sa, sb = s + 4.0 * d, s - 4.0 * d
+    if sa * sb > 0.0 and min(abs(sa), abs(sb)) > 4.0:
+        # The phase runs: the ends alone count (stationary phase), here to second order.
+        ga, gb, turn = _inner(wa, c), _inner(wb, c), wb - wa
+        xa, xb = -turn / (wa * sa) + 8.0 * d / (sa * sa), -turn / (wb * sb) + 8.0 * d / (sb * sb)
+        worst = max(abs(turn / (wa * sa)), abs(turn / (wb * sb))) + 8.0 * abs(d) / min(sa * sa, sb * sb)
+        if 12.0 * worst * worst < _FINE * min(abs(sa * wa), abs(sb * wb)):
+            first = -1j * ga / sa * complex(1.0, -xa) * cmath.exp(-1j * pa)
+            last = 1j * gb / sb * complex(1.0, -xb) * cmath.exp(-1j * pb)
+            return first, last
+    panels = 1 + int((abs(s) + 4.0 * abs(d)) / _PANEL)
+    first, last = 0j, 0j
+    for i in range(panels):
+        for q in range(6):
+            t = (i + _SIX[0, q]) / panels
+            g = _SIX[1, q] * _inner(wa + t * (wb - wa), c) * cmath.exp(-1j * (pa + t * s + 4.0 * d * t * (1.0 - t)))
+            first += (1.0 - t) * g
+            last += t * g
+    return first / panels, last / panels
+
+
+@njit(cache=True)
+def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
+    """Fill in the mean's parts where the phase runs along lines parallel to one edge: the ends of these, which lie on
+    the two other edges, alone count. Return False where it runs in no such direction.
+
+    Source: Wong, Asymptotic Approximations of Integrals, 2001, secs. II.3 and VIII.
+    """
+    best, edge = 0.0, -1
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        wi = phases[j] - phases[i] + 4.0 * d[i]
+        wj = wi - 8.0 * d[i]
+        wk = wi + 4.0 * (d[j] - d[i] - d[k])
+        if wi * wj > 0.0 and wi * wk > 0.0:
+            least = min(abs(wi), abs(wj), abs(wk))
+            if 60.0 * abs(8.0 * d[i] / (least * least)) ** 3 < _FINE * least and least > max(best, 4.0):
+                best, edge = least, i
+    if edge < 0:
+        return False
+    i, j, k = edge, (edge + 1) % 3, (edge + 2) % 3
+    wi = phases[j] - phases[i] + 4.0 * d[i]
+    wj, c = wi - 8.0 * d[i], -8.0 * d[i]
+    wk = wi + 4.0 * (d[j] - d[i] - d[k])
+    j_part, k_part = _along_edge(phases[j], phases[3 + j], phases[k], wj, wk, c)
+    i_part, other = _along_edge(phases[i], phases[3 + k], phases[k], wi, wk, c)
+    out[i], out[j], out[k] = -2.0 * i_part, 2.0 * j_part, 2.0 * (k_part - other)
+    return True
+
+
+@njit(cache=True, inline="always")
+def _quadratic(phases, d01, d12, d20, v, w):  # type: ignore[no-untyped-def]
+    u = 1.0 - v - w
+    return u * phases[0] + v * phases[1] + w * phases[2] + 4.0 * (d01 * u * v + d12 * v * w + d20 * w * u)
+
+
+@njit(cache=True)
+def _gauss(phases, d01, d12, d20, rule, panels, out) -> int:  # type: ignore[no-untyped-def]
+    """Fill in the mean's parts by a Gauss rule (2, n) across and along, on some panels; return how many points."""
+    t0, t1, t2 = 0j, 0j, 0j
+    h = 1.0 / panels
+    for i in range(panels):
+        for q in range(rule.shape[1]):
+            w = (i + rule[0, q]) * h
+            for j in range(panels):
+                for r in range(rule.shape[1]):
+                    v = (1.0 - w) * (j + rule[0, r]) * h
+                    phase = _quadratic(phases, d01, d12, d20, v, w)
+                    e = 2.0 * h * h * rule[1, q] * rule[1, r] * (1.0 - w) * cmath.exp(-1j * phase)
+                    t0 += (1.0 - v - w) * e
+                    t1 += v * e
+                    t2 += w * e
+    out[0], out[1], out[2] = t0, t1, t2
+    return rule.shape[1] * rule.shape[1] * panels * panels
+
+
+@njit(cache=True)
+def _pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped-def]
+    """Fill in the mean's parts by m^2 equal pieces, linear on each, with the mean bend of a piece put in its phase."""
     h = 1.0 / m
     # The mean of a piece's own bend: a third of the sum of its edges' bends, alike for all pieces.
     shift = cmath.exp(-1j * (d01 + d12 + d20) * h * h / 3.0) * h * h
-    if m == 1:
-        e0, e1, e2 = cmath.exp(-1j * phases[0]), cmath.exp(-1j * phases[1]), cmath.exp(-1j * phases[2])
-        t0, t1, t2 = _corner_terms(phases[0], phases[1], phases[2], e0, e1, e2)
-        out[0], out[1], out[2] = shift * t0, shift * t1, shift * t2
-        return 1
     p, e = np.empty((2, m + 1)), np.empty((2, m + 1), np.complex128)
     total, s1, s2 = 0j, 0j, 0j
     # Along a row the phase is a parabola, so its exponential follows from two running factors.
@@ -163,10 +244,33 @@ def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untype
     return m * m
 
 
-@njit(cache=True, inline="always")
-def _quadratic(phases, d01, d12, d20, v, w):  # type: ignore[no-untyped-def]
-    u = 1.0 - v - w
-    return u * phases[0] + v * phases[1] + w * phases[2] + 4.0 * (d01 * u * v + d12 * v * w + d20 * w * u)
+@njit(cache=True)
+def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untyped-def]
+    """Integrate exp(-j phi) over a triangle on which phi is quadratic; return how many points or pieces it took.
+
+    Args: phases (6,) [rad] at the corners 0, 1, 2 and the middles of edges 01, 12, 20; linear [rad] how far a phase may
+    bend that counts as linear. out (3,) receives the mean's parts that belong to each corner (their sum is the mean),
+    so that each may be given its own delay.
+    """
+    d01 = phases[3] - 0.5 * (phases[0] + phases[1])
+    d12 = phases[4] - 0.5 * (phases[1] + phases[2])
+    d20 = phases[5] - 0.5 * (phases[2] + phases[0])
+    bend = max(abs(d01), abs(d12), abs(d20))
+    if bend <= linear:
+        e0, e1, e2 = cmath.exp(-1j * phases[0]), cmath.exp(-1j * phases[1]), cmath.exp(-1j * phases[2])
+        t0, t1, t2 = _corner_terms(phases[0], phases[1], phases[2], e0, e1, e2)
+        shift = cmath.exp(-1j * (d01 + d12 + d20) / 3.0)
+        out[0], out[1], out[2] = shift * t0, shift * t1, shift * t2
+        return 1
+    span = max(phases[0], phases[1], phases[2]) - min(phases[0], phases[1], phases[2])
+    if span > _PANEL and _running(phases, (d01, d12, d20), out):
+        return 1
+    reach = span + 4.0 * bend
+    if reach <= _CALM:
+        return _gauss(phases, d01, d12, d20, _FOUR, 1, out)
+    if reach <= _PANELS * _PANEL:
+        return _gauss(phases, d01, d12, d20, _SIX, math.ceil(reach / _PANEL), out)
+    return _pieces(phases, d01, d12, d20, min(math.ceil(math.sqrt(bend / linear)), _MOST), out)
 
 
 @njit(cache=True, nogil=True)

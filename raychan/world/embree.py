@@ -7,32 +7,32 @@ facets before it is cast to float32, so a scene far from the origin gives the an
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.kernels.rays import clear, companions, land, plane_distances, set_out
+from raychan.kernels.rows import in_two
 from raychan.tables import LAYER, Facets
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_CHUNK = 1 << 16
 _MISS = np.int32(-1)
+_MANY = 4096  # rays from which on a second thread pays
+_CHUNK = 1 << 16
 _SLACK = 2e-6  # of a coordinate: a few float32 spacings
 _EDGE = 0.15  # of the pace: what float32 may move a ray aside
-_TOUCH = 2e-5  # m: surfaces nearer than this lie on each other
-_NEAREST = 1e-6  # m: a hit closer than this is the surface the ray leaves
+# Of the size of a small scene, or of 1 m in a larger one:
+_TOUCH = 2e-5  # surfaces nearer than this lie on each other
+_NEAREST = 1e-6  # a hit closer than this is the surface the ray leaves
 
 
 class Tracer:
     """A scene of facets that answers rays; holds counts of the rays it cast."""
 
     def __init__(self, facets: Facets) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
         self.facets = facets
         v = facets.vertices
         self.first = v[:, 0]
@@ -45,62 +45,35 @@ class Tracer:
         # Which facets are one surface; each for itself until someone knows better.
         self.plane = self.smooth = np.arange(len(v), dtype=np.int32)
         self._any_layer = bool(self.is_layer.any())
+        # Whether facets never hide each other from a point that looks at their lit sides.
+        self.hides_nothing = False
         self._scene: Any = None
-        self.extent = 0.0
+        self.extent, self._size, self._touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
         if len(v):
             low, high = v.min(axis=(0, 1)), v.max(axis=(0, 1))
             self._centre = 0.5 * (low + high)
             self.extent = float(np.linalg.norm(high - low))
-            self._scene = EmbreeScene(robust=True)
-            self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(v - self._centre, dtype=np.float32))
-            self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+            self._size = min(self.extent, 1.0)
+            # Far from the origin coordinates themselves are only known to their float64 spacing.
+            blur = 8.0 * float(np.spacing(np.abs(v).max()))
+            self._touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
 
-    def _ids(self, origin: Floats, direction: Floats) -> Ints:
-        """Return the first triangle of each float32 ray, over two threads in chunks."""
-        o = (origin - self._centre).astype(np.float32)
-        d = direction.astype(np.float32)
-        if len(o) <= _CHUNK:
-            return self._scene.run(o, d)
-        starts = range(0, len(o), _CHUNK)
-        with ThreadPoolExecutor(2) as pool:
-            run = self._scene.run
-            parts = pool.map(lambda i: run(o[i : i + _CHUNK], d[i : i + _CHUNK]), starts)
-            return np.concatenate(list(parts))
+    def _built(self) -> Any:
+        """Return Embree's scene, made for the first ray."""
+        if self._scene is None:
+            from embreex.mesh_construction import TriangleMesh
+            from embreex.rtcore_scene import EmbreeScene
 
-    def _mend(self, hit: Ints, origin: Floats, direction: Floats, pace: Floats) -> None:
-        """Cast all rays again, a few float32 spacings to either side: what is nearer then counts.
-
-        Of rays aimed at corners Embree lets one in some hundreds through, of those aimed at edges one in a million, in
-        its robust mode too. A ray and its two companions count as one.
-        """
-        side = np.cross(direction, direction[:, [2, 0, 1]] + np.array([0.0, 0.3, -0.7]))
-        for turn in (1.0, -1.0):
-            other = self._ids(origin + turn * pace[:, None] * side, direction)
-            rows = np.flatnonzero((other != hit) & (other >= 0))
-            old, new = hit[rows], other[rows]
-            t_old = np.where(old >= 0, self.distance(old, origin[rows], direction[rows]), np.inf)
-            t_new = self.distance(new, origin[rows], direction[rows])
-            nearer = (t_new > 0.0) & (t_new < t_old - pace[rows])
-            rows, new = rows[nearer], new[nearer]
-            real = self._holds(new, origin[rows] + t_new[nearer, None] * direction[rows], _EDGE * pace[rows])
-            hit[rows[real]] = new[real]
-
-    def _holds(self, facet: Ints, point: Floats, margin: Floats) -> NDArray[np.bool_]:
-        """Tell whether points (n, 3) of facets' planes lie on the facets, or within a margin (n,) [m] of them."""
-        v, n = self.facets.vertices[facet], self.normal[facet]
-        side = np.roll(v, -1, axis=1) - v
-        inward = np.cross(n[:, None], side)
-        depth = np.einsum("nij,nij->ni", point[:, None] - v, inward)
-        return np.asarray((depth > -margin[:, None] * np.linalg.norm(side, axis=2)).all(axis=1))
+            scene = EmbreeScene(robust=True)
+            self._mesh = TriangleMesh(scene, np.ascontiguousarray(self.facets.vertices - self._centre, np.float32))
+            scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+            self._scene = scene
+        return self._scene
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
-        n = self.normal[facet]
-        slope = np.einsum("ij,ij->i", n, direction)
-        height = np.einsum("ij,ij->i", n, self.first[facet] - origin)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = height / slope
-        return np.where(slope == 0.0, np.inf, t)
+        found: Floats = plane_distances(facet, origin, direction, self.first, self.normal)
+        return found
 
     def cast(self, origin: Floats, direction: Floats, skip: Ints, start: Floats | None = None) -> tuple[Ints, Floats]:
         """Return the first facet (-1: none) hit by each ray and its distance [m].
@@ -109,39 +82,39 @@ class Tracer:
         hit (-1: none), start (n,) distance [m] from which hits count.
         """
         n = len(origin)
-        facet = np.full(n, _MISS, np.int32)
-        distance = np.full(n, np.inf)
-        if self._scene is None or n == 0:
+        facet, distance = np.full(n, _MISS, np.int32), np.full(n, np.inf)
+        if not len(self.first) or n == 0:
             return facet, distance
         begin = np.zeros(n) if start is None else np.asarray(start, float)
-        # Rays leave a little ahead, in float32 terms; the float64 origin stays the true one.
-        pace = _SLACK * (1.0 + np.abs(origin - self._centre).max(axis=1))
-        ahead = begin + np.where((skip >= 0) | (begin > 0), pace, 0.0)
-        todo = np.arange(n)
-        for _ in range(8):
-            at, d = origin[todo] + ahead[todo, None] * direction[todo], direction[todo]
-            hit = self._ids(at, d)
-            self.rays += len(hit)
-            self._mend(hit, at, d, pace[todo])
-            found = hit >= 0
-            rows, ids = todo[found], hit[found]
-            t = self.distance(ids, origin[rows], direction[rows])
-            again = (ids == skip[rows]) | (t <= begin[rows] + _NEAREST)
-            facet[rows[~again]], distance[rows[~again]] = ids[~again], t[~again]
-            todo = rows[again]
-            if len(todo) == 0:
-                break
-            ahead[todo] = np.maximum(np.where(np.isfinite(t[again]), t[again], 0.0), ahead[todo]) + pace[todo] * 2.0
-            pace[todo] *= 2.0
+        scene, casts = self._built(), []
+
+        def some(rows: slice) -> None:
+            for i in range(rows.start, rows.stop, _CHUNK):
+                at = slice(i, min(i + _CHUNK, rows.stop))
+                casts.append(self._cast(scene, origin[at], direction[at], skip[at], begin[at], facet[at], distance[at]))
+
+        in_two(n, some, _MANY)
+        # A ray and its two companions count as one.
+        self.rays += sum(casts)
         return facet, distance
 
-    def _twin(self, facet: Ints, t: Floats, limit: Floats, slack: Floats, target: Ints) -> NDArray[np.bool_]:
-        """Tell which rays met another surface lying in the plane of their target at the same place: it counts there,
-        the target does not, so that what is drawn twice returns once."""
-        a, b = np.maximum(facet, 0), np.maximum(target, 0)
-        there = (facet >= 0) & (target >= 0) & (np.abs(t - limit) < np.minimum(slack, _TOUCH))
-        apart = (self.plane[a] != self.plane[b]) & (self.smooth[a] != self.smooth[b])
-        return there & apart & (np.abs(np.einsum("ij,ij->i", self.normal[a], self.normal[b])) > 1.0 - 1e-9)
+    def _cast(
+        self, scene: Any, origin: Floats, direction: Floats, skip: Ints, begin: Floats, facet: Ints, distance: Floats
+    ) -> int:
+        """Write the facets and distances of a chunk of rays; return how many were cast."""
+        # Rays leave a little ahead, in float32 terms; the float64 origin stays the true one.
+        ball = self._centre, 0.5001 * self.extent
+        ahead, pace = set_out(origin, direction, skip, begin, *ball, _SLACK, self._size)
+        todo, count = np.arange(len(origin)), 0
+        shape = self.facets.vertices, self.first, self.normal
+        for _ in range(8):
+            hit = scene.run(*companions(todo, origin, direction, ahead, pace, self._centre))
+            count += len(todo)
+            ways = origin, direction, skip, begin, ahead, pace, _EDGE, self._nearest
+            todo = land(todo, hit, *ways, *shape, facet, distance)
+            if len(todo) == 0:
+                break
+        return count
 
     def walk(
         self,
@@ -168,22 +141,27 @@ class Tracer:
         blocker = np.full(n, _MISS, np.int32)
         count = np.zeros(n, np.int64)
         todo, start = np.arange(n), np.zeros(n)
+        if self.hides_nothing:
+            # What looks towards the ray's start is then seen from it; each such point still counts as a ray.
+            towards = np.einsum("ij,ij->i", direction, self.normal[target]) < 0.0
+            reached = towards & (target >= 0) & (skip < 0)
+            todo = np.flatnonzero(~reached)
+            self.rays += n - len(todo)
         while len(todo):
-            facet, t = self.cast(origin[todo], direction[todo], skip[todo], start[todo])
-            # Only the target's own curved surface may lie before it by more than rounding.
-            own = self.smooth[facet] == self.smooth[target[todo]]
-            near = np.where(own, slack[todo], np.minimum(slack[todo], _TOUCH))
-            clear = (facet < 0) | (t >= limit[todo] - near) | (facet == target[todo])
-            clear &= ~self._twin(facet, t, limit[todo], slack[todo], target[todo])
+            o, d, aim = origin[todo], direction[todo], target[todo]
+            facet, t = self.cast(o, d, skip[todo], start[todo])
+            ways = o, d, limit[todo], slack[todo], aim, self._touch
+            margin = _EDGE * _SLACK * self._size
+            free = clear(facet, t, *ways, self.plane, self.smooth, self.facets.vertices, self.normal, margin)
             if inside is not None:
-                clear |= self.facets.body[np.maximum(facet, 0)] == inside[todo]
-            reached[todo[clear]] = True
-            blocker[todo] = np.where(clear, _MISS, facet)
+                free |= self.facets.body[np.maximum(facet, 0)] == inside[todo]
+            reached[todo[free]] = True
+            blocker[todo] = np.where(free, _MISS, facet)
             if not self._any_layer or layers == 0:
                 break
-            more = ~clear & self.is_layer[facet] & (count[todo] < layers)
+            more = ~free & self.is_layer[facet] & (count[todo] < layers)
             todo, facet, t = todo[more], facet[more], t[more]
             passed[todo, count[todo]] = facet
             count[todo] += 1
-            start[todo] = t + _NEAREST
+            start[todo] = t + self._nearest
         return reached, passed, blocker

@@ -1,0 +1,167 @@
+"""Rays: what is done in float64 about the float32 casts of a ray and its two companions (numba loops).
+
+Everywhere: origin, direction (n, 3) [m], unit; normal (m, 3), first (m, 3) and vertices (m, 3, 3) of the facets.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+_FAR = 32.0  # radii of the ball about all facets from which an origin is far off
+
+
+@njit(cache=True, inline="always")
+def _plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
+    """Return the distance from x + along d to the plane through v of normal n, along d."""
+    slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+    if slope == 0.0:
+        return np.inf
+    height = 0.0
+    for c in range(3):
+        height += n[c] * (v[c] - (x[c] + along * d[c]))
+    return height / slope
+
+
+@njit(cache=True, nogil=True)
+def plane_distances(facet, origin, direction, first, normal):  # type: ignore[no-untyped-def]
+    """Return the distance [m] along each ray to the plane of its facet (n,), inf when parallel."""
+    out = np.empty(len(facet))
+    for i in range(len(facet)):
+        f = facet[i]
+        out[i] = _plane_distance(normal[f], first[f], origin[i], 0.0, direction[i])
+    return out
+
+
+@njit(cache=True, inline="always")
+def _holds(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
+    """Tell whether x + t d, a point of a facet's plane, lies on it, or at most `margin` [m] outside."""
+    for a in range(3):
+        b = (a + 1) % 3
+        sx, sy, sz = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
+        px, py, pz = x[0] + t * d[0] - v[a, 0], x[1] + t * d[1] - v[a, 1], x[2] + t * d[2] - v[a, 2]
+        depth = px * (n[1] * sz - n[2] * sy) + py * (n[2] * sx - n[0] * sz) + pz * (n[0] * sy - n[1] * sx)
+        if depth <= -margin * math.sqrt(sx * sx + sy * sy + sz * sz):
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def set_out(origin, direction, skip, start, centre, radius, slack, size):  # type: ignore[no-untyped-def]
+    """Return how far ahead (n,) [m] rays are cast, and their pace (n,) [m]: a few float32 spacings.
+
+    Args: skip, start (n,) as for `Tracer.cast`; centre (3,), radius [m] of a ball about all facets; slack, the pace in
+    parts of a coordinate; size [m] that a coordinate counts at least.
+    """
+    n = len(origin)
+    ahead, pace = np.empty(n), np.empty(n)
+    for i in range(n):
+        x, d = origin[i], direction[i]
+        along = 0.0
+        for c in range(3):
+            along += (centre[c] - x[c]) * d[c]
+        aside = 0.0
+        for c in range(3):
+            aside += (x[c] + along * d[c] - centre[c]) ** 2
+        # Before the ball about all facets nothing is hit: rays from far off set out there, where float32 is finer.
+        at = along - math.sqrt(max(radius * radius - aside, 0.0))
+        at = at if at > max(start[i], _FAR * radius) else start[i]
+        most = 0.0
+        for c in range(3):
+            most = max(most, abs(x[c] + at * d[c] - centre[c]))
+        pace[i] = slack * (size + most)
+        ahead[i] = at + (pace[i] if at == start[i] and (skip[i] >= 0 or start[i] > 0.0) else 0.0)
+    return ahead, pace
+
+
+@njit(cache=True, nogil=True)
+def companions(todo, origin, direction, ahead, pace, centre):  # type: ignore[no-untyped-def]
+    """Return float32 origins and directions (3 m, 3) of the rays `todo` (m,), each with two companions, a pace to
+    either side."""
+    m = len(todo)
+    o, d = np.empty((3 * m, 3), np.float32), np.empty((3 * m, 3), np.float32)
+    side = np.empty(3)
+    for j in range(m):
+        i = todo[j]
+        x, y, z = direction[i]
+        # Not parallel to the direction, and not along the axes, on which edges like to lie.
+        side[0] = y * (y - 0.7) - z * (x + 0.3)
+        side[1] = z * z - x * (y - 0.7)
+        side[2] = x * (x + 0.3) - y * z
+        for c in range(3):
+            at, way = origin[i, c] + ahead[i] * direction[i, c], pace[i] * side[c]
+            o[3 * j, c], d[3 * j, c] = at - centre[c], direction[i, c]
+            o[3 * j + 1, c], d[3 * j + 1, c] = at + way - centre[c], direction[i, c]
+            o[3 * j + 2, c], d[3 * j + 2, c] = at - way - centre[c], direction[i, c]
+    return o, d
+
+
+@njit(cache=True, nogil=True)
+def land(  # type: ignore[no-untyped-def]
+    todo, hit, origin, direction, skip, start, ahead, pace, edge, nearest, vertices, first, normal, facet, distance
+):
+    """Write facets and distances of the rays `todo` (m,); return those to be cast again from farther on.
+
+    Args: hit (3 m,) what each ray and its companions met. Of rays aimed at corners Embree lets one in some hundreds
+    through, of those aimed at edges one in a million: what a companion met nearer counts, where the ray meets it too,
+    or misses it by `edge` of its pace at most. nearest [m]: a hit closer to the start is the surface left.
+    """
+    again = np.empty(len(todo), np.int64)
+    count = 0
+    for j in range(len(todo)):
+        i = todo[j]
+        x, d = origin[i], direction[i]
+        h = hit[3 * j]
+        for s in range(1, 3):
+            other = hit[3 * j + s]
+            if other < 0 or other == h:
+                continue
+            old = np.inf if h < 0 else _plane_distance(normal[h], first[h], x, ahead[i], d)
+            new = _plane_distance(normal[other], first[other], x, ahead[i], d)
+            if 0.0 < new < old - pace[i] and _holds(
+                vertices[other], normal[other], x, ahead[i] + new, d, edge * pace[i]
+            ):
+                h = other
+        if h < 0:
+            continue
+        t = _plane_distance(normal[h], first[h], x, 0.0, d)
+        if h != skip[i] and t > start[i] + nearest:
+            facet[i], distance[i] = h, t
+            continue
+        ahead[i] = max(t if np.isfinite(t) else 0.0, ahead[i]) + 2.0 * pace[i]
+        pace[i] *= 2.0
+        again[count] = i
+        count += 1
+    return again[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def clear(  # type: ignore[no-untyped-def]
+    facet, t, origin, direction, limit, slack, target, touch, plane, smooth, vertices, normal, margin
+):
+    """Tell of rays (n,) that met `facet` at t [m] whether they reached their `limit` [m].
+
+    Only the target's own smooth surface may lie before it by `slack` (n,) [m], others by `touch` [m]. Where another
+    surface lies in the plane of the target, at the same place, that counts and the target does not: what is drawn
+    twice returns once. Facets of one plane overlap where the point lies within both, by `margin` [m].
+    """
+    out = np.ones(len(facet), np.bool_)
+    for i in range(len(facet)):
+        a, b = facet[i], target[i]
+        if a < 0 or a == b:
+            continue
+        own = b >= 0 and smooth[a] == smooth[b]
+        close = min(slack[i], touch)
+        out[i] = t[i] >= limit[i] - (slack[i] if own else close)
+        if b < 0 or abs(t[i] - limit[i]) >= close:
+            continue
+        if abs(normal[a, 0] * normal[b, 0] + normal[a, 1] * normal[b, 1] + normal[a, 2] * normal[b, 2]) <= 1.0 - 1e-9:
+            continue
+        if (plane[a] != plane[b] and not own) or (
+            _holds(vertices[a], normal[a], origin[i], t[i], direction[i], -margin)
+            and _holds(vertices[b], normal[b], origin[i], t[i], direction[i], -margin)
+        ):
+            out[i] = False
+    return out
