@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.edges import meeting_lines
+from raychan.channel.found import Found
 from raychan.channel.legs import Leg
 from raychan.channel.shadows import shadows_of
 from raychan.channel.surface import Surface
@@ -20,10 +21,8 @@ from raychan.channel.tubes import (
     along_line,
     edge_lengths,
     halves,
-    least,
     phases_of,
     stand,
-    that_count,
     unit,
     vector_area,
 )
@@ -35,12 +34,12 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 
-def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement) -> Tubes:
+def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found) -> Tubes:
     """Return the tubes of first bounces seen over `leg`, fine enough for a return over `out`.
 
-    Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do.
+    Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do; found what was so far.
     """
-    f = surface.facets
+    f, rule = surface.facets, found.rule
     shape = f.vertices, f.normals, surface.bulge
     ways = leg.image, leg.far, out.image, out.far
     facet = _seeds(surface, leg, bodies)
@@ -50,7 +49,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, rule: Refinement
     facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
     if out != leg:
         facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
-    return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), rule)
+    return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found)
 
 
 def _seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
@@ -86,15 +85,22 @@ def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement) -> tupl
     return np.concatenate([f for f, _ in done]), np.concatenate([b for _, b in done])
 
 
-def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Tubes:
+def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found) -> Tubes:
     """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
     kept: list[Tubes] = []
+    rule = found.rule
     ph = phases_of(surface, leg, out, tubes, True, rule)
-    doubt = least(rule, ph.scale())
-    tubes = tubes.take(that_count(ph.bound, doubt))
+    tubes = tubes.take(found.that_count(ph.bound, ph.length))
+    if not surface.convex_alone:
+        # What nobody sees must not count: the strongest lit surface may stand behind a wall.
+        nothing = np.zeros(len(tubes), bool)
+        seen = sight(surface, leg, tubes, nothing, rule).seen[:, CENTRE]
+        ph = phases_of(surface, leg, out, tubes.take(seen), True, rule)
+    found.add(ph)
     for level in range(rule.levels + 1):
-        matters = phases_of(surface, leg, out, tubes, True, rule).bound > doubt
-        view = sight(surface, leg, tubes, matters, rule)
+        ph = phases_of(surface, leg, out, tubes, True, rule)
+        matters = ph.bound > found.doubt(ph.length)
+        view = sight(surface, leg, tubes, matters, rule, level < GAPS)
         split = view.mixed & matters & (level < rule.levels)
         ready = ~split & view.seen[:, CENTRE]
         kept.append(tubes.take(ready))
@@ -104,6 +110,9 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Ref
         rows = np.flatnonzero(split)
         tubes, _ = divide(surface, leg, tubes.take(rows), rows, view.side[rows], True, rule)
     return Tubes.join(kept)
+
+
+GAPS = 1  # cuts of a hidden tube in search of a part that is seen
 
 
 @dataclass(frozen=True)
@@ -120,11 +129,14 @@ class Sight:
     def mixed(self) -> Bools:
         """Tubes that are seen in part."""
         some, whole = self.seen.any(axis=1), self.seen.all(axis=1)
-        return (some & ~whole) | (some & (self.side != 0.0).any(axis=1))
+        return (some & ~whole) | (self.side != 0.0).any(axis=1)
 
 
-def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refinement) -> Sight:
-    """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter."""
+def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refinement, gaps: bool = True) -> Sight:
+    """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter.
+
+    Args: gaps whether to look for one through which a tube is seen that none of its rays is.
+    """
     n = len(tubes)
     # Corners lie on edges that other facets share: draw them in a little.
     centre = tubes.points[:, CENTRE:]
@@ -141,10 +153,14 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     seen, block = np.repeat(view.seen[:n], 4).reshape(n, 4), np.full((n, 4), -1, np.int32)
     seen.reshape(-1)[ray], block.reshape(-1)[ray] = view.seen, view.blocker
     source = np.broadcast_to(leg.image, (n, 3))
-    partly = seen.any(axis=1) & matters
+    # Between two bodies that hide all four rays there may be a gap; behind one there is none.
+    covers = surface.smooth[block]
+    one = (block >= 0).all(axis=1) & (covers == covers[:, :1]).all(axis=1)
+    partly = matters & (seen.any(axis=1) | (gaps & ~one))
     side = np.zeros((n, 3))
     if partly.any():
-        side = shadows_of(surface, leg).across(tubes.points, surface.normal[tubes.facet], partly, slack)
+        own = surface.normal[tubes.facet], surface.smooth[tubes.facet]
+        side = shadows_of(surface, leg).across(tubes.points, *own, partly, slack)
     # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
     known = seen | (block >= 0)
     facet = np.where(block >= 0, block, tubes.facet[:, None])
@@ -152,6 +168,7 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     own = vector_area(tubes.points)
     own /= np.maximum(np.linalg.norm(own, axis=1), 1e-300)[:, None]
     meeting_lines(tubes.points, source, -k, leg.far, met, block, surface.first, surface.normal, own, side)
+    side[~partly] = 0.0
     return Sight(seen, view.corners[:n], view.passed[:n], side)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.beam import Beam
 from raychan.channel.surface import Surface
 
 Floats = NDArray[np.float64]
@@ -62,6 +63,7 @@ class Leg:
     end: Floats
     far: bool = False
     mirrors: tuple[Mirror, ...] = ()
+    beam: Beam | None = None
     image: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -86,6 +88,15 @@ class Leg:
     def spread(self, length: Floats) -> Floats:
         """Return the field's spreading [1/m] (1 for a plane wave)."""
         return np.ones_like(length) if self.far else 1.0 / length
+
+    def weight(self, points: Floats) -> Floats:
+        """Return the field (n,) that the end's antenna sends to points over this leg, relative to its strongest."""
+        if self.beam is None:
+            return np.ones(len(points))
+        look, _ = self.rays(points)
+        for m in reversed(self.mirrors):
+            look = look - 2.0 * np.outer(look @ m.normal, m.normal)
+        return self.beam(look)
 
     def bounces(self, points: Floats) -> Floats:
         """Return the mirror points (n, m, 3) [m] of the way to each point, end's side first."""

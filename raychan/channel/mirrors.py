@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.beam import Beam
 from raychan.channel.legs import Leg, Mirror
 from raychan.channel.surface import Surface
 from raychan.tables import BLOCKER, MIRROR
@@ -46,9 +47,10 @@ def planes_that_mirror(surface: Surface, end: Floats) -> list[Mirror]:
     return [m for _, m in found[:_MOST]]
 
 
-def legs_over(surface: Surface, end: Floats, bounces: int) -> list[Leg]:
-    """Return the legs from `end` (3,) [m] with at most `bounces` mirrors, the direct one first."""
-    direct = Leg(end=np.asarray(end, float))
+def legs_over(surface: Surface, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
+    """Return the legs from `end` (3,) [m], whose antenna has a `beam`, with at most `bounces` mirrors, the direct one
+    first."""
+    direct = Leg(end=np.asarray(end, float), beam=beam)
     legs = [direct]
     if bounces < 1:
         return legs
@@ -57,7 +59,7 @@ def legs_over(surface: Surface, end: Floats, bounces: int) -> list[Leg]:
     for count in range(1, bounces + 1):
         for chain in permutations(everything, count):
             if _possible(direct.end, chain):
-                legs.append(Leg(end=direct.end, mirrors=chain))
+                legs.append(Leg(end=direct.end, mirrors=chain, beam=beam))
     return legs
 
 

@@ -22,7 +22,7 @@ class Shadows:
     """The silhouette edges of all bodies as seen over one leg, in a grid of directions from the leg's last image."""
 
     def __init__(self, surface: Surface, leg: Leg) -> None:
-        self.edges = _silhouette(surface, leg)
+        self.edges, self._smooth = _silhouette(surface, leg)
         if len(self.edges):
             a, b = (_directions(self.edges[:, i], leg) for i in range(2))
             low, high = np.minimum(a, b).min(axis=0), np.maximum(a, b).max(axis=0)
@@ -30,17 +30,20 @@ class Shadows:
             low -= 2.0 * cell
             shape = np.ceil((high - low) / cell).astype(np.int64) + 3
             self._grid = *_fill(self.edges, leg.image, leg.far, low, cell, shape), low, cell, shape
-        self._from = leg.image, leg.far
+        self._from = leg.image, leg.far, surface.touch
 
-    def across(self, points: Floats, normal: Floats, wanted: NDArray[np.bool_], slack: Floats) -> Floats:
+    def across(self, points: Floats, normal: Floats, smooth: Ints, wanted: NDArray[np.bool_], slack: Floats) -> Floats:
         """Return signed distances (n, 3) [m] of tubes' corners from the longest shadow edge on each; zeros: none.
 
-        Args: points (n, 4, 3) [m] corners and centres; normal (n, 3) of the planes they lie on; wanted (n,) which tubes
-        to look at; slack (n,) [m] in front of the plane that still belongs to its own surface.
+        Args: points (n, 4, 3) [m] corners and centres; normal (n, 3) of the planes they lie on; smooth (n,) the smooth
+        patches they are of; wanted (n,) which tubes to look at; slack (n,) [m] in front of the plane that still belongs
+        to its own patch.
         """
         if not len(self.edges):
             return np.zeros((len(points), 3))
-        found: Floats = _across(points, normal, wanted, slack, *self._from, self.edges, *self._grid)
+        found: Floats = _across(
+            points, normal, smooth, wanted, slack, *self._from, self.edges, self._smooth, *self._grid
+        )
         return found
 
 
@@ -52,20 +55,21 @@ def shadows_of(surface: Surface, leg: Leg) -> Shadows:
     return known[leg]
 
 
-def _silhouette(surface: Surface, leg: Leg) -> Floats:
+def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
     """Return the edges (m, 2, 3) [m] at which a body turns away, and the rims of open sheets, in front of the last
-    mirror."""
+    mirror; and the smooth patches (m, 2) that meet there."""
     facing = surface.normal @ leg.image
     if not leg.far:
         facing = facing - np.einsum("ij,ij->i", surface.normal, surface.first)
     front = facing > 0.0
     pair = surface.edge_faces
     kept = (pair[:, 1] < 0) | (front[pair[:, 0]] != front[pair[:, 1]])
-    edges = surface.edge_ends[kept]
+    edges, smooth = surface.edge_ends[kept], surface.smooth[np.where(pair < 0, pair[:, ::-1], pair)[kept]]
     if leg.mirrors:
         m = leg.mirrors[-1]
-        edges = edges[((edges - m.point) @ m.normal > 0.0).any(axis=1)]
-    return np.ascontiguousarray(edges)
+        ahead = ((edges - m.point) @ m.normal > 0.0).any(axis=1)
+        edges, smooth = edges[ahead], smooth[ahead]
+    return np.ascontiguousarray(edges), np.ascontiguousarray(smooth)
 
 
 def _directions(points: Floats, leg: Leg) -> Floats:
@@ -130,7 +134,7 @@ def _fill(edges, image, far, low, cell, shape):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _across(  # type: ignore[no-untyped-def]
-    points, normal, wanted, slack, image, far, edges, first, index, low, cell, shape
+    points, normal, smooth, wanted, slack, image, far, touch, edges, edge_smooth, first, index, low, cell, shape
 ):
     n = len(points)
     out = np.zeros((n, 3))
@@ -174,7 +178,9 @@ def _across(  # type: ignore[no-untyped-def]
                         ha += sign * (a[c] - centre[c]) * normal[i, c]
                         hb += sign * (b[c] - centre[c]) * normal[i, c]
                     # Only what lies in front of the tube's plane throws a shadow on it.
-                    begin, end = above(ha - slack[i], hb - slack[i])
+                    own = edge_smooth[e, 0] == smooth[i] or edge_smooth[e, 1] == smooth[i]
+                    near = slack[i] if own else min(slack[i], touch)
+                    begin, end = above(ha - near, hb - near)
                     if begin == end:
                         continue
                     begin, end = inside(a, b, points[i], centre, image, k, far, begin, end, work)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.collect import routes_of
+from raychan.channel.found import Found
 from raychan.channel.launch import launch
 from raychan.channel.legs import Leg
 from raychan.channel.mirrors import reachable
@@ -20,14 +21,24 @@ Floats = NDArray[np.float64]
 
 
 def tube_routes(
-    surface: Surface, leg: Leg, outs: list[Leg], bodies: NDArray[np.bool_], rule: Refinement, bounces: int
+    surface: Surface,
+    leg: Leg,
+    outs: list[Leg],
+    bodies: NDArray[np.bool_],
+    rule: Refinement,
+    bounces: int,
+    so_far: Found | None = None,
 ) -> Iterator[Routes]:
-    """Yield the routes of tubes launched over `leg`, bounce by bounce and way out by way out."""
+    """Yield the routes of tubes launched over `leg`, bounce by bounce and way out by way out.
+
+    Args: so_far what launches over other legs have found.
+    """
     f = surface.facets
     direct = outs[0]
-    tubes = launch(surface, leg, direct, bodies, rule)
+    found = so_far or Found(rule)
+    tubes = launch(surface, leg, direct, bodies, found)
     mirror_planes = _planes_in(surface, outs)
-    first, total = True, 0.0
+    first = True
     reach = [reachable(surface, out) for out in outs]
     while len(tubes):
         counts = tubes.bounces
@@ -50,16 +61,16 @@ def tube_routes(
             if first and out == leg:
                 corners, passed = _same_way_back(some, leg, rule)
             else:
-                some, corners, passed = settle(surface, leg, out, some, total, rule, first)
+                some, corners, passed = settle(surface, leg, out, some, found, first)
             if len(some):
-                total = max(total, phases_of(surface, leg, out, some, first, rule).scale())
+                found.add(phases_of(surface, leg, out, some, first, rule))
                 yield routes_of(surface, leg, out, some, first, corners, passed)
         tubes = tubes.take(counts < bounces)
         if not len(tubes) or surface.convex_alone:
             return
         before = tubes
         last = int(before.bounces[0]) + 1 >= bounces
-        tubes = bounce(surface, leg, direct, before, first, last, total, rule)
+        tubes = bounce(surface, leg, direct, before, first, last, found)
         if first and len(tubes):
             # From a plane mirror to another body: the legs over mirrors have these.
             previous = tubes.facets[np.arange(len(tubes)), _last_bounce(tubes)]

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.advance import APART, corner_rates
+from raychan.channel.beam import beam_of
 from raychan.channel.diffract import diffracted_paths
 from raychan.channel.fields import departures, rates, transfer
+from raychan.channel.found import Found
 from raychan.channel.legs import Leg
 from raychan.channel.mirrors import legs_over, reachable
 from raychan.channel.scatterers import point_routes
@@ -53,12 +55,17 @@ class Stats:
 
 
 def refinement(
-    frequency: float, tolerance_db: float, floor: float = 0.0, layers: int = 2, jitter: float = 0.0
+    frequency: float,
+    tolerance_db: float,
+    floor: float = 0.0,
+    layers: int = 2,
+    jitter: float = 0.0,
+    cell: float = np.inf,
 ) -> Refinement:
     """Return how finely tubes must be cut for a tolerance [dB].
 
     Args: floor [1/m] the scattered amplitude that drowns in noise; layers that a
-    stretch may pass; jitter another lattice. The constants are those at which two
+    stretch may pass; jitter another lattice; cell [m] of two-way length that the radar tells apart. The constants are those at which two
     launches of the shapes in the tests differ by about half the tolerance.
     """
     fine = tolerance_db / 0.5
@@ -68,7 +75,8 @@ def refinement(
         turn=min(0.3, 0.15 * fine),
         relative=min(0.1, 0.02 * fine),
         max_edge=0.3 * min(1.0, np.sqrt(fine)),
-        floor=floor,
+        floor=2.0 * floor * fine,
+        cell=cell,
         layers=layers,
         slots=8 + layers,
         jitter=jitter,
@@ -98,7 +106,7 @@ def solve(
     surface = facets if isinstance(facets, Surface) else Surface(facets)
     facets, before = surface.facets, surface.rays
     stats.add("build", since)
-    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1)
+    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, beam_of(radar))
     stats.legs = len(legs)
     parts: list[Paths] = []
 
@@ -117,6 +125,7 @@ def solve(
     if found is not None:
         carry(found)
     stats.add("points", since)
+    so_far = Found(rule)
     for i, leg in enumerate(legs):
         if progress:
             progress("trace", i / len(legs))
@@ -124,7 +133,7 @@ def solve(
         if not bodies.any():
             continue
         since = perf_counter()
-        for routes in tube_routes(surface, leg, legs, bodies, rule, bounces):
+        for routes in tube_routes(surface, leg, legs, bodies, rule, bounces, so_far):
             stats.add("trace", since)
             since = perf_counter()
             stats.tubes += len(routes.kind)

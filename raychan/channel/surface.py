@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from raychan.kernels.fresnel import coefficients_array
-from raychan.tables import MIRROR, Facets
+from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.embree import Tracer
 
 Floats = NDArray[np.float64]
@@ -20,6 +20,7 @@ Ints = NDArray[np.int32]
 
 _WELD = 1e-6  # m
 _MIX = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB, 0x2545F4914F6CDD1D])
+_METAL = 1e3  # relative permittivity from which a surface returns nearly all
 _SHARP = 0.95  # cosine of corner normals across an edge above which it is round, not a wedge
 
 
@@ -36,6 +37,8 @@ class Surface(Tracer):
         self.open_facet = np.ones(n, bool)
         self.curved = np.zeros(n, bool)
         self.convex_alone = False
+        m = facets.materials
+        self.dull = ((m.kind != PEC) & (np.abs(m.eps) < _METAL))[facets.material]
         self.bulge = np.zeros((n, 3, 3))
         self.outline = np.zeros((0, 2, 3))
         self.first_edge = np.zeros(1, np.int64)
@@ -122,7 +125,8 @@ class Surface(Tracer):
 
     def _list_edges(self, ea: Ints, eb: Ints, rim: Ints) -> None:
         """List every edge that can be a body's outline: `edge_ends` (e, 2, 3) [m] and `edge_faces` (e, 2), -1 beyond a
-        rim. Hollow edges hide nothing; between coplanar facets none is seen."""
+        rim. Hollow edges hide nothing; between coplanar facets none is seen. Where a pane meets its frame, the frame
+        ends as at a rim."""
         a, b = ea // 3, eb // 3
         v = self.facets.vertices
         height = np.einsum("ij,ij->i", v[b, (eb % 3 + 2) % 3] - v[a, ea % 3], self.normal[a])
@@ -130,7 +134,10 @@ class Surface(Tracer):
         # The ground ends where nobody looks, and its far rim would stretch every grid.
         solid = self.facets.role[self.facets.body] != MIRROR
         bent &= solid[a]
-        rim = rim[solid[rim // 3]]
+        framed = self.is_layer[a] != self.is_layer[b]
+        bent &= ~framed
+        frame = np.where(self.is_layer[a], eb, ea)[framed & solid[a]]
+        rim = np.concatenate([rim[solid[rim // 3]], frame])
         pick = np.concatenate([ea[bent], rim])
         self.edge_ends = np.stack([v[pick // 3, pick % 3], v[pick // 3, (pick % 3 + 1) % 3]], axis=1)
         beyond = np.concatenate([b[bent], np.full(len(rim), -1)])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.between import between
 from raychan.channel.edges import edge_within, meeting_lines
-from raychan.channel.launch import divide, sight, write_layers
+from raychan.channel.found import Found
+from raychan.channel.launch import GAPS, divide, sight, write_layers
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
@@ -15,9 +18,7 @@ from raychan.channel.tubes import (
     Refinement,
     Tubes,
     halves,
-    least,
     phases_of,
-    that_count,
     vector_area,
 )
 from raychan.kernels.landing import landing_span
@@ -30,65 +31,81 @@ Bools = NDArray[np.bool_]
 _ALIKE = 0.98  # cosine within which normals of one smooth patch may differ over a tube
 
 
-def bounce(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, last: bool, total: float, rule: Refinement
-) -> Tubes:
+def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, last: bool, found: Found) -> Tubes:
     """Return the tubes after one more reflection, standing where they land.
 
     Args: out the way back used to weigh tubes; first, last whether `tubes` stand on their first surface, or land on
-    their last; total [1/m] the scattered field found so far, against which `rule.relative` counts.
+    their last; found what was so far.
     """
+    rule = found.rule
     landed: list[Tubes] = []
-    room = tubes.slots < rule.slots - 2
-    start = np.zeros((int(room.sum()), 4))
-    through = np.full((int(room.sum()), rule.layers), -1, np.int32)
-    _fly(surface, leg, out, tubes.take(room), start, through, 0, first, last, total, rule, landed)
+    tubes = tubes.take(tubes.slots < rule.slots - 2)
+    n = len(tubes)
+    flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, rule.layers), -1, np.int32), np.zeros((2, n), np.int8))
+    while len(flight.tubes):
+        flight = _step(surface, leg, out, flight, first, last, found, landed)
     if not landed:
-        return tubes.take(np.zeros(len(tubes), bool))
+        return tubes.take(np.zeros(n, bool))
     after = Tubes.join(landed)
     ph = phases_of(surface, leg, out, after, False, rule)
-    return after.take(that_count(ph.bound if last else ph.area, least(rule, total)))
+    return after.take(found.that_count(ph.bound if last else ph.area, ph.length))
 
 
-def _fly(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, start: Floats, through: Ints, layer: int,
-    first: bool, last: bool, total: float, rule: Refinement, landed: list[Tubes],
-) -> None:  # fmt: skip
-    """Cast, land what agrees, cut what does not; then go on behind the thin layers that were hit."""
-    for level in range(rule.levels + 1):
-        if not len(tubes):
-            return
-        k = mirrored(tubes)
-        area, doubt = phases_of(surface, leg, out, tubes, first, rule).area, least(rule, total)
-        hit, t = _cast(surface, tubes, k, start, area > doubt)
-        matters = area > doubt
-        if last:
-            # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
-            # back. Before more mirrors nobody knows.
-            span = _landing_span(surface, out, tubes, k, hit, rule)
-            # A tube of which no ray meets anything may still hold a small body between its rays.
-            matters &= (area > doubt * (1.0 + 0.5 * span)) | (hit < 0).all(axis=1)
-        mid = hit[:, CENTRE]
-        agree = _agree(surface, hit)
-        side = _edges(surface, leg, tubes, k, hit, t, matters)
-        mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
-        split = mixed & matters & (level < rule.levels)
-        ready = np.flatnonzero(~split & (mid >= 0))
-        whole = np.where(agree[ready, None], hit[ready], mid[ready, None])
-        landed.append(_land(surface, leg, tubes.take(ready), k[ready], whole, through[ready], rule))
-        behind = ready[surface.is_layer[mid[ready]]] if layer < rule.layers else ready[:0]
-        if len(behind):
-            beyond, passed = t[behind].copy(), through[behind].copy()
-            centre = beyond[:, CENTRE:].repeat(4, axis=1)
-            beyond = np.where(np.isfinite(beyond), beyond, centre) + 1e-6
-            passed[:, layer] = mid[behind]
-            _fly(surface, leg, out, tubes.take(behind), beyond, passed, layer + 1, first, last, total, rule, landed)
-        if not split.any():
-            return
-        rows = np.flatnonzero(split)
-        tubes, rows = divide(surface, leg, tubes.take(rows), rows, side[rows], first, rule)
-        start, through = start[rows], through[rows]
-        start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
+@dataclass(frozen=True)
+class _Flight:
+    """Tubes between two surfaces: `start` (n, 4) [m] from which hits count, layers `through` (n, l) so far, and how
+    often each was cut and passed a layer, `count` (2, n)."""
+
+    tubes: Tubes
+    start: Floats
+    through: Ints
+    count: NDArray[np.int8]
+
+    def take(self, rows: NDArray[np.signedinteger]) -> _Flight:
+        return _Flight(self.tubes.take(rows), self.start[rows], self.through[rows], self.count[:, rows])
+
+
+def _step(
+    surface: Surface, leg: Leg, out: Leg, flight: _Flight, first: bool, last: bool, found: Found, landed: list[Tubes]
+) -> _Flight:
+    """Cast, land what agrees; return what was cut, and what goes on behind the thin layers that were hit."""
+    rule, tubes = found.rule, flight.tubes
+    k = mirrored(tubes)
+    ph = phases_of(surface, leg, out, tubes, first, rule)
+    hit, t = _cast(surface, tubes, k, flight.start, ph.area > found.doubt(ph.length))
+    doubt = found.doubt(_whole_way(out, tubes, k, t) if last else ph.length)
+    matters = ph.area > doubt
+    if last:
+        # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
+        # back. Before more mirrors nobody knows.
+        span = _landing_span(surface, out, tubes, k, hit, rule)
+        # A tube of which no ray meets anything may still hold a small body between its rays.
+        matters &= (ph.area > doubt * (1.0 + 0.5 * span)) | (hit < 0).all(axis=1)
+    mid, agree = hit[:, CENTRE], _agree(surface, hit)
+    side = _edges(surface, leg, tubes, k, hit, t, matters)
+    mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
+    cuts, layers = flight.count
+    split = mixed & matters & (cuts < rule.levels)
+    ready = np.flatnonzero(~split & (mid >= 0))
+    whole = np.where(agree[ready, None], hit[ready], mid[ready, None])
+    landed.append(_land(surface, leg, tubes.take(ready), k[ready], whole, flight.through[ready], rule))
+    behind = ready[surface.is_layer[mid[ready]] & (layers[ready] < rule.layers)]
+    beyond = flight.take(behind)
+    reach = np.where(np.isfinite(t[behind]), t[behind], t[behind, CENTRE, None]) + 1e-6
+    beyond.through[np.arange(len(behind)), layers[behind]] = mid[behind]
+    beyond.count[1] += 1
+    rows = np.flatnonzero(split)
+    parts, rows = divide(surface, leg, tubes.take(rows), rows, side[rows], first, rule)
+    start = flight.start[rows]
+    start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
+    count = flight.count[:, rows]
+    count[0] += 1
+    return _Flight(
+        Tubes.join([parts, beyond.tubes]),
+        np.concatenate([start, reach]),
+        np.concatenate([flight.through[rows], beyond.through]),
+        np.concatenate([count, beyond.count], axis=1),
+    )
 
 
 def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, t: Floats, wanted: Bools) -> Floats:
@@ -127,6 +144,13 @@ def _landing_span(surface: Surface, out: Leg, tubes: Tubes, k: Floats, hit: Ints
     ways = surface.first, surface.normal, out.image, out.far
     span: Floats = landing_span(tubes.points, k, tubes.length, hit, *(*ways, rule.wavenumber))
     return span
+
+
+def _whole_way(out: Leg, tubes: Tubes, k: Floats, t: Floats) -> Floats:
+    """Return the lengths (n,) [m] of the ways that end where the centre rays land, or here where they do not."""
+    reach = np.where(np.isfinite(t[:, CENTRE]), t[:, CENTRE], 0.0)
+    end = tubes.points[:, CENTRE] + reach[:, None] * k[:, CENTRE]
+    return np.asarray(tubes.length[:, CENTRE] + reach + out.rays(end)[1])
 
 
 def mirrored(tubes: Tubes) -> Floats:
@@ -197,18 +221,18 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
 
 
 def settle(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, total: float, rule: Refinement, first: bool = False
+    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, first: bool = False
 ) -> tuple[Tubes, Floats, Ints]:
     """Cut tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
 
     Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
     """
     kept, ways, layers = [], [], []
-    doubt = least(rule, total)
+    rule = found.rule
     for level in range(rule.levels + 1):
         ph = phases_of(surface, leg, out, tubes, first, rule)
-        matters = ph.bound > doubt
-        view = sight(surface, out, tubes, matters, rule)
+        matters = ph.bound > found.doubt(ph.length)
+        view = sight(surface, out, tubes, matters, rule, level < GAPS)
         back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
         lit = back < 0.0
         rough = lit & view.seen.any(axis=1) & (ph.rough > 1.0)

@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.kernels.patch import phases, rays_on
-from raychan.kernels.po import quadratic_means
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 CENTRE = 3
-_MANY = 4096  # tubes under which letting some go saves nothing
 MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
@@ -33,7 +31,7 @@ class Refinement:
 
     `wavenumber` [rad/m]; `phase` [rad] deviation from quadratic that a tube may have where its phase stands still;
     `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the
-    same as a fraction of what was found so far; `max_edge` [m] of first tubes; `levels` of cutting for sight and
+    same as a fraction of what was found so far within the same `cell` [m] of two-way length; `max_edge` [m] of first tubes; `levels` of cutting for sight and
     bounces;
     `slots` of history; `layers` that a stretch may pass; `jitter` (0 to 0.5) draws cuts off the middle, for a second
     lattice.
@@ -44,6 +42,7 @@ class Refinement:
     turn: float = 0.15
     floor: float = 0.0
     relative: float = 0.01
+    cell: float = np.inf
     max_edge: float = 0.3
     levels: int = 12
     slots: int = 8
@@ -112,7 +111,7 @@ def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> 
         normals=normals,
         facet=facet,
         spread=leg.spread(length[:, CENTRE]),
-        strength=np.ones(n),
+        strength=leg.weight(points[:, CENTRE]),
         flat=np.ones(n, bool),
         bary=bary,
         slots=np.zeros(n, np.int8),
@@ -233,21 +232,15 @@ def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floa
 class Phases:
     """Phases of tubes over a way out [rad]: `six` (n, 6) at corners and edge middles, `bend` (n, 3) of the edges from
     straight, `bound` (n,) [1/m] on what a tube can scatter, `area` the same were it in phase, `rough` (n,) above 1
-    where a tube bends more than a quadratic phase and one direction of the surface can follow."""
+    where a tube bends more than a quadratic phase and one direction of the surface can follow, `length` (n,) [m] of
+    the whole way."""
 
     six: Floats
     bend: Floats
     bound: Floats
     area: Floats
     rough: Floats
-
-    def scale(self) -> float:
-        """Return the size [1/m] of the scattered field: the scalar sum of all tubes, or their rms sum where that
-        cancels."""
-        if not len(self.six):
-            return 0.0
-        each = self.area * quadratic_means(self.six, 0.5)
-        return float(max(abs(each.sum()), np.sqrt(np.sum(np.abs(each) ** 2))))
+    length: Floats
 
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
@@ -257,25 +250,12 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
         surface.bulge, leg.image, leg.far, out.image, out.far, rule.wavenumber, tubes.strength, tubes.spread,
         rule.phase, rule.turn, MOST_BEND,
     )  # fmt: skip
-    return Phases(six, bend, bound, area, rough)
-
-
-def least(rule: Refinement, total: float) -> float:
-    """Return the bound [1/m] under which a doubtful tube is left as it is; about a hundred such add up to
-    `relative`."""
-    return max(rule.floor, rule.relative * total) / 10.0
-
-
-def that_count(bound: Floats, doubt: float) -> NDArray[np.intp]:
-    """Return the tubes to keep: of many, the weakest are let go while all these in phase stay under 0.3 `doubt`."""
-    if len(bound) < _MANY:
-        return np.arange(len(bound))
-    # The weakest few are enough: none that alone exceeds the sum is looked at.
-    weak = np.flatnonzero(bound < 0.3 * doubt)
-    order = weak[np.argsort(bound[weak])]
-    keep = np.ones(len(bound), bool)
-    keep[order[np.cumsum(bound[order]) <= 0.3 * doubt]] = False
-    return np.flatnonzero(keep)
+    gain = out.weight(tubes.points[:, CENTRE])
+    dull = np.flatnonzero(surface.dull[tubes.facet])
+    cosine = np.abs(np.einsum("ij,ij->i", tubes.normals[dull, CENTRE], tubes.k[dull, CENTRE]))
+    gain[dull] *= surface.strength(tubes.facet[dull], cosine, rule.wavenumber)
+    bound, area = gain * bound, gain * area
+    return Phases(six, bend, bound, area, rough, six[:, :3].mean(axis=1) / rule.wavenumber)
 
 
 def unit(v: Floats) -> Floats:

@@ -29,6 +29,7 @@ from raychan.run.result import Receiver, Result
 from raychan.run.spread import claimed, launch_share, motion, without
 from raychan.signal.cube import synthesize
 from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, Points, RangeDoppler, Routes
+from raychan.units import C0
 from raychan.world.scene import Scene
 
 Progress = Callable[[str, float], None]
@@ -98,18 +99,18 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
     model = _changed(scene.model, changes)
     carrier = sensor.waveform.carrier
-    floor = drowned(sensor, settings)
+    floor, cell = drowned(sensor, settings), C0 / sensor.waveform.bandwidth
     with clock.stage("geometry"):
         surface, points = Surface(scene.facets(0.0)), scene.points(0.0)
     # The coarse launch comes first: it tells what is needed, and later how wrong the fine one may be.
     chosen = None
     with clock.stage("check"):
-        rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, jitter=0.13)
+        rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
         everything = model.diffraction or model.mode == "auto"
         others, more = solve(surface, points, sensor, carrier, rule, model.max_bounces, diffraction=everything)
         if model.mode == "auto":
-            cell = noise_of_cell(sensor, settings)
-            chosen = choose(others, sensor, settings, cell, model.tolerance_db)
+            noise = noise_of_cell(sensor, settings)
+            chosen = choose(others, sensor, settings, noise, model.tolerance_db)
             model = _changed(
                 model,
                 {
@@ -119,7 +120,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
                 },
             )
     with clock.stage("trace"):
-        rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions)
+        rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions, cell=cell)
         rule = dataclasses.replace(rule, slots=others.kind.shape[1])
         again = needed(scene, model.retrace, rule.max_edge)
         routes: list[Routes] = []

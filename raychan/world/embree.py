@@ -48,7 +48,7 @@ class Tracer:
         # Whether facets never hide each other from a point that looks at their lit sides.
         self.hides_nothing = False
         self._scene: Any = None
-        self.extent, self._size, self._touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
+        self.extent, self._size, self.touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
         if len(v):
             low, high = v.min(axis=(0, 1)), v.max(axis=(0, 1))
             self._centre = 0.5 * (low + high)
@@ -56,7 +56,7 @@ class Tracer:
             self._size = min(self.extent, 1.0)
             # Far from the origin coordinates themselves are only known to their float64 spacing.
             blur = 8.0 * float(np.spacing(np.abs(v).max()))
-            self._touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
+            self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
 
     def _built(self) -> Any:
         """Return Embree's scene, made for the first ray."""
@@ -150,7 +150,7 @@ class Tracer:
         while len(todo):
             o, d, aim = origin[todo], direction[todo], target[todo]
             facet, t = self.cast(o, d, skip[todo], start[todo])
-            ways = o, d, limit[todo], slack[todo], aim, self._touch
+            ways = o, d, limit[todo], slack[todo], aim, self.touch
             margin = _EDGE * _SLACK * self._size
             free = clear(facet, t, *ways, self.plane, self.smooth, self.facets.vertices, self.normal, margin)
             if inside is not None:

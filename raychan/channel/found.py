@@ -1,0 +1,65 @@
+"""Found: how much field a launch has found so far, by length of way; what is let go is weighed against it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.tubes import Phases, Refinement
+from raychan.kernels.po import quadratic_means
+
+Floats = NDArray[np.float64]
+
+_MANY = 4096  # tubes under which letting some go saves nothing
+_SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
+
+
+class Found:
+    """The scattered field [1/m] found within each stretch of two-way length, `rule.cell` long."""
+
+    def __init__(self, rule: Refinement) -> None:
+        self.rule = rule
+        self._level = np.zeros(1)
+
+    def _cell(self, length: Floats) -> NDArray[np.int64]:
+        return np.asarray(np.maximum(length / self.rule.cell, 0.0), np.int64)
+
+    def doubt(self, length: Floats) -> Floats:
+        """Return the bound [1/m] under which doubtful tubes of two-way lengths (n,) [m] are left as they are; about a
+        hundred such add up to `rule.relative` of what was found there."""
+        at = np.minimum(self._cell(length), len(self._level) - 1)
+        return np.maximum(self.rule.floor, 0.1 * self.rule.relative * self._level[at])
+
+    def add(self, ph: Phases) -> None:
+        """Count tubes that are seen: in each cell the scalar sum of all, or their rms sum where that cancels."""
+        if not len(ph.six):
+            return
+        each = ph.area * quadratic_means(ph.six, 0.5)
+        cell = self._cell(ph.length)
+        # A cell more at the end, which stays empty, for all that is longer.
+        n = max(len(self._level), int(cell.max()) + 3)
+        whole = np.hypot(np.bincount(cell, each.real, n), np.bincount(cell, each.imag, n))
+        size = np.maximum(whole, np.sqrt(np.bincount(cell, np.abs(each) ** 2, n)))
+        if np.isfinite(self.rule.cell):
+            # A window spreads each return over its neighbours.
+            size = np.maximum(size, np.maximum(np.append(size[1:], 0.0), np.append(0.0, size[:-1])))
+        self._level = np.maximum(size, np.pad(self._level, (0, n - len(self._level))))
+        if not np.isfinite(self.rule.cell):
+            self._level = self._level[:1]
+
+    def that_count(self, bound: Floats, length: Floats) -> NDArray[np.intp]:
+        """Return the tubes to keep: of many, the weakest of each cell are let go while all these in phase stay under
+        0.3 of the doubt."""
+        if len(bound) < _MANY:
+            return np.arange(len(bound))
+        share = bound / np.maximum(self.doubt(length), 1e-300)
+        # The weakest few are enough: none that alone exceeds the sum is looked at.
+        weak = np.flatnonzero(share < _SHARE)
+        cell = self._cell(length[weak])
+        order = np.lexsort((share[weak], cell))
+        cell, running = cell[order], np.cumsum(share[weak[order]])
+        first = np.searchsorted(cell, cell)
+        running -= np.where(first > 0, running[first - 1], 0.0)
+        keep = np.ones(len(bound), bool)
+        keep[weak[order[running <= _SHARE]]] = False
+        return np.flatnonzero(keep)
