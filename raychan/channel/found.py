@@ -11,6 +11,7 @@ from raychan.kernels.po import quadratic_means
 Floats = NDArray[np.float64]
 
 _MANY = 4096  # tubes under which letting some go saves nothing
+_NOTHING = 1e-100  # 1/m
 _SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
 
 
@@ -28,7 +29,7 @@ class Found:
         """Return the bound [1/m] under which doubtful tubes of two-way lengths (n,) [m] are left as they are; about a
         hundred such add up to `rule.relative` of what was found there."""
         at = np.minimum(self._cell(length), len(self._level) - 1)
-        return np.maximum(self.rule.floor, 0.1 * self.rule.relative * self._level[at])
+        return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * self._level[at])
 
     def add(self, ph: Phases) -> None:
         """Count tubes that are seen: in each cell the scalar sum of all, or their rms sum where that cancels."""
@@ -52,7 +53,7 @@ class Found:
         0.3 of the doubt."""
         if len(bound) < _MANY:
             return np.arange(len(bound))
-        share = bound / np.maximum(self.doubt(length), 1e-300)
+        share = bound / self.doubt(length)
         # The weakest few are enough: none that alone exceeds the sum is looked at.
         weak = np.flatnonzero(share < _SHARE)
         cell = self._cell(length[weak])
