@@ -89,26 +89,32 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
     kept: list[Tubes] = []
     rule = found.rule
-    ph = phases_of(surface, leg, out, tubes, True, rule)
-    tubes = tubes.take(found.that_count(ph.bound, ph.length))
-    if not surface.convex_alone:
-        # What nobody sees must not count: the strongest lit surface may stand behind a wall.
-        nothing = np.zeros(len(tubes), bool)
-        seen = sight(surface, leg, tubes, nothing, rule).seen[:, CENTRE]
-        ph = phases_of(surface, leg, out, tubes.take(seen), True, rule)
-    found.add(ph)
-    for level in range(rule.levels + 1):
-        ph = phases_of(surface, leg, out, tubes, True, rule)
-        matters = ph.bound > found.doubt(ph.length)
-        view = sight(surface, leg, tubes, matters, rule, level < GAPS)
-        split = view.mixed & matters & (level < rule.levels)
-        ready = ~split & view.seen[:, CENTRE]
+
+    def keep(view: Sight, ready: Bools) -> None:
         kept.append(tubes.take(ready))
         _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready], rule)
-        if not split.any():
+
+    ph = phases_of(surface, leg, out, tubes, True, rule)
+    rows = found.that_count(ph.bound, ph.length)
+    tubes, ph = tubes.take(rows), ph.take(rows)
+    # First by the centre rays alone: what nobody sees must not count, and the strongest lit surface may stand behind
+    # a wall.
+    view = sight(surface, leg, tubes, np.zeros(len(tubes), bool), rule)
+    seen = view.seen[:, CENTRE]
+    found.add(ph.take(seen))
+    matters = (ph.bound > found.doubt(ph.length)) & (not surface.convex_alone)
+    keep(view, seen & ~matters)
+    tubes, matters = tubes.take(matters), matters[matters]
+    for level in range(rule.levels + 1):
+        if not len(tubes):
             break
+        view = sight(surface, leg, tubes, matters, rule, level < GAPS)
+        split = view.mixed & matters & (level < rule.levels)
+        keep(view, ~split & view.seen[:, CENTRE])
         rows = np.flatnonzero(split)
         tubes, _ = divide(surface, leg, tubes.take(rows), rows, view.side[rows], True, rule)
+        ph = phases_of(surface, leg, out, tubes, True, rule)
+        matters = ph.bound > found.doubt(ph.length)
     return Tubes.join(kept)
 
 

@@ -242,6 +242,10 @@ class Phases:
     rough: Floats
     length: Floats
 
+    def take(self, index: NDArray[np.generic]) -> Phases:
+        """Return the phases of the tubes at `index` (mask or numbers)."""
+        return Phases(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
     """Return the phases of tubes over the way out, and what each can scatter back at most."""
