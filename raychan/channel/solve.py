@@ -75,7 +75,7 @@ def refinement(
         turn=min(0.3, 0.15 * fine),
         relative=min(0.1, 0.02 * fine),
         max_edge=0.3 * min(1.0, np.sqrt(fine)),
-        floor=2.0 * floor * fine,
+        floor=0.5 * floor * fine,
         cell=cell,
         layers=layers,
         slots=8 + layers,

@@ -68,20 +68,22 @@ class _Flight:
 def _step(
     surface: Surface, leg: Leg, out: Leg, flight: _Flight, first: bool, last: bool, found: Found, landed: list[Tubes]
 ) -> _Flight:
-    """Cast, land what agrees; return what was cut, and what goes on behind the thin layers that were hit."""
+    """Cast centre rays, and corners where they matter; land what agrees; return what was cut, and what goes on behind the thin layers that were hit."""
     rule, tubes = found.rule, flight.tubes
     k = mirrored(tubes)
     ph = phases_of(surface, leg, out, tubes, first, rule)
-    hit, t = _cast(surface, tubes, k, flight.start, ph.area > found.doubt(ph.length))
-    doubt = found.doubt(_whole_way(out, tubes, k, t) if last else ph.length)
-    matters = ph.area > doubt
+    mid, ahead = surface.cast(tubes.points[:, CENTRE], k[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
+    hit, t = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     if last:
         # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
         # back. Before more mirrors nobody knows.
-        span = _landing_span(surface, out, tubes, k, hit, rule)
-        # A tube of which no ray meets anything may still hold a small body between its rays.
-        matters &= (ph.area > doubt * (1.0 + 0.5 * span)) | (hit < 0).all(axis=1)
-    mid, agree = hit[:, CENTRE], _agree(surface, hit)
+        # Beside a centre that meets nothing there may still be a body, but then its outline runs through the tube.
+        span = np.where(mid >= 0, _landing_span(surface, out, tubes, k, hit, rule), 0.0)
+        matters = ph.area > found.doubt(_whole_way(out, tubes, k, ahead)) * (1.0 + 0.5 * span)
+    else:
+        matters = ph.area > found.doubt(ph.length)
+    _cast_corners(surface, tubes, k, flight.start, np.flatnonzero(matters & (mid >= 0)), hit, t)
+    agree = _agree(surface, hit)
     side = _edges(surface, leg, tubes, k, hit, t, matters)
     mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
     cuts, layers = flight.count
@@ -148,7 +150,7 @@ def _landing_span(surface: Surface, out: Leg, tubes: Tubes, k: Floats, hit: Ints
 
 def _whole_way(out: Leg, tubes: Tubes, k: Floats, t: Floats) -> Floats:
     """Return the lengths (n,) [m] of the ways that end where the centre rays land, or here where they do not."""
-    reach = np.where(np.isfinite(t[:, CENTRE]), t[:, CENTRE], 0.0)
+    reach = np.where(np.isfinite(t), t, 0.0)
     end = tubes.points[:, CENTRE] + reach[:, None] * k[:, CENTRE]
     return np.asarray(tubes.length[:, CENTRE] + reach + out.rays(end)[1])
 
@@ -159,17 +161,16 @@ def mirrored(tubes: Tubes) -> Floats:
     return tubes.k - 2.0 * dot[..., None] * tubes.normals
 
 
-def _cast(surface: Surface, tubes: Tubes, k: Floats, start: Floats, matters: Bools) -> tuple[Ints, Floats]:
-    """Return the facets met and distances (n, 4); of tubes that matter little the centre ray speaks for all."""
-    n = len(tubes)
-    centre = tubes.points[:, CENTRE:]
-    origin = (centre + 0.98 * (tubes.points - centre)).reshape(-1, 3)
-    whole = np.flatnonzero(matters)
-    ray = np.concatenate([4 * np.arange(n) + CENTRE, (4 * whole[:, None] + np.arange(3)).ravel()])
-    found, distance = surface.cast(origin[ray], k.reshape(-1, 3)[ray], tubes.facet[ray // 4], start.ravel()[ray])
-    hit, t = np.repeat(found[:n], 4), np.repeat(distance[:n], 4)
-    hit[ray], t[ray] = found, distance
-    return hit.reshape(n, 4), t.reshape(n, 4)
+def _cast_corners(
+    surface: Surface, tubes: Tubes, k: Floats, start: Floats, rows: NDArray[np.signedinteger], hit: Ints, t: Floats
+) -> None:
+    """Write the facets met and distances (n, 4) of the corner rays of the tubes `rows`; the centre's speak for the
+    others."""
+    centre = tubes.points[rows, CENTRE:]
+    origin = (centre + 0.98 * (tubes.points[rows, :3] - centre)).reshape(-1, 3)
+    facet = np.repeat(tubes.facet[rows], 3)
+    found, distance = surface.cast(origin, k[rows, :3].reshape(-1, 3), facet, start[rows, :3].ravel())
+    hit[rows, :3], t[rows, :3] = found.reshape(-1, 3), distance.reshape(-1, 3)
 
 
 def _agree(surface: Surface, hit: Ints) -> Bools:
