@@ -2,30 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from raychan.frames import direction
 
 Floats = NDArray[np.float64]
-Beam = Callable[[Floats], Floats]
-"""Of unit directions (n, 3), world axes, away from the end: the field (n,) relative to the strongest."""
 
-_STEP = 2.0  # deg: no beam of use is narrower
+_STEPS = 180  # of elevation, and half of those of azimuth: no beam of use is narrower than a few of them
 
 
-def beam_of(radar: Any) -> Beam:
-    """Return the beam of a radar: the stronger of its transmitting and its receiving antenna in each direction."""
-    azimuth, elevation = np.meshgrid(np.arange(-180.0, 180.0, _STEP), np.arange(-90.0, 90.1, _STEP))
-    every = direction(np.radians(azimuth.ravel()), np.radians(elevation.ravel()))
-    peaks = [np.linalg.norm(f(every), axis=1).max() for f in (radar.tx_field, radar.rx_field)]
+class Beam:
+    """The field of the stronger of a radar's two antennas in each direction, relative to its strongest."""
 
-    def beam(look: Floats) -> Floats:
-        ends = zip((radar.tx_field, radar.rx_field), peaks, strict=True)
-        sizes = [np.linalg.norm(f(look), axis=1) / peak for f, peak in ends if peak > 0.0]
-        return np.asarray(np.max(sizes, axis=0) if sizes else np.zeros(len(look)))
+    def __init__(self, radar: Any) -> None:
+        azimuth = np.linspace(-np.pi, np.pi, 2 * _STEPS + 1)
+        elevation = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _STEPS + 1)
+        look = direction(*(x.ravel() for x in np.meshgrid(azimuth, elevation)))
+        shape = len(elevation), len(azimuth)
+        sizes = [np.linalg.norm(f(look), axis=1).reshape(shape) for f in (radar.tx_field, radar.rx_field)]
+        self.table = np.maximum.reduce([s / max(s.max(), 1e-300) for s in sizes])
 
-    return beam
+    def __call__(self, look: Floats) -> Floats:
+        """Return the relative field (n,) in unit directions (n, 3), world axes, away from the radar."""
+        found: Floats = _between(np.ascontiguousarray(look), self.table)
+        return found
+
+
+@njit(cache=True, nogil=True)
+def _between(look, table):  # type: ignore[no-untyped-def]
+    """Return the table's value (n,) in each direction, linear in both angles."""
+    out = np.empty(len(look))
+    steps = table.shape[0] - 1
+    for i in range(len(look)):
+        up = (math.asin(min(max(look[i, 2], -1.0), 1.0)) / math.pi + 0.5) * steps
+        round_ = (math.atan2(look[i, 1], look[i, 0]) / math.pi + 1.0) * steps
+        a, b = min(int(up), steps - 1), min(int(round_), 2 * steps - 1)
+        x, y = up - a, round_ - b
+        low = (1.0 - y) * table[a, b] + y * table[a, b + 1]
+        high = (1.0 - y) * table[a + 1, b] + y * table[a + 1, b + 1]
+        out[i] = (1.0 - x) * low + x * high
+    return out

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.edges import above, cross_into, dot, inside, starts_again
 from raychan.channel.surface import Surface
+from raychan.kernels.rows import in_two
 from raychan.tables import MIRROR
 
 Floats = NDArray[np.float64]
@@ -18,6 +19,7 @@ _MOST_CELLS = 2_000_000
 _LEAST_CELL = 0.02  # m
 _BLOCK = 8  # cells a side that are passed over at once where they hold no edge
 _WIDE = 1000  # cells abreast beyond which a tube is halved before anyone asks what stands in it
+_MANY = 500  # tubes from which on a second thread pays
 _CLEAR = 1e-5  # m: what lies nearer to a surface belongs to it
 
 
@@ -50,20 +52,23 @@ class Between:
         flat: Bools,
         hit: Ints,
         reach: Floats,
-        wanted: Bools,
         side: Floats,
     ) -> None:
         """Fill in rows of side (n, 3) that are zero: corners' distances [m] from the longest shadow edge on a tube.
 
         Args: points (n, 4, 3) [m] footprints; k (n, 4, 3) directions after reflection, from a source (n, 3) [m] where
-        all mirrors were flat (n,); hit (n,) facet on which the centre lands, -1 for none, after reach (n,) [m];
-        wanted (n,).
+        all mirrors were flat (n,); hit (n,) facet on which the centre lands, -1 for none, after reach (n,) [m].
         """
         s = self.surface
-        _across(
-            points, k, source, far, flat, hit, reach, wanted, s.edge_ends, s.edge_faces, s.first, s.normal,
-            self.first, self.index, self.low, self.cell, self.shape, self.crowd, self.centre, self.radius, side,
-        )  # fmt: skip
+
+        def some(rows: slice) -> None:
+            _across(
+                points[rows], k[rows], source[rows], far, flat[rows], hit[rows], reach[rows],
+                s.edge_ends, s.edge_faces, s.first, s.normal, self.first, self.index, self.low, self.cell, self.shape,
+                self.crowd, self.centre, self.radius, side[rows],
+            )  # fmt: skip
+
+        in_two(len(points), some, _MANY)
 
 
 def between(surface: Surface) -> Between:
@@ -183,7 +188,6 @@ def _across(  # type: ignore[no-untyped-def]
     flat,
     hit,
     reach,
-    wanted,
     ends,
     faces,
     first_point,
@@ -203,7 +207,7 @@ def _across(  # type: ignore[no-untyped-def]
     section = np.empty((4, 3))
     begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
     for i in range(len(points)):
-        if not wanted[i] or out[i].any():
+        if out[i].any():
             continue
         centre = points[i, 3]
         k[:] = ks[i, 3]

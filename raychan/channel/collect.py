@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import CENTRE, Tubes, middles, vector_area
+from raychan.frames import sizes
 from raychan.tables import REFLECT, SCATTER, TRANSMIT, Routes
 
 Floats = NDArray[np.float64]
@@ -25,38 +26,44 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
     back_k, back = out.rays(tubes.points)
     middle, half_way = middles(surface, leg, tubes, first)
     lengths = np.concatenate([tubes.length[:, :3] + back[:, :3], half_way + out.rays(middle)[1]], axis=1)
+    vertices, normals, facets, kinds = tubes.history.tables(tubes.last, tubes.slots)
     if not first:
-        _retrace(surface, tubes)
+        _retrace(surface, tubes, vertices, normals, facets, kinds)
     every = np.arange(n)
-    scatter = tubes.slots.copy()
-    tubes.append(every, tubes.points[:, CENTRE], tubes.normals[:, CENTRE], tubes.facet, SCATTER)
+    slots = tubes.slots.copy()
+
+    def append(rows: NDArray[np.signedinteger], vertex: Floats, normal: Floats, facet: Ints, kind: int) -> None:
+        at = rows, slots[rows]
+        vertices[at], normals[at], facets[at], kinds[at] = vertex, normal, facet, kind
+        slots[rows] += 1
+
+    append(every, tubes.points[:, CENTRE], tubes.normals[:, CENTRE], tubes.facet, SCATTER)
     for j in range(passed.shape[1] - 1, -1, -1):
         rows = np.flatnonzero(passed[:, j] >= 0)
         facet = passed[rows, j]
         p, k = tubes.points[rows, CENTRE], -back_k[rows, CENTRE]
         t = surface.distance(facet, p, k)
-        tubes.append(rows, p + t[:, None] * k, surface.normal[facet], facet, TRANSMIT)
+        append(rows, p + t[:, None] * k, surface.normal[facet], facet, TRANSMIT)
     for i in range(len(out.mirrors) - 1, -1, -1):
         m = out.mirrors[i]
-        tubes.append(every, corners[:, i], m.normal, np.full(n, m.facet, np.int32), REFLECT)
-    unused = tubes.kinds == 0
-    vertices = np.where(unused[..., None], 0.0 if out.far else end, tubes.vertices)
-    body = surface.facets.body[np.maximum(tubes.facets, 0)] if n else np.zeros_like(tubes.facets)
+        append(every, corners[:, i], m.normal, np.full(n, m.facet, np.int32), REFLECT)
+    vertices[kinds == 0] = 0.0 if out.far else end
+    body = surface.facets.body[np.maximum(facets, 0)] if n else np.zeros_like(facets)
     return Routes(
         tx=np.asarray(leg.end, float),
         rx=end,
         far=out.far,
         vertices=vertices,
-        normals=tubes.vertex_normals,
-        facet=tubes.facets,
-        body=np.where(tubes.facets >= 0, body, -1).astype(np.int16),
-        kind=tubes.kinds,
-        scatter=scatter,
+        normals=normals,
+        facet=facets,
+        body=np.where(facets >= 0, body, -1).astype(np.int16),
+        kind=kinds,
+        scatter=tubes.slots.copy(),
         points=np.concatenate([tubes.points[:, :3], middle], axis=1),
         lengths=lengths,
         length=tubes.length[:, CENTRE] + back[:, CENTRE],
         taper=_taper(tubes, back_k, back, out.far),
-        area=np.linalg.norm(vector_area(tubes.points), axis=1),
+        area=sizes(vector_area(tubes.points)),
         spread_in=tubes.spread,
         spread_out=out.spread(back[:, CENTRE]),
         caustics=tubes.caustics,
@@ -71,7 +78,7 @@ def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
     strength = np.maximum(cosine, 0.0)
     # Where the true surface turns away from the flat one there is more of it.
     flat = vector_area(tubes.points)
-    flat /= np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
+    flat /= np.maximum(sizes(flat), 1e-300)[:, None]
     turned = np.abs(np.einsum("nij,nj->ni", tubes.normals[:, :3], flat))
     strength[:, :3] /= np.maximum(turned, 0.5)
     if not far:
@@ -81,16 +88,19 @@ def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
     return np.clip(np.where(centre > 0.0, ratio, 0.0), 0.0, 4.0)
 
 
-def _retrace(surface: Surface, tubes: Tubes) -> None:
-    """Put the history's vertices under the centre ray as it is now, after cuts: backwards over the plane mirrors."""
+def _retrace(
+    surface: Surface, tubes: Tubes, vertices: Floats, normals: Floats, facets: Ints, kinds: NDArray[np.int8]
+) -> None:
+    """Put vertices (n, d, 3) of the history under the centre ray as it is now, after cuts: backwards over the plane
+    mirrors."""
     point, k = tubes.points[:, CENTRE].copy(), tubes.k[:, CENTRE].copy()
     for back in range(int(tubes.slots.max(initial=0))):
         slot = tubes.slots - 1 - back
         rows = np.flatnonzero((slot >= 0) & tubes.flat)
         at = slot[rows]
-        facet, normal = tubes.facets[rows, at], tubes.vertex_normals[rows, at]
+        facet, normal = facets[rows, at], normals[rows, at]
         t = surface.distance(facet, point[rows], -k[rows])
         point[rows] -= np.where(np.isfinite(t), t, 0.0)[:, None] * k[rows]
-        tubes.vertices[rows, at] = point[rows]
-        turn = 2.0 * np.einsum("ij,ij->i", k[rows], normal) * (tubes.kinds[rows, at] == REFLECT)
+        vertices[rows, at] = point[rows]
+        turn = 2.0 * np.einsum("ij,ij->i", k[rows], normal) * (kinds[rows, at] == REFLECT)
         k[rows] -= turn[:, None] * normal

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from raychan.frames import sizes
 from raychan.kernels.fresnel import coefficients
 from raychan.kernels.po import huygens, triangle_terms
 from raychan.kernels.polar import dot, reflect, transmit
@@ -35,7 +36,7 @@ def departures(routes: Routes) -> tuple[Floats, Floats]:
     first = np.where(any_vertex, routes.vertices[:, 0] if d else routes.rx, routes.rx)
     last = np.where(any_vertex, routes.vertices[row, count - 1] if d else routes.tx, routes.tx)
     out, back = first - routes.tx, last - routes.rx
-    return out / np.linalg.norm(out, axis=1)[:, None], back / np.linalg.norm(back, axis=1)[:, None]
+    return out / sizes(out)[:, None], back / sizes(back)[:, None]
 
 
 def transfer(

@@ -26,6 +26,7 @@ from raychan.channel.tubes import (
     unit,
     vector_area,
 )
+from raychan.frames import sizes
 from raychan.kernels.patch import edge_to_cut, halved, lit_parts
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
@@ -64,7 +65,7 @@ def _seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
     if leg.mirrors:
         v = f.vertices[rows]
         middle = v.mean(axis=1)
-        rows = rows[leg.may_reach(middle, np.linalg.norm(v - middle[:, None], axis=2).max(axis=1))]
+        rows = rows[leg.may_reach(middle, sizes(v - middle[:, None]).max(axis=1))]
     return rows
 
 
@@ -172,7 +173,7 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     facet = np.where(block >= 0, block, tubes.facet[:, None])
     met = np.where(known, surface.plane[facet], -1)
     own = vector_area(tubes.points)
-    own /= np.maximum(np.linalg.norm(own, axis=1), 1e-300)[:, None]
+    own /= np.maximum(sizes(own), 1e-300)[:, None]
     meeting_lines(tubes.points, source, -k, leg.far, met, block, surface.first, surface.normal, own, side)
     side[~partly] = 0.0
     return Sight(seen, view.corners[:n], view.passed[:n], side)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.beam import Beam
 from raychan.channel.surface import Surface
+from raychan.frames import sizes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -82,7 +83,7 @@ class Leg:
         if self.far:
             return np.broadcast_to(-self.image, points.shape), -points @ self.image
         d = points - self.image
-        length = np.linalg.norm(d, axis=-1)
+        length = sizes(d)
         return d / length[..., None], length
 
     def spread(self, length: Floats) -> Floats:
@@ -124,7 +125,7 @@ class Leg:
             spots = self.bounces(points)
             for i, m in enumerate(self.mirrors):
                 # A ray to the ball's rim meets a mirror nearer to the ray to its centre than the ball's radius.
-                ok &= np.linalg.norm(spots[:, i] - m.centre, axis=1) < m.radius + size
+                ok &= sizes(spots[:, i] - m.centre) < m.radius + size
         return ok
 
     def visible(
@@ -178,5 +179,5 @@ class Leg:
 
 def _towards(start: Floats, stop: Floats) -> tuple[Floats, Floats]:
     d = stop - start
-    length = np.linalg.norm(d, axis=1)
+    length = sizes(d)
     return d / np.where(length > 0, length, 1.0)[:, None], length

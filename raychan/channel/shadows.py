@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from raychan.channel.edges import above, cross_into, dot, inside, starts_again
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
+from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+_MANY = 2000  # tubes from which on a second thread pays
 _CELLS = 128  # along the longest side of the grid of directions
 
 
@@ -41,10 +43,14 @@ class Shadows:
         """
         if not len(self.edges):
             return np.zeros((len(points), 3))
-        found: Floats = _across(
-            points, normal, smooth, wanted, slack, *self._from, self.edges, self._smooth, *self._grid
-        )
-        return found
+        side = np.zeros((len(points), 3))
+
+        def some(rows: slice) -> None:
+            tubes = points[rows], normal[rows], smooth[rows], wanted[rows], slack[rows]
+            _across(*tubes, *self._from, self.edges, self._smooth, *self._grid, side[rows])
+
+        in_two(len(points), some, _MANY)
+        return side
 
 
 def shadows_of(surface: Surface, leg: Leg) -> Shadows:
@@ -134,10 +140,9 @@ def _fill(edges, image, far, low, cell, shape):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _across(  # type: ignore[no-untyped-def]
-    points, normal, smooth, wanted, slack, image, far, touch, edges, edge_smooth, first, index, low, cell, shape
+    points, normal, smooth, wanted, slack, image, far, touch, edges, edge_smooth, first, index, low, cell, shape, out
 ):
     n = len(points)
-    out = np.zeros((n, 3))
     tried = np.full(len(edges), -1, np.int64)
     side, m, work, k = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     x, least, most = np.empty(3), np.empty(3), np.empty(3)
@@ -204,7 +209,6 @@ def _across(  # type: ignore[no-untyped-def]
                     if lowest < 0.0 < highest:
                         best = length
                         out[i] = side
-    return out
 
 
 @njit(cache=True, inline="always")

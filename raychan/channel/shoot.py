@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,8 @@ from raychan.channel.mirrors import reachable
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce, settle
 from raychan.channel.tubes import CENTRE, Refinement, Tubes, phases_of
-from raychan.tables import MIRROR, REFLECT, TRANSMIT, Routes
+from raychan.frames import sizes
+from raychan.tables import MIRROR, TRANSMIT, Routes
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +37,8 @@ def tube_routes(
     """
     f = surface.facets
     direct = outs[0]
+    # Where a wave still has to bounce it does not matter how the antenna looks at the place.
+    blind = replace(direct, beam=None)
     found = so_far or Found(rule)
     tubes = launch(surface, leg, direct, bodies, found)
     mirror_planes = _planes_in(surface, outs)
@@ -70,24 +74,18 @@ def tube_routes(
             return
         before = tubes
         last = int(before.bounces[0]) + 1 >= bounces
-        tubes = bounce(surface, leg, direct, before, first, last, found)
+        tubes = bounce(surface, leg, blind, before, first, last, found)
         if first and len(tubes):
             # From a plane mirror to another body: the legs over mirrors have these.
-            previous = tubes.facets[np.arange(len(tubes)), _last_bounce(tubes)]
+            previous = tubes.came_from()
             moved = f.body[previous] != f.body[tubes.facet]
             tubes = tubes.take(~(mirror_planes[previous] & moved))
         first = False
 
 
-def _last_bounce(tubes: Tubes) -> NDArray[np.int64]:
-    kinds = np.where(tubes.kinds == REFLECT, np.arange(tubes.kinds.shape[1]), -1)
-    return kinds.max(axis=1)
-
-
 def _other_body(surface: Surface, tubes: Tubes) -> NDArray[np.bool_]:
     f = surface.facets
-    previous = tubes.facets[np.arange(len(tubes)), _last_bounce(tubes)]
-    return f.body[previous] != f.body[tubes.facet]
+    return f.body[tubes.came_from()] != f.body[tubes.facet]
 
 
 def _may_leave(out: Leg, tubes: Tubes) -> NDArray[np.bool_]:
@@ -96,7 +94,7 @@ def _may_leave(out: Leg, tubes: Tubes) -> NDArray[np.bool_]:
     ok = np.einsum("nj,nj->n", out.rays(centre)[0], tubes.normals[:, CENTRE]) < 0.0
     if out.mirrors:
         rows = np.flatnonzero(ok)
-        size = np.linalg.norm(tubes.points[rows, :3] - centre[rows, None], axis=2).max(axis=1)
+        size = sizes(tubes.points[rows, :3] - centre[rows, None]).max(axis=1)
         ok[rows] = out.may_reach(centre[rows], size)
     return ok
 
@@ -109,9 +107,9 @@ def _planes_in(surface: Surface, legs: list[Leg]) -> NDArray[np.bool_]:
 def _same_way_back(tubes: Tubes, leg: Leg, rule: Refinement) -> tuple[Floats, NDArray[np.int32]]:
     """Return the way out of first-bounce tubes over the leg they came by, from their history."""
     n, m = len(tubes), len(leg.mirrors)
-    corners = tubes.vertices[:, :m]
+    vertices, _, facets, kinds = tubes.history.tables(tubes.last, tubes.slots)
     passed = np.full((n, rule.layers), -1, np.int32)
     for j in range(rule.layers):
         slot = m + j
-        passed[:, j] = np.where(tubes.kinds[:, slot] == TRANSMIT, tubes.facets[:, slot], -1)
-    return corners, passed
+        passed[:, j] = np.where(kinds[:, slot] == TRANSMIT, facets[:, slot], -1)
+    return vertices[:, :m], passed

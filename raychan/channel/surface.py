@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from raychan.frames import sizes
 from raychan.kernels.fresnel import coefficients_array
 from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.embree import Tracer
@@ -176,7 +177,7 @@ class Surface(Tracer):
             # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it
             # straight.
             turn = np.sqrt(np.maximum(2.0 * (1.0 - a), 0.0))
-            small = np.linalg.norm(c, axis=1) < turn * np.linalg.norm(d, axis=1)
+            small = sizes(c) < turn * sizes(d)
             self.bulge[:, e] = c * (ok & small)[:, None]
         self.curved = np.asarray((np.abs(self.bulge) > 1e-9).any(axis=(1, 2)))
 
@@ -202,7 +203,7 @@ class Surface(Tracer):
     def normal_at(self, facet: Ints, bary: Floats) -> Floats:
         """Return unit normals (n, ..., 3) of the true surface at barycentric coordinates."""
         v = np.einsum("n...i,nij->n...j", bary, self.facets.normals[facet])
-        return v / np.linalg.norm(v, axis=-1, keepdims=True)
+        return v / sizes(v)[..., None]
 
     def strength(self, facet: Ints, cosine: Floats, wavenumber: float, passing: bool = False) -> Floats:
         """Return the larger of |R_s|, |R_p| (or of |T_s|, |T_p| when `passing`) at facets (n,) for cosines of

@@ -68,7 +68,8 @@ class _Flight:
 def _step(
     surface: Surface, leg: Leg, out: Leg, flight: _Flight, first: bool, last: bool, found: Found, landed: list[Tubes]
 ) -> _Flight:
-    """Cast centre rays, and corners where they matter; land what agrees; return what was cut, and what goes on behind the thin layers that were hit."""
+    """Cast centre rays, and corners where they matter; land what agrees; return what was cut, and what goes on behind
+    the thin layers that were hit."""
     rule, tubes = found.rule, flight.tubes
     k = mirrored(tubes)
     ph = phases_of(surface, leg, out, tubes, first, rule)
@@ -111,33 +112,22 @@ def _step(
 
 
 def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, t: Floats, wanted: Bools) -> Floats:
-    """Return the sides (n, 3) of an edge that runs through each tube; zeros where none does."""
+    """Return the sides (n, 3) of an edge that runs through each of the tubes `wanted`; zeros where none does."""
     flat = tubes.flat & ~surface.curved[tubes.facet]
-    mid = k[:, CENTRE]
-    reach = np.where(hit[:, CENTRE] >= 0, t[:, CENTRE], surface.extent)
-    # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the section that the
-    # tube has where it lands.
-    spread = np.where(flat, 0.0, reach)[:, None, None] * (k - mid[:, None])
-    plane = np.where(hit >= 0, surface.plane[np.maximum(hit, 0)], -1)
-    source = tubes.points[:, CENTRE] - tubes.length[:, CENTRE, None] * mid
     side = np.zeros((len(tubes), 3))
-    for rows, far in ((np.flatnonzero(flat), leg.far), (np.flatnonzero(~flat), True)):
-        at = tubes.points[rows] + spread[rows]
-        found = edge_within(at, source[rows], mid[rows], far, plane[rows], surface.first_edge, surface.outline)
-        meeting_lines(
-            at, source[rows], mid[rows], far, plane[rows], hit[rows], surface.first, surface.normal, mid[rows], found
-        )
-        between(surface).across(
-            tubes.points[rows],
-            k[rows],
-            source[rows],
-            far,
-            flat[rows],
-            hit[rows, CENTRE],
-            reach[rows],
-            wanted[rows],
-            found,
-        )
+    for rows, far in ((np.flatnonzero(flat & wanted), leg.far), (np.flatnonzero(~flat & wanted), True)):
+        points, way, met = tubes.points[rows], k[rows], hit[rows]
+        mid = way[:, CENTRE]
+        reach = np.where(met[:, CENTRE] >= 0, t[rows, CENTRE], surface.extent)
+        # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the section that
+        # the tube has where it lands.
+        spread = np.where(flat[rows], 0.0, reach)[:, None, None] * (way - mid[:, None])
+        plane = np.where(met >= 0, surface.plane[np.maximum(met, 0)], -1)
+        source = points[:, CENTRE] - tubes.length[rows, CENTRE, None] * mid
+        at = points + spread
+        found = edge_within(at, source, mid, far, plane, surface.first_edge, surface.outline)
+        meeting_lines(at, source, mid, far, plane, met, surface.first, surface.normal, mid, found)
+        between(surface).across(points, way, source, far, flat[rows], met[:, CENTRE], reach, found)
         side[rows] = found
     return side
 

@@ -12,9 +12,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.history import History
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
+from raychan.frames import sizes
 from raychan.kernels.patch import phases, rays_on
+from raychan.tables import REFLECT
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -31,10 +34,9 @@ class Refinement:
 
     `wavenumber` [rad/m]; `phase` [rad] deviation from quadratic that a tube may have where its phase stands still;
     `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the
-    same as a fraction of what was found so far within the same `cell` [m] of two-way length; `max_edge` [m] of first tubes; `levels` of cutting for sight and
-    bounces;
-    `slots` of history; `layers` that a stretch may pass; `jitter` (0 to 0.5) draws cuts off the middle, for a second
-    lattice.
+    same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
+    [m] of first tubes; `levels` of cutting for sight and bounces; `slots` of history; `layers` that a stretch may
+    pass; `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
     """
 
     wavenumber: float
@@ -58,7 +60,8 @@ class Tubes:
     `strength` left of the field by mirrors and layers; `points` [m], `k` unit directions of arrival, `length` [m]
     from the transmitter, `normals` of the true surface on the lit side, `spread` [1/m] field at the footprint, `flat`
     all mirrors so far were planes, `bary` corners on
-    the first facet, `slots` of history in use, `bounces` counted with this one, `caustics` passed; then the history.
+    the first facet, `slots` of history in use, `bounces` counted with this one, `caustics` passed, `last` row of the
+    `history` that tubes of one launch share.
     """
 
     points: Floats
@@ -73,31 +76,33 @@ class Tubes:
     slots: Ints
     bounces: Ints
     caustics: Ints
-    vertices: Floats
-    vertex_normals: Floats
-    facets: Ints
-    kinds: Ints
+    last: Ints
+    history: History
 
     def __len__(self) -> int:
         return len(self.facet)
 
     def take(self, index: NDArray[np.generic]) -> Tubes:
         """Return the tubes at `index` (mask or numbers)."""
-        return Tubes(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        return Tubes(**{name: getattr(self, name)[index] for name in _ROWS}, history=self.history)
 
     @staticmethod
     def join(parts: list[Tubes]) -> Tubes:
-        """Return all tubes of several sets as one."""
-        return Tubes(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Tubes)})
+        """Return all tubes of several sets of one launch as one."""
+        rows = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _ROWS}
+        return Tubes(**rows, history=parts[0].history)
 
     def append(self, rows: NDArray[np.generic], vertex: Floats, normal: Floats, facet: Ints, kind: int) -> None:
         """Write one more vertex into the history of the tubes `rows`."""
-        slot = self.slots[rows]
-        self.vertices[rows, slot] = vertex
-        self.vertex_normals[rows, slot] = normal
-        self.facets[rows, slot] = facet
-        self.kinds[rows, slot] = kind
-        self.slots[rows] = slot + 1
+        self.last[rows] = self.history.append(self.last[rows], vertex, normal, facet, kind)
+        self.slots[rows] += 1
+
+    def came_from(self) -> Ints:
+        """Return the facets (n,) of the last reflection before the surface that the tubes stand on; -1: none."""
+        return self.history.newest(self.last, REFLECT)
+
+
+_ROWS = tuple(f.name for f in fields(Tubes) if f.name != "history")
 
 
 def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> Tubes:
@@ -117,10 +122,8 @@ def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> 
         slots=np.zeros(n, np.int8),
         bounces=np.full(n, len(leg.mirrors) + 1, np.int8),
         caustics=np.zeros(n, np.int8),
-        vertices=np.zeros((n, slots, 3)),
-        vertex_normals=np.zeros((n, slots, 3)),
-        facets=np.full((n, slots), -1, np.int32),
-        kinds=np.zeros((n, slots), np.int8),
+        last=np.full(n, -1, np.int32),
+        history=History(slots),
     )
 
 
@@ -158,7 +161,7 @@ def along_line(surface: Surface, leg: Leg, tubes: Tubes, side: Floats, first: bo
     v = corner[lone] * (1.0 - to_c)[:, None] + corner[c] * to_c[:, None]
     triples = ((corner[lone], u, v), (u, corner[b], corner[c]), (u, corner[c], v))
     out = Tubes.join([parts_of(surface, leg, tubes, np.stack(t, axis=1), first) for t in triples])
-    real = np.linalg.norm(vector_area(out.points), axis=1) > 1e-14
+    real = sizes(vector_area(out.points)) > 1e-14
     return out.take(real), real
 
 
@@ -214,7 +217,7 @@ def vector_area(points: Floats) -> Floats:
 def edge_lengths(tubes: Tubes) -> Floats:
     """Return the three edges (n, 3) [m] of each footprint."""
     p = tubes.points[:, :3]
-    return np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2)
+    return sizes(np.roll(p, -1, axis=1) - p)
 
 
 def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
@@ -264,5 +267,5 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
 
 def unit(v: Floats) -> Floats:
     """Return vectors (..., 3) scaled to length one; a vector of none stays as it is."""
-    size = np.linalg.norm(v, axis=-1, keepdims=True)
+    size = sizes(v)[..., None]
     return v / np.where(size > 0.0, size, 1.0)
