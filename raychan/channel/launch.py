@@ -166,8 +166,8 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     partly = matters & (seen.any(axis=1) | (gaps & ~one))
     side = np.zeros((n, 3))
     if partly.any():
-        own = surface.normal[tubes.facet], surface.smooth[tubes.facet]
-        side = shadows_of(surface, leg).across(tubes.points, *own, partly, slack)
+        stand_on = surface.normal[tubes.facet], surface.smooth[tubes.facet]
+        side = shadows_of(surface, leg).across(tubes.points, *stand_on, partly, slack)
     # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
     known = seen | (block >= 0)
     facet = np.where(block >= 0, block, tubes.facet[:, None])

@@ -47,7 +47,8 @@ class Shadows:
 
         def some(rows: slice) -> None:
             tubes = points[rows], normal[rows], smooth[rows], wanted[rows], slack[rows]
-            _across(*tubes, *self._from, self.edges, self._smooth, *self._grid, side[rows])
+            shadows = *self._from, self.edges, self._smooth, *self._grid
+            _across(*(*tubes, *shadows, side[rows]))
 
         in_two(len(points), some, _MANY)
         return side
