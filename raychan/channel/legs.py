@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from raychan.channel.beam import Beam
 from raychan.channel.surface import Surface
 from raychan.frames import sizes
+from raychan.kernels.chains import may_leave, possible
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -66,12 +67,16 @@ class Leg:
     mirrors: tuple[Mirror, ...] = ()
     beam: Beam | None = None
     image: Floats = field(init=False)
+    _chain: tuple[Floats, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        x = np.asarray(self.end, float)
+        images = [np.asarray(self.end, float)]
         for m in self.mirrors:
-            x = m.image(x)
-        object.__setattr__(self, "image", x)
+            images.append(m.image(images[-1]))
+        object.__setattr__(self, "image", images[-1])
+        sheets = [np.array([getattr(m, name) for m in self.mirrors]) for name in ("point", "normal", "centre")]
+        radius = np.array([m.radius for m in self.mirrors])
+        object.__setattr__(self, "_chain", (np.array(images), *(s.reshape(-1, 3) for s in sheets), radius))
 
     @property
     def bodies(self) -> set[int]:
@@ -101,9 +106,7 @@ class Leg:
 
     def bounces(self, points: Floats) -> Floats:
         """Return the mirror points (n, m, 3) [m] of the way to each point, end's side first."""
-        images = [np.asarray(self.end, float)]
-        for m in self.mirrors:
-            images.append(m.image(images[-1]))
+        images = self._chain[0]
         out = np.empty((len(points), len(self.mirrors), 3))
         towards = points
         for i in range(len(self.mirrors) - 1, -1, -1):
@@ -119,13 +122,12 @@ class Leg:
     def may_reach(self, points: Floats, size: Floats) -> Bools:
         """Tell which balls about points (n, 3) of radius `size` (n,) [m] could be met: in front of the last mirror,
         and by way of each mirror's circle."""
-        ok = np.ones(len(points), bool)
-        if self.mirrors:
-            ok &= (points - self.mirrors[-1].point) @ self.mirrors[-1].normal > -size
-            spots = self.bounces(points)
-            for i, m in enumerate(self.mirrors):
-                # A ray to the ball's rim meets a mirror nearer to the ray to its centre than the ball's radius.
-                ok &= sizes(spots[:, i] - m.centre) < m.radius + size
+        ok: Bools = possible(points, size, *self._chain)
+        return ok
+
+    def may_leave(self, points: Floats, normals: Floats) -> Bools:
+        """Tell which tubes (n, 4, 3), standing on surfaces of these normals, could send something to the end."""
+        ok: Bools = may_leave(points, normals, self.far, *self._chain)
         return ok
 
     def visible(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import permutations
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,11 +82,12 @@ def _possible(end: Floats, chain: tuple[Mirror, ...]) -> bool:
 
 def reachable(surface: Surface, leg: Leg) -> Bools:
     """Return which bodies (b,) can be met over a leg: in front of its last mirror and through its outline's sphere."""
-    f = surface.facets
-    n = len(f.role)
-    if not leg.mirrors:
-        return np.ones(n, bool)
-    centre, radius, empty = surface.balls
-    ok = ~empty & leg.may_reach(centre, radius)
-    ok[leg.mirrors[-1].body] = False
-    return ok
+    known: WeakKeyDictionary[Leg, Bools] = surface.reach
+    if leg not in known:
+        ok = np.ones(len(surface.facets.role), bool)
+        if leg.mirrors:
+            centre, radius, empty = surface.balls
+            ok = ~empty & leg.may_reach(centre, radius)
+            ok[leg.mirrors[-1].body] = False
+        known[leg] = ok
+    return known[leg]

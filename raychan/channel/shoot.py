@@ -15,8 +15,7 @@ from raychan.channel.legs import Leg
 from raychan.channel.mirrors import reachable
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce, settle
-from raychan.channel.tubes import CENTRE, Refinement, Tubes, phases_of
-from raychan.frames import sizes
+from raychan.channel.tubes import Refinement, Tubes, phases_of
 from raychan.tables import MIRROR, TRANSMIT, Routes
 
 Floats = NDArray[np.float64]
@@ -43,25 +42,24 @@ def tube_routes(
     tubes = launch(surface, leg, direct, bodies, found)
     mirror_planes = _planes_in(surface, outs)
     first = True
-    reach = [reachable(surface, out) for out in outs]
     while len(tubes):
-        counts = tubes.bounces
-        present = np.bincount(f.body[tubes.facet], minlength=len(f.role)) > 0
-        for out, may in zip(outs, reach, strict=True):
-            if not (present & may).any():
+        count, body = int(tubes.bounces[0]), f.body[tubes.facet]
+        # Ground has no return of its own here; a plane mirror lit from another body returns by its image, not twice.
+        own = f.role[body] != MIRROR
+        if not first:
+            own &= ~(mirror_planes[tubes.facet] & (f.body[tubes.came_from()] != body))
+        present = np.bincount(body[own], minlength=len(f.role)) > 0
+        for out in outs:
+            may = reachable(surface, out) & present
+            may[list(out.bodies)] = False
+            if count + len(out.mirrors) > bounces or not may.any():
                 continue
-            fits = counts + len(out.mirrors) <= bounces
-            fits &= may[f.body[tubes.facet]] & ~np.isin(f.body[tubes.facet], list(out.bodies))
-            # Ground has no return of its own here; a plane mirror lit from another body returns by its image, not
-            # twice.
-            fits &= f.role[f.body[tubes.facet]] != MIRROR
-            if not first:
-                fits &= ~(mirror_planes[tubes.facet] & _other_body(surface, tubes))
+            rows = np.flatnonzero(own & may[body])
             if out.mirrors or not first:
-                fits &= _may_leave(out, tubes)
-            some = tubes.take(fits)
-            if not len(some):
+                rows = rows[out.may_leave(tubes.points[rows], tubes.normals[rows])]
+            if not len(rows):
                 continue
+            some = tubes.take(rows)
             if first and out == leg:
                 corners, passed = _same_way_back(some, leg, rule)
             else:
@@ -69,34 +67,16 @@ def tube_routes(
             if len(some):
                 found.add(phases_of(surface, leg, out, some, first, rule))
                 yield routes_of(surface, leg, out, some, first, corners, passed)
-        tubes = tubes.take(counts < bounces)
-        if not len(tubes) or surface.convex_alone:
+        if count >= bounces or surface.convex_alone:
             return
-        before = tubes
-        last = int(before.bounces[0]) + 1 >= bounces
-        tubes = bounce(surface, leg, blind, before, first, last, found)
+        last = count + 1 >= bounces
+        tubes = bounce(surface, leg, blind, tubes, first, last, found)
         if first and len(tubes):
             # From a plane mirror to another body: the legs over mirrors have these.
             previous = tubes.came_from()
             moved = f.body[previous] != f.body[tubes.facet]
             tubes = tubes.take(~(mirror_planes[previous] & moved))
         first = False
-
-
-def _other_body(surface: Surface, tubes: Tubes) -> NDArray[np.bool_]:
-    f = surface.facets
-    return f.body[tubes.came_from()] != f.body[tubes.facet]
-
-
-def _may_leave(out: Leg, tubes: Tubes) -> NDArray[np.bool_]:
-    """Tell which tubes could send something over a way out: turned to it, and within the circles of its mirrors."""
-    centre = tubes.points[:, CENTRE]
-    ok = np.einsum("nj,nj->n", out.rays(centre)[0], tubes.normals[:, CENTRE]) < 0.0
-    if out.mirrors:
-        rows = np.flatnonzero(ok)
-        size = sizes(tubes.points[rows, :3] - centre[rows, None]).max(axis=1)
-        ok[rows] = out.may_reach(centre[rows], size)
-    return ok
 
 
 def _planes_in(surface: Surface, legs: list[Leg]) -> NDArray[np.bool_]:

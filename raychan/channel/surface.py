@@ -46,7 +46,9 @@ class Surface(Tracer):
         self.edge_ends = np.zeros((0, 2, 3))
         self.edge_faces = np.zeros((0, 2), np.int32)
         self.between: Any = None
-        self.shadows: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()  # by leg
+        # What was found out about a leg, once.
+        self.shadows: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
+        self.reach: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
         self.wedge = np.zeros((0, 2, 3))
         self.wedge_facet = np.zeros((0, 2), np.int32)
         self.wedge_n = np.zeros(0)
