@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.kernels.beat import periodic
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.units import C0
@@ -79,9 +80,5 @@ def _table(weights: Floats) -> Complexes:
 
 
 def _lookup(table: Complexes, n: int, cells: Floats) -> Complexes:
-    period = np.floor(cells / n)
-    at = (cells - period * n) * _FINE
-    low = np.minimum(at.astype(np.int64), n * _FINE - 1)
-    value = table[low] + (at - low) * (table[low + 1] - table[low])
-    # One period on, a response counted from the middle of an even window has turned its sign.
-    return value * np.where((period * (n - 1)) % 2 == 0, 1.0, -1.0)
+    found: Complexes = periodic(table, n, _FINE, np.ascontiguousarray(cells))
+    return found
