@@ -96,16 +96,18 @@ def tubes(road: Road, tolerance_db: float, checked: bool = True) -> Run:
     """Return the map by adaptive tubes as `raychan run` does: cut for a tolerance, and once more to state the error."""
     since = perf_counter()
     f, s, points, surface = road.frequency, road.sensor, road.scene.points(0.0), Surface(road.facets)
-    rules = [refinement(f, tolerance_db, road.floor)]
+    cell = C0 / s.waveform.bandwidth
+    rules = [refinement(f, tolerance_db, road.floor, cell=cell)]
     if checked:
-        rules.append(refinement(f, 3.0 * tolerance_db, road.floor, jitter=0.13))
+        rules.append(refinement(f, 3.0 * tolerance_db, road.floor, jitter=0.13, cell=cell))
     paths = [solve(surface, points, s, f, rule, road.bounces)[0] for rule in rules]
     return Run(road.map_of(paths[0]), surface.rays, perf_counter() - since)
 
 
 def converged(road: Road, tolerance_db: float) -> Floats:
-    """Return the map of a launch that knows no noise, on a lattice of cuts of its own: never that of a method."""
-    rule = refinement(road.frequency, tolerance_db, jitter=0.2)
+    """Return the map of a launch on a lattice of cuts of its own: never that of a method."""
+    cell = C0 / road.sensor.waveform.bandwidth
+    rule = refinement(road.frequency, tolerance_db, road.floor, jitter=0.2, cell=cell)
     paths, _ = solve(road.facets, road.scene.points(0.0), road.sensor, road.frequency, rule, road.bounces)
     return road.map_of(paths)
 
