@@ -73,7 +73,7 @@ def refinement(
         wavenumber=2.0 * np.pi * frequency / C0,
         phase=min(0.2, 0.1 * fine),
         turn=min(0.3, 0.15 * fine),
-        relative=min(0.1, 0.02 * fine),
+        relative=min(0.15, 0.05 * fine),
         max_edge=0.3 * min(1.0, np.sqrt(fine)),
         floor=0.5 * floor * fine,
         cell=cell,

@@ -35,6 +35,8 @@ from raychan.world.scene import Scene
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, 0 to 1."""
 
+_BELOW = 0.1  # of the amplitude of a cell's noise, a dB of tolerance: what tubes that no launch cuts may bring
+
 STAGES = ("geometry", "check", "trace", "profile", "receive", "explain")
 
 
@@ -153,13 +155,14 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     with clock.stage("receive"):
         cube, rdmap, detections = receive(paths, sensor, settings, noise_rng, channel.turned)
         turned, others = channel.turned, channel.others
+        below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(sensor, settings)
         if turned is None:
-            error = map_error(paths, others, sensor, settings)
+            error = MapError(map_error(paths, others, sensor, settings).power + below)
         else:
             brought, doubt = (quiet_map(x, sensor, settings) for x in (turned.turning, turned.error))
             share = launch_share(paths, others, turned.turns, sensor)
             still = map_error(without(paths, turned.turns), without(others, turned.turns), sensor, settings)
-            error = MapError(still.power + doubt + share * brought)
+            error = MapError(still.power + doubt + share * brought + below)
     receiver = Receiver(
         sensor.waveform,
         settings.range_window,

@@ -1,0 +1,36 @@
+"""The error that a map states, against a far finer launch: in scenes, cell by cell, as `test_rcs.py` does for bodies."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.channel.rcs import stated_error
+from raychan.channel.solve import refinement, solve
+from raychan.run.chain import Clock, drowned, noise_of_cell, quiet_map, result_of, trace
+from raychan.signal.cube import synthesize
+from raychan.units import C0
+
+SCENES = Path(__file__).parents[1] / "scenes"
+
+
+@pytest.mark.parametrize("name", ["living_street", "urban"])
+def test_a_maps_stated_error_covers_the_true_one_in_most_cells(name):
+    scene = rc.Scene.load(SCENES / f"{name}.toml")
+    sensor, settings, wave = scene.sensor, scene.processing, scene.sensor.waveform
+    channel = trace(scene, 1.0, 2, Clock())
+    fine = refinement(
+        wave.carrier, 0.25, drowned(sensor, settings), scene.model.max_transmissions, 0.07, C0 / wave.bandwidth
+    )
+    truth, _ = solve(channel.surface, channel.points, sensor, wave.carrier, fine, 2)
+    silent = replace(sensor, noise=False)
+    found, true = (quiet_map(synthesize(p, silent).samples, sensor, settings) for p in (channel.paths, truth))
+    difference = result_of(scene, channel, 0, Clock()).error.power
+    rows = found > 20.0 * noise_of_cell(sensor, settings)
+    stated = np.array([stated_error(complex(a), b) for a, b in np.sqrt(np.stack([found, difference])[:, rows]).T])
+    off = np.abs(10.0 * np.log10(found[rows] / true[rows]))
+    assert rows.sum() > 100
+    assert np.mean(off <= stated) > 0.9
+    assert np.median(off) < 0.3
