@@ -12,6 +12,7 @@ Floats = NDArray[np.float64]
 
 _MANY = 4096  # tubes under which letting some go saves nothing
 _NOTHING = 1e-100  # 1/m
+_DEPTH = 1e-2  # of the strongest cell: weaker ones are no finer than such a one, should there be no noise
 _SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
 
 
@@ -29,7 +30,8 @@ class Found:
         """Return the bound [1/m] under which doubtful tubes of two-way lengths (n,) [m] are left as they are; about a
         hundred such add up to `rule.relative` of what was found there."""
         at = np.minimum(self._cell(length), len(self._level) - 1)
-        return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * self._level[at])
+        level = np.maximum(self._level[at], _DEPTH * self._level.max())
+        return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * level)
 
     def add(self, ph: Phases) -> None:
         """Count tubes that are seen: in each cell the scalar sum of all, or their rms sum where that cancels."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_FIRST = 1024  # rows; they double when full
+_FIRST = 1000  # rows; they double when full
 
 
 class History:
