@@ -23,7 +23,6 @@ VARIANTS = {
     "no car": ([f"bodies.car.{ASIDE}"], 3),
     "two interactions": ([], 2),
 }
-TOLERANCE_DB = 3.0  # coarser than the scene's own, for speed; the ghost's path is exact at any
 
 # Table 10: parts that count as the thing, range [m], its tolerance [m], speed [m/s].
 TABLE_10 = {
@@ -40,7 +39,7 @@ BIN = 0.0375  # m: c / 2B at 4 GHz
 @cache
 def ran(variant):
     changes, bounces = VARIANTS[variant]
-    return simulate(Scene.load(SCENE).override(changes), seed=0, tolerance_db=TOLERANCE_DB, max_bounces=bounces)
+    return simulate(Scene.load(SCENE).override(changes), seed=0, max_bounces=bounces)
 
 
 @pytest.fixture(scope="module")

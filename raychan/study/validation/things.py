@@ -146,10 +146,11 @@ def peaks(bench: Bench, run: str, low: float, high: float) -> Seen:
 
 @measure
 def split(bench: Bench, run: str, at: list[float]) -> Seen:
-    """Say whether the profile has a peak of its own within a third of the least gap of each of some ranges [m]."""
+    """Say whether the profile has a peak within a third of the least gap, and within a cell, of each range [m]."""
     made = bench.run(run).profile
     tops = made.range[made.peaks]
-    near = float(np.diff(sorted(at)).min()) / 3.0
+    # What lies further off than a cell is the peak of something else.
+    near = min(float(np.diff(sorted(at)).min()) / 3.0, bench.scene(run).sensor.waveform.range_resolution)
     return all(np.abs(tops - x).min(initial=np.inf) < near for x in at)
 
 
