@@ -35,10 +35,11 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 
-def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found) -> Tubes:
+def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, more: bool) -> Tubes:
     """Return the tubes of first bounces seen over `leg`, fine enough for a return over `out`.
 
-    Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do; found what was so far.
+    Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do; found what was so far;
+    more whether the tubes will bounce again.
     """
     f, rule = surface.facets, found.rule
     shape = f.vertices, f.normals, surface.bulge
@@ -50,7 +51,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found) ->
     facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
     if out != leg:
         facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
-    return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found)
+    return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found, more)
 
 
 def _seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
@@ -86,7 +87,7 @@ def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement) -> tupl
     return np.concatenate([f for f, _ in done]), np.concatenate([b for _, b in done])
 
 
-def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found) -> Tubes:
+def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, more: bool) -> Tubes:
     """Keep what is seen; cut the tubes of which only some rays are seen, while they matter."""
     kept: list[Tubes] = []
     rule = found.rule
@@ -96,7 +97,8 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
         _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready], rule)
 
     ph = phases_of(surface, leg, out, tubes, True, rule)
-    rows = found.that_count(ph.bound, ph.length)
+    # What returns little by itself may still carry the next bounces.
+    rows = found.that_count(ph.area if more else ph.bound, ph.length)
     tubes, ph = tubes.take(rows), ph.take(rows)
     # First by the centre rays alone: what nobody sees must not count, and the strongest lit surface may stand behind
     # a wall.

@@ -39,7 +39,8 @@ def tube_routes(
     # Where a wave still has to bounce it does not matter how the antenna looks at the place.
     blind = replace(direct, beam=None)
     found = so_far or Found(rule)
-    tubes = launch(surface, leg, direct, bodies, found)
+    more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
+    tubes = launch(surface, leg, direct, bodies, found, more)
     mirror_planes = _planes_in(surface, outs)
     first = True
     while len(tubes):
