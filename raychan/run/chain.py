@@ -35,7 +35,7 @@ from raychan.world.scene import Scene
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, 0 to 1."""
 
-_BELOW = 0.1  # of the amplitude of a cell's noise, a dB of tolerance: what tubes that no launch cuts may bring
+_BELOW = 0.3  # of the amplitude of a cell's noise, a dB of tolerance: what tubes that no launch cuts may bring
 
 STAGES = ("geometry", "check", "trace", "profile", "receive", "explain")
 
