@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+GAPS = 1  # cuts of a hidden tube in search of a part that is seen
+
 
 def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, more: bool) -> Tubes:
     """Return the tubes of first bounces seen over `leg`, fine enough for a return over `out`.
@@ -119,9 +121,6 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
         ph = phases_of(surface, leg, out, tubes, True, rule)
         matters = ph.bound > found.doubt(ph.length)
     return Tubes.join(kept)
-
-
-GAPS = 1  # cuts of a hidden tube in search of a part that is seen
 
 
 @dataclass(frozen=True)
