@@ -55,6 +55,7 @@ def summary_picture(rows: Sequence[Row], path: Path, earlier: Sequence[Row] = ()
             _front(axes, old, color="#555555", lw=1.2, ls="--", zorder=2, label="front of the earlier run")
             _defaults(axes, old, "seconds", mfc="none", mew=1.2, label="its default setting")
             _lines(axes, mine, "seconds")
+            axes.set_xlim(*_span([max(r.seconds, 1e-5) for r in mine + [r for r in old if r.default]]))
             axes.set_title(mine[0].title, fontsize=9)
         for axes in grid[len(cases) :]:
             axes.set_visible(False)
