@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _thread
 import os
+import signal
 import sys
 import threading
 
@@ -81,9 +82,18 @@ def main(argv: list[str] | None = None) -> None:
 def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
     """Repeat a Ctrl-C that was lost in a callback from C, such as numba's when it loads compiled code."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
-        threading.Timer(0.05, _thread.interrupt_main).start()
+        threading.Timer(0.05, _interrupt).start()
     else:
         sys.__unraisablehook__(lost)
+
+
+def _interrupt() -> None:
+    """Send the interruption to the main thread again; a signal, unlike a mere note, also ends its waits."""
+    main_thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main_thread is not None:
+        signal.pthread_kill(main_thread, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
 
 
 def invoke(argv: list[str]) -> int:
