@@ -20,7 +20,7 @@ test: $(VENV)/.installed-dev $(VENV)/.compiled
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
 bench: $(VENV)/.installed $(VENV)/.compiled
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)

@@ -77,12 +77,12 @@ def _step(
     hit, t = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     if last:
         # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
-        # back. Before more mirrors nobody knows.
-        # Beside a centre that meets nothing there may still be a body, but then its outline runs through the tube.
+        # back. Before more mirrors nobody knows. Where the centre meets nothing a body may still stand beside it.
         span = np.where(mid >= 0, _landing_span(surface, out, tubes, k, hit, rule), 0.0)
         matters = ph.area > found.doubt(_whole_way(out, tubes, k, ahead)) * (1.0 + 0.5 * span)
     else:
         matters = ph.area > found.doubt(ph.length)
+    # Beside a centre that meets nothing no corner is cast: the outline of a body there runs through the tube.
     _cast_corners(surface, tubes, k, flight.start, np.flatnonzero(matters & (mid >= 0)), hit, t)
     agree = _agree(surface, hit)
     side = _edges(surface, leg, tubes, k, hit, t, matters)
