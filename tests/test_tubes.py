@@ -119,6 +119,37 @@ def test_mean_of_a_quadratic_phase_hangs_on_no_setting_where_it_is_not_cut_in_pi
             assert out == pytest.approx(e @ BARY, abs=5e-4)
 
 
+@pytest.mark.parametrize("bend", [0.0, 0.3])
+@pytest.mark.parametrize("slope", [1.0, 1.9, 2.1, 5.0, 30.0])
+def test_corner_terms_keep_the_change_of_the_mean_with_frequency(slope, bend):
+    """Fixed terms that turn with their corners' delays: their derivative is that of the integral; for plain corner
+    terms of stationary phase it would be off by 2 over the number of radians."""
+    rng = np.random.default_rng(4)
+    out, off = np.empty(3, complex), []
+    for _ in range(20):
+        p = rng.uniform(0, 1, 3)
+        p *= slope / np.ptp(p)
+        phases = linear_phases(p)
+        phases[3:] += rng.uniform(-1, 1, 3) * bend
+        triangle_terms(phases, 1e-3, out)
+        e = WEIGHTS * np.exp(-1j * quadratic(phases, BARY))
+        # About the middle of the phases, so that a common delay weighs nothing.
+        first = out @ (p - p.mean())
+        off.append(min(abs(first - e @ (f - p.mean())) for f in (quadratic(phases, BARY), BARY @ p)))
+    assert max(off) < 0.05
+
+
+def test_elements_of_the_true_surface_add_up_to_its_area_and_point_along_its_normals():
+    surface = Surface(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
+    every = np.arange(len(surface.area), dtype=np.int32)
+    bary, weights = nodes(2, 4)
+    elements = surface.elements(every, np.broadcast_to(bary, (len(every), *bary.shape)))
+    assert (0.5 * np.linalg.norm(elements, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
+    points = surface.point(every, np.broadcast_to(bary, (len(every), *bary.shape)))
+    along = elements / np.linalg.norm(elements, axis=2, keepdims=True)
+    assert np.einsum("nij,nij->ni", along, points / 0.5).min() > np.cos(0.02)
+
+
 # --- no ray is lost at an edge ------------------------------------------------------------------------------------
 
 

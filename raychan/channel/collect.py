@@ -62,7 +62,7 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
         points=np.concatenate([tubes.points[:, :3], middle], axis=1),
         lengths=lengths,
         length=tubes.length[:, CENTRE] + back[:, CENTRE],
-        taper=_taper(tubes, back_k, back, out.far),
+        taper=_taper(surface, tubes, back_k, back, out.far, first),
         area=sizes(vector_area(tubes.points)),
         spread_in=tubes.spread,
         spread_out=out.spread(back[:, CENTRE]),
@@ -71,16 +71,23 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
     )
 
 
-def _taper(tubes: Tubes, back_k: Floats, back: Floats, far: bool) -> Floats:
+def _taper(surface: Surface, tubes: Tubes, back_k: Floats, back: Floats, far: bool, first: bool) -> Floats:
     """Return the mean obliquity times spreading at the corners over that at the centre (n, 3), for areas of the flat
     footprint; zero beyond the terminator."""
-    cosine = -0.5 * np.einsum("nij,nij->ni", tubes.normals, tubes.k + back_k)
-    strength = np.maximum(cosine, 0.0)
-    # Where the true surface turns away from the flat one there is more of it.
+    towards = -0.5 * (tubes.k + back_k)
+    strength = np.einsum("nij,nij->ni", tubes.normals, towards)
     flat = vector_area(tubes.points)
-    flat /= np.maximum(sizes(flat), 1e-300)[:, None]
-    turned = np.abs(np.einsum("nij,nj->ni", tubes.normals[:, :3], flat))
+    area = np.maximum(sizes(flat), 1e-300)
+    # Where the true surface turns away from the flat one there is more of it.
+    turned = np.abs(np.einsum("nij,nj->ni", tubes.normals[:, :3], flat / area[:, None]))
     strength[:, :3] /= np.maximum(turned, 0.5)
+    if first:
+        rows = np.flatnonzero(surface.curved[tubes.facet])
+        lit = np.einsum("nij,nij->ni", surface.elements(tubes.facet[rows], tubes.bary[rows]), towards[rows, :3])
+        lit *= np.sign(np.einsum("ij,ij->i", surface.normal[tubes.facet[rows]], tubes.normals[rows, CENTRE]))[:, None]
+        share = 0.5 * np.abs(np.linalg.det(tubes.bary[rows]))
+        strength[rows, :3] = lit * (share / area[rows])[:, None]
+    strength = np.maximum(strength, 0.0)
     if not far:
         strength = strength / (tubes.length * back)
     centre = strength[:, CENTRE:]

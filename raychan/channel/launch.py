@@ -49,7 +49,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     facet = _seeds(surface, leg, bodies)
     if not len(facet):
         return stand(surface, leg, facet, np.zeros((0, 3, 3)), rule.slots)
-    facet, bary = _cut_for_phase(facet, shape, ways, rule)
+    facet, bary = _cut_for_phase(facet, shape, ways, rule, not more)
     facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
     if out != leg:
         facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
@@ -72,13 +72,16 @@ def _seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
     return rows
 
 
-def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement) -> tuple[Ints, Floats]:
-    """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts."""
+def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> tuple[Ints, Floats]:
+    """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts.
+
+    Args: across whether only an edge's length across the rays counts: tubes that bounce again are needed as short.
+    """
     bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
     done, spent, level = [(facet[:0], bary[:0])], 0, 0
     while len(facet):
         spent += len(facet)
-        limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND
+        limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
         edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
         if spent > rule.max_tubes:
             edge[:] = -1
@@ -104,7 +107,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     tubes, ph = tubes.take(rows), ph.take(rows)
     # First by the centre rays alone: what nobody sees must not count, and the strongest lit surface may stand behind
     # a wall.
-    view = sight(surface, leg, tubes, np.zeros(len(tubes), bool), rule)
+    view = sight(surface, leg, tubes, np.zeros(len(tubes), bool), True, rule)
     seen = view.seen[:, CENTRE]
     found.add(ph.take(seen))
     matters = (ph.bound > found.doubt(ph.length)) & (not surface.convex_alone)
@@ -113,7 +116,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     for level in range(rule.levels + 1):
         if not len(tubes):
             break
-        view = sight(surface, leg, tubes, matters, rule, level < GAPS)
+        view = sight(surface, leg, tubes, matters, True, rule, level < GAPS)
         split = view.mixed & matters & (level < rule.levels)
         keep(view, ~split & view.seen[:, CENTRE])
         rows = np.flatnonzero(split)
@@ -140,15 +143,18 @@ class Sight:
         return (some & ~whole) | (self.side != 0.0).any(axis=1)
 
 
-def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refinement, gaps: bool = True) -> Sight:
+def sight(
+    surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, first: bool, rule: Refinement, gaps: bool = True
+) -> Sight:
     """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter.
 
     Args: gaps whether to look for one through which a tube is seen that none of its rays is.
     """
     n = len(tubes)
     # Corners lie on edges that other facets share: draw them in a little.
-    centre = tubes.points[:, CENTRE:]
-    aim = centre + 0.98 * (tubes.points - centre)
+    points = on_facets(surface, tubes) if first else tubes.points
+    centre = points[:, CENTRE:]
+    aim = centre + 0.98 * (points - centre)
     # On a curved patch points hover over their facet: a hit a little before them is their own surface.
     k, _ = leg.rays(tubes.points[:, CENTRE])
     rise = tubes.points - surface.first[tubes.facet][:, None]
@@ -168,16 +174,25 @@ def sight(surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, rule: Refine
     side = np.zeros((n, 3))
     if partly.any():
         stand_on = surface.normal[tubes.facet], surface.smooth[tubes.facet]
-        side = shadows_of(surface, leg).across(tubes.points, *stand_on, partly, slack)
+        side = shadows_of(surface, leg).across(points, *stand_on, partly, slack)
     # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
     known = seen | (block >= 0)
     facet = np.where(block >= 0, block, tubes.facet[:, None])
     met = np.where(known, surface.plane[facet], -1)
-    own = vector_area(tubes.points)
+    own = vector_area(points)
     own /= np.maximum(sizes(own), 1e-300)[:, None]
-    meeting_lines(tubes.points, source, -k, leg.far, met, block, surface.first, surface.normal, own, side)
+    meeting_lines(points, source, -k, leg.far, met, block, surface.first, surface.normal, own, side)
     side[~partly] = 0.0
     return Sight(seen, view.corners[:n], view.passed[:n], side)
+
+
+def on_facets(surface: Surface, tubes: Tubes) -> Floats:
+    """Return the points (n, 4, 3) [m] of tubes on their first surface, put down on the flat facets that rays meet."""
+    points = tubes.points.copy()
+    rows = np.flatnonzero(surface.curved[tubes.facet])
+    points[rows, :3] = tubes.bary[rows] @ surface.facets.vertices[tubes.facet[rows]]
+    points[rows, CENTRE] = points[rows, :3].mean(axis=1)
+    return points
 
 
 def divide(

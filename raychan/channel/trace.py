@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from raychan.channel.between import between
 from raychan.channel.edges import edge_within, meeting_lines
 from raychan.channel.found import Found
-from raychan.channel.launch import GAPS, divide, sight, write_layers
+from raychan.channel.launch import GAPS, divide, on_facets, sight, write_layers
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
@@ -73,7 +73,8 @@ def _step(
     rule, tubes = found.rule, flight.tubes
     k = mirrored(tubes)
     ph = phases_of(surface, leg, out, tubes, first, rule)
-    mid, ahead = surface.cast(tubes.points[:, CENTRE], k[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
+    points = on_facets(surface, tubes) if first else tubes.points
+    mid, ahead = surface.cast(points[:, CENTRE], k[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
     hit, t = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     if last:
         # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
@@ -83,9 +84,9 @@ def _step(
     else:
         matters = ph.area > found.doubt(ph.length)
     # Beside a centre that meets nothing no corner is cast: the outline of a body there runs through the tube.
-    _cast_corners(surface, tubes, k, flight.start, np.flatnonzero(matters & (mid >= 0)), hit, t)
+    _cast_corners(surface, points, tubes.facet, k, flight.start, np.flatnonzero(matters & (mid >= 0)), hit, t)
     agree = _agree(surface, hit)
-    side = _edges(surface, leg, tubes, k, hit, t, matters)
+    side = _edges(surface, leg, tubes, points, k, hit, t, matters)
     mixed = (~agree & (hit >= 0).any(axis=1)) | (side != 0.0).any(axis=1)
     cuts, layers = flight.count
     split = mixed & matters & (cuts < rule.levels)
@@ -111,12 +112,14 @@ def _step(
     )
 
 
-def _edges(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, t: Floats, wanted: Bools) -> Floats:
+def _edges(
+    surface: Surface, leg: Leg, tubes: Tubes, footprint: Floats, k: Floats, hit: Ints, t: Floats, wanted: Bools
+) -> Floats:
     """Return the sides (n, 3) of an edge that runs through each of the tubes `wanted`; zeros where none does."""
     flat = tubes.flat & ~surface.curved[tubes.facet]
     side = np.zeros((len(tubes), 3))
     for rows, far in ((np.flatnonzero(flat & wanted), leg.far), (np.flatnonzero(~flat & wanted), True)):
-        points, way, met = tubes.points[rows], k[rows], hit[rows]
+        points, way, met = footprint[rows], k[rows], hit[rows]
         mid = way[:, CENTRE]
         reach = np.where(met[:, CENTRE] >= 0, t[rows, CENTRE], surface.extent)
         # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the section that
@@ -152,14 +155,21 @@ def mirrored(tubes: Tubes) -> Floats:
 
 
 def _cast_corners(
-    surface: Surface, tubes: Tubes, k: Floats, start: Floats, rows: NDArray[np.signedinteger], hit: Ints, t: Floats
+    surface: Surface,
+    points: Floats,
+    facet: Ints,
+    k: Floats,
+    start: Floats,
+    rows: NDArray[np.signedinteger],
+    hit: Ints,
+    t: Floats,
 ) -> None:
     """Write the facets met and distances (n, 4) of the corner rays of the tubes `rows`; the centre's speak for the
     others."""
-    centre = tubes.points[rows, CENTRE:]
-    origin = (centre + 0.98 * (tubes.points[rows, :3] - centre)).reshape(-1, 3)
-    facet = np.repeat(tubes.facet[rows], 3)
-    found, distance = surface.cast(origin, k[rows, :3].reshape(-1, 3), facet, start[rows, :3].ravel())
+    centre = points[rows, CENTRE:]
+    origin = (centre + 0.98 * (points[rows, :3] - centre)).reshape(-1, 3)
+    own = np.repeat(facet[rows], 3)
+    found, distance = surface.cast(origin, k[rows, :3].reshape(-1, 3), own, start[rows, :3].ravel())
     hit[rows, :3], t[rows, :3] = found.reshape(-1, 3), distance.reshape(-1, 3)
 
 
@@ -223,7 +233,7 @@ def settle(
     for level in range(rule.levels + 1):
         ph = phases_of(surface, leg, out, tubes, first, rule)
         matters = ph.bound > found.doubt(ph.length)
-        view = sight(surface, out, tubes, matters, rule, level < GAPS)
+        view = sight(surface, out, tubes, matters, first, rule, level < GAPS)
         back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
         lit = back < 0.0
         rough = lit & view.seen.any(axis=1) & (ph.rough > 1.0)

@@ -70,14 +70,27 @@ def _distance(p, q):  # type: ignore[no-untyped-def]
     return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
 
 
+@njit(cache=True, inline="always")
+def _seen(p, q, image, far):  # type: ignore[no-untyped-def]
+    """Return how long pq looks from the end of a way [m]."""
+    whole, along, size = 0.0, 0.0, 0.0
+    for c in range(3):
+        d = q[c] - p[c]
+        k = image[c] if far else 0.5 * (p[c] + q[c]) - image[c]
+        whole += d * d
+        along += d * k
+        size += k * k
+    return math.sqrt(max(whole - along * along / max(size, 1e-300), 0.0))
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def edge_to_cut(  # type: ignore[no-untyped-def]
-    facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend
+    facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend, across
 ):  # fmt: skip
     """Return which edge (n,) of each patch to halve so that its two-way phase comes nearer to a quadratic; -1: none.
 
     Args: phase [rad] that the quadratic through corners and mid-edges may miss the centre by; turn [rad] of the
-    normal; max_edge [m]; most_bend [rad] that an edge may bend.
+    normal; max_edge [m], as seen from the end of the first way if `across`; most_bend [rad] that an edge may bend.
     """
     out = np.empty(len(facet), np.int8)
     p, normal, total = np.empty((7, 3)), np.empty((4, 3)), np.empty(7)
@@ -107,7 +120,10 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         turned = 0.0
         for c in range(3):
             turned = max(turned, _distance(normal[c], normal[3]) / turn)
-        e0, e1, e2 = _distance(p[0], p[1]), _distance(p[1], p[2]), _distance(p[2], p[0])
+        if across:
+            e0, e1, e2 = _seen(p[0], p[1], image, far), _seen(p[1], p[2], image, far), _seen(p[2], p[0], image, far)
+        else:
+            e0, e1, e2 = _distance(p[0], p[1]), _distance(p[1], p[2]), _distance(p[2], p[0])
         limit = 1.0 + 0.5 * (high - low)
         if off > limit:
             out[i] = _largest(bend0, bend1, bend2)

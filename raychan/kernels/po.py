@@ -48,6 +48,21 @@ def _edge(a: float, b: float, ea: complex, eb: complex) -> complex:
     return 1j * (eb - ea) / gap
 
 
+@njit(cache=True, inline="always")
+def _mended(
+    p0: float, p1: float, p2: float, t0: complex, t1: complex, t2: complex, lost: complex
+) -> tuple[complex, complex, complex]:
+    """Return corner terms of the same sum that also keep the first moment of the phase, off by j `lost`.
+
+    Terms of stationary phase fall with frequency, t ~ 1/phase; given fixed amplitudes they would keep the mean at the
+    carrier only, and beside it neighbours made by another rule would not match them.
+    """
+    mean = (p0 + p1 + p2) / 3.0
+    a, b, c = p0 - mean, p1 - mean, p2 - mean
+    shift = -1j * lost / (a * a + b * b + c * c)
+    return t0 + shift * a, t1 + shift * b, t2 + shift * c
+
+
 @njit(cache=True)
 def _corner_terms(
     p0: float, p1: float, p2: float, e0: complex, e1: complex, e2: complex
@@ -83,18 +98,25 @@ def _corner_terms(
     else:
         scale = 2j / span
         gap = p2 - p1
+        # Each division by a phase leaves out of the first moment what _mended puts back.
         if gap < 2.0:
             upper = scale * _edge(p1, p2, e1, e2)
             t1, t2 = upper * complex(0.5, gap / 12.0), upper * complex(0.5, -gap / 12.0)
+            lost = upper
         else:
             t1, t2 = scale * e1 / (1j * gap), -scale * e2 / (1j * gap)
+            lost = 2.0 * (t1 + t2)
         if x < 2.0:
             lower = scale * _edge(p0, p1, e0, e1)
             t0 = -lower * complex(0.5, x / 12.0)
             t1 -= lower * complex(0.5, -x / 12.0)
+            lost -= lower
         else:
-            t0 = -scale * e0 / (1j * x)
-            t1 += scale * e1 / (1j * x)
+            first, last = -scale * e0 / (1j * x), scale * e1 / (1j * x)
+            t0 = first
+            t1 += last
+            lost += 2.0 * (first + last)
+        t0, t1, t2 = _mended(p0, p1, p2, t0, t1, t2, lost)
     r0 = t0 if i0 == 0 else (t1 if i1 == 0 else t2)
     r1 = t0 if i0 == 1 else (t1 if i1 == 1 else t2)
     r2 = t0 if i0 == 2 else (t1 if i1 == 2 else t2)
@@ -120,7 +142,8 @@ def _inner(w: float, c: float) -> complex:
 
 @njit(cache=True)
 def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
-    """Integrate `_inner` exp(-j phi) along an edge; return the parts of its two ends.
+    """Integrate `_inner` exp(-j phi) along an edge; return the parts of its two ends, and by how many phases they were
+    divided in all.
 
     Args: pa, pm, pb phases [rad] at ends and middle; wa, wb, c slopes at the ends and bend across the edge.
     """
@@ -134,7 +157,7 @@ def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
         if 12.0 * worst * worst < _FINE * min(abs(sa * wa), abs(sb * wb)):
             first = -1j * ga / sa * complex(1.0, -xa) * cmath.exp(-1j * pa)
             last = 1j * gb / sb * complex(1.0, -xb) * cmath.exp(-1j * pb)
-            return first, last
+            return first, last, 2.0
     panels = 1 + int((abs(s) + 4.0 * abs(d)) / _PANEL)
     first, last = 0j, 0j
     for i in range(panels):
@@ -143,7 +166,7 @@ def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
             g = _SIX[1, q] * _inner(wa + t * (wb - wa), c) * cmath.exp(-1j * (pa + t * s + 4.0 * d * t * (1.0 - t)))
             first += (1.0 - t) * g
             last += t * g
-    return first / panels, last / panels
+    return first / panels, last / panels, 1.0
 
 
 @njit(cache=True)
@@ -169,9 +192,12 @@ def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
     wi = phases[j] - phases[i] + 4.0 * d[i]
     wj, c = wi - 8.0 * d[i], -8.0 * d[i]
     wk = wi + 4.0 * (d[j] - d[i] - d[k])
-    j_part, k_part = _along_edge(phases[j], phases[3 + j], phases[k], wj, wk, c)
-    i_part, other = _along_edge(phases[i], phases[3 + k], phases[k], wi, wk, c)
-    out[i], out[j], out[k] = -2.0 * i_part, 2.0 * j_part, 2.0 * (k_part - other)
+    j_part, k_part, ahead = _along_edge(phases[j], phases[3 + j], phases[k], wj, wk, c)
+    i_part, other, behind = _along_edge(phases[i], phases[3 + k], phases[k], wi, wk, c)
+    lost = 2.0 * (ahead * (j_part + k_part) - behind * (i_part + other))
+    out[i], out[j], out[k] = _mended(
+        phases[i], phases[j], phases[k], -2.0 * i_part, 2.0 * j_part, 2.0 * (k_part - other), lost
+    )
     return True
 
 
