@@ -80,7 +80,7 @@ def test_migration_left_out_would_be_wrong():
 
 
 def test_more_paths_than_one_chunk_add_up(monkeypatch):
-    monkeypatch.setattr("raychan.signal.cube._CHUNK", 7)
+    monkeypatch.setattr("raychan.signal.keystone._CHUNK", 7)
     paths = random_paths(3, 40, SMALL)
     assert worst_db(synthesize(paths, sensor(SMALL), method="nufft"), formula(paths, SMALL)) < -100.0
 
