@@ -59,6 +59,28 @@ def wave(turn):  # type: ignore[no-untyped-def]
     return (-re if q == 1.0 or q == 2.0 else re), (im if q >= 2.0 else -im)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _chebyshev(n, x):  # type: ignore[no-untyped-def]
+    before, this = x, 1.0
+    for _ in range(n):
+        before, this = this, 2.0 * x * this - before
+    return this
+
+
+@njit(cache=True, nogil=True)
+def _bessel(n, x):  # type: ignore[no-untyped-def]
+    """Return J_n(x) of small x, times 2 unless n is 0."""
+    term = 1.0 if n == 0 else 2.0
+    for i in range(n):
+        term *= 0.5 * x / (i + 1)
+    total, k = term, 0
+    while abs(term) > 1e-17:
+        k += 1
+        term *= -0.25 * x * x / (k * (k + n))
+        total += term
+    return total
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def sources(x, y, strength, amplitude, delay, growth, later, ramp, grid, rest):  # type: ignore[no-untyped-def]
     """Write where echoes (n,) stand on a grid, x (n,) rows of frequency per time and y (n,) columns of frequency per
@@ -85,20 +107,17 @@ def sources(x, y, strength, amplitude, delay, growth, later, ramp, grid, rest): 
         size = amplitude[i] * complex(cosine, sine)
         far = (b * slope * off * slope / frequency - rest[0, 0]) * rest[0, 1]
         late = (-0.5 * slope * b * b - rest[1, 0]) * rest[1, 1]
-        p, power = 0, size
+        p = 0
         for j in range(order_a + 1):
-            term = power
-            for _ in range(min(order_b, most - j) + 1):
-                strength[i, p] = term
-                term *= far * -1j
+            for k in range(min(order_b, most - j) + 1):
+                strength[i, p] = size * (_chebyshev(k, far) * _chebyshev(j, late))
                 p += 1
-            power *= late * -1j
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def stretched(place, factor, powers, frame, rest, falloff):  # type: ignore[no-untyped-def]
-    """Write where in the transform over shifts each sample (m, s) is read off, the factor that it takes, and those
-    (p, m, s) of the terms of the power series: see signal.keystone.
+def stretched(place, factor, frame, rest, falloff):  # type: ignore[no-untyped-def]
+    """Write where in the transforms over shifts each sample (m, s) is read off, and its factors (p, m, s) there: see
+    signal.keystone.
 
     Args: frame repetition, step [s], stretch [1/s], middle shift [Hz], rows per Hz, oversampling, length of the
     transform; rest as for `sources`, with the half widths; falloff, coefficients of 1 over the kernel's transform.
@@ -107,6 +126,7 @@ def stretched(place, factor, powers, frame, rest, falloff):  # type: ignore[no-u
     chirps, samples = place.shape
     order_b, order_a = int(rest[0, 2]), int(rest[1, 2])
     most = max(order_b, order_a)
+    turns_b, turns_a = 2.0 * math.pi * rest[0, 3], 2.0 * math.pi * rest[1, 3]
     for m in range(chirps):
         late = (m - chirps // 2) * repetition
         for s in range(samples):
@@ -119,15 +139,15 @@ def stretched(place, factor, powers, frame, rest, falloff):  # type: ignore[no-u
                 value = value * at + falloff[d]
             far, long = (late + t) * t, (late + t) ** 2
             cosine, sine = wave(shift * u + rest[0, 0] * far + rest[1, 0] * long)
-            factor[m, s] = value * complex(cosine, sine)
-            p, first = 0, 1.0
+            p, quarter = 0, complex(value * cosine, value * sine)
             for j in range(order_a + 1):
-                term = first
-                for i in range(min(order_b, most - j) + 1):
-                    powers[p, m, s] = term
-                    term *= 2.0 * math.pi * rest[0, 3] * far / (i + 1)
+                turned = quarter
+                for k in range(min(order_b, most - j) + 1):
+                    size = _bessel(k, turns_b * far) if order_b > 0 else 1.0
+                    factor[p, m, s] = turned * (size * _bessel(j, turns_a * long) if order_a > 0 else size)
+                    turned *= -1j
                     p += 1
-                first *= 2.0 * math.pi * rest[1, 3] * long / (j + 1)
+                quarter *= -1j
 
 
 _ABREAST = 8  # echoes whose recurrences run side by side, so that a core's vector unit is full

@@ -7,11 +7,12 @@ polynomials).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numba import njit
-from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
+from scipy.special import i0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -25,35 +26,30 @@ def transform(width: int, frequency: Floats) -> Floats:
     """Return the kernel's Fourier transform at frequencies [cycles per grid cell], up to 1 / (2 OVER)."""
     shape = _shape(width)
     root = np.sqrt(shape**2 - (np.pi * width * frequency) ** 2)
-    return np.asarray(width * np.sinh(root) / (root * np.i0(shape)))
+    return np.asarray(width * np.sinh(root) / (root * i0(shape)))
 
 
 def kernel_pieces(width: int) -> Floats:
     """Return coefficients (d, width), highest power first, of the kernel's pieces, each over -1 to 1."""
-    shape = _shape(width)
 
-    def piece(j: int) -> Floats:
-        def kernel(x: Floats) -> Floats:
-            at = (0.5 * (x + 1.0) + j) * 2.0 / width - 1.0
-            return np.asarray(np.i0(shape * np.sqrt(np.maximum(1.0 - at * at, 0.0))) / np.i0(shape))
+    def kernel(x: Floats) -> Floats:
+        at = (x + 1.0 + 2.0 * np.arange(width)) / width - 1.0
+        return np.asarray(i0(_shape(width) * np.sqrt(1.0 - at * at)) / i0(_shape(width)))
 
-        return powers(kernel, width // 2 + 4)
-
-    return np.ascontiguousarray(np.stack([piece(j) for j in range(width)], axis=1))
+    return _fitted(kernel, width // 2 + 4)
 
 
 def target_factor(width: int) -> Floats:
     """Return coefficients (d,), highest power first, of 1 / `transform` over the square of its argument, the square
     going from 0 to its largest as -1 to 1."""
-    return powers(lambda x: 1.0 / transform(width, np.sqrt(0.5 * (x + 1.0)) / (2.0 * OVER)), width // 2 + 6)
+    return _fitted(lambda x: 1.0 / transform(width, np.sqrt(0.5 * (x + 1.0)) / (2.0 * OVER)), width // 2 + 6)[:, 0]
 
 
-def powers(function, degree: int) -> Floats:  # type: ignore[no-untyped-def]
-    """Return coefficients, highest power first, of a polynomial that follows a function over -1 to 1."""
-    fitted = Chebyshev.interpolate(function, degree).convert(kind=Polynomial)
-    out = np.zeros(degree + 1)
-    out[: len(fitted.coef)] = fitted.coef
-    return out[::-1].copy()
+def _fitted(function: Callable[[Floats], Floats], degree: int) -> Floats:
+    """Return coefficients (degree + 1, f), highest power first, of polynomials over -1 to 1 that follow functions
+    (x, f) of a column of points."""
+    knots = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+    return np.ascontiguousarray(np.linalg.solve(np.vander(knots), function(knots[:, None])))
 
 
 def _shape(width: int) -> float:
@@ -111,28 +107,28 @@ def fold(out, grid, margin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def turned_over(out, rows_in, first, column, over, along):  # type: ignore[no-untyped-def]
+def exchange(out, rows, first, column, over, along):  # type: ignore[no-untyped-def]
     """Add rows (p, r, c) to out (p, s, l) with rows and columns exchanged, row r at (first + r) wrapped to l.
 
     Args: column, the one that s = 0 takes, wrapped; over (r,) and along (s,) factors.
     """
-    planes, count, period = rows_in.shape
-    steps, length = out.shape[1:]
+    planes, count, period = rows.shape
+    length = out.shape[2]
+    below = min(max(-first, 0), count)
     for p in range(planes):
-        for block in range(0, count, 8):
-            for s in range(steps):
-                c = (column + s) % period
-                for r in range(block, min(block + 8, count)):
-                    at = first + r
-                    out[p, s, at + length if at < 0 else at] += rows_in[p, r, c] * (over[r] * along[s])
+        for low, high, to in ((0, below, first + length), (below, count, first)):
+            for block in range(low, high, 8):
+                end = min(block + 8, high)
+                for s in range(len(along)):
+                    c = column + s - (period if column + s >= period else 0)
+                    line = out[p, s, to + block : to + end]
+                    for r in range(end - block):
+                        line[r] += rows[p, block + r, c] * (over[block + r] * along[s])
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def read(out, spectra, place, factor, powers, pieces):  # type: ignore[no-untyped-def]
-    """Add to out (m, s) what spectra (p, s, l) hold at place (m, s), times factor (m, s).
-
-    Args: powers (p, m, s) factors of the planes; pieces of the kernel.
-    """
+def read(out, spectra, place, factor, pieces):  # type: ignore[no-untyped-def]
+    """Add to out (m, s) what spectra (p, s, l) hold at place (m, s), times factors (p, m, s)."""
     planes, steps, length = spectra.shape
     width = pieces.shape[1]
     weight = np.empty(width)
@@ -152,20 +148,20 @@ def read(out, spectra, place, factor, powers, pieces):  # type: ignore[no-untype
                 for j in range(width):
                     re += weight[j] * some[j].real
                     im += weight[j] * some[j].imag
-                total += complex(re, im) * powers[p, m, s]
-            out[m, s] += total * factor[m, s]
+                total += complex(re, im) * factor[p, m, s]
+            out[m, s] += total
 
 
 @njit(cache=True, nogil=True)
-def rows_order(row, count):  # type: ignore[no-untyped-def]
+def order_of(box, count):  # type: ignore[no-untyped-def]
     """Return the order (n,) that sorts whole numbers (n,) below `count`, equal ones as they come."""
     start = np.zeros(count + 1, np.int64)
-    for i in range(row.size):
-        start[row[i] + 1] += 1
-    for r in range(count):
-        start[r + 1] += start[r]
-    order = np.empty(row.size, np.int64)
-    for i in range(row.size):
-        order[start[row[i]]] = i
-        start[row[i]] += 1
+    for i in range(box.size):
+        start[box[i] + 1] += 1
+    for b in range(count):
+        start[b + 1] += start[b]
+    order = np.empty(box.size, np.int64)
+    for i in range(box.size):
+        order[start[box[i]]] = i
+        start[box[i]] += 1
     return order

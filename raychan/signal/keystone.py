@@ -8,7 +8,7 @@ turns by
 Its Doppler shift n = b (F - S off) makes this (S tau + n) t + n u + B T t + A T^2, with u = M (1 + S t / F) + S t^2 / F,
 B = S off b S / F and A = -S b^2 / 2: every sample sees all shifts at one stretched time u, whatever the echo (the
 keystone transform of radar imaging). So a transform over beat frequencies and one over shifts, read off at u, sum all
-echoes. The rest, below 1e-2 as a rule, is a power series in B and A, each term one more pair of transforms; no term of
+echoes. The rest, below 1e-2 as a rule, is a series in B and A, each term one more pair of transforms; no term of
 the phase is dropped that the tolerance would show.
 """
 
@@ -24,8 +24,17 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from raychan.kernels.beat import sources, stretched
-from raychan.kernels.gridding import OVER, fold, kernel_pieces, read, rows_order, spread, target_factor, transform
-from raychan.kernels.gridding import turned_over as exchange
+from raychan.kernels.gridding import (
+    OVER,
+    exchange,
+    fold,
+    kernel_pieces,
+    order_of,
+    read,
+    spread,
+    target_factor,
+    transform,
+)
 from raychan.radar.waveform import Waveform
 from raychan.units import C0
 
@@ -38,6 +47,7 @@ _STRIPES = 4  # parts of the echoes that are gridded side by side
 _BLOCK = 64  # samples of a chirp whose transforms over shifts are made at a time
 _ROOM = 1 << 28  # bytes of a grid
 _CHUNK = 1 << 18  # echoes gridded at a time
+_BOX = 8, 8
 
 
 @dataclass(frozen=True)
@@ -88,7 +98,7 @@ class Keystone:
         far_turn, late_turn = 2.0 * np.pi * far_span * (m + t) * t, 2.0 * np.pi * late_span * (m + t) ** 2
         small = 0.1 * tolerance
         self.rest_turn = far_turn * (far_turn > small), late_turn * (late_turn > small)
-        order = _order(sum(self.rest_turn), 0.25 * tolerance)
+        order = _order(sum(self.rest_turn), 0.4 * tolerance)
         self.orders = tuple(order if z > 0.0 else 0 for z in self.rest_turn)
         self.planes = sum(min(self.orders[0], order - j) + 1 for j in range(self.orders[1] + 1))
         self.rest = np.array(
@@ -117,18 +127,21 @@ class Keystone:
         """Return the echoes by row, and lay out how the grid is read off."""
         wave = self.wave
         shift = echoes.growth * (self.frequency - wave.slope * (echoes.delay - self.delay))
-        row = ((shift - self.shift) * self.dense + 0.5 * self.rows).astype(np.int64)
+        turn = (wave.slope * echoes.delay + shift) * self.step
+        # In boxes of some rows and columns, so that what is added to lies near by: rows first, for the stripes.
+        box = ((shift - self.shift) * self.dense + 0.5 * self.rows).astype(np.int64) // _BOX[0]
+        across = self.columns // _BOX[1] + 1
+        box = box * across + ((turn - np.floor(turn)) * self.columns).astype(np.int64) // _BOX[1]
         self.pieces = kernel_pieces(self.width)
         k, s = np.arange(self.rows) - self.rows // 2, np.arange(wave.n_samples) - wave.n_samples // 2
         # The sign moves the middle of the transform to the middle of its length, so that nothing is read across its end.
         self.over = (1.0 - 2.0 * (k % 2)) / transform(self.width, k / self.length)
         self.along = 1.0 / transform(self.width, s / self.columns)
         shape = wave.n_chirps, wave.n_samples
-        self.place, self.factor = np.empty(shape), np.empty(shape, np.complex128)
-        self.powers = np.empty((self.planes, *shape))
+        self.place, self.factor = np.empty(shape), np.empty((self.planes, *shape), np.complex128)
         frame = np.array([wave.repetition, self.step, self.stretch, self.shift, self.dense, OVER, self.length])
-        stretched(self.place, self.factor, self.powers, frame, self.rest, target_factor(self.width))
-        return echoes[rows_order(row, self.rows)]
+        stretched(self.place, self.factor, frame, self.rest, target_factor(self.width))
+        return echoes[order_of(box, (self.rows // _BOX[0] + 1) * across)]
 
     def add(self, out: Complexes, echoes: Echoes, element: Floats, each: Each) -> None:
         """Add to out (chirps, samples) what a receiver at `element` (3,) [m] gets from the `prepared` echoes; `each`
@@ -148,7 +161,9 @@ class Keystone:
             strength = np.empty((len(later), self.planes), np.complex128)
             sources(x, y, strength, some.amplitude, some.delay, some.growth, later, ramp, grid, self.rest)
             first = math.ceil(x.min() - half)
-            cells = np.zeros((self.planes, math.ceil(x.max() - half) + 2 * half - first, self.columns + 2 * half), complex)
+            cells = np.zeros(
+                (self.planes, math.ceil(x.max() - half) + 2 * half - first, self.columns + 2 * half), complex
+            )
             spread(cells, x - first, y, strength, self.pieces)
             rows = np.empty((*cells.shape[:2], self.columns), sort)
             fold(rows, cells, half)
@@ -167,7 +182,7 @@ class Keystone:
                 exchange(spectra, rows, first - self.rows // 2, column, over, self.along[start:end])
             spectra = scipy.fft.fft(spectra, axis=2, overwrite_x=True)
             part = np.s_[:, start:end]
-            read(out[part], spectra, self.place[part], self.factor[part], self.powers[:, :, start:end], self.pieces)
+            read(out[part], spectra, self.place[part], self.factor[:, :, start:end], self.pieces)
 
         for _ in each(told, range(0, samples, _BLOCK)):
             pass
@@ -198,11 +213,11 @@ def _middle(values: Floats, margin: float) -> tuple[float, float]:
 
 
 def _order(turn: float, tolerance: float) -> int:
-    """Return the order at which the power series of exp(j turn) is cut."""
+    """Return the order at which the series of exp(j turn x) in Chebyshev polynomials, its terms 2 J_n, is cut."""
     order, bound = 0, turn
     while bound > tolerance:
         order += 1
-        bound *= turn / (order + 1)
+        bound *= 0.5 * turn / (order + 1)
     return order
 
 
