@@ -129,7 +129,7 @@ def exchange(out, rows, first, column, over, along):  # type: ignore[no-untyped-
 @njit(cache=True, nogil=True, fastmath=True)
 def read(out, spectra, place, factor, pieces):  # type: ignore[no-untyped-def]
     """Add to out (m, s) what spectra (p, s, l) hold at place (m, s), times factors (p, m, s)."""
-    planes, steps, length = spectra.shape
+    planes, steps = spectra.shape[:2]
     width = pieces.shape[1]
     weight = np.empty(width)
     for s in range(steps):

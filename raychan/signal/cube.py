@@ -72,8 +72,8 @@ def synthesize(
 def _direct(amplitude: Complexes, delay: Floats, growth: Floats, wave: Waveform) -> Complexes:
     step = wave.chirp_duration / wave.n_samples
     ramp = (wave.carrier, wave.slope, wave.repetition, step)
-    echoes = (np.ascontiguousarray(x) for x in (amplitude, delay, growth))
-    return np.asarray(beat_sum(*echoes, *ramp, wave.n_chirps, wave.n_samples))
+    a, d, g = np.ascontiguousarray(amplitude), np.ascontiguousarray(delay), np.ascontiguousarray(growth)
+    return np.asarray(beat_sum(a, d, g, *ramp, wave.n_chirps, wave.n_samples))
 
 
 def _fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: Floats) -> None:

@@ -5,10 +5,10 @@ turns by
 
     S tau t + b T (F + S t - S off) - S b^2 T^2 / 2,    off = tau - tau_0,  F = carrier + S t_0 - S tau_0.
 
-Its Doppler shift n = b (F - S off) makes this (S tau + n) t + n u + B T t + A T^2, with u = M (1 + S t / F) + S t^2 / F,
-B = S off b S / F and A = -S b^2 / 2: every sample sees all shifts at one stretched time u, whatever the echo (the
-keystone transform of radar imaging). So a transform over beat frequencies and one over shifts, read off at u, sum all
-echoes. The rest, below 1e-2 as a rule, is a series in B and A, each term one more pair of transforms; no term of
+Its Doppler shift n = b (F - S off) makes this (S tau + n) t + n u + B T t + A T^2, with u = M (1 + S t / F) +
+S t^2 / F, B = S off b S / F and A = -S b^2 / 2: every sample sees all shifts at one stretched time u, whatever the echo
+(the keystone transform of radar imaging). So a transform over beat frequencies and one over shifts, read off at u, sum
+all echoes. The rest, below 1e-2 as a rule, is a series in B and A, each term one more pair of transforms; no term of
 the phase is dropped that the tolerance would show.
 """
 
@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,7 @@ class Keystone:
         box = box * across + ((turn - np.floor(turn)) * self.columns).astype(np.int64) // _BOX[1]
         self.pieces = kernel_pieces(self.width)
         k, s = np.arange(self.rows) - self.rows // 2, np.arange(wave.n_samples) - wave.n_samples // 2
-        # The sign moves the middle of the transform to the middle of its length, so that nothing is read across its end.
+        # The sign moves the transform's middle to the middle of its length: nothing is read across its end.
         self.over = (1.0 - 2.0 * (k % 2)) / transform(self.width, k / self.length)
         self.along = 1.0 / transform(self.width, s / self.columns)
         shape = wave.n_chirps, wave.n_samples
@@ -171,7 +172,7 @@ class Keystone:
 
         stripes = min(count, max(_STRIPES, -(-count // _CHUNK)))
         bounds = np.linspace(0, count, stripes + 1).astype(int)
-        held = list(each(gridded, [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]))
+        held = list(each(gridded, [slice(a, b) for a, b in pairwise(bounds)]))
 
         def told(start: int) -> None:
             end = min(start + _BLOCK, samples)
