@@ -208,20 +208,3 @@ def ramp_sums(
         for s in range(samples):
             out[m, s] = complex(re[s], im[s])
     return out
-
-
-@njit(cache=True, nogil=True)
-def periodic(table, n, fine, cells):  # type: ignore[no-untyped-def]
-    """Return a window's response at `cells` (m,) cells from its peak, linear between `fine` points a cell.
-
-    Args: table (n fine + 1,) one period of the response of n samples, its phase counted from their middle.
-    """
-    out = np.empty(len(cells), np.complex128)
-    for i in range(len(cells)):
-        period = math.floor(cells[i] / n)
-        at = (cells[i] - period * n) * fine
-        low = min(int(at), n * fine - 1)
-        value = table[low] + (at - low) * (table[low + 1] - table[low])
-        # One period on, a response counted from the middle of an even window has turned its sign.
-        out[i] = -value if (int(period) * (n - 1)) % 2 else value
-    return out
