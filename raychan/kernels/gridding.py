@@ -57,19 +57,21 @@ def _shape(width: int) -> float:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def spread(grid, x, y, strengths, pieces):  # type: ignore[no-untyped-def]
+def spread(grid, flat, x, y, strengths, pieces):  # type: ignore[no-untyped-def]
     """Add sources to a grid (p, rows, columns), each over as many cells as the kernel is wide.
 
-    Args: x (n,) rows, y (n,) columns where they stand, at least half a kernel from the edge; strengths (n, p);
-    pieces of the kernel, whose width is a multiple of 8.
+    Args: flat, the grid's real and imaginary parts in a row; x (n,) rows, y (n,) columns where they stand, at least
+    half a kernel from the edge; strengths (n, p); pieces of the kernel, whose width is a multiple of 8. All of one
+    precision, but for the places.
     """
     planes, rows, columns = grid.shape
     width = pieces.shape[1]
-    flat = grid.reshape(-1).view(np.float64)
-    over, along, part = np.empty(width), np.empty(width), np.empty(2 * width)
+    over, along, part = np.empty(width, flat.dtype), np.empty(width, flat.dtype), np.empty(2 * width, flat.dtype)
+    at = np.empty(2, flat.dtype)
     for i in range(x.size):
         row, column = math.ceil(x[i] - 0.5 * width), math.ceil(y[i] - 0.5 * width)
-        at_x, at_y = 2.0 * (row - x[i]) + width - 1.0, 2.0 * (column - y[i]) + width - 1.0
+        at[0], at[1] = 2.0 * (row - x[i]) + width - 1.0, 2.0 * (column - y[i]) + width - 1.0
+        at_x, at_y = at[0], at[1]
         over[:], along[:] = pieces[0], pieces[0]
         for d in range(1, len(pieces)):
             coefficients = pieces[d]
@@ -92,18 +94,15 @@ def spread(grid, x, y, strengths, pieces):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def fold(out, grid, margin):  # type: ignore[no-untyped-def]
-    """Write a grid (p, rows, columns) whose margins stand for the other end into out (p, rows, period)."""
+def fold(grid, margin):  # type: ignore[no-untyped-def]
+    """Add the margins of a grid (p, rows, columns), which stand for its other end, to that."""
     planes, rows, columns = grid.shape
-    period = out.shape[2]
+    period = columns - 2 * margin
     for p in range(planes):
         for r in range(rows):
-            for c in range(period):
-                out[p, r, c] = grid[p, r, c + margin]
             for c in range(margin):
-                out[p, r, period - margin + c] += grid[p, r, c]
-            for c in range(margin + period, columns):
-                out[p, r, c - margin - period] += grid[p, r, c]
+                grid[p, r, c + period] += grid[p, r, c]
+                grid[p, r, c + margin] += grid[p, r, c + margin + period]
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -154,14 +153,16 @@ def read(out, spectra, place, factor, pieces):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def order_of(box, count):  # type: ignore[no-untyped-def]
-    """Return the order (n,) that sorts whole numbers (n,) below `count`, equal ones as they come."""
+    """Return the order (n,) that sorts whole numbers (n,) below `count`, equal ones as they come, and how many at most
+    are equal."""
     start = np.zeros(count + 1, np.int64)
     for i in range(box.size):
         start[box[i] + 1] += 1
+    most = start.max()
     for b in range(count):
         start[b + 1] += start[b]
     order = np.empty(box.size, np.int64)
     for i in range(box.size):
         order[start[box[i]]] = i
         start[box[i]] += 1
-    return order
+    return order, most

@@ -49,6 +49,7 @@ _BLOCK = 64  # samples of a chirp whose transforms over shifts are made at a tim
 _ROOM = 1 << 28  # bytes of a grid
 _CHUNK = 1 << 18  # echoes gridded at a time
 _BOX = 8, 8
+_CROWD = 64  # echoes in a box of cells up to which they are added up in single precision: 3e-7 of them
 
 
 @dataclass(frozen=True)
@@ -142,13 +143,15 @@ class Keystone:
         self.place, self.factor = np.empty(shape), np.empty((self.planes, *shape), np.complex128)
         frame = np.array([wave.repetition, self.step, self.stretch, self.shift, self.dense, OVER, self.length])
         stretched(self.place, self.factor, frame, self.rest, target_factor(self.width))
-        return echoes[order_of(box, (self.rows // _BOX[0] + 1) * across)]
+        order, most = order_of(box, (self.rows // _BOX[0] + 1) * across)
+        # Where many echoes add up in one cell, single precision would round too often.
+        self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
+        return echoes[order]
 
     def add(self, out: Complexes, echoes: Echoes, element: Floats, each: Each) -> None:
         """Add to out (chirps, samples) what a receiver at `element` (3,) [m] gets from the `prepared` echoes; `each`
         is `map` or that of a pool."""
         count, samples, half = len(echoes.delay), self.wave.n_samples, self.width // 2
-        sort = np.complex64 if self.single else np.complex128
         ramp = np.array([self.wave.carrier, self.wave.slope, self.then, self.t, self.step])
         grid = np.array(
             [self.delay, self.frequency, self.shift, self.dense, 0.5 * self.rows, self.columns, float(half)]
@@ -159,16 +162,14 @@ class Keystone:
             # A receiver moved towards the arriving wave has a shorter path.
             later = (some.arrival @ element) * (-1.0 / C0)
             x, y = np.empty(len(later)), np.empty(len(later))
-            strength = np.empty((len(later), self.planes), np.complex128)
+            strength = np.empty((len(later), self.planes), self.sort)
             sources(x, y, strength, some.amplitude, some.delay, some.growth, later, ramp, grid, self.rest)
-            first = math.ceil(x.min() - half)
-            cells = np.zeros(
-                (self.planes, math.ceil(x.max() - half) + 2 * half - first, self.columns + 2 * half), complex
-            )
-            spread(cells, x - first, y, strength, self.pieces)
-            rows = np.empty((*cells.shape[:2], self.columns), sort)
-            fold(rows, cells, half)
-            return first, scipy.fft.fft(rows, axis=2, overwrite_x=True)
+            first, end = math.ceil(x.min() - half), math.ceil(x.max() + half)
+            cells = np.zeros((self.planes, end - first, self.columns + 2 * half), self.sort)
+            flat = cells.view(cells.real.dtype).reshape(-1)
+            spread(cells, flat, x - first, y, strength, self.pieces.astype(flat.dtype))
+            fold(cells, half)
+            return first, scipy.fft.fft(cells[:, :, half:-half], axis=2, overwrite_x=True)
 
         stripes = min(count, max(_STRIPES, -(-count // _CHUNK)))
         bounds = np.linspace(0, count, stripes + 1).astype(int)
@@ -176,7 +177,7 @@ class Keystone:
 
         def told(start: int) -> None:
             end = min(start + _BLOCK, samples)
-            spectra = np.zeros((self.planes, end - start, self.length), sort)
+            spectra = np.zeros((self.planes, end - start, self.length), np.complex64 if self.single else np.complex128)
             for first, rows in held:
                 over = self.over[first : first + rows.shape[1]]
                 column = (start - samples // 2) % self.columns
