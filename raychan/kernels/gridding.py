@@ -120,9 +120,9 @@ def exchange(out, rows, first, column, over, along):  # type: ignore[no-untyped-
                 end = min(block + 8, high)
                 for s in range(len(along)):
                     c = column + s - (period if column + s >= period else 0)
-                    line = out[p, s, to + block : to + end]
+                    line, some, factor = out[p, s, to + block : to + end], rows[p, block:end, c], over[block:end]
                     for r in range(end - block):
-                        line[r] += rows[p, block + r, c] * (over[block + r] * along[s])
+                        line[r] += some[r] * (factor[r] * along[s])
 
 
 @njit(cache=True, nogil=True, fastmath=True)

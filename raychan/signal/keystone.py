@@ -98,9 +98,9 @@ class Keystone:
         late, late_span = _middle(-0.5 * slope * echoes.growth**2, 0.0)
         t, m = (samples // 2) * self.step, (chirps // 2) * wave.repetition
         far_turn, late_turn = 2.0 * np.pi * far_span * (m + t) * t, 2.0 * np.pi * late_span * (m + t) ** 2
-        small = 0.1 * tolerance
+        small = 0.3 * tolerance
         self.rest_turn = far_turn * (far_turn > small), late_turn * (late_turn > small)
-        order = _order(sum(self.rest_turn), 0.4 * tolerance)
+        order = _order(sum(self.rest_turn), 0.3 * tolerance)
         self.orders = tuple(order if z > 0.0 else 0 for z in self.rest_turn)
         self.planes = sum(min(self.orders[0], order - j) + 1 for j in range(self.orders[1] + 1))
         self.rest = np.array(
@@ -178,13 +178,14 @@ class Keystone:
         def told(start: int) -> None:
             end = min(start + _BLOCK, samples)
             spectra = np.zeros((self.planes, end - start, self.length), np.complex64 if self.single else np.complex128)
+            real = spectra.real.dtype
+            along, column = self.along[start:end].astype(real), (start - samples // 2) % self.columns
             for first, rows in held:
-                over = self.over[first : first + rows.shape[1]]
-                column = (start - samples // 2) % self.columns
-                exchange(spectra, rows, first - self.rows // 2, column, over, self.along[start:end])
+                over = self.over[first : first + rows.shape[1]].astype(real)
+                exchange(spectra, rows, first - self.rows // 2, column, over, along)
             spectra = scipy.fft.fft(spectra, axis=2, overwrite_x=True)
-            part = np.s_[:, start:end]
-            read(out[part], spectra, self.place[part], self.factor[:, :, start:end], self.pieces)
+            part, factor = np.s_[:, start:end], self.factor[:, :, start:end]
+            read(out[part], spectra, self.place[part], factor, self.pieces)
 
         for _ in each(told, range(0, samples, _BLOCK)):
             pass
