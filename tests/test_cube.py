@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from raychan.radar.waveform import Waveform
 from raychan.signal.cube import synthesize
+from raychan.signal.keystone import Echoes, keystones
+from raychan.signal.keystone import middle as centre
 from raychan.units import C0, db
 
 
@@ -25,6 +27,12 @@ def formula(paths, wave: Waveform) -> np.ndarray:
 
 def worst_db(cube, truth) -> float:
     return float(db((np.abs(cube.samples[0] - truth) ** 2).max() / (np.abs(truth) ** 2).max()))
+
+
+def grids(paths, wave: Waveform):
+    growth = 2.0 * paths.rate / C0
+    middle = paths.delay + growth * centre(wave)[0]
+    return keystones(Echoes(middle, growth, paths.amplitude, paths.arrival), wave, 1e-6, 0.0)
 
 
 def random_paths(seed: int, n: int, wave: Waveform, fastest: float = 30.0):
@@ -80,9 +88,43 @@ def test_migration_left_out_would_be_wrong():
 
 
 def test_more_paths_than_one_chunk_add_up(monkeypatch):
-    monkeypatch.setattr("raychan.signal.cube._CHUNK", 7)
+    monkeypatch.setattr("raychan.signal.keystone._CHUNK", 7)
     paths = random_paths(3, 40, SMALL)
     assert worst_db(synthesize(paths, sensor(SMALL), method="nufft"), formula(paths, SMALL)) < -100.0
+
+
+def test_grids_too_large_for_their_room_are_split_and_add_up(monkeypatch):
+    paths = random_paths(9, 60, WIDE)
+    assert len(grids(paths, WIDE)) == 1
+    monkeypatch.setattr("raychan.signal.keystone._ROOM", 1 << 23)
+    assert len(grids(paths, WIDE)) > 2
+    assert worst_db(synthesize(paths, sensor(WIDE), method="nufft"), formula(paths, WIDE)) < -100.0
+
+
+def test_movers_so_fast_that_the_small_terms_turn_by_more_than_a_radian_stay_exact():
+    # 1,500 m/s at 10 GHz and 4 GHz: at last the small terms need several grids, each with terms of high order.
+    wave = Waveform(10e9, 4e9, 60e-6, 60e-6, 128, 256)
+    paths = random_paths(10, 30, wave, fastest=1500.0)
+    parts = grids(paths, wave)
+    assert len(parts) > 1 and max(max(grid.orders) for grid, _ in parts) > 3
+    assert worst_db(synthesize(paths, sensor(wave), method="nufft"), formula(paths, wave)) < -100.0
+
+
+def test_crowds_of_echoes_in_one_cell_do_not_lose_digits():
+    rng = np.random.default_rng(11)
+    n = 20_000
+    paths = echoes(9.0 + 0.01 * rng.random(n), 0.01 * rng.random(n), rng.normal(size=n) + 1j * rng.normal(size=n))
+    direct = synthesize(paths, sensor(SMALL), method="direct")
+    assert worst_db(synthesize(paths, sensor(SMALL), method="nufft"), direct.samples[0]) < -115.0
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-7])
+def test_a_lone_echo_is_within_the_tolerance(tolerance):
+    rng = np.random.default_rng(12)
+    for r, v in zip(rng.uniform(0.1, 38.0, 20), rng.uniform(-30.0, 30.0, 20), strict=True):
+        paths = echoes([r, 20.0], [v, -v], [1.0, 1e-6])
+        off = synthesize(paths, sensor(WIDE), method="nufft", tolerance=tolerance).samples[0] - formula(paths, WIDE)
+        assert np.abs(off).max() < tolerance + 2e-7  # samples have single precision
 
 
 def test_equal_inputs_give_equal_bytes_and_noise_follows_the_seed():

@@ -42,28 +42,112 @@ def beat_sum(
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def add_bent(out: Complexes, plane: Complexes, growth: float, slope: float, repetition: float, step: float) -> None:
-    """Add to out (chirps, samples) the sum of plane phases times what bends them: range migration and its kin.
+@njit(cache=True, nogil=True, inline="always")
+def wave(turn):  # type: ignore[no-untyped-def]
+    """Return cosine and sine of -2 pi times a number of turns, by their series about the nearest quarter."""
+    quarter = math.floor(4.0 * turn + 0.5)
+    x = 2.0 * math.pi * (turn - 0.25 * quarter)
+    q = quarter - 4.0 * math.floor(0.25 * quarter)
+    s = x * x
+    sine = -1.0 / 39916800.0 + s * (1.0 / 6227020800.0 - s * (1.0 / 1307674368000.0))
+    sine = x * (1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s * (1.0 / 362880.0 + s * sine)))))
+    cosine = 1.0 / 40320.0 + s * (-1.0 / 3628800.0 + s * (1.0 / 479001600.0 - s * (1.0 / 87178291200.0)))
+    cosine = 1.0 + s * (-0.5 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * cosine)))
+    odd = q == 1.0 or q == 3.0
+    re = sine if odd else cosine
+    im = cosine if odd else sine
+    return (-re if q == 1.0 or q == 2.0 else re), (im if q >= 2.0 else -im)
 
-    With M and t counted from the middle sample (chirps // 2, samples // 2) the phase of an echo that is neither
-    constant nor linear in them is -2 pi S b [(1 - b) M t + (1 - b/2) t^2 - (b/2) M^2], b the growth of its delay.
+
+@njit(cache=True, nogil=True, inline="always")
+def _chebyshev(n, x):  # type: ignore[no-untyped-def]
+    before, this = x, 1.0
+    for _ in range(n):
+        before, this = this, 2.0 * x * this - before
+    return this
+
+
+@njit(cache=True, nogil=True)
+def _bessel(n, x):  # type: ignore[no-untyped-def]
+    """Return J_n(x) of small x, times 2 unless n is 0."""
+    term = 1.0 if n == 0 else 2.0
+    for i in range(n):
+        term *= 0.5 * x / (i + 1)
+    total, k = term, 0
+    while abs(term) > 1e-17:
+        k += 1
+        term *= -0.25 * x * x / (k * (k + n))
+        total += term
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sources(x, y, strength, amplitude, delay, growth, later, ramp, grid, rest):  # type: ignore[no-untyped-def]
+    """Write where echoes (n,) stand on a grid, x (n,) rows of frequency per time and y (n,) columns of frequency per
+    sample, and their strengths (n, p): see signal.keystone.
+
+    Args: delay and growth as for `beat_sum` but at the middle instant, later (n,) [s] to be added to it; ramp carrier
+    [Hz], slope [Hz/s], then, t [s], step [s]; grid delay, frequency, row zero, rows per Hz, middle row, columns a
+    turn, margin; rest (2, 4): middle, 1 / half width, order and half
+    width of the two small terms.
     """
-    chirps, samples = out.shape
-    first = -(samples // 2)
-    bend = np.empty(samples, np.complex128)
-    for s in range(samples):
-        angle = -2.0 * math.pi * slope * growth * (1.0 - 0.5 * growth) * ((first + s) * step) ** 2
-        bend[s] = complex(math.cos(angle), math.sin(angle))
+    carrier, slope, then, t, step = ramp
+    middle, frequency, shift_0, dense, row_0, columns, margin = grid
+    order_b, order_a = int(rest[0, 2]), int(rest[1, 2])
+    most = max(order_b, order_a)
+    for i in range(delay.size):
+        tau, b = delay[i] + later[i], growth[i]
+        off = tau - middle
+        shift = b * (frequency - slope * off)
+        x[i] = (shift - shift_0) * dense + row_0
+        turn = (slope * tau + shift) * step
+        turn -= math.floor(turn)
+        y[i] = turn * columns + margin
+        cosine, sine = wave(carrier * (b * then + later[i]) + slope * tau * (t - 0.5 * tau))
+        size = amplitude[i] * complex(cosine, sine)
+        far = (b * slope * off * slope / frequency - rest[0, 0]) * rest[0, 1]
+        late = (-0.5 * slope * b * b - rest[1, 0]) * rest[1, 1]
+        p = 0
+        for j in range(order_a + 1):
+            for k in range(min(order_b, most - j) + 1):
+                strength[i, p] = size * (_chebyshev(k, far) * _chebyshev(j, late))
+                p += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def stretched(place, factor, frame, rest, falloff):  # type: ignore[no-untyped-def]
+    """Write where in the transforms over shifts each sample (m, s) is read off, and its factors (p, m, s) there: see
+    signal.keystone.
+
+    Args: frame repetition, step [s], stretch [1/s], middle shift [Hz], rows per Hz, oversampling, length of the
+    transform; rest as for `sources`, with the half widths; falloff, coefficients of 1 over the kernel's transform.
+    """
+    repetition, step, stretch, shift, dense, over, length = frame
+    chirps, samples = place.shape
+    order_b, order_a = int(rest[0, 2]), int(rest[1, 2])
+    most = max(order_b, order_a)
+    turns_b, turns_a = 2.0 * math.pi * rest[0, 3], 2.0 * math.pi * rest[1, 3]
     for m in range(chirps):
         late = (m - chirps // 2) * repetition
-        twist = -2.0 * math.pi * slope * growth * (1.0 - growth) * late * step
-        start = twist * first + math.pi * slope * (growth * late) ** 2
-        turn = complex(math.cos(start), math.sin(start))
-        one = complex(math.cos(twist), math.sin(twist))
         for s in range(samples):
-            out[m, s] += plane[m, s] * bend[s] * turn
-            turn *= one
+            t = (s - samples // 2) * step
+            u = late * (1.0 + stretch * t) + stretch * t * t
+            place[m, s] = length * (u / dense + 0.5)
+            at = 2.0 * (2.0 * over * u / dense) ** 2 - 1.0
+            value = falloff[0]
+            for d in range(1, len(falloff)):
+                value = value * at + falloff[d]
+            far, long = (late + t) * t, (late + t) ** 2
+            cosine, sine = wave(shift * u + rest[0, 0] * far + rest[1, 0] * long)
+            p, quarter = 0, complex(value * cosine, value * sine)
+            for j in range(order_a + 1):
+                turned = quarter
+                for k in range(min(order_b, most - j) + 1):
+                    size = _bessel(k, turns_b * far) if order_b > 0 else 1.0
+                    factor[p, m, s] = turned * (size * _bessel(j, turns_a * long) if order_a > 0 else size)
+                    turned *= -1j
+                    p += 1
+                quarter *= -1j
 
 
 _ABREAST = 8  # echoes whose recurrences run side by side, so that a core's vector unit is full
@@ -123,21 +207,4 @@ def ramp_sums(
                     im[s] += sum_im
         for s in range(samples):
             out[m, s] = complex(re[s], im[s])
-    return out
-
-
-@njit(cache=True, nogil=True)
-def periodic(table, n, fine, cells):  # type: ignore[no-untyped-def]
-    """Return a window's response at `cells` (m,) cells from its peak, linear between `fine` points a cell.
-
-    Args: table (n fine + 1,) one period of the response of n samples, its phase counted from their middle.
-    """
-    out = np.empty(len(cells), np.complex128)
-    for i in range(len(cells)):
-        period = math.floor(cells[i] / n)
-        at = (cells[i] - period * n) * fine
-        low = min(int(at), n * fine - 1)
-        value = table[low] + (at - low) * (table[low + 1] - table[low])
-        # One period on, a response counted from the middle of an even window has turned its sign.
-        out[i] = -value if (int(period) * (n - 1)) % 2 else value
     return out

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
+from raychan.run.pieces import heard
 from raychan.signal.cube import synthesize
-from raychan.tables import DIFFRACT, TRANSMIT, Paths, take
+from raychan.tables import DIFFRACT, TRANSMIT, Paths
 from raychan.units import db, undb
 
 
@@ -35,7 +36,7 @@ def peak(paths: Paths, rows: NDArray[np.bool_], sensor: Sensor, settings: Any) -
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
     if not rows.any():
         return 0.0
-    cube = synthesize(take(paths, rows), dataclasses.replace(sensor, noise=False))
+    cube = synthesize(heard(paths, rows), dataclasses.replace(sensor, noise=False))
     rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
     return float(rdmap.power.max())
 

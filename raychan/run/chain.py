@@ -23,7 +23,7 @@ from raychan.radar.windows import processing_gain, window
 from raychan.run.auto import Choice, choose
 from raychan.run.ledger import ledger
 from raychan.run.microdoppler import needed, retraced
-from raychan.run.pieces import Retraced, Traced
+from raychan.run.pieces import Retraced, Traced, heard
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
 from raychan.run.spread import claimed, launch_share, motion, without
@@ -246,7 +246,7 @@ def noise_of_cell(sensor: Sensor, settings: Any) -> float:
 
 def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any) -> MapError:
     """Return the map of what two launches differ by: their difference sent through the same receiver, without noise."""
-    difference = join([paths, others.replace(amplitude=-others.amplitude)])
+    difference = join([heard(paths), heard(others.replace(amplitude=-others.amplitude))])
     return MapError(
         quiet_map(synthesize(difference, dataclasses.replace(sensor, noise=False)).samples, sensor, settings)
     )

@@ -129,3 +129,12 @@ def echoes(delay: Floats, amplitude: Complexes, growth: Floats, place: Floats) -
         kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32), body_names=(), part_names=(),
         tx=place, rx=place,
     )  # fmt: skip
+
+
+def heard(paths: Paths, rows: Any = slice(None)) -> Paths:
+    """Return rows of paths without their history: all that a receiver needs."""
+    kept: Paths = paths.replace(
+        **{f: getattr(paths, f)[rows] for f in ("delay", "amplitude", "rate", "departure", "arrival")},
+        **{f: getattr(paths, f)[rows, :0] for f in ("body", "part", "kind", "vertices")},
+    )
+    return kept

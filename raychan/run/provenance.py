@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.rcs import stated_error
+from raychan.kernels.cell import cell_sums
 from raychan.run.response import Response
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver, Result
 from raychan.tables import KIND_LETTERS, TRANSMIT, Detections, Paths, RangeDoppler
@@ -18,6 +20,7 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 _LEAST_SHARE = 0.005
+_DIGITS = 9
 _DEPTH = 0.3  # m: an echo over the ground no further behind its target than a road user is deep is no ghost
 _UNEXPLAINED = 0.1  # a cell whose paths give less than this share of its power is noise
 
@@ -70,8 +73,7 @@ def explain_cell(
     the same chain add as waves, chains as powers.
     """
     wave, at = waves_in(paths, response, range, rate)
-    count = len(known.names)
-    summed = _sums(known.part, wave, count)
+    summed, sizes, strongest = cell_sums(known.part, len(known.names), wave, at, paths.rate)
     whole = complex(summed.sum())
     predicted = abs(whole) ** 2 * receiver.power
     speed = (rate or 0.0) + receiver.ego_speed
@@ -82,40 +84,39 @@ def explain_cell(
     shares /= shares.sum()
     # The ground beside a target adds to its return, so what leads is the target over all its ways.
     leading = np.argmax(np.abs(_sums(known.targets, summed, int(known.targets.max()) + 1)))
-    size = np.abs(wave)
-    paths_in, sizes = np.bincount(known.part, minlength=count), np.bincount(known.part, size, count)
-    ranges, rates = (np.bincount(known.part, size * x, count) for x in (at, paths.rate))
-    order = np.argsort(-shares, kind="stable")
+    paths_in, size, ranges, rates = sizes
+    # There and back again are equal but for rounding: in the order of their chains, then.
+    order = np.argsort(-shares.round(_DIGITS), kind="stable")
     first = order[known.targets[order] == leading][0]
     order = np.append(first, order[order != first])
     parts = tuple(
         Contribution(
             known.names[g],
             len(known.bodies[g]),
-            float(ranges[g] / sizes[g]),
-            float(rates[g] / sizes[g]),
+            float(ranges[g] / size[g]),
+            float(rates[g] / size[g]),
             float(shares[g]),
             int(paths_in[g]),
         )
         for g in order
-        if (shares[g] >= _LEAST_SHARE or g == first) and sizes[g] > 0.0
+        if (shares[g] >= _LEAST_SHARE or g == first) and size[g] > 0.0
     )
-    strongest = int(np.argmax(np.where(known.part == first, size, -1.0)))
-    label = label_of(paths, strongest, known.bodies[first], receiver)
+    label = label_of(paths, int(strongest[first]), known.bodies[first], receiver)
     return Explanation(range, rate or 0.0, speed, power, predicted, error_db, label, parts)
 
 
 def waves_in(
     paths: Paths, response: Response, range: float, rate: float | None
-) -> tuple[NDArray[np.complex128], Floats]:
+) -> tuple[NDArray[np.complexfloating[Any, Any]], Floats]:
     """Return what each path (n,) brings to a cell, its amplitude times the response of both windows there, and the
     range (n,) [m] at which it stands.
 
     Args: range [m] and rate [m/s] of the cell; None for a cell of the power-delay profile.
     """
-    at, turn = response.reference(paths.delay, None if rate is None else paths.rate)
-    weight = response.in_range(at - range) if rate is None else response.in_cell(at - range, paths.rate, rate)
-    return paths.amplitude * turn * weight, at
+    if rate is not None:
+        return response.in_cell(paths.amplitude, paths.delay, paths.rate, range, rate)
+    weight, at = response.in_profile(paths.delay, range)
+    return paths.amplitude * weight, at
 
 
 def provenance(

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.kernels.beat import periodic
+from raychan.kernels.cell import cell_waves, periodic
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _FINE = 64  # points of the tabulated window response per resolution cell
 _STEP = 0.25  # range cells that a path may move within one piece of the frame
@@ -26,49 +27,56 @@ class Response:
         self.waveform = waveform
         self._range = window(range_window, waveform.n_samples)
         self._rate = window(rate_window, waveform.n_chirps)
+        self._pieces: dict[int, tuple[Complexes, Floats]] = {}
 
     @cached_property
-    def _range_tables(self) -> tuple[Complexes, Complexes]:
+    def _range_tables(self) -> Complexes:
         """The range response and its slope by range cells."""
         table = _table(self._range / self._range.sum())
-        return table, np.gradient(table, 1.0 / _FINE)
+        return np.stack([table, np.gradient(table, 1.0 / _FINE)], axis=1)
 
-    def reference(self, delay: Floats, rate: Floats | None = None) -> tuple[Floats, Complexes]:
-        """Return range [m] and phase factor (n,) at mid sweep and mid frame, or its start without rates."""
-        wave = self.waveform
-        then = delay if rate is None else delay + 2.0 * rate * wave.centre / C0
-        swept = 0.5 * wave.bandwidth * (1.0 - 1.0 / wave.n_samples)
-        turn = wave.carrier * (then - delay) + swept * then - 0.5 * wave.slope * then**2
-        return 0.5 * C0 * then, np.exp(-2j * np.pi * turn)
+    def in_profile(self, delay: Floats, range: float) -> tuple[Complexes, Floats]:
+        """Return the response (n,) of the range window to paths of delays (n,) [s] at a range [m], their phase at mid
+        sweep of the frame's first ramp in, and the ranges (n,) [m] at which they stand."""
+        wave, at = self.waveform, 0.5 * C0 * delay
+        turn = self._swept * delay - 0.5 * wave.slope * delay**2
+        cells = np.ascontiguousarray((at - range) / wave.range_resolution)
+        return periodic(self._range_tables[:, 0], len(self._range), _FINE, cells) * np.exp(-2j * np.pi * turn), at
 
-    def in_range(self, offset: Floats) -> Complexes:
-        """Return the response (n,) of the range window at offsets [m]."""
-        return _lookup(self._range_tables[0], len(self._range), offset / self.waveform.range_resolution)
+    def in_cell(
+        self, amplitude: Complexes, delay: Floats, rate: Floats, range: float, cell_rate: float
+    ) -> tuple[Complexes, Floats]:
+        """Return what paths (n,) bring to a cell of the map, and the ranges (n,) [m] at which they stand mid frame.
 
-    def in_cell(self, offset: Floats, rate: Floats, cell_rate: float) -> Complexes:
-        """Return the response (n,) of paths with range offsets [m] and rates [m/s] in a cell of rate `cell_rate`."""
+        Args: amplitude, delay [s] at the frame's start and rate [m/s] of paths; range [m] and rate [m/s] of the cell.
+        """
         wave, count = self.waveform, len(self._rate)
-        # Doppler is measured at the middle sample of the sweep.
-        middle = wave.carrier + 0.5 * wave.bandwidth * (1.0 - 1.0 / wave.n_samples)
-        apart = 2.0 * middle / C0 * (rate - cell_rate) * count * wave.repetition
-        # Each row of the map is freed of its own Doppler within the ramp, not of that of others.
-        offset = offset + (rate - cell_rate) * middle / wave.slope
-        apart_range = offset / wave.range_resolution
-        per_chirp = rate * wave.repetition / wave.range_resolution
-        moved = float(np.abs(per_chirp).max(initial=0.0)) * count
+        middle = wave.carrier + self._swept
+        moved = float(np.abs(rate).max(initial=0.0)) * wave.repetition / wave.range_resolution * count
         pieces = max(1, min(count, int(np.ceil(moved / _STEP))))
-        total = np.zeros(len(offset), np.complex128)
-        for part in np.array_split(np.arange(count), pieces):
-            # Within a piece the range response runs along a straight line.
-            middle_chirp = part.mean()
-            held = np.zeros(count)
+        if pieces not in self._pieces:
+            self._pieces[pieces] = self._rate_tables(pieces)
+        ramp = (wave.carrier, wave.slope, wave.centre, self._swept, middle, wave.repetition, wave.range_resolution, C0)
+        sizes = (len(self._range), count, _FINE)
+        found: tuple[Complexes, Floats] = cell_waves(
+            amplitude, delay, rate, (range, cell_rate), ramp, sizes, self._range_tables, self._pieces[pieces]
+        )
+        return found
+
+    @property
+    def _swept(self) -> float:
+        return 0.5 * self.waveform.bandwidth * (1.0 - 1.0 / self.waveform.n_samples)
+
+    def _rate_tables(self, pieces: int) -> tuple[Complexes, Floats]:
+        """Return the rate response of each piece of the frame and that of its chirps' numbers, counted from its middle
+        (pieces, ., 2), and the middles (pieces,)."""
+        chirps, tables, middles = np.arange(len(self._rate)), [], []
+        for part in np.array_split(chirps, pieces):
+            held = np.zeros(len(chirps))
             held[part] = self._rate[part] / self._rate.sum()
-            slope = held * (np.arange(count) - middle_chirp)
-            away = apart_range + per_chirp * (middle_chirp - 0.5 * (count - 1))
-            level, lean = (_lookup(table, len(self._range), away) for table in self._range_tables)
-            total += level * _lookup(_table(held), count, apart)
-            total += lean * per_chirp * _lookup(_table(slope), count, apart)
-        return total
+            tables.append(np.stack([_table(held), _table(held * (chirps - part.mean()))], axis=1))
+            middles.append(part.mean())
+        return np.array(tables), np.array(middles)
 
 
 def _table(weights: Floats) -> Complexes:
@@ -77,8 +85,3 @@ def _table(weights: Floats) -> Complexes:
     raw = np.fft.fft(weights, n * _FINE)
     # The phase is counted from the middle of the samples, where a symmetric window is real.
     return np.append(raw, raw[0]) * np.exp(1j * np.pi * (n - 1) / n * np.arange(n * _FINE + 1) / _FINE)
-
-
-def _lookup(table: Complexes, n: int, cells: Floats) -> Complexes:
-    found: Complexes = periodic(table, n, _FINE, np.ascontiguousarray(cells))
-    return found

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from raychan.channel.rcs import stated_error
 from raychan.radar.sensor import Sensor
 from raychan.run.ledger import Entry
-from raychan.run.pieces import Retraced
+from raychan.run.pieces import Retraced, heard
 from raychan.run.provenance import chains, label_of
 from raychan.run.result import Contribution, Explanation, Receiver
 from raychan.signal.cube import synthesize
@@ -35,7 +35,7 @@ def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
 def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], sensor: Sensor) -> float:
     """Return by which share of their power two launches differ in what turning bodies bring to the first ramp."""
     one = replace(sensor, noise=False, waveform=replace(sensor.waveform, n_chirps=1))
-    a, b = (synthesize(take(p, meets(p, turns)), one).samples for p in (paths, others))
+    a, b = (synthesize(heard(p, meets(p, turns)), one).samples for p in (paths, others))
     power = float((np.abs(a) ** 2).sum())
     return float((np.abs(a - b) ** 2).sum()) / power if power > 0.0 else 0.0
 

@@ -1,0 +1,228 @@
+"""Keystone: the samples of many echoes that move through range cells, by one pair of transforms.
+
+With T = M + t counted from the middle sample, M over chirps and t within one, an echo of delay tau and growth b there
+turns by
+
+    S tau t + b T (F + S t - S off) - S b^2 T^2 / 2,    off = tau - tau_0,  F = carrier + S t_0 - S tau_0.
+
+Its Doppler shift n = b (F - S off) makes this (S tau + n) t + n u + B T t + A T^2, with u = M (1 + S t / F) +
+S t^2 / F, B = S off b S / F and A = -S b^2 / 2: every sample sees all shifts at one stretched time u, whatever the echo
+(the keystone transform of radar imaging). So a transform over beat frequencies and one over shifts, read off at u, sum
+all echoes. The rest, below 1e-2 as a rule, is a series in B and A, each term one more pair of transforms; no term of
+the phase is dropped that the tolerance would show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from raychan.kernels.beat import sources, stretched
+from raychan.kernels.gridding import (
+    OVER,
+    exchange,
+    fold,
+    kernel_pieces,
+    order_of,
+    read,
+    spread,
+    target_factor,
+    transform,
+)
+from raychan.radar.waveform import Waveform
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Each = Callable[..., Iterable[Any]]
+
+_SINGLE = 1e-6  # tolerance down to which transforms in single precision, and a kernel of 8 cells, do
+_STRIPES = 4  # parts of the echoes that are gridded side by side
+_BLOCK = 64  # samples of a chirp whose transforms over shifts are made at a time
+_ROOM = 1 << 28  # bytes of a grid
+_CHUNK = 1 << 18  # echoes gridded at a time
+_BOX = 8, 8
+_CROWD = 64  # echoes in a box of cells up to which they are added up in single precision: 3e-7 of them
+
+
+@dataclass(frozen=True)
+class Echoes:
+    """Echoes at the middle sample of a frame; rows (n,)."""
+
+    delay: Floats
+    growth: Floats
+    amplitude: Complexes
+    arrival: Floats
+    """Directions (n, 3)."""
+
+    def __getitem__(self, rows: Any) -> Echoes:
+        return Echoes(self.delay[rows], self.growth[rows], self.amplitude[rows], self.arrival[rows])
+
+
+def middle(wave: Waveform) -> tuple[float, float, float]:
+    """Return when the middle sample is, from the frame's start and from its ramp's, and the sample step [s]."""
+    step = wave.chirp_duration / wave.n_samples
+    t = (wave.n_samples // 2) * step
+    return (wave.n_chirps // 2) * wave.repetition + t, t, step
+
+
+class Keystone:
+    """The grid for some echoes, and how it is read off; the same for all receivers."""
+
+    def __init__(self, echoes: Echoes, wave: Waveform, tolerance: float, reach: float) -> None:
+        """Args: echoes, one at least; tolerance against the sum of their |amplitude|; reach [s] by how much less or
+        more a receiver's delays may be."""
+        self.then, self.t, self.step = middle(wave)
+        self.wave, slope = wave, wave.slope
+        chirps, samples = wave.n_chirps, wave.n_samples
+        self.single = tolerance >= _SINGLE
+        self.width = 8 if self.single else 16
+        self.delays = float(echoes.delay.min()), float(echoes.delay.max())
+        self.growths = float(echoes.growth.min()), float(echoes.growth.max())
+        self.delay = 0.5 * sum(self.delays)
+        self.frequency = wave.carrier + slope * (self.t - self.delay)
+        self.stretch = slope / self.frequency
+
+        off = echoes.delay - self.delay
+        fastest = max(map(abs, self.growths))
+        shift = echoes.growth * (self.frequency - slope * off)
+        self.shift, span = _middle(shift, fastest * slope * reach)
+        far, far_span = _middle(echoes.growth * off * (slope * self.stretch), fastest * reach * slope * self.stretch)
+        late, late_span = _middle(-0.5 * slope * echoes.growth**2, 0.0)
+        t, m = (samples // 2) * self.step, (chirps // 2) * wave.repetition
+        far_turn, late_turn = 2.0 * np.pi * far_span * (m + t) * t, 2.0 * np.pi * late_span * (m + t) ** 2
+        small = 0.3 * tolerance
+        self.rest_turn = far_turn * (far_turn > small), late_turn * (late_turn > small)
+        order = _order(sum(self.rest_turn), 0.3 * tolerance)
+        self.orders = tuple(order if z > 0.0 else 0 for z in self.rest_turn)
+        self.planes = sum(min(self.orders[0], order - j) + 1 for j in range(self.orders[1] + 1))
+        self.rest = np.array(
+            [
+                [middle, 1.0 / half if n else 0.0, n, half]
+                for (middle, half), n in zip(((far, far_span), (late, late_span)), self.orders, strict=True)
+            ]
+        )
+
+        longest = max(m * (1.0 + self.stretch * t) + self.stretch * t * t, self.step)
+        self.dense = 2.0 * OVER * longest
+        self.rows = 2 * math.ceil(span * self.dense + 0.5 * self.width + 2.0)
+        self.length, self.columns = _fast(OVER * self.rows), _fast(max(OVER * samples, 2.0 * self.width))
+
+    @property
+    def turns(self) -> float:
+        """How far the power series must reach [rad]."""
+        return sum(self.rest_turn)
+
+    @property
+    def cells(self) -> int:
+        """Cells that are transformed."""
+        return self.planes * (self.rows * self.columns + self.length * self.wave.n_samples)
+
+    def prepared(self, echoes: Echoes) -> Echoes:
+        """Return the echoes by row, and lay out how the grid is read off."""
+        wave = self.wave
+        shift = echoes.growth * (self.frequency - wave.slope * (echoes.delay - self.delay))
+        turn = (wave.slope * echoes.delay + shift) * self.step
+        # In boxes of some rows and columns, so that what is added to lies near by: rows first, for the stripes.
+        box = ((shift - self.shift) * self.dense + 0.5 * self.rows).astype(np.int64) // _BOX[0]
+        across = self.columns // _BOX[1] + 1
+        box = box * across + ((turn - np.floor(turn)) * self.columns).astype(np.int64) // _BOX[1]
+        self.pieces = kernel_pieces(self.width)
+        k, s = np.arange(self.rows) - self.rows // 2, np.arange(wave.n_samples) - wave.n_samples // 2
+        # The sign moves the transform's middle to the middle of its length: nothing is read across its end.
+        self.over = (1.0 - 2.0 * (k % 2)) / transform(self.width, k / self.length)
+        self.along = 1.0 / transform(self.width, s / self.columns)
+        shape = wave.n_chirps, wave.n_samples
+        self.place, self.factor = np.empty(shape), np.empty((self.planes, *shape), np.complex128)
+        frame = np.array([wave.repetition, self.step, self.stretch, self.shift, self.dense, OVER, self.length])
+        stretched(self.place, self.factor, frame, self.rest, target_factor(self.width))
+        order, most = order_of(box, (self.rows // _BOX[0] + 1) * across)
+        # Where many echoes add up in one cell, single precision would round too often.
+        self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
+        return echoes[order]
+
+    def add(self, out: Complexes, echoes: Echoes, element: Floats, each: Each) -> None:
+        """Add to out (chirps, samples) what a receiver at `element` (3,) [m] gets from the `prepared` echoes; `each`
+        is `map` or that of a pool."""
+        count, samples, half = len(echoes.delay), self.wave.n_samples, self.width // 2
+        ramp = np.array([self.wave.carrier, self.wave.slope, self.then, self.t, self.step])
+        grid = np.array(
+            [self.delay, self.frequency, self.shift, self.dense, 0.5 * self.rows, self.columns, float(half)]
+        )
+
+        def gridded(part: slice) -> tuple[int, NDArray[Any]]:
+            some = echoes[part]
+            # A receiver moved towards the arriving wave has a shorter path.
+            later = (some.arrival @ element) * (-1.0 / C0)
+            x, y = np.empty(len(later)), np.empty(len(later))
+            strength = np.empty((len(later), self.planes), self.sort)
+            sources(x, y, strength, some.amplitude, some.delay, some.growth, later, ramp, grid, self.rest)
+            first, end = math.ceil(x.min() - half), math.ceil(x.max() + half)
+            cells = np.zeros((self.planes, end - first, self.columns + 2 * half), self.sort)
+            flat = cells.view(cells.real.dtype).reshape(-1)
+            spread(cells, flat, x - first, y, strength, self.pieces.astype(flat.dtype))
+            fold(cells, half)
+            return first, scipy.fft.fft(cells[:, :, half:-half], axis=2, overwrite_x=True)
+
+        stripes = min(count, max(_STRIPES, -(-count // _CHUNK)))
+        bounds = np.linspace(0, count, stripes + 1).astype(int)
+        held = list(each(gridded, [slice(a, b) for a, b in pairwise(bounds)]))
+
+        def told(start: int) -> None:
+            end = min(start + _BLOCK, samples)
+            spectra = np.zeros((self.planes, end - start, self.length), np.complex64 if self.single else np.complex128)
+            real = spectra.real.dtype
+            along, column = self.along[start:end].astype(real), (start - samples // 2) % self.columns
+            for first, rows in held:
+                over = self.over[first : first + rows.shape[1]].astype(real)
+                exchange(spectra, rows, first - self.rows // 2, column, over, along)
+            spectra = scipy.fft.fft(spectra, axis=2, overwrite_x=True)
+            part, factor = np.s_[:, start:end], self.factor[:, :, start:end]
+            read(out[part], spectra, self.place[part], factor, self.pieces)
+
+        for _ in each(told, range(0, samples, _BLOCK)):
+            pass
+
+
+def keystones(echoes: Echoes, wave: Waveform, tolerance: float, reach: float) -> list[tuple[Keystone, Echoes]]:
+    """Return grids for echoes, each with its own; one, but where they differ so much that several cost less."""
+    grid = Keystone(echoes, wave, tolerance, reach)
+    large = 16 * grid.planes * grid.rows * grid.columns > _ROOM
+    if not large and grid.turns <= 1.0:
+        return [(grid, echoes)]
+    spans = grid.growths[1] - grid.growths[0], grid.delays[1] - grid.delays[0]
+    fastest = max(map(abs, grid.growths))
+    if large:
+        by_growth = spans[0] * grid.frequency >= fastest * wave.slope * spans[1]
+    else:
+        by_growth = grid.rest_turn[1] >= grid.rest_turn[0]
+    values, limits = (echoes.growth, grid.growths) if by_growth else (echoes.delay, grid.delays)
+    below = values <= 0.5 * sum(limits)
+    if below.all() or not below.any():
+        return [(grid, echoes)]
+    return [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach)]
+
+
+def _middle(values: Floats, margin: float) -> tuple[float, float]:
+    low, high = float(values.min()), float(values.max())
+    return 0.5 * (low + high), 0.5 * (high - low) + margin
+
+
+def _order(turn: float, tolerance: float) -> int:
+    """Return the order at which the series of exp(j turn x) in Chebyshev polynomials, its terms 2 J_n, is cut."""
+    order, bound = 0, turn
+    while bound > tolerance:
+        order += 1
+        bound *= 0.5 * turn / (order + 1)
+    return order
+
+
+def _fast(least: float) -> int:
+    return 2 * int(scipy.fft.next_fast_len(math.ceil(0.5 * least)))
