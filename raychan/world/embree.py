@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.kernels.facets import planes_of
 from raychan.kernels.rays import clear, companions, land, plane_distances, set_out
 from raychan.kernels.rows import in_two
 from raychan.tables import LAYER, Facets
@@ -36,10 +37,7 @@ class Tracer:
         self.facets = facets
         v = facets.vertices
         self.first = v[:, 0]
-        cross = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
-        norm = np.linalg.norm(cross, axis=1, keepdims=True)
-        self.normal = cross / np.where(norm > 0, norm, 1.0)
-        self.area = 0.5 * norm[:, 0]
+        self.normal, self.area = planes_of(v)
         self.is_layer = facets.materials.kind[facets.material] == LAYER if len(v) else np.zeros(0, bool)
         self.rays = 0
         # Which facets are one surface; each for itself until someone knows better.
