@@ -33,6 +33,14 @@ class Beam:
         return found
 
 
+def beam_of(radar: Any) -> Beam:
+    """Return the beam of a radar, made once and kept with it if it has a place `kept` for that."""
+    kept: dict[Any, Beam] = getattr(radar, "kept", {})
+    if Beam not in kept:
+        kept[Beam] = Beam(radar)
+    return kept[Beam]
+
+
 @njit(cache=True, nogil=True)
 def _between(look, table):  # type: ignore[no-untyped-def]
     """Return the table's value (n,) in each direction, linear in both angles."""

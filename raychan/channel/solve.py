@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.advance import APART, corner_rates
-from raychan.channel.beam import Beam
+from raychan.channel.beam import beam_of
 from raychan.channel.diffract import diffracted_paths
 from raychan.channel.fields import departures, rates, transfer
 from raychan.channel.found import Found
@@ -106,7 +106,7 @@ def solve(
     surface = facets if isinstance(facets, Surface) else Surface(facets)
     facets, before = surface.facets, surface.rays
     stats.add("build", since)
-    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, Beam(radar))
+    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, beam_of(radar))
     stats.legs = len(legs)
     parts: list[Paths] = []
 

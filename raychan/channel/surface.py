@@ -37,7 +37,9 @@ class Surface(Tracer):
         m = facets.materials
         self.dull = ((m.kind != PEC) & (np.abs(m.eps) < _METAL))[facets.material]
         self.bulge, self.curved = bulges(facets.vertices, facets.normals)
+        # What others made of all this, once.
         self.between: Any = None
+        self.screens: Any = None
         # What was found out about a leg, once.
         self.shadows: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
         self.reach: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
@@ -59,7 +61,8 @@ class Surface(Tracer):
         """Return how all facets hang together; those of different bodies never do."""
         f = self.facets
         vertex = places((f.vertices - self._centre).reshape(-1, 3), np.repeat(f.body, 3)).reshape(-1, 3)
-        return joined(vertex, f.part * np.int64(len(f.materials.kind)) + f.material, f.vertices, f.normals)
+        kind = f.part * np.int64(len(f.materials.kind)) + f.material
+        return joined(vertex, kind, f.vertices, f.normals, f.body)
 
     def _numbers(self, labels: list[Ints], counts: list[int]) -> Ints:
         """Return labels of all bodies' facets, each body's counted on from the last one's."""
@@ -72,16 +75,21 @@ class Surface(Tracer):
         at = [x + np.int32(3 * i) for x, (_, i) in zip(found, self._joined, strict=True)]
         return np.concatenate(at) if at else np.zeros((0, 2) if name == "pair" else 0, np.int32)
 
-    def _ends(self, half: Ints) -> Floats:
+    def ends(self, half: Ints) -> Floats:
         """Return both ends (e, 2, 3) [m] of half edges."""
         v = self.facets.vertices
         return np.stack([v[half // 3, half % 3], v[half // 3, (half % 3 + 1) % 3]], axis=1)
 
     @cached_property
-    def _outlines(self) -> tuple[Floats, NDArray[np.int64]]:
+    def _outlines(self) -> tuple[Floats, NDArray[np.int64], Ints]:
         outer = self._halves("outer")
         count = np.bincount(self.plane[outer // 3], minlength=len(self.plane))
-        return self._ends(outer), np.concatenate([[0], np.cumsum(count)])
+        return self.ends(outer), np.concatenate([[0], np.cumsum(count)]), outer // 3
+
+    @property
+    def borders(self) -> NDArray[np.bool_]:
+        """Which half edges (3 n,) are not inside a plane: 3 f + k runs from corner k of facet f to the next."""
+        return np.concatenate([np.zeros(0, bool), *(j.border for j, _ in self._joined)])
 
     @property
     def outline(self) -> Floats:
@@ -93,6 +101,11 @@ class Surface(Tracer):
     def first_edge(self) -> NDArray[np.int64]:
         """See `outline`."""
         return self._outlines[1]
+
+    @property
+    def outline_facet(self) -> Ints:
+        """Facets (e,) to which the edges of `outline` belong."""
+        return self._outlines[2]
 
     @cached_property
     def _silhouettes(self) -> tuple[Floats, Ints]:
@@ -111,7 +124,7 @@ class Surface(Tracer):
             frame = np.where(self.is_layer[a], every[:, 1], every[:, 0])[framed]
         rim = np.concatenate([rim[solid[rim // 3]], frame])
         faces = np.concatenate([pair // 3, np.stack([rim // 3, np.full(len(rim), -1)], axis=1)])
-        return self._ends(np.concatenate([pair[:, 0], rim])), faces.astype(np.int32)
+        return self.ends(np.concatenate([pair[:, 0], rim])), faces.astype(np.int32)
 
     @property
     def edge_ends(self) -> Floats:
@@ -133,7 +146,7 @@ class Surface(Tracer):
     @cached_property
     def wedge(self) -> Floats:
         """Ends (w, 2, 3) [m] of the edges of `wedge_facet`."""
-        return self._ends(np.concatenate([self._halves("pair", "sharp")[:, 0], self._halves("rim")]))
+        return self.ends(np.concatenate([self._halves("pair", "sharp")[:, 0], self._halves("rim")]))
 
     @cached_property
     def wedge_n(self) -> Floats:
@@ -143,7 +156,7 @@ class Surface(Tracer):
 
     @cached_property
     def clusters(self) -> Clusters:
-        """The facets in clusters of neighbours, each of one body when joints were given by body."""
+        """The facets in clusters of neighbours, each of one body."""
         parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self._joined]
         order, first = (np.concatenate(x) for x in zip(*parts, strict=True))
         first = np.append(first, len(order))

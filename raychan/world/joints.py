@@ -66,11 +66,17 @@ def places(points: Floats, group: NDArray[np.signedinteger[Any]] | None = None) 
     return np.unique(keyed, return_inverse=True)[1].astype(np.int64)
 
 
-def joined(vertex: NDArray[np.int64], kind: NDArray[np.signedinteger[Any]], v: Floats, normals: Floats) -> Joints:
+def joined(
+    vertex: NDArray[np.int64],
+    kind: NDArray[np.signedinteger[Any]],
+    v: Floats,
+    normals: Floats,
+    body: NDArray[np.signedinteger[Any]] | None = None,
+) -> Joints:
     """Return the joints of facets.
 
     Args: vertex (n, 3) number of each corner's place; kind (n,): only facets of one kind share planes and patches;
-    v, normals (n, 3, 3) corners [m] and normals there.
+    v, normals (n, 3, 3) corners [m] and normals there; body (n,) if they are of several.
     """
     n = len(v)
     normal, area = planes_of(v)
@@ -94,7 +100,9 @@ def joined(vertex: NDArray[np.int64], kind: NDArray[np.signedinteger[Any]], v: F
     outer = outer[np.argsort(plane[outer // 3], kind="stable")]
     size = float(np.linalg.norm(np.ptp(v, axis=(0, 1))))
     whole = not len(rim) and int(_components(pair, n).max()) == 0
-    groups = np.append(np.arange(0, n, _CLUSTER), n)
+    along = _along_curve(v.mean(axis=1))
+    if body is not None:
+        along = along[np.argsort(body[along], kind="stable")]
     return Joints(
         plane=plane,
         smooth=_components(pair[soft], n),
@@ -106,9 +114,16 @@ def joined(vertex: NDArray[np.int64], kind: NDArray[np.signedinteger[Any]], v: F
         outer=outer.astype(np.int32),
         border=border,
         convex=bool(whole and (height < 1e-9 * (1.0 + size)).all()),
-        order=_along_curve(v.mean(axis=1)),
-        first=groups,
+        order=along,
+        first=_starts(None if body is None else body[along], n),
     )
+
+
+def _starts(body: NDArray[np.signedinteger[Any]] | None, n: int) -> NDArray[np.int64]:
+    """Return where clusters of n facets begin, and n: none holds two bodies."""
+    every = np.arange(0, n, _CLUSTER)
+    change = np.zeros(0, int) if body is None else np.flatnonzero(np.diff(body)) + 1
+    return np.append(np.union1d(every, change), n)
 
 
 def _but(pair: Ints, n: int) -> Bools:

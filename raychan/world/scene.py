@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import cached_property
 from operator import is_
 from pathlib import Path
@@ -190,8 +189,7 @@ class Scene:
 
     def sensor_at(self, time: float) -> Any:
         """Return the radar.Sensor where its velocity has brought it at a time [s]."""
-        s = self.sensor
-        return replace(s, position=np.asarray(s.position) + time * np.asarray(s.velocity))
+        return self.sensor.at(time)
 
     @cached_property
     def warnings(self) -> list[str]:
