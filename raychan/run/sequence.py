@@ -82,7 +82,10 @@ def _frames(
         else:
             channel = trace(now, tolerance_db, max_bounces, clock)
             first = channel if once else None
-        yield Frame(k, time, result_of(now, channel, seed + k, clock))
+        result = result_of(now, channel, seed + k, clock)
+        # What was built for this frame goes before the next builds its own.
+        del channel, now
+        yield Frame(k, time, result)
 
 
 def carried(scene: Scene) -> bool:
