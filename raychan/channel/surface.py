@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.frames import sizes
-from raychan.kernels.facets import bulges, hulls
+from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
 from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.embree import Tracer
@@ -77,8 +77,8 @@ class Surface(Tracer):
 
     def ends(self, half: Ints) -> Floats:
         """Return both ends (e, 2, 3) [m] of half edges."""
-        v = self.facets.vertices
-        return np.stack([v[half // 3, half % 3], v[half // 3, (half % 3 + 1) % 3]], axis=1)
+        found: Floats = ends(self.facets.vertices, np.ascontiguousarray(half))
+        return found
 
     @cached_property
     def _outlines(self) -> tuple[Floats, NDArray[np.int64], Ints]:
@@ -167,15 +167,10 @@ class Surface(Tracer):
     @cached_property
     def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Centre (b, 3) [m] and radius (b,) [m] of a ball about each body, and which bodies (b,) have no facet."""
-        f = self.facets
-        n = len(f.role)
-        centre, radius, empty = np.zeros((n, 3)), np.zeros(n), np.ones(n, bool)
-        for b in range(n):
-            v = f.vertices[f.body == b].reshape(-1, 3)
-            if len(v):
-                low, high = v.min(axis=0), v.max(axis=0)
-                centre[b], radius[b], empty[b] = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low), False
-        return centre, radius, empty
+        low, high = np.moveaxis(self.extents, 1, 0)
+        empty = np.asarray(~(low <= high).all(axis=1))
+        low, high = np.where(empty[:, None], 0.0, low), np.where(empty[:, None], 0.0, high)
+        return 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1), empty
 
     def point(self, facet: Ints, bary: Floats) -> Floats:
         """Return points (n, ..., 3) of the true surface at barycentric coordinates (n, ..., 3)."""

@@ -67,6 +67,31 @@ def bulges(v, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def extents(v, body, count):  # type: ignore[no-untyped-def]
+    """Return the lowest and highest corner (count, 2, 3) [m] of bodies whose facets are numbered body (m,); inf and
+    -inf of one that has none."""
+    out = np.empty((count, 2, 3))
+    out[:, 0], out[:, 1] = np.inf, -np.inf
+    for f in range(len(v)):
+        b = body[f]
+        for q in range(3):
+            for c in range(3):
+                out[b, 0, c], out[b, 1, c] = min(out[b, 0, c], v[f, q, c]), max(out[b, 1, c], v[f, q, c])
+    return out
+
+
+@njit(cache=True, nogil=True)
+def ends(v, half):  # type: ignore[no-untyped-def]
+    """Return both ends (e, 2, 3) [m] of half edges (e,): 3 f + k runs from corner k of facet f to the next."""
+    out = np.empty((len(half), 2, 3))
+    for i in range(len(half)):
+        f, k = half[i] // 3, half[i] % 3
+        for c in range(3):
+            out[i, 0, c], out[i, 1, c] = v[f, k, c], v[f, (k + 1) % 3, c]
+    return out
+
+
+@njit(cache=True, nogil=True)
 def bends(pair, v, n, normal, area):  # type: ignore[no-untyped-def]
     """Tell of edges, given as half edges (e, 2) of both facets, half edge 3 f + k from corner k of facet f on: whether
     the facets share a plane (flat), corner normals (soft), bend outward (bent), make a wedge (sharp), and how far the

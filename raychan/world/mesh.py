@@ -77,7 +77,7 @@ class Mesh:
         """Corners (f, 3, 3) [m] of the faces."""
         return self.vertices[self.faces]
 
-    @property
+    @cached_property
     def bounds(self) -> Floats:
         """Lowest and highest corner (2, 3) [m]."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
