@@ -170,3 +170,16 @@ def test_what_a_wall_hides_is_what_no_ray_finds(aside, side):
     slack = np.full(len(left), 1e-3)
     assert not leg.visible(surface, middle, left.astype(np.int32), slack, 0).seen.any()
     assert (len(left) > 0) == (aside < 2.5)
+
+
+def test_where_the_antenna_sends_nothing_nothing_is_launched(scene):
+    surface = Surface(
+        facets([ball((6.0, 1.0, 0.0), 1.5), ball((-6.0, 0.0, 0.5)), ball((0.0, 5.0, 1.0), 1.0)], smooth=True)
+    )
+    leg, bodies = Leg(end=np.zeros(3), beam=beam_of(scene.sensor)), np.ones(3, bool)
+    found, every = seeds(surface, leg, bodies), wanted(surface, leg, bodies)
+    assert set(surface.facets.body[found]) == {0, 2}
+    left = np.setdiff1d(every, found)
+    look = surface.facets.vertices[left].reshape(-1, 3)
+    assert not leg.weight(look).any()
+    assert len(np.intersect1d(found, every)) == len(found)

@@ -1,5 +1,5 @@
 """Seeds: the facets that could be met over a leg; clusters of them that all turn away are passed over whole, and so are
-those out of a mirror's reach or behind a wall."""
+those out of a mirror's reach, behind a wall, or where the antenna does not look."""
 
 from __future__ import annotations
 
@@ -32,6 +32,7 @@ def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
     if not len(may) or not bodies.any():
         return np.zeros(0, np.int32)
     c, walls = surface.clusters, _screens(surface).over(leg)
+    dark = leg.dark(c.centre, c.radius)
     facets = f.vertices, f.normals, f.body, surface.area, surface.open_facet, bodies
     mirror = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
     if leg.mirrors and not leg.far:
@@ -41,7 +42,7 @@ def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
 
     def some(rows: slice) -> None:
         hull = c.centre[rows], c.radius[rows], c.axis[rows], c.spread[rows]
-        _mark(*(c.order, c.first[rows.start : rows.stop + 1], *hull, *facets, *way, *walls, may))
+        _mark(*(dark[rows], c.order, c.first[rows.start : rows.stop + 1], *hull, *facets, *way, *walls, may))
 
     in_two(len(c.radius), some, _MANY)
     rows = np.flatnonzero(may).astype(np.int32)
@@ -109,14 +110,14 @@ def _hidden(centre, radius, body, point, normal, owner, first, edge, inward):  #
 
 @njit(cache=True, nogil=True)
 def _mark(  # type: ignore[no-untyped-def]
-    order, first, centre, radius, axis, spread, v, n, body, area, is_open, bodies, image, far, mirrored, at, normal,
-    middle, reach, walls, normals, owners, begins, edges, inwards, touch, may,
+    dark, order, first, centre, radius, axis, spread, v, n, body, area, is_open, bodies, image, far, mirrored, at,
+    normal, middle, reach, walls, normals, owners, begins, edges, inwards, touch, may,
 ):  # fmt: skip
     """Mark the facets that could be met: of clusters order[first[i] : first[i + 1]] with their balls and cones."""
     d, work = np.empty(3), np.empty(3)
     for i in range(len(radius)):
         lead = order[first[i]]
-        if not bodies[body[lead]]:
+        if dark[i] or not bodies[body[lead]]:
             continue
         for c in range(3):
             d[c] = -image[c] if far else centre[i, c] - image[c]
