@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from raychan.kernels.facets import turned
 from raychan.tables import Facets, Points
 from raychan.world import check, edit
 from raychan.world.body import Body
@@ -231,16 +232,18 @@ class Scene:
         materials, parts, rows = self._index
         turns = [b.motion.rotation(time) for b in self.bodies]
         meshes = [b.geometry for b in self.bodies]
-        places = [b.motion.to_world(m.vertices, time)[m.faces] for b, m in zip(self.bodies, meshes, strict=True)]
+        origins = [b.motion.origin(time) for b in self.bodies]
+        places = [turned(m.vertices, r, o)[m.faces] for m, r, o in zip(meshes, turns, origins, strict=True)]
+        looks = [turned(m.normals.reshape(-1, 3), r, np.zeros(3)) for m, r in zip(meshes, turns, strict=True)]
         body = [np.full(len(m.faces), i, np.int32) for i, m in enumerate(meshes)]
         return Facets(
             vertices=_stack(places, (3, 3), float),
-            normals=_stack([_turned(m.normals, r) for m, r in zip(meshes, turns, strict=True)], (3, 3), float),
+            normals=_stack(looks, (3,), float).reshape(-1, 3, 3),
             body=_stack(body, (), np.int32),
             part=_stack([p for _, p in rows], (), np.int32),
             material=_stack([m for m, _ in rows], (), np.int32),
             role=np.array([b.kind for b in self.bodies], np.int8),
-            origin=np.array([b.motion.origin(time) for b in self.bodies]).reshape(-1, 3),
+            origin=np.array(origins).reshape(-1, 3),
             velocity=np.array([b.motion.velocity for b in self.bodies], float).reshape(-1, 3),
             spin=np.array([b.motion.spin(time) for b in self.bodies]).reshape(-1, 3),
             materials=resolve(materials, self.frequency),
@@ -269,11 +272,6 @@ class Scene:
             sigma=np.array([np.interp(knots, *t) for t in tables]).reshape(-1, len(knots)),
             heading=np.array([b.motion.heading(time) for _, b in rows], float),
         )
-
-
-def _turned(normals: Floats, turn: Floats) -> Floats:
-    # One product of many rows: products of many matrices take five times as long.
-    return (normals.reshape(-1, 3) @ turn.T).reshape(-1, 3, 3)
 
 
 def _stack(pieces: list[Any], shape: tuple[int, ...], dtype: Any) -> Any:
