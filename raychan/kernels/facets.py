@@ -15,7 +15,8 @@ _SHARP = 0.95  # cosine of corner normals across an edge above which it is round
 
 @njit(cache=True, nogil=True)
 def turned(rows, matrix, shift):  # type: ignore[no-untyped-def]
-    """Return matrix (3, 3) times each of the rows (n, 3), plus shift (3,). NumPy's product of so narrow arrays takes six times as long or more."""
+    """Return matrix (3, 3) times each of the rows (n, 3), plus shift (3,)."""
+    # NumPy's product of arrays this narrow took 6 to 12 times as long.
     out = np.empty((len(rows), 3))
     for i in range(len(rows)):
         x, y, z = rows[i, 0], rows[i, 1], rows[i, 2]
