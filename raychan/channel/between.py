@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import proxy
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -27,7 +29,8 @@ class Between:
     """Every edge that can be an outline, in a grid of cubes; tubes walk through it from mirror to landing."""
 
     def __init__(self, surface: Surface) -> None:
-        self.surface = surface
+        # The surface holds this: a reference back would keep both until the garbage collector comes by.
+        self.surface = proxy(surface)
         ends = surface.edge_ends
         low, high = (ends.min(axis=(0, 1)), ends.max(axis=(0, 1))) if len(ends) else (np.zeros(3), np.ones(3))
         volume = float(np.prod(high - low + _LEAST_CELL))

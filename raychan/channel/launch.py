@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.channel.edges import meeting_lines
 from raychan.channel.found import Found
 from raychan.channel.legs import Leg
+from raychan.channel.seeds import seeds
 from raychan.channel.shadows import shadows_of
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
@@ -46,7 +47,9 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     f, rule = surface.facets, found.rule
     shape = f.vertices, f.normals, surface.bulge
     ways = leg.image, leg.far, out.image, out.far
-    facet = _seeds(surface, leg, bodies)
+    allowed = bodies & (f.role == SCATTERER)
+    allowed[list(leg.bodies)] = False
+    facet = seeds(surface, leg, allowed)
     if not len(facet):
         return stand(surface, leg, facet, np.zeros((0, 3, 3)), rule.slots)
     facet, bary = _cut_for_phase(facet, shape, ways, rule, not more)
@@ -54,22 +57,6 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     if out != leg:
         facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
     return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found, more)
-
-
-def _seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
-    """Return the facets that could be met over `leg`."""
-    f = surface.facets
-    allowed = bodies & (f.role == SCATTERER)
-    allowed[list(leg.bodies)] = False
-    rows = np.flatnonzero(allowed[f.body] & (surface.area > 0.0)).astype(np.int32)
-    k, _ = leg.rays(f.vertices[rows])
-    towards = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
-    rows = rows[towards | surface.open_facet[rows]]
-    if leg.mirrors:
-        v = f.vertices[rows]
-        middle = v.mean(axis=1)
-        rows = rows[leg.may_reach(middle, sizes(v - middle[:, None]).max(axis=1))]
-    return rows
 
 
 def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> tuple[Ints, Floats]:

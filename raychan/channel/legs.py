@@ -99,10 +99,21 @@ class Leg:
         """Return the field (n,) that the end's antenna sends to points over this leg, relative to its strongest."""
         if self.beam is None:
             return np.ones(len(points))
-        look, _ = self.rays(points)
+        return self.beam(self._look(points)[0])
+
+    def dark(self, points: Floats, radius: Floats) -> Bools:
+        """Tell to which balls (n,), about points (n, 3) [m], the end's antenna sends nothing at all over this leg."""
+        if self.beam is None or self.far:
+            return np.zeros(len(points), bool)
+        look, length = self._look(points)
+        return self.beam.dark(look, np.where(radius < length, np.arcsin(np.minimum(radius / length, 1.0)), np.pi))
+
+    def _look(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return the unit directions (n, 3) in which the end looks at points, and their distances (n,) [m]."""
+        look, length = self.rays(points)
         for m in reversed(self.mirrors):
             look = look - 2.0 * np.outer(look @ m.normal, m.normal)
-        return self.beam(look)
+        return look, length
 
     def bounces(self, points: Floats) -> Floats:
         """Return the mirror points (n, m, 3) [m] of the way to each point, end's side first."""

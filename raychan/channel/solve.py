@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.advance import APART, corner_rates
-from raychan.channel.beam import Beam
+from raychan.channel.beam import beam_of
 from raychan.channel.diffract import diffracted_paths
 from raychan.channel.fields import departures, rates, transfer
 from raychan.channel.found import Found
@@ -106,7 +106,7 @@ def solve(
     surface = facets if isinstance(facets, Surface) else Surface(facets)
     facets, before = surface.facets, surface.rays
     stats.add("build", since)
-    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, Beam(radar))
+    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, beam_of(radar))
     stats.legs = len(legs)
     parts: list[Paths] = []
 
@@ -221,7 +221,7 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> 
         body=routes.body[index],
         part=part[index],
         kind=routes.kind[index],
-        vertices=routes.vertices[index].astype(np.float32),
+        vertices=routes.vertices.astype(np.float32)[index],
         body_names=facets.body_names,
         part_names=facets.part_names,
         tx=routes.tx,
@@ -251,6 +251,8 @@ def nothing(facets: Facets, radar: Radar, slots: int) -> Paths:
 
 def join(parts: list[Paths]) -> Paths:
     """Return all paths of several sets as one record."""
+    if len(parts) == 1:
+        return parts[0]
     rows: dict[str, Any] = {
         f.name: np.concatenate([getattr(p, f.name) for p in parts])
         for f in dataclasses.fields(Paths)

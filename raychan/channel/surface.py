@@ -2,199 +2,175 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from raychan.frames import sizes
+from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
 from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.embree import Tracer
+from raychan.world.joints import Joints, joined, places
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_WELD = 1e-6  # m
-_MIX = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB, 0x2545F4914F6CDD1D])
 _METAL = 1e3  # relative permittivity from which a surface returns nearly all
-_SHARP = 0.95  # cosine of corner normals across an edge above which it is round, not a wedge
 
 
 class Surface(Tracer):
     """A tracer that also knows which facets share a plane or a smooth patch, and the curved surface through corner
-    normals."""
+    normals.
 
-    def __init__(self, facets: Facets) -> None:
+    Args: facets; joints of each body's facets, bodies one after the other; found anew if not given.
+    """
+
+    def __init__(self, facets: Facets, joints: Sequence[Joints] = ()) -> None:
         super().__init__(facets)
         n = len(facets.vertices)
-        self.plane = np.arange(n, dtype=np.int32)
-        self.smooth = np.arange(n, dtype=np.int32)
-        self.closed = np.zeros(len(facets.role), bool)
-        self.open_facet = np.ones(n, bool)
-        self.curved = np.zeros(n, bool)
-        self.convex_alone = False
         m = facets.materials
         self.dull = ((m.kind != PEC) & (np.abs(m.eps) < _METAL))[facets.material]
-        self.bulge = np.zeros((n, 3, 3))
-        self.outline = np.zeros((0, 2, 3))
-        self.first_edge = np.zeros(1, np.int64)
-        self.edge_ends = np.zeros((0, 2, 3))
-        self.edge_faces = np.zeros((0, 2), np.int32)
+        self.bulge, self.curved = bulges(facets.vertices, facets.normals)
+        # What others made of all this, once.
         self.between: Any = None
+        self.screens: Any = None
         # What was found out about a leg, once.
         self.shadows: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
         self.reach: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
-        self.wedge = np.zeros((0, 2, 3))
-        self.wedge_facet = np.zeros((0, 2), np.int32)
-        self.wedge_n = np.zeros(0)
-        if n:
-            self._join()
-            self._bend()
-
-    def _join(self) -> None:
-        """Number planes (adjacent coplanar facets of one body, part and material) and smooth patches."""
-        f = self.facets
-        n = len(f.vertices)
-        corner = (f.vertices - self._centre).reshape(-1, 3)
-        keyed = np.column_stack([np.round(corner / _WELD), np.repeat(f.body, 3)]).astype(np.int64)
-        # One number a place: rows of four sort ten times slower. Two places share one once in 10^7 scenes.
-        _, vertex = np.unique(keyed @ _MIX, return_inverse=True)
-        vertex = vertex.reshape(n, 3)
-        start, end = vertex, np.roll(vertex, -1, axis=1)
-        low, high = np.minimum(start, end).ravel(), np.maximum(start, end).ravel()
-        edge = low.astype(np.int64) * (3 * n) + high
-        order = np.argsort(edge, kind="stable")
-        same = np.diff(edge[order]) == 0
-        runs = np.concatenate([[0], np.cumsum(~same)])
-        use = np.bincount(runs)
-        odd = use[runs] != 2
-        open_bodies = np.unique(f.body[order[odd] // 3])
-        self.closed[:] = True
-        self.closed[open_bodies] = False
-        self.open_facet = ~self.closed[f.body]
-        a, b = order[:-1][same] // 3, order[1:][same] // 3
-        kin = (f.part[a] == f.part[b]) & (f.material[a] == f.material[b])
-        a, b, ea, eb = a[kin], b[kin], order[:-1][same][kin], order[1:][same][kin]
-        flat = np.abs(np.einsum("ij,ij->i", self.normal[a], self.normal[b])) > 1.0 - 1e-10
-        self.plane = _components(a[flat], b[flat], n)
-        # Smooth where the corner normals agree along the shared edge (which two facets walk in opposite ways).
-        own, nxt = np.arange(3), np.roll(np.arange(3), -1)
-        na0, na1 = f.normals[a, own[ea % 3]], f.normals[a, nxt[ea % 3]]
-        nb0, nb1 = f.normals[b, nxt[eb % 3]], f.normals[b, own[eb % 3]]
-        soft = (np.einsum("ij,ij->i", na0, nb0) > 1 - 1e-6) & (np.einsum("ij,ij->i", na1, nb1) > 1 - 1e-6)
-        self.smooth = _components(a[soft], b[soft], n)
-        one_sheet = bool((self.plane == self.plane[0]).all())
+        joints = joints or ([self._joints()] if n else [])
+        self._joined = list(zip(joints, np.cumsum([0, *(len(j.plane) for j in joints)]), strict=False))
+        self.plane = self._numbers([j.plane for j in joints], [j.planes for j in joints])
+        self.smooth = self._numbers([j.smooth for j in joints], [j.patches for j in joints])
+        self.closed = np.full(len(facets.role), n > 0)
+        self.closed[facets.body[self._halves("rim") // 3]] = False
+        one_sheet = n > 0 and not self.plane.any()
         if one_sheet:
             # Two sheets upon each other share every edge twice, yet have no inside.
-            self.closed[:], self.open_facet[:] = False, True
-        convex = one_sheet or (bool(self.closed[0]) and self._convex(order[:-1][same], order[1:][same]))
-        self.convex_alone = len(f.role) == 1 and convex
+            self.closed[:] = False
+        self.open_facet = ~self.closed[facets.body]
+        self.convex_alone = n > 0 and len(facets.role) == 1 and (one_sheet or (len(joints) == 1 and joints[0].convex))
         self.hides_nothing = self.convex_alone and bool(self.closed[0])
-        every = order[:-1][same], order[1:][same]
-        self._wedges(*every, order[odd])
-        if not self.convex_alone:
+
+    def _joints(self) -> Joints:
+        """Return how all facets hang together; those of different bodies never do."""
+        f = self.facets
+        vertex = places((f.vertices - self._centre).reshape(-1, 3), np.repeat(f.body, 3)).reshape(-1, 3)
+        kind = f.part * np.int64(len(f.materials.kind)) + f.material
+        return joined(vertex, kind, f.vertices, f.normals, f.body)
+
+    def _numbers(self, labels: list[Ints], counts: list[int]) -> Ints:
+        """Return labels of all bodies' facets, each body's counted on from the last one's."""
+        at = np.cumsum([0, *counts])
+        return np.concatenate([np.zeros(0, np.int32), *(x + np.int32(i) for x, i in zip(labels, at, strict=False))])
+
+    def _halves(self, name: str, rows: str = "") -> Ints:
+        """Return half edges of all joints by their numbers in the scene, some rows of them if asked."""
+        found = [getattr(j, name)[getattr(j, rows)] if rows else getattr(j, name) for j, _ in self._joined]
+        at = [x + np.int32(3 * i) for x, (_, i) in zip(found, self._joined, strict=True)]
+        return np.concatenate(at) if at else np.zeros((0, 2) if name == "pair" else 0, np.int32)
+
+    def ends(self, half: Ints) -> Floats:
+        """Return both ends (e, 2, 3) [m] of half edges."""
+        found: Floats = ends(self.facets.vertices, np.ascontiguousarray(half))
+        return found
+
+    @cached_property
+    def _outlines(self) -> tuple[Floats, NDArray[np.int64], Ints]:
+        outer = self._halves("outer")
+        count = np.bincount(self.plane[outer // 3], minlength=len(self.plane))
+        return self.ends(outer), np.concatenate([[0], np.cumsum(count)]), outer // 3
+
+    @property
+    def borders(self) -> NDArray[np.bool_]:
+        """Which half edges (3 n,) are not inside a plane: 3 f + k runs from corner k of facet f to the next."""
+        return np.concatenate([np.zeros(0, bool), *(j.border for j, _ in self._joined)])
+
+    @property
+    def outline(self) -> Floats:
+        """Edges (e, 2, 3) [m] around the planes, not those shared within one or a smooth patch: of plane p those of
+        `outline[first_edge[p] : first_edge[p + 1]]`."""
+        return self._outlines[0]
+
+    @property
+    def first_edge(self) -> NDArray[np.int64]:
+        """See `outline`."""
+        return self._outlines[1]
+
+    @property
+    def outline_facet(self) -> Ints:
+        """Facets (e,) to which the edges of `outline` belong."""
+        return self._outlines[2]
+
+    @cached_property
+    def _silhouettes(self) -> tuple[Floats, Ints]:
+        if self.convex_alone:
             # No shadow falls on a body that hides nothing of itself.
-            self._list_edges(*every, order[odd])
-        inner = flat | soft
-        self._outline(np.concatenate([ea[inner], eb[inner]]))
-
-    def _convex(self, ea: Ints, eb: Ints) -> bool:
-        """Tell whether a closed body of one piece bends outward at every pair of half edges (ea, eb): it hides
-        nothing."""
-        a, b = ea // 3, eb // 3
-        pieces = connected_components(coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(len(self.plane),) * 2))[0]
-        far_corner = self.facets.vertices[b, (eb % 3 + 2) % 3]
-        height = np.einsum("ij,ij->i", far_corner - self.facets.vertices[a, ea % 3], self.normal[a])
-        return bool(pieces == 1 and (height < 1e-9 * (1.0 + self.extent)).all())
-
-    def _outline(self, inner: Ints) -> None:
-        """List the edges around each plane (those not shared within it or a smooth patch): `outline[first_edge[p] :
-        first_edge[p + 1]]`."""
-        n = len(self.plane)
-        outer = np.ones(3 * n, bool)
-        outer[inner] = False
-        edges = np.flatnonzero(outer)
-        plane = self.plane[edges // 3]
-        order = np.argsort(plane, kind="stable")
-        v = self.facets.vertices
-        a, b = v[edges // 3, edges % 3], v[edges // 3, (edges + 1) % 3]
-        self.outline = np.stack([a, b], axis=1)[order]
-        self.first_edge = np.searchsorted(plane[order], np.arange(n + 1))
-
-    def _list_edges(self, ea: Ints, eb: Ints, rim: Ints) -> None:
-        """List every edge that can be a body's outline: `edge_ends` (e, 2, 3) [m] and `edge_faces` (e, 2), -1 beyond a
-        rim. Hollow edges hide nothing; between coplanar facets none is seen. Where a pane meets its frame, the frame
-        ends as at a rim."""
-        a, b = ea // 3, eb // 3
-        v = self.facets.vertices
-        height = np.einsum("ij,ij->i", v[b, (eb % 3 + 2) % 3] - v[a, ea % 3], self.normal[a])
-        bent = height < -1e-9 * np.sqrt(self.area[b])
+            return np.zeros((0, 2, 3)), np.zeros((0, 2), np.int32)
         # The ground ends where nobody looks, and its far rim would stretch every grid.
         solid = self.facets.role[self.facets.body] != MIRROR
-        bent &= solid[a]
-        framed = self.is_layer[a] != self.is_layer[b]
-        bent &= ~framed
-        frame = np.where(self.is_layer[a], eb, ea)[framed & solid[a]]
+        pair, rim = self._halves("pair", "bent"), self._halves("rim")
+        pair, frame = pair[solid[pair[:, 0] // 3]], rim[:0]
+        if self._any_layer:
+            pair = pair[self.is_layer[pair[:, 0] // 3] == self.is_layer[pair[:, 1] // 3]]
+            every = self._halves("pair")
+            a, b = every.T // 3
+            framed = (self.is_layer[a] != self.is_layer[b]) & solid[a]
+            frame = np.where(self.is_layer[a], every[:, 1], every[:, 0])[framed]
         rim = np.concatenate([rim[solid[rim // 3]], frame])
-        pick = np.concatenate([ea[bent], rim])
-        self.edge_ends = np.stack([v[pick // 3, pick % 3], v[pick // 3, (pick % 3 + 1) % 3]], axis=1)
-        beyond = np.concatenate([b[bent], np.full(len(rim), -1)])
-        self.edge_faces = np.stack([pick // 3, beyond], axis=1).astype(np.int32)
+        faces = np.concatenate([pair // 3, np.stack([rim // 3, np.full(len(rim), -1)], axis=1)])
+        return self.ends(np.concatenate([pair[:, 0], rim])), faces.astype(np.int32)
 
-    def _wedges(self, ea: Ints, eb: Ints, rim: Ints) -> None:
-        """List convex edges: `wedge` (w, 2, 3) ends [m], `wedge_facet` (w, 2) faces 0 and n, `wedge_n` exterior angle
-        over pi; the rims of open sheets are half planes."""
-        a, b = ea // 3, eb // 3
-        v, corner = self.facets.vertices, np.arange(3)
-        cosine = np.einsum("ij,ij->i", self.normal[a], self.normal[b])
-        far = v[b, corner[(eb % 3 + 2) % 3]]
-        convex = np.einsum("ij,ij->i", far - v[a, ea % 3], self.normal[a]) < -1e-9
-        na = self.facets.normals[a, ea % 3]
-        nb = self.facets.normals[b, (eb % 3 + 1) % 3]
-        sharp = convex & (np.einsum("ij,ij->i", na, nb) < _SHARP)
-        pick = np.concatenate([ea[sharp], rim])
-        self.wedge = np.stack([v[pick // 3, pick % 3], v[pick // 3, (pick % 3 + 1) % 3]], axis=1)
-        self.wedge_facet = np.stack([pick // 3, np.concatenate([b[sharp], rim // 3])], axis=1).astype(np.int32)
-        turn = np.arccos(np.clip(cosine[sharp], -1.0, 1.0)) / np.pi
-        self.wedge_n = np.concatenate([1.0 + turn, np.full(len(rim), 2.0)])
+    @property
+    def edge_ends(self) -> Floats:
+        """Ends (e, 2, 3) [m] of every edge that can be a body's outline. Hollow edges hide nothing; between coplanar
+        facets none is seen. Where a pane meets its frame, the frame ends as at a rim."""
+        return self._silhouettes[0]
 
-    def _bend(self) -> None:
-        """Quadratic patch through corners and corner normals: x = sum l_i x_i - sum c_ij l_i l_j (Nagata 2005, eq.
-        10)."""
+    @property
+    def edge_faces(self) -> Ints:
+        """Facets (e, 2) on both sides of `edge_ends`, -1 beyond a rim."""
+        return self._silhouettes[1]
+
+    @cached_property
+    def wedge_facet(self) -> Ints:
+        """Faces 0 and n (w, 2) of convex edges; the rims of open sheets are half planes."""
+        rim = self._halves("rim") // 3
+        return np.concatenate([self._halves("pair", "sharp") // 3, np.stack([rim, rim], axis=1)]).astype(np.int32)
+
+    @cached_property
+    def wedge(self) -> Floats:
+        """Ends (w, 2, 3) [m] of the edges of `wedge_facet`."""
+        return self.ends(np.concatenate([self._halves("pair", "sharp")[:, 0], self._halves("rim")]))
+
+    @cached_property
+    def wedge_n(self) -> Floats:
+        """Exterior angle (w,) over pi of the edges of `wedge_facet`."""
+        turns = [j.turn[j.sharp] for j, _ in self._joined]
+        return 1.0 + np.concatenate([*turns, np.ones(len(self._halves("rim")))])
+
+    @cached_property
+    def clusters(self) -> Clusters:
+        """The facets in clusters of neighbours, each of one body."""
+        parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self._joined]
+        order, first = (np.concatenate(x) for x in zip(*parts, strict=True))
+        first = np.append(first, len(order))
         f = self.facets
-        for e, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
-            d = f.vertices[:, j] - f.vertices[:, i]
-            ni, nj = f.normals[:, i], f.normals[:, j]
-            a = np.einsum("ij,ij->i", ni, nj)
-            p, q = np.einsum("ij,ij->i", d, ni), -np.einsum("ij,ij->i", d, nj)
-            det = 1.0 - a * a
-            ok = det > 1e-12
-            safe = np.where(ok, det, 1.0)
-            c = ((p - a * q) / safe)[:, None] * ni + ((q - a * p) / safe)[:, None] * nj
-            # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it
-            # straight.
-            turn = np.sqrt(np.maximum(2.0 * (1.0 - a), 0.0))
-            small = sizes(c) < turn * sizes(d)
-            self.bulge[:, e] = c * (ok & small)[:, None]
-        self.curved = np.asarray((np.abs(self.bulge) > 1e-9).any(axis=(1, 2)))
+        hull = hulls(order, first, f.vertices, f.normals, self.normal, self.bulge)
+        return Clusters(order, first, *hull)
 
     @cached_property
     def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Centre (b, 3) [m] and radius (b,) [m] of a ball about each body, and which bodies (b,) have no facet."""
-        f = self.facets
-        n = len(f.role)
-        centre, radius, empty = np.zeros((n, 3)), np.zeros(n), np.ones(n, bool)
-        for b in range(n):
-            v = f.vertices[f.body == b].reshape(-1, 3)
-            if len(v):
-                low, high = v.min(axis=0), v.max(axis=0)
-                centre[b], radius[b], empty[b] = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low), False
-        return centre, radius, empty
+        low, high = np.moveaxis(self.extents, 1, 0)
+        empty = np.asarray(~(low <= high).all(axis=1))
+        low, high = np.where(empty[:, None], 0.0, low), np.where(empty[:, None], 0.0, high)
+        return 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1), empty
 
     def point(self, facet: Ints, bary: Floats) -> Floats:
         """Return points (n, ..., 3) of the true surface at barycentric coordinates (n, ..., 3)."""
@@ -240,6 +216,32 @@ def _column(x: Floats, like: Floats) -> Floats:
     return x.reshape(len(x), *([1] * (like.ndim - 2)))
 
 
-def _components(a: Ints, b: Ints, n: int) -> Ints:
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int32)
+@dataclass(frozen=True, eq=False)
+class Clusters:
+    """Facets order[first[i] : first[i + 1]] in a ball, centre (k, 3) and radius (k,) [m], their normals in a cone, axis
+    (k, 3) and half angle spread (k,) [rad]."""
+
+    order: Ints
+    first: NDArray[np.int64]
+    centre: Floats
+    radius: Floats
+    axis: Floats
+    spread: Floats
+
+
+class Stands(Protocol):
+    """A scene of bodies (see world.scene.Scene)."""
+
+    @property
+    def joints(self) -> Sequence[Joints]: ...
+    @property
+    def kept(self) -> dict[Any, Any]: ...
+    def facets(self) -> Facets: ...
+
+
+def surface_of(scene: Stands) -> Surface:
+    """Return the surface of a scene's bodies as they stand at time 0, built once and kept with the scene."""
+    if Surface not in scene.kept:
+        scene.kept[Surface] = Surface(scene.facets(), scene.joints)
+    kept: Surface = scene.kept[Surface]
+    return kept

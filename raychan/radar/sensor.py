@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,17 @@ class Sensor:
     def axes(self) -> Floats:
         """Matrix (3, 3) from the antenna's frame to the world's."""
         return rotation(self.yaw, self.pitch, self.roll)
+
+    @cached_property
+    def kept(self) -> dict[Any, Any]:
+        """What others make of the antennas and how they stand, by its class; shared with the same radar elsewhere."""
+        return {}
+
+    def at(self, time: float) -> Sensor:
+        """Return the radar where its velocity has brought it at a time [s]."""
+        moved = replace(self, position=self.position + time * self.velocity)
+        moved.__dict__["kept"] = self.kept
+        return moved
 
     @property
     def boresight(self) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 
 from raychan.channel.profile import profile
 from raychan.channel.solve import join, refinement, solve
-from raychan.channel.surface import Surface
+from raychan.channel.surface import Surface, surface_of
 from raychan.frames import direction
 from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
@@ -103,7 +103,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     carrier = sensor.waveform.carrier
     floor, cell = drowned(sensor, settings), C0 / sensor.waveform.bandwidth
     with clock.stage("geometry"):
-        surface, points = Surface(scene.facets(0.0)), scene.points(0.0)
+        surface, points = surface_of(scene), scene.points(0.0)
     # The coarse launch comes first: it tells what is needed, and later how wrong the fine one may be.
     chosen = None
     with clock.stage("check"):
@@ -193,7 +193,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
         stats=channel.stats | {"reached_db": max((r.error_db for r in reasons), default=0.0)},
         warnings=tuple(scene.warnings),
-        scene=scene,
+        scene=scene.bare(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )

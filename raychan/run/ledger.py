@@ -115,7 +115,7 @@ def _diffraction(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
     sigma = zone**2 / np.pi * np.sinc(2.0 * along / wavelength) ** 2
     power = sensor.power * gain * wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
     at = int(np.argmax(power))
-    name = surface.facets.body_names[_body_at(surface, middle[at])]
+    name = surface.facets.body_names[surface.facets.body[surface.outline_facet[at]]]
     how = f"strongest edge's fringe field, L^2/pi broadside, if it were seen: on {name} at {r[at]:.1f} m"
     return Entry(float(db(power[at] / weakest)), "bound", how)
 
@@ -134,11 +134,6 @@ def _around(surface: Surface, points: Points, sensor: Sensor, settings: Any, mod
     found = join(parts)
     level = peak(found, np.ones(len(found.delay), bool), sensor, settings)
     return Entry(float(db(max(level, 1e-40) / weakest)), "estimate", "strongest cell of the diffracted returns (UTD)")
-
-
-def _body_at(surface: Surface, point: Floats) -> int:
-    nearest = np.argmin(np.linalg.norm(surface.facets.vertices.mean(axis=1) - point, axis=1))
-    return int(surface.facets.body[nearest])
 
 
 def _diffuse(surface: Surface, sensor: Sensor, weakest: float) -> Entry:

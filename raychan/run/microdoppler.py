@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from raychan.channel.advance import Poses, carried, strengths
 from raychan.channel.fields import departures
 from raychan.channel.solve import solve
+from raychan.channel.surface import Surface
 from raychan.channel.tubes import Refinement
 from raychan.kernels.beat import ramp_sums
 from raychan.radar.sensor import Sensor
@@ -157,16 +158,15 @@ class _Work:
         """Trace the scene at a chirp."""
         now = self.scene.at(chirp * self.step)
         self.times.append(chirp * self.step)
-        carrier = self.sensor.waveform.carrier
+        carrier, facets = self.sensor.waveform.carrier, now.facets()
         if known is None:
             found: list[Routes] = []
             paths, stats = solve(
-                now.facets(), now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
+                Surface(facets, now.joints), now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
                 self.model.diffraction, found.append,
             )  # fmt: skip
             self.rays += stats.rays
             known = Traced(paths, tuple(found))
-        facets = now.facets()
         parts = [take(r, self.touches(r.body, r.kind)) for r in known.routes]
         routes = tuple(r for r in parts if len(r.kind))
         rest = ~self.touches(known.paths.body, known.paths.kind) | (known.paths.kind == DIFFRACT).any(axis=1)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from raychan.channel.surface import Surface
+from raychan.channel.surface import surface_of
 from raychan.run.chain import Channel, Clock, Progress, result_of, trace
 from raychan.run.files import StoreError, staging
 from raychan.run.result import Result
@@ -82,7 +82,10 @@ def _frames(
         else:
             channel = trace(now, tolerance_db, max_bounces, clock)
             first = channel if once else None
-        yield Frame(k, time, result_of(now, channel, seed + k, clock))
+        result = result_of(now, channel, seed + k, clock)
+        # What was built for this frame goes before the next builds its own.
+        del channel, now
+        yield Frame(k, time, result)
 
 
 def carried(scene: Scene) -> bool:
@@ -101,11 +104,11 @@ def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
         )
         return there
 
-    facets, points = scene.facets(), scene.points()
+    points = scene.points()
     stats = channel.stats | {"rays": 0, "tubes": 0}
     return replace(
         channel,
-        surface=Surface(facets),
+        surface=surface_of(scene),
         points=points,
         paths=moved(channel.paths),
         others=moved(channel.others),

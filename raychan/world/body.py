@@ -90,7 +90,9 @@ class Body:
         return Motion((x, y, z), yaw, pitch, roll, (u, v, w), turn, (spin[0], spin[1], spin[2]))
 
     def at(self, time: float) -> Body:
-        """Return the body where it is at a time [s]; the mesh is shared."""
+        """Return the body where it is at a time [s], itself if it does not move; the mesh is shared."""
+        if not (any(self.motion.velocity) or self.motion.spin().any()):
+            return self
         then = self.motion.at(time)
         yaw, pitch, roll = (float(np.degrees(a)) for a in (then.yaw, then.pitch, then.roll))
         moved = replace(self, position=then.position, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)

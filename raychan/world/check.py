@@ -53,7 +53,7 @@ def aliases(scene: Scene) -> list[str]:
     at, own = np.array(scene.radar.position), np.array(scene.radar.velocity_mps)
     limit, top = waveform.unambiguous_range, waveform.unambiguous_rate
     for body in scene.bodies:
-        if body.kind == MIRROR:
+        if body.kind == MIRROR or _near_and_slow(body, at, own, limit, top):
             continue
         place = nearest_point(body, at) if body.rcs is None else body.motion.to_world(body.target_point())
         way = place - at
@@ -72,6 +72,18 @@ def aliases(scene: Scene) -> list[str]:
                 f"it appears at {seen:.2f} m/s"
             )
     return said
+
+
+def _near_and_slow(body: Body, at: Floats, own: Floats, limit: float, top: float) -> bool:
+    """Tell whether no point of a body is farther than `limit` [m] from a radar, or faster than `top` [m/s] to it."""
+    low, high = body.geometry.bounds
+    places = [low, high] if body.rcs is None else [low, high, body.target_point()]
+    middle = 0.5 * (low + high)
+    radius = max(float(np.linalg.norm(p - middle)) for p in places)
+    way = body.motion.to_world(middle) - at
+    arm = float(np.linalg.norm(middle)) + radius
+    speed = float(np.linalg.norm(np.asarray(body.motion.velocity) - own) + np.linalg.norm(body.motion.spin()) * arm)
+    return float(np.linalg.norm(way)) + radius < limit and speed < top
 
 
 def folded_range(distance: float, limit: float, complex_sampling: bool) -> float:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.kernels.facets import extents, planes_of
 from raychan.kernels.rays import clear, companions, land, plane_distances, set_out
 from raychan.kernels.rows import in_two
 from raychan.tables import LAYER, Facets
@@ -36,10 +37,8 @@ class Tracer:
         self.facets = facets
         v = facets.vertices
         self.first = v[:, 0]
-        cross = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
-        norm = np.linalg.norm(cross, axis=1, keepdims=True)
-        self.normal = cross / np.where(norm > 0, norm, 1.0)
-        self.area = 0.5 * norm[:, 0]
+        self.normal, self.area = planes_of(v)
+        self.extents = extents(v, facets.body, len(facets.role))
         self.is_layer = facets.materials.kind[facets.material] == LAYER if len(v) else np.zeros(0, bool)
         self.rays = 0
         # Which facets are one surface; each for itself until someone knows better.
@@ -50,12 +49,12 @@ class Tracer:
         self._scene: Any = None
         self.extent, self._size, self.touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
         if len(v):
-            low, high = v.min(axis=(0, 1)), v.max(axis=(0, 1))
+            low, high = self.extents[:, 0].min(axis=0), self.extents[:, 1].max(axis=0)
             self._centre = 0.5 * (low + high)
             self.extent = float(np.linalg.norm(high - low))
             self._size = min(self.extent, 1.0)
             # Far from the origin coordinates themselves are only known to their float64 spacing.
-            blur = 8.0 * float(np.spacing(np.abs(v).max()))
+            blur = 8.0 * float(np.spacing(np.maximum(-low, high).max()))
             self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
 
     def _built(self) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from raychan.world.errors import SceneError
 from raychan.world.flatten import merge_flat
+from raychan.world.joints import Joints, joined, places
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
@@ -65,12 +67,17 @@ class Mesh:
     report: MeshReport
     part_materials: tuple[str, ...] = field(default=())
 
+    @cached_property
+    def joints(self) -> Joints:
+        """How the faces hang together."""
+        return joined(places(self.vertices)[self.faces], self.part, self.corners, self.normals)
+
     @property
     def corners(self) -> Floats:
         """Corners (f, 3, 3) [m] of the faces."""
         return self.vertices[self.faces]
 
-    @property
+    @cached_property
     def bounds(self) -> Floats:
         """Lowest and highest corner (2, 3) [m]."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])

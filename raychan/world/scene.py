@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import cached_property
+from operator import is_
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from raychan.kernels.facets import turned
 from raychan.tables import Facets, Points
 from raychan.world import check, edit
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, nearest
+from raychan.world.joints import Joints
+from raychan.world.made import body_of, material_of
 from raychan.world.material import Material, material, names, resolve, validity
 from raychan.world.mesh import Floats
 from raychan.world.mount import sensor_of
-from raychan.world.schema import BodyTable, MaterialTable, Model, Processing, RadarTable, SceneFile, checked
+from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile, checked
 
 __all__ = ["Body", "Scene", "SceneError"]
 
@@ -57,6 +60,10 @@ class Scene:
             raise SceneError(f"{frequency!r} is not possible", key="frequency", value=frequency, allowed="above 0 Hz")
         self.materials = dict(materials or {})
         self._data: dict[str, Any] | None = None
+        self._tables: Sequence[BodyTable] = ()
+        # What other floors make of the bodies as they stand at time 0, by its class; never changed, and dropped with
+        # the scenes that share it.
+        self.kept: dict[Any, Any] = {}
         try:
             self._prepare()
         except SceneError as e:
@@ -83,23 +90,31 @@ class Scene:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], path: str | Path | None = None, text: str = "") -> Scene:
         """Return the scene of tables as they stand in a scene file."""
+        return cls._of(data, path, text)
+
+    @classmethod
+    def _of(cls, data: Mapping[str, Any], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
+        """Return the scene of tables; bodies that stand in another alike are that one's, with their meshes."""
         file = None if path is None else Path(path)
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
         ghz = tables.scene.frequency_ghz
+        known = {t.name: (t, b) for t, b in zip(like._tables, like.bodies, strict=True)} if like else {}
         scene = cls(
-            bodies=[_body(b, folder) for b in tables.bodies],
+            bodies=[body_of(b, folder, known.get(b.name)) for b in tables.bodies],
             frequency=None if ghz is None else ghz * 1e9,
             radar=tables.radar,
             processing=tables.processing,
             model=tables.model,
-            materials={name: _material(name, m, file) for name, m in tables.materials.items()},
+            materials={name: material_of(name, m, file) for name, m in tables.materials.items()},
             title=tables.scene.title,
             text=text,
             path=file,
             folder=folder,
         )
-        scene._data = dict(data)
+        scene._data, scene._tables = dict(data), tables.bodies
+        if like is not None and scene._stands_as(like):
+            scene.kept = like.kept
         return scene
 
     def override(self, changes: Sequence[str]) -> Scene:
@@ -112,7 +127,12 @@ class Scene:
         if self._data is None:
             raise ValueError("only a scene from a file or from tables has keys to change")
         text = self.text + "".join(f"\n# changed: {c}" for c in changes)
-        return self.from_dict(edit.changed(self._data, changes, self.path), self.path, text)
+        return self._of(edit.changed(self._data, changes, self.path), self.path, text, self)
+
+    def _stands_as(self, other: Scene) -> bool:
+        """Tell whether both scenes have the same bodies at the same places, of the same materials."""
+        alike = len(self.bodies) == len(other.bodies) and all(map(is_, self.bodies, other.bodies))
+        return alike and (self.materials, self.frequency) == (other.materials, other.frequency)
 
     def _prepare(self) -> None:
         """Check everything once, so that a scene is complete or does not exist."""
@@ -148,6 +168,7 @@ class Scene:
             return self
         moved = copy(self)
         moved.bodies = tuple(b.at(time) for b in self.bodies)
+        moved.kept = self.kept if moved._stands_as(self) else {}
         if self.radar is not None:
             there = np.asarray(self.radar.position) + time * np.asarray(self.radar.velocity_mps)
             moved.radar = self.radar.model_copy(update={"position": there.tolist()})
@@ -161,10 +182,15 @@ class Scene:
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
         return moved
 
+    def bare(self) -> Scene:
+        """Return the scene without what is kept for it: a result that stays does not hold on to that."""
+        alone = copy(self)
+        alone.kept = {}
+        return alone
+
     def sensor_at(self, time: float) -> Any:
         """Return the radar.Sensor where its velocity has brought it at a time [s]."""
-        s = self.sensor
-        return replace(s, position=np.asarray(s.position) + time * np.asarray(s.velocity))
+        return self.sensor.at(time)
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -206,22 +232,29 @@ class Scene:
         materials, parts, rows = self._index
         turns = [b.motion.rotation(time) for b in self.bodies]
         meshes = [b.geometry for b in self.bodies]
-        places = [b.motion.to_world(m.vertices, time)[m.faces] for b, m in zip(self.bodies, meshes, strict=True)]
+        origins = [b.motion.origin(time) for b in self.bodies]
+        places = [turned(m.vertices, r, o)[m.faces] for m, r, o in zip(meshes, turns, origins, strict=True)]
+        looks = [turned(m.normals.reshape(-1, 3), r, np.zeros(3)) for m, r in zip(meshes, turns, strict=True)]
         body = [np.full(len(m.faces), i, np.int32) for i, m in enumerate(meshes)]
         return Facets(
             vertices=_stack(places, (3, 3), float),
-            normals=_stack([m.normals @ r.T for m, r in zip(meshes, turns, strict=True)], (3, 3), float),
+            normals=_stack(looks, (3,), float).reshape(-1, 3, 3),
             body=_stack(body, (), np.int32),
             part=_stack([p for _, p in rows], (), np.int32),
             material=_stack([m for m, _ in rows], (), np.int32),
             role=np.array([b.kind for b in self.bodies], np.int8),
-            origin=np.array([b.motion.origin(time) for b in self.bodies]).reshape(-1, 3),
+            origin=np.array(origins).reshape(-1, 3),
             velocity=np.array([b.motion.velocity for b in self.bodies], float).reshape(-1, 3),
             spin=np.array([b.motion.spin(time) for b in self.bodies]).reshape(-1, 3),
             materials=resolve(materials, self.frequency),
             body_names=tuple(b.name for b in self.bodies),
             part_names=tuple(parts),
         )
+
+    @property
+    def joints(self) -> list[Joints]:
+        """How the facets of each body hang together."""
+        return [b.geometry.joints for b in self.bodies]
 
     def points(self, time: float = 0.0) -> Points:
         """Return the targets given by their RCS at a time [s]."""
@@ -243,37 +276,3 @@ class Scene:
 
 def _stack(pieces: list[Any], shape: tuple[int, ...], dtype: Any) -> Any:
     return np.concatenate(pieces) if pieces else np.zeros((0, *shape), dtype)
-
-
-def _body(t: BodyTable, folder: Path) -> Body:
-    return Body(
-        name=t.name,
-        mesh=None if t.mesh is None else folder / t.mesh,
-        shape=t.shape,
-        params=t.params,
-        material=t.material,
-        materials=t.materials,
-        position=t.position,
-        yaw_deg=t.yaw_deg,
-        pitch_deg=t.pitch_deg,
-        roll_deg=t.roll_deg,
-        velocity=t.velocity_mps,
-        turn_rate_dps=t.turn_rate_dps,
-        spin_dps=t.spin_dps,
-        rcs=t.rcs_dbsm,
-        rcs_point=t.rcs_point,
-        role=t.role,
-        unit=t.unit,
-        up=t.up,
-        forward=t.forward,
-        scale=t.scale,
-        crease_deg=t.crease_deg,
-    )
-
-
-def _material(name: str, t: MaterialTable, file: Path | None) -> Material:
-    thickness = None if t.thickness_mm is None else t.thickness_mm * 1e-3
-    try:
-        return Material(t.eps_r, t.sigma, thickness, t.roughness_mm * 1e-3, t.pec, name, t.source)
-    except SceneError as e:
-        raise e.at(file=file, key=f"materials.{name}") from None

@@ -1,0 +1,67 @@
+"""Screens: plane walls of a scene that hide from a leg all that stands behind them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.legs import Leg
+from raychan.channel.surface import Surface
+from raychan.tables import MIRROR
+
+Floats = NDArray[np.float64]
+
+_LEAST_AREA = 0.25  # m^2
+_MOST = 24  # over one leg
+_MOST_EDGES = 64  # around one
+
+
+class Screens:
+    """The large opaque planes of a surface with the edges around them, in the facets' own sense."""
+
+    def __init__(self, surface: Surface) -> None:
+        f = surface.facets
+        solid = ~surface.curved & ~surface.is_layer & (f.role[f.body] != MIRROR)
+        area = np.bincount(surface.plane, weights=np.where(solid, surface.area, 0.0))
+        count = np.bincount(surface.plane, weights=surface.borders.reshape(-1, 3).sum(axis=1))
+        large = (area >= _LEAST_AREA) & (count <= _MOST_EDGES)
+        if len(f.role) < 2:
+            # A wall hides other bodies only: how far a body's own surface may lie before its facets is not known here.
+            large[:] = False
+        rows = np.flatnonzero(large[surface.plane])
+        rows = rows[np.argsort(surface.plane[rows], kind="stable")]
+        numbers, lead = np.unique(surface.plane[rows], return_index=True)
+        half = (3 * rows[:, None] + np.arange(3)).ravel()
+        half = half[surface.borders[half]]
+        self.touch = 1e-4 + surface.touch
+        self.area, self.edge = area[numbers], surface.ends(half)
+        self.first = np.searchsorted(surface.plane[half // 3], np.append(numbers, len(area)))
+        self.point, self.normal, self.owner = surface.first[rows[lead]], surface.normal[rows[lead]], f.body[rows[lead]]
+
+    def over(self, leg: Leg) -> tuple[Any, ...]:
+        """Return the walls that hide most over a leg: point (w, 3), normal (w, 3) towards the leg, body (w,), the first
+        of its edges (w + 1,), a point on each edge (e, 3), normal inward (e, 3) of the plane through it and the leg's
+        image, and how far [m] behind these a thing must lie."""
+        image = np.asarray(leg.image, float)
+        height = self.normal @ image if leg.far else np.einsum("ij,ij->i", image - self.point, self.normal)
+        away = np.ones(len(height)) if leg.far else np.linalg.norm(image - self.point, axis=1)
+        view = self.area * np.abs(height) / away**3
+        if leg.mirrors:
+            m = leg.mirrors[-1]
+            over = (self.edge - m.point) @ m.normal > self.touch
+            behind = np.add.reduceat(~over.all(axis=1), self.first[:-1]) if len(view) else view
+            view = np.where(behind, 0.0, view)
+        pick = np.argsort(-view, kind="stable")[:_MOST]
+        pick = pick[view[pick] > 0.0]
+        count = np.diff(self.first)[pick]
+        edge = np.concatenate([np.zeros(0, int), *(np.arange(self.first[w], self.first[w + 1]) for w in pick)])
+        a, b = self.edge[edge, 0], self.edge[edge, 1]
+        side = np.repeat(np.sign(height[pick]), count)
+        inward = np.cross(image, b - a) if leg.far else np.cross(b - image, a - image)
+        size = np.linalg.norm(inward, axis=1, keepdims=True)
+        inward *= side[:, None] / np.where(size > 0.0, size, 1.0)
+        first = np.concatenate([[0], np.cumsum(count)])
+        normal = self.normal[pick] * np.sign(height[pick])[:, None]
+        return self.point[pick], normal, self.owner[pick], first, a, inward, self.touch

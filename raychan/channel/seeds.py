@@ -1,0 +1,143 @@
+"""Seeds: the facets that could be met over a leg; clusters of them that all turn away are passed over whole, and so are
+those out of a mirror's reach, behind a wall, or where the antenna does not look."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from raychan.channel.edges import dot
+from raychan.channel.legs import Leg
+from raychan.channel.screens import Screens
+from raychan.channel.surface import Surface
+from raychan.frames import sizes
+from raychan.kernels.rows import in_two
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+_MANY = 1000  # clusters from which on a second thread pays
+_WIDE = 1e-6  # rad: rounding must not hide what grazes
+
+
+def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
+    """Return the facets of bodies (b,) that could be met over a leg, in order."""
+    f = surface.facets
+    may = np.zeros(len(f.body), np.bool_)
+    if not len(may) or not bodies.any():
+        return np.zeros(0, np.int32)
+    c, walls = surface.clusters, _screens(surface).over(leg)
+    dark = leg.dark(c.centre, c.radius)
+    facets = f.vertices, f.normals, f.body, surface.area, surface.open_facet, bodies
+    mirror = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+    if leg.mirrors and not leg.far:
+        m = leg.mirrors[-1]
+        mirror = m.point, m.normal, m.centre, m.radius
+    way = np.asarray(leg.image, float), leg.far, bool(leg.mirrors) and not leg.far, *mirror
+
+    def some(rows: slice) -> None:
+        hull = c.centre[rows], c.radius[rows], c.axis[rows], c.spread[rows]
+        _mark(*(dark[rows], c.order, c.first[rows.start : rows.stop + 1], *hull, *facets, *way, *walls, may))
+
+    in_two(len(c.radius), some, _MANY)
+    rows = np.flatnonzero(may).astype(np.int32)
+    if leg.mirrors:
+        v = f.vertices[rows]
+        middle = v.mean(axis=1)
+        rows = rows[leg.may_reach(middle, sizes(v - middle[:, None]).max(axis=1))]
+    return rows
+
+
+def _screens(surface: Surface) -> Any:
+    if surface.screens is None:
+        surface.screens = Screens(surface)
+    return surface.screens
+
+
+@njit(cache=True, inline="always")
+def _angle(a, b):  # type: ignore[no-untyped-def]
+    """Return the angle [rad] between two vectors."""
+    size = math.sqrt(dot(a, a) * dot(b, b))
+    return math.acos(min(max(dot(a, b) / size, -1.0), 1.0)) if size > 0.0 else 0.0
+
+
+@njit(cache=True, inline="always")
+def _half(radius, distance):  # type: ignore[no-untyped-def]
+    """Return half the angle [rad] under which a ball is seen; pi from within."""
+    return math.asin(radius / distance) if radius < distance else math.pi
+
+
+@njit(cache=True, inline="always")
+def _over(centre, radius, d, image, point, normal, middle, reach, work):  # type: ignore[no-untyped-def]
+    """Tell whether something in a ball, at d from the image, could be met over a mirror within a ball about middle."""
+    height = 0.0
+    for c in range(3):
+        height += (centre[c] - point[c]) * normal[c]
+        work[c] = middle[c] - image[c]
+    # A facet in the ball has a ball of its own, of up to twice the radius, that may lie across.
+    if height < -3.0 * radius:
+        return False
+    widest = _half(reach + 2.0 * radius, math.sqrt(dot(work, work))) + _half(radius, math.sqrt(dot(d, d)))
+    return _angle(work, d) <= widest + _WIDE
+
+
+@njit(cache=True, inline="always")
+def _hidden(centre, radius, body, point, normal, owner, first, edge, inward):  # type: ignore[no-untyped-def]
+    """Tell whether a wall of another body hides a ball: it lies behind, within the planes through the wall's edges."""
+    for w in range(len(owner)):
+        if owner[w] == body:
+            continue
+        depth = 0.0
+        for c in range(3):
+            depth -= (centre[c] - point[w, c]) * normal[w, c]
+        hides = depth > radius
+        for e in range(first[w], first[w + 1]):
+            if not hides:
+                break
+            within = 0.0
+            for c in range(3):
+                within += (centre[c] - edge[e, c]) * inward[e, c]
+            hides = within > radius
+        if hides:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _mark(  # type: ignore[no-untyped-def]
+    dark, order, first, centre, radius, axis, spread, v, n, body, area, is_open, bodies, image, far, mirrored, at,
+    normal, middle, reach, walls, normals, owners, begins, edges, inwards, touch, may,
+):  # fmt: skip
+    """Mark the facets that could be met: of clusters order[first[i] : first[i + 1]] with their balls and cones."""
+    d, work = np.empty(3), np.empty(3)
+    for i in range(len(radius)):
+        lead = order[first[i]]
+        if dark[i] or not bodies[body[lead]]:
+            continue
+        for c in range(3):
+            d[c] = -image[c] if far else centre[i, c] - image[c]
+        if not is_open[lead]:
+            around = 0.0 if far else _half(radius[i], math.sqrt(dot(d, d)))
+            if _angle(d, axis[i]) + spread[i] + around < 0.5 * math.pi - _WIDE:
+                continue
+        if mirrored and not _over(centre[i], radius[i], d, image, at, normal, middle, reach, work):
+            continue
+        swell = 1.001 * radius[i] + touch
+        if _hidden(centre[i], swell, body[lead], walls, normals, owners, begins, edges, inwards):
+            continue
+        for j in range(first[i], first[i + 1]):
+            f = order[j]
+            if not area[f] > 0.0:
+                continue
+            lit = is_open[f]
+            for q in range(3):
+                towards = 0.0
+                for c in range(3):
+                    towards += (-image[c] if far else v[f, q, c] - image[c]) * n[f, q, c]
+                lit |= towards < 0.0
+            may[f] = lit

@@ -1,0 +1,185 @@
+"""Geometry is made once and kept: with a mesh, a body, a scene; and goes when these go."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import weakref
+
+import numpy as np
+import pytest
+import trimesh
+from helpers import facets, quad
+from test_sequence import same
+
+import raychan as rc
+from raychan.channel.beam import beam_of
+from raychan.channel.legs import Leg
+from raychan.channel.seeds import seeds
+from raychan.channel.surface import Surface, surface_of
+from raychan.run.sequence import frames
+from raychan.world.embree import Tracer
+
+RADAR = {
+    "position": [0.0, 0.0, 1.0],
+    "waveform": {"bandwidth_mhz": 500.0, "chirp_us": 30.0, "chirps": 16, "samples": 64},
+}
+BODIES = """
+[[bodies]]
+name = "wall"
+shape = "plate"
+params = { width = 2.0, height = 2.0 }
+position = [6.0, 0.0, 1.0]
+yaw_deg = 180.0
+
+[[bodies]]
+name = "box"
+shape = "box"
+position = [4.0, 2.0, 0.0]
+"""
+TEXT = """
+[radar]
+position = [0.0, 0.0, 1.0]
+waveform = { bandwidth_mhz = 500.0, chirp_us = 30.0, chirps = 16, samples = 64 }
+"""
+
+
+@pytest.fixture
+def scene():
+    return rc.Scene.from_text(TEXT + BODIES)
+
+
+@pytest.fixture
+def builds(monkeypatch):
+    """Counts how many tracers are made."""
+    made = []
+    init = Tracer.__init__
+    monkeypatch.setattr(Tracer, "__init__", lambda self, f: (made.append(len(f.body)), init(self, f))[1])
+    return made
+
+
+def test_a_scene_is_built_once_for_all_seeds_and_radars(scene, builds):
+    first = rc.simulate(scene, seed=1)
+    rc.simulate(scene, seed=2)
+    louder = scene.override(["radar.power_dbm=20", "radar.position=[0.5, 0.0, 1.0]"])
+    rc.simulate(louder)
+    assert len(builds) == 1
+    same(first, rc.simulate(rc.Scene.from_text(TEXT + BODIES), seed=1))
+    assert len(builds) == 2
+
+
+def test_a_moved_body_keeps_its_mesh_and_the_others_stay_what_they_are(scene, builds):
+    moved = scene.override(["bodies.box.position=[4.0, -2.0, 0.0]"])
+    assert moved.bodies[0] is scene.bodies[0]
+    assert moved.bodies[1].geometry is scene.bodies[1].geometry
+    assert surface_of(moved) is not surface_of(scene)
+    np.testing.assert_allclose(moved.facets().vertices[-1, :, 1], scene.facets().vertices[-1, :, 1] - 4.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "change", ["bodies.box.material='glass'", "bodies.box.params.length=3.0", "scene.frequency_ghz=24.0"]
+)
+def test_what_changes_a_surface_makes_a_new_one(scene, change):
+    assert surface_of(scene.override([change])) is not surface_of(scene)
+
+
+def test_joints_of_meshes_are_those_found_from_facets_alone(scene):
+    turned = scene.override(["bodies.box.yaw_deg=33.0"])
+    own, blind = Surface(turned.facets(), turned.joints), Surface(turned.facets())
+    for name in ("plane", "smooth", "closed", "open_facet", "first_edge", "outline"):
+        np.testing.assert_array_equal(getattr(own, name), getattr(blind, name), err_msg=name)
+    for name in ("edge_ends", "wedge"):
+        a, b = (np.sort(getattr(s, name).reshape(-1, 6), axis=0) for s in (own, blind))
+        np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+def test_what_is_kept_goes_with_the_scene():
+    scene = rc.Scene.from_text(TEXT + BODIES)
+    result = rc.simulate(scene)
+    gone = weakref.ref(surface_of(scene)), weakref.ref(scene.bodies[0].geometry.joints)
+    del scene
+    gc.collect()
+    assert gone[0]() is None, "a result holds on to the surface"
+    assert gone[1]() is not None, "the meshes are the result's too"
+    del result
+    gc.collect()
+    assert gone[1]() is None
+
+
+def test_surfaces_go_without_the_garbage_collector_frame_by_frame():
+    moving = rc.Scene.from_text(TEXT + BODIES + "velocity_mps = [0.0, -1.0, 0.0]\n")
+    alive = weakref.WeakSet()
+    init = Surface.__init__
+
+    def noted(self, *args):
+        init(self, *args)
+        alive.add(self)
+
+    gc.collect()
+    gc.disable()
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Surface, "__init__", noted)
+            kept, most = [], 0
+            for frame in frames(moving, 4, 0.05):
+                kept.append(frame.result)
+                most = max(most, len(alive))
+    finally:
+        gc.enable()
+    assert most == 1
+    assert len(kept) == 4
+
+
+def test_a_moving_radar_has_one_beam(scene):
+    assert beam_of(scene.sensor) is beam_of(scene.sensor.at(0.3))
+    assert beam_of(scene.sensor) is not beam_of(dataclasses.replace(scene.sensor, yaw=0.1))
+
+
+def wanted(surface, leg, bodies):
+    """The facets that could be met over a leg, each looked at by itself."""
+    f = surface.facets
+    rows = np.flatnonzero(bodies[f.body])
+    k, _ = leg.rays(f.vertices[rows])
+    lit = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
+    return rows[lit | surface.open_facet[rows]]
+
+
+def ball(at, radius=0.5):
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    mesh.apply_translation(at)
+    return mesh
+
+
+@pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (0.3, 3.0, -1.0), (6.0, 0.2, 0.1), (30.0, -4.0, 9.0)])
+def test_clusters_pass_over_only_facets_that_turn_away(end):
+    surface = Surface(facets([ball((6.0, 0.0, 0.0), 1.5), ball((9.0, 1.0, 2.0))], smooth=True))
+    for leg in (Leg(end=np.array(end)), Leg(end=np.array([0.6, 0.0, 0.8]), far=True)):
+        for bodies in (np.array([True, True]), np.array([False, True])):
+            np.testing.assert_array_equal(seeds(surface, leg, bodies), wanted(surface, leg, bodies))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("aside", np.linspace(0.0, 4.0, 9))
+def test_what_a_wall_hides_is_what_no_ray_finds(aside, side):
+    corners = np.array([[4, -1, -1], [4, 1, -1], [4, 1, 1], [4, -1, 1]], float)[:: int(side)]
+    surface = Surface(facets([quad(corners), ball((8.0, aside, 0.3))], smooth=True))
+    leg, bodies = Leg(end=np.zeros(3)), np.array([True, True])
+    found = seeds(surface, leg, bodies)
+    left = np.setdiff1d(wanted(surface, leg, bodies), found)
+    middle = surface.facets.vertices[left].mean(axis=1)
+    slack = np.full(len(left), 1e-3)
+    assert not leg.visible(surface, middle, left.astype(np.int32), slack, 0).seen.any()
+    assert (len(left) > 0) == (aside < 2.5)
+
+
+def test_where_the_antenna_sends_nothing_nothing_is_launched(scene):
+    surface = Surface(
+        facets([ball((6.0, 1.0, 0.0), 1.5), ball((-6.0, 0.0, 0.5)), ball((0.0, 5.0, 1.0), 1.0)], smooth=True)
+    )
+    leg, bodies = Leg(end=np.zeros(3), beam=beam_of(scene.sensor)), np.ones(3, bool)
+    found, every = seeds(surface, leg, bodies), wanted(surface, leg, bodies)
+    assert set(surface.facets.body[found]) == {0, 2}
+    left = np.setdiff1d(every, found)
+    look = surface.facets.vertices[left].reshape(-1, 3)
+    assert not leg.weight(look).any()
+    assert len(np.intersect1d(found, every)) == len(found)
