@@ -126,27 +126,38 @@ def exchange(out, rows, first, column, over, along):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def read(out, spectra, place, factor, pieces):  # type: ignore[no-untyped-def]
-    """Add to out (m, s) what spectra (p, s, l) hold at place (m, s), times factors (p, m, s)."""
-    planes, steps = spectra.shape[:2]
+def weigh(first, weight, place, pieces):  # type: ignore[no-untyped-def]
+    """Write for places (m, s) the first of the cells under the kernel, and its values (m, s, width) there."""
     width = pieces.shape[1]
-    weight = np.empty(width)
-    for s in range(steps):
-        for m in range(len(out)):
-            first = math.ceil(place[m, s] - 0.5 * width)
-            at = 2.0 * (first - place[m, s]) + width - 1.0
-            weight[:] = pieces[0]
+    value = np.empty(width)
+    for m in range(place.shape[0]):
+        for s in range(place.shape[1]):
+            start = math.ceil(place[m, s] - 0.5 * width)
+            at = 2.0 * (start - place[m, s]) + width - 1.0
+            value[:] = pieces[0]
             for d in range(1, len(pieces)):
                 coefficients = pieces[d]
                 for j in range(width):
-                    weight[j] = weight[j] * at + coefficients[j]
+                    value[j] = value[j] * at + coefficients[j]
+            first[m, s] = start
+            weight[m, s, :] = value
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def read(out, spectra, first, weight, factor):  # type: ignore[no-untyped-def]
+    """Add to out (m, s) what spectra (p, s, l) hold under kernels (from `weigh`), times factors (p, m, s)."""
+    planes, steps = spectra.shape[:2]
+    width = weight.shape[2]
+    for s in range(steps):
+        for m in range(len(out)):
+            start, value = first[m, s], weight[m, s]
             total = 0j
             for p in range(planes):
-                some = spectra[p, s, int(first) : int(first) + width]
+                some = spectra[p, s, start : start + width]
                 re, im = 0.0, 0.0
                 for j in range(width):
-                    re += weight[j] * some[j].real
-                    im += weight[j] * some[j].imag
+                    re += value[j] * some[j].real
+                    im += value[j] * some[j].imag
                 total += complex(re, im) * factor[p, m, s]
             out[m, s] += total
 

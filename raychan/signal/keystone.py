@@ -35,6 +35,7 @@ from raychan.kernels.gridding import (
     spread,
     target_factor,
     transform,
+    weigh,
 )
 from raychan.radar.waveform import Waveform
 from raychan.units import C0
@@ -140,9 +141,13 @@ class Keystone:
         self.over = (1.0 - 2.0 * (k % 2)) / transform(self.width, k / self.length)
         self.along = 1.0 / transform(self.width, s / self.columns)
         shape = wave.n_chirps, wave.n_samples
-        self.place, self.factor = np.empty(shape), np.empty((self.planes, *shape), np.complex128)
+        place, self.factor = np.empty(shape), np.empty((self.planes, *shape), np.complex128)
         frame = np.array([wave.repetition, self.step, self.stretch, self.shift, self.dense, OVER, self.length])
-        stretched(self.place, self.factor, frame, self.rest, target_factor(self.width))
+        stretched(place, self.factor, frame, self.rest, target_factor(self.width))
+        # What all receivers share.
+        self.first = np.empty(shape, np.int64)
+        self.weight = np.empty((*shape, self.width), np.float32 if self.single else np.float64)
+        weigh(self.first, self.weight, place, self.pieces)
         order, most = order_of(box, (self.rows // _BOX[0] + 1) * across)
         # Where many echoes add up in one cell, single precision would round too often.
         self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
@@ -185,7 +190,7 @@ class Keystone:
                 exchange(spectra, rows, first - self.rows // 2, column, over, along)
             spectra = scipy.fft.fft(spectra, axis=2, overwrite_x=True)
             part, factor = np.s_[:, start:end], self.factor[:, :, start:end]
-            read(out[part], spectra, self.place[part], factor, self.pieces)
+            read(out[part], spectra, self.first[part], self.weight[part], factor)
 
         for _ in each(told, range(0, samples, _BLOCK)):
             pass
