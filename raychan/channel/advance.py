@@ -163,7 +163,7 @@ def _corner_ways(  # type: ignore[no-untyped-def]
             out[t, i, :] = now[:3]
 
 
-APART = 2e-3  # m of path: footprints longer than this in range give each corner its own delay
+APART = 3e-4  # m of path: footprints longer than this in range give each corner its own delay
 
 
 @njit(cache=True, parallel=True)
