@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from printed import table
 
 from raychan.channel.surface import Surface
 from raychan.run.chain import simulate
@@ -24,15 +25,16 @@ VARIANTS = {
     "two interactions": ([], 2),
 }
 
-# Table 10: parts that count as the thing, range [m], its tolerance [m], speed [m/s].
-TABLE_10 = {
-    "car tail": (("car.tail", "car.rear_bumper", "car.quarter_left"), 6.15, 0.1, 0.28),
-    "mirror": (("car.mirror_left",), 9.16, 0.1, 0.01),
-    "truck tail": (("truck.tail", "truck.lock_bars"), 18.22, 0.3, 0.04),
+# The parts that count as a thing of table 10.
+PARTS = {
+    "car_tail": ("car.tail", "car.rear_bumper", "car.quarter_left"),
+    "mirror": ("car.mirror_left",),
+    "truck_tail": ("truck.tail", "truck.lock_bars"),
 }
+TABLE_10 = table(10)
 SPEED = 0.15  # m/s
-GHOST, GHOST_SPEED = 22.5, 0.05  # Table 10
-STANDS = 13.5  # m, Table 4
+GHOST, WITHIN = TABLE_10["ghost"]["range"]["theirs"], TABLE_10["ghost"]["range"]["within"]
+STANDS = table(4)["pedestrian"]["range"]
 BIN = 0.0375  # m: c / 2B at 4 GHz
 
 
@@ -55,13 +57,15 @@ def with_pedestrian(result):
     return [w for w in result.provenance if "pedestrian" in w.bodies]
 
 
-@pytest.mark.parametrize("thing", TABLE_10)
+@pytest.mark.parametrize("thing", PARTS)
 def test_parts_of_car_and_truck_are_detected_where_table_10_has_them(base, thing):
-    parts, at, within, speed = TABLE_10[thing]
-    rows = [i for i in near(base, at, within) if any(p in base.provenance[i].bodies for p in parts)]
+    row = TABLE_10[thing]
+    at = row["range"] if isinstance(row["range"], dict) else {"theirs": row["range"], "within": 0.1}
+    here = near(base, at["theirs"], at["within"])
+    rows = [i for i in here if any(p in base.provenance[i].bodies for p in PARTS[thing])]
     assert rows
     best = rows[int(np.argmax(base.detections.power[rows]))]
-    assert base.detections.speed[best] == pytest.approx(speed, abs=SPEED)
+    assert base.detections.speed[best] == pytest.approx(row["speed"], abs=SPEED)
 
 
 def test_car_hides_point_and_silhouette_of_the_pedestrian(base):
@@ -89,12 +93,12 @@ def test_nothing_is_detected_where_the_pedestrian_stands(base):
 
 
 def test_ghost_of_table_10_is_multipath_over_the_trucks_tail(base):
-    rows = near(base, GHOST, 0.15)
+    rows = near(base, GHOST, WITHIN)
     assert len(rows) == 1
     why = base.provenance[rows[0]]
     assert why.label == "multipath"
     assert why.contributions[0].chain == ("truck.tail", "pedestrian", "truck.tail")
-    assert base.detections.speed[rows[0]] == pytest.approx(GHOST_SPEED, abs=SPEED)
+    assert base.detections.speed[rows[0]] == pytest.approx(TABLE_10["ghost"]["speed"], abs=SPEED)
 
 
 def test_every_ghost_is_as_long_as_its_path_to_a_bin(base):
@@ -103,7 +107,7 @@ def test_every_ghost_is_as_long_as_its_path_to_a_bin(base):
             first = why.contributions[0]
             assert first.range == pytest.approx(why.range, abs=BIN)
     image = np.array([2.0 * 17.507 - 12.880, -4.0, 1.1])
-    assert base.detections.range[near(base, GHOST, 0.15)[0]] == pytest.approx(
+    assert base.detections.range[near(base, GHOST, WITHIN)[0]] == pytest.approx(
         np.linalg.norm(image - [0.0, 0.0, 0.5]), abs=BIN
     )
 
@@ -111,7 +115,7 @@ def test_every_ghost_is_as_long_as_its_path_to_a_bin(base):
 @pytest.mark.parametrize("variant", ["no truck", "two interactions"])
 def test_no_ghost_without_the_truck_or_the_third_interaction(variant):
     found = ran(variant)
-    assert len(near(found, GHOST, 0.15)) == 0
+    assert len(near(found, GHOST, WITHIN)) == 0
     assert not with_pedestrian(found)
 
 
@@ -120,7 +124,7 @@ def test_without_the_car_the_direct_return_and_both_ghosts_are_there():
     chains = {round(w.range, 1): w for w in with_pedestrian(found)}
     assert STANDS in chains
     assert set(chains[STANDS].contributions[0].chain) <= {"ground", "pedestrian"}
-    assert len(near(found, GHOST, 0.15)) == 1
+    assert len(near(found, GHOST, WITHIN)) == 1
     halfway = near(found, 0.5 * (STANDS + GHOST), 0.1)
     assert len(halfway)
     leading = found.provenance[halfway[0]]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from printed import table
 
 from raychan.run.chain import background, receive, simulate
 from raychan.run.provenance import provenance
@@ -15,14 +16,8 @@ SCENE = Path(__file__).parents[1] / "scenes" / "urban.toml"
 CELL = 0.264  # m, Table 2
 SPEED = 0.12  # m/s
 
-# Range [m] and range rate [m/s], receding positive, of the simulated and of the measured column (whose
-# signs are opposite: the simulated one counts closing as positive).
-TABLE_3 = {
-    "suv": ((12.64, -0.40), (12.6, -0.40)),
-    "red_car": ((15.79, 1.95), (15.8, 2.0)),
-    "van": ((24.98, -0.39), (25.0, -0.40)),
-    "lamp": ((30.3, -7.0), (30.0, -7.0)),
-}
+# Range [m] and range rate [m/s], receding positive, of the simulated and of the measured column.
+TABLE_3 = {t: ((row["sim_range"], row["sim_rate"]), (row["range"], row["rate"])) for t, row in table(3).items()}
 
 
 @pytest.fixture(scope="module")

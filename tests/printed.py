@@ -1,0 +1,15 @@
+"""What the study prints, read from `validation/`, where its tables stand as data."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+_TABLES = Path(__file__).parents[1] / "validation" / "tables.toml"
+
+
+def table(number):
+    """Rows of a table of the study, by target; a cell with a tolerance of its own is a dict with `theirs`, `within`."""
+    every = tomllib.loads(_TABLES.read_text(encoding="utf-8"))["table"]
+    (rows,) = (t["rows"] for t in every if t["number"] == number)
+    return {row["target"]: row for row in rows}
