@@ -405,9 +405,10 @@ def theta_phi_of(look):
     return np.stack(theta_phi(look), axis=1).astype(complex)
 
 
-@pytest.mark.parametrize("azimuth_deg", [3.0, 37.0, 95.0, 171.0])
-def test_range_profile_of_a_car_is_that_of_a_finer_launch_over_another_lattice(azimuth_deg):
-    """Cells within 30 dB of the peak within 2 dB rms at under a million rays, 15 m away, 3 bounces."""
+@pytest.mark.parametrize(("azimuth_deg", "most"), [(3.0, 1.0), (37.0, 1.0), (95.0, 1.0), (100.0, 2.0), (171.0, 1.0)])
+def test_range_profile_of_a_car_is_that_of_a_finer_launch_over_another_lattice(azimuth_deg, most):
+    """Cells within 30 dB of the peak within 1 dB rms (2 dB where it returns least) at under a million rays, 15 m away, 3
+    bounces."""
     surface = Surface(facets_of(car(), "pec", F))
     leg = Leg(end=view(azimuth_deg)[0] * 15.0)
     coarse, fine = itertools.islice(refinements(surface, F), 2)
@@ -415,4 +416,4 @@ def test_range_profile_of_a_car_is_that_of_a_finer_launch_over_another_lattice(a
     assert surface.rays <= 1_000_000
     true = range_profile(surface, leg, 15.0, fine)
     seen = true > true.max() * 10.0 ** (-30.0 / 20.0)
-    assert 2.0 * rms(db(got / true)[seen]) < 2.0
+    assert rms(db(got / true)[seen]) < most
