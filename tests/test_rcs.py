@@ -407,7 +407,7 @@ def theta_phi_of(look):
 
 @pytest.mark.parametrize(("azimuth_deg", "most"), [(3.0, 1.0), (37.0, 1.0), (95.0, 1.0), (100.0, 2.0), (171.0, 1.0)])
 def test_range_profile_of_a_car_is_that_of_a_finer_launch_over_another_lattice(azimuth_deg, most):
-    """Cells within 30 dB of the peak within 1 dB rms (2 dB where it returns least) at under a million rays, 15 m away, 3
+    """Cells within 30 dB of the peak within 1 dB rms (2 dB where least returns), under a million rays, 15 m away, 3
     bounces."""
     surface = Surface(facets_of(car(), "pec", F))
     leg = Leg(end=view(azimuth_deg)[0] * 15.0)
