@@ -117,6 +117,8 @@ def _leaks(c: dict[str, Any], path: Path) -> Path:
         axes.plot(bound, y[none], "<", ms=5, mfc="none", color=colours[i])
         axes.plot([], [], "s", color=colours[i], label=f"{target}: {leaks[:, i].sum()} in {rays[:, i].sum():,} rays")
     axes.set_xscale("log")
+    low, high = np.log10(axes.get_xlim())
+    axes.set_xlim(10.0 ** np.floor(low), 10.0 ** np.ceil(high))
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(alpha=0.25, lw=0.5)
