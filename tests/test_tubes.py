@@ -14,6 +14,7 @@ from raychan.channel.legs import Leg
 from raychan.channel.rcs import facets_of, refinements
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
+from raychan.kernels.footprint import elements
 from raychan.kernels.po import triangle_terms
 from raychan.world.shapes import build
 
@@ -143,10 +144,11 @@ def test_elements_of_the_true_surface_add_up_to_its_area_and_point_along_its_nor
     surface = Surface(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
     every = np.arange(len(surface.area), dtype=np.int32)
     bary, weights = nodes(2, 4)
-    elements = surface.elements(every, np.broadcast_to(bary, (len(every), *bary.shape)))
-    assert (0.5 * np.linalg.norm(elements, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
-    points = surface.point(every, np.broadcast_to(bary, (len(every), *bary.shape)))
-    along = elements / np.linalg.norm(elements, axis=2, keepdims=True)
+    at = np.repeat(bary[None], len(every), axis=0)
+    normal = elements(every, at, surface.facets.vertices, surface.bulge)
+    assert (0.5 * np.linalg.norm(normal, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
+    points = surface.point(every, at)
+    along = normal / np.linalg.norm(normal, axis=2, keepdims=True)
     assert np.einsum("nij,nij->ni", along, points / 0.5).min() > np.cos(0.02)
 
 

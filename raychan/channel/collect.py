@@ -9,6 +9,7 @@ from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import CENTRE, Tubes, middles, vector_area
 from raychan.frames import sizes
+from raychan.kernels.footprint import tapers
 from raychan.tables import REFLECT, SCATTER, TRANSMIT, Routes
 
 Floats = NDArray[np.float64]
@@ -25,6 +26,9 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
     end = np.asarray(out.end, float)
     back_k, back = out.rays(tubes.points)
     middle, half_way = middles(surface, leg, tubes, first)
+    bent = surface.curved[tubes.facet] if first else np.zeros(n, bool)
+    lit = tubes.points, tubes.k, tubes.length, tubes.normals, back_k, back, out.far
+    shape = tubes.facet, tubes.bary, bent, surface.normal[tubes.facet], surface.facets.vertices, surface.bulge
     lengths = np.concatenate([tubes.length[:, :3] + back[:, :3], half_way + out.rays(middle)[1]], axis=1)
     vertices, normals, facets, kinds = tubes.history.tables(tubes.last, tubes.slots)
     if not first:
@@ -62,37 +66,13 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
         points=np.concatenate([tubes.points[:, :3], middle], axis=1),
         lengths=lengths,
         length=tubes.length[:, CENTRE] + back[:, CENTRE],
-        taper=_taper(surface, tubes, back_k, back, out.far, first),
+        taper=tapers(*(*lit, *shape)),
         area=sizes(vector_area(tubes.points)),
         spread_in=tubes.spread,
         spread_out=out.spread(back[:, CENTRE]),
         caustics=tubes.caustics,
         sigma=np.zeros(n),
     )
-
-
-def _taper(surface: Surface, tubes: Tubes, back_k: Floats, back: Floats, far: bool, first: bool) -> Floats:
-    """Return the mean obliquity times spreading at the corners over that at the centre (n, 3), for areas of the flat
-    footprint; zero beyond the terminator."""
-    towards = -0.5 * (tubes.k + back_k)
-    strength = np.einsum("nij,nij->ni", tubes.normals, towards)
-    flat = vector_area(tubes.points)
-    area = np.maximum(sizes(flat), 1e-300)
-    # Where the true surface turns away from the flat one there is more of it.
-    turned = np.abs(np.einsum("nij,nj->ni", tubes.normals[:, :3], flat / area[:, None]))
-    strength[:, :3] /= np.maximum(turned, 0.5)
-    if first:
-        rows = np.flatnonzero(surface.curved[tubes.facet])
-        lit = np.einsum("nij,nij->ni", surface.elements(tubes.facet[rows], tubes.bary[rows]), towards[rows, :3])
-        lit *= np.sign(np.einsum("ij,ij->i", surface.normal[tubes.facet[rows]], tubes.normals[rows, CENTRE]))[:, None]
-        share = 0.5 * np.abs(np.linalg.det(tubes.bary[rows]))
-        strength[rows, :3] = lit * (share / area[rows])[:, None]
-    strength = np.maximum(strength, 0.0)
-    if not far:
-        strength = strength / (tubes.length * back)
-    centre = strength[:, CENTRE:]
-    ratio = strength[:, :3] / np.where(centre > 0.0, centre, 1.0)
-    return np.clip(np.where(centre > 0.0, ratio, 0.0), 0.0, 4.0)
 
 
 def _retrace(

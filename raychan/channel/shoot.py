@@ -66,7 +66,8 @@ def tube_routes(
             else:
                 some, corners, passed = settle(surface, leg, out, some, found, first)
             if len(some):
-                found.add(phases_of(surface, leg, out, some, first, rule))
+                if not surface.convex_alone:
+                    found.add(phases_of(surface, leg, out, some, first, rule))
                 yield routes_of(surface, leg, out, some, first, corners, passed)
         if count >= bounces or surface.convex_alone:
             return

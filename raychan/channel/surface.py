@@ -183,15 +183,6 @@ class Surface(Tracer):
         v = np.einsum("n...i,nij->n...j", bary, self.facets.normals[facet])
         return v / sizes(v)[..., None]
 
-    def elements(self, facet: Ints, bary: Floats) -> Floats:
-        """Return vectors (n, m, 3) [m^2] normal to the true surface at barycentric coordinates (n, m, 3): its area for
-        a unit of the last two of these."""
-        v, c = self.facets.vertices[facet][:, :, None], self.bulge[facet][:, :, None]
-        l0, l1, l2 = (bary[..., i, None] for i in range(3))
-        along = v[:, 1] - v[:, 0] - (l0 - l1) * c[:, 0] - l2 * (c[:, 1] - c[:, 2])
-        aside = v[:, 2] - v[:, 0] + l1 * (c[:, 0] - c[:, 1]) - (l0 - l2) * c[:, 2]
-        return np.cross(along, aside)
-
     def strength(self, facet: Ints, cosine: Floats, wavenumber: float, passing: bool = False) -> Floats:
         """Return the larger of |R_s|, |R_p| (or of |T_s|, |T_p| when `passing`) at facets (n,) for cosines of
         incidence."""

@@ -223,8 +223,10 @@ def edge_lengths(tubes: Tubes) -> Floats:
 def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
     """Return the middles of the three edges (n, 3, 3) [m] and the lengths there (n, 3) [m]."""
     if first:
-        points = surface.point(tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1)))
-        return points, leg.rays(points)[1]
+        points, _, length, _ = _first_rays(
+            surface, leg, tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1))
+        )
+        return points[:, :3], length[:, :3]
     p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
     d = np.roll(p, -1, axis=1) - p
     bend = np.einsum("nij,nij->ni", k - np.roll(k, -1, axis=1), d)
