@@ -172,12 +172,6 @@ class Surface(Tracer):
         low, high = np.where(empty[:, None], 0.0, low), np.where(empty[:, None], 0.0, high)
         return 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1), empty
 
-    def point(self, facet: Ints, bary: Floats) -> Floats:
-        """Return points (n, ..., 3) of the true surface at barycentric coordinates (n, ..., 3)."""
-        flat = np.einsum("n...i,nij->n...j", bary, self.facets.vertices[facet])
-        pairs = bary * np.roll(bary, -1, axis=-1)
-        return flat - np.einsum("n...e,nej->n...j", pairs, self.bulge[facet])
-
     def normal_at(self, facet: Ints, bary: Floats) -> Floats:
         """Return unit normals (n, ..., 3) of the true surface at barycentric coordinates."""
         v = np.einsum("n...i,nij->n...j", bary, self.facets.normals[facet])
