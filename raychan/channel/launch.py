@@ -135,14 +135,16 @@ def sight(
 ) -> Sight:
     """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter.
 
-    Args: gaps whether to look for one through which a tube is seen that none of its rays is.
+    Args: first whether they stand on their first surface; gaps whether to look for one through which a tube is seen
+    that none of its rays is.
     """
     n = len(tubes)
     # Corners lie on edges that other facets share: draw them in a little.
     points = on_facets(surface, tubes) if first else tubes.points
     centre = points[:, CENTRE:]
     aim = centre + 0.98 * (points - centre)
-    # On a curved patch points hover over their facet: a hit a little before them is their own surface.
+    # Towards its terminator a curved surface is lit where its facets already turn away: then their own neighbours
+    # stand before them, by some of what it rises over them.
     k, _ = leg.rays(tubes.points[:, CENTRE])
     rise = tubes.points - surface.first[tubes.facet][:, None]
     hover = np.abs(np.einsum("nij,nj->ni", rise, surface.normal[tubes.facet])).max(axis=1)
