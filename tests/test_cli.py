@@ -126,6 +126,8 @@ def python(code):
 _STOPPED = """
 import os, signal, sys
 import raychan.channel.solve, raychan.cli
+# A job in the background starts deaf to it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 raychan.channel.solve.solve = lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)
 sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
 """
@@ -141,6 +143,8 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
 _STOPPED_IN_C = """
 import ctypes, os, signal, time
 import raychan.channel.solve, raychan.cli
+# A job in the background starts deaf to it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 stop = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))
 raychan.channel.solve.solve = lambda *a, **k: (stop(), time.sleep(50))
 raychan.cli.main(["run", {scene!r}, "--out", {out!r}])

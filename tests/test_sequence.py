@@ -125,6 +125,8 @@ def test_the_command_writes_a_directory_a_frame_and_one_list_of_detections(file,
 _STOPPED = """
 import os, signal, sys
 import raychan.cli, raychan.run.sequence as s
+# A job in the background starts deaf to it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 def one_then_stop(*a, **k):
     yield next(real(*a, **k))
     os.kill(os.getpid(), signal.SIGINT)

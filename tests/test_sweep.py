@@ -243,6 +243,8 @@ def test_wrong_words_are_told_in_a_sentence_and_write_nothing(options, words, fi
 _STOPPED = """
 import os, signal, sys
 import raychan.study.visibility, raychan.cli
+# A job in the background starts deaf to it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 raychan.study.visibility.occlusion = lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)
 sys.exit(raychan.cli.invoke(["study", "sweep", {scene!r}, "--target", "walker", "--out", {out!r}]))
 """
