@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import gc
+import pickle
 import weakref
 
 import numpy as np
@@ -66,6 +68,13 @@ def test_a_scene_is_built_once_for_all_seeds_and_radars(scene, builds):
     assert len(builds) == 1
     same(first, rc.simulate(rc.Scene.from_text(TEXT + BODIES), seed=1))
     assert len(builds) == 2
+
+
+def test_a_scene_that_has_run_can_be_sent_to_another_process(scene):
+    first = rc.simulate(scene, seed=1)
+    for sent in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
+        assert not sent.kept
+        same(first, rc.simulate(sent, seed=1))
 
 
 def test_a_moved_body_keeps_its_mesh_and_the_others_stay_what_they_are(scene, builds):

@@ -129,6 +129,10 @@ class Scene:
         text = self.text + "".join(f"\n# changed: {c}" for c in changes)
         return self._of(edit.changed(self._data, changes, self.path), self.path, text, self)
 
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy, perhaps in another process, makes its own.
+        return self.__dict__ | {"kept": {}}
+
     def _stands_as(self, other: Scene) -> bool:
         """Tell whether both scenes have the same bodies at the same places, of the same materials."""
         alike = len(self.bodies) == len(other.bodies) and all(map(is_, self.bodies, other.bodies))
