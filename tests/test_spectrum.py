@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from echoes import SMALL, WIDE, echoes, sensor
+from printed import figures
 
 from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
@@ -30,7 +31,7 @@ def test_a_lone_path_reads_its_received_power_in_every_window(name):
 
 
 @pytest.mark.parametrize("v", [-20.0, -3.3, 0.0, 7.77, 20.0])
-@pytest.mark.parametrize("bandwidth", [568.62e6, 4e9])
+@pytest.mark.parametrize("bandwidth", [0.57e9, 4e9])
 def test_ranges_and_rates_are_those_at_mid_frame_whatever_the_speed(v, bandwidth):
     wave = Waveform(77e9, bandwidth, 25.6e-6, 40e-6, 128, 1024)
     found = detect(rdmap(echoes([20.0], v), wave, "hann"), waveform=wave)
@@ -67,13 +68,17 @@ def test_c002_hann_doubles_it():
     assert 0.8 * 0.075 < gap_in_cells("hann", 1) * WIDE.range_resolution < 1.1 * 0.075
 
 
-def test_c003_range_resolution_of_568_62_mhz():
-    assert Waveform(76.5e9, 568.62e6, 50e-6, 61.02e-6, 256, 256).range_resolution == pytest.approx(0.2636, abs=1e-3)
+def test_c003_range_resolution_of_the_urban_waveform():
+    printed = figures(2)
+    urban = Waveform(76.5e9, printed["bandwidth"] * 1e6, 50e-6, 60e-6, 256, 256)
+    assert urban.range_resolution == pytest.approx(printed["range resolution"], abs=1e-3)
 
 
 def test_c004_c005_rate_resolutions():
     assert WIDE.rate_resolution == pytest.approx(0.380, rel=0.02)
-    assert Waveform(77e9, 568.62e6, 50e-6, 61.02e-6, 128, 256).rate_resolution == pytest.approx(0.249, rel=0.01)
+    printed = figures(2)
+    urban = Waveform(77e9, 0.5e9, 50e-6, printed["chirp"] * 1e-6, 128, 256)
+    assert urban.rate_resolution == pytest.approx(printed["speed resolution"], rel=0.01)
     assert gap_in_cells("rect", 0) == pytest.approx(1.0, rel=0.2)
 
 

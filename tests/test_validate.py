@@ -11,6 +11,8 @@ from collections import Counter
 import numpy as np
 import pytest
 from PIL import Image
+from printed import figures
+from printed import table as of_study
 
 from raychan.cli import invoke
 from raychan.report.validation_page import page
@@ -28,6 +30,10 @@ FORMULAS = ["C001", "C003", "C004", "C005", "C006", "C007", "C008", "C009", "C01
 PATTERNS = ["C046", "C047", "C048", "C049", "C051", "C052"]
 LAMBDA = 299_792_458.0 / 77e9
 TOLERANCE_DB = 3.0
+_ANTENNAS = of_study(7)
+PATCH, ARRAY = (_ANTENNAS[name]["gain"] for name in ("patch", "array_16x16"))
+WIDTHS = _ANTENNAS["patch"]["width_h"], _ANTENNAS["patch"]["width_v"]
+SPACING = tomllib.loads((HERE.parent / "scenes" / "antennas" / "array_16x16.toml").read_text("utf-8"))["spacing_y"]
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +59,9 @@ def test_each_table_and_claim_stands_there_once(study):
 
 
 def test_each_figure_has_a_key_of_its_own_and_a_measure_that_exists(study):
-    figures = [f for i in study.items for f in i.figure]
-    assert not [k for k, n in Counter(f.key for f in figures).items() if n > 1]
-    assert {f.measure[0] for f in figures} <= set(MEASURES)
+    every = [f for i in study.items for f in i.figure]
+    assert not [k for k, n in Counter(f.key for f in every).items() if n > 1]
+    assert {f.measure[0] for f in every} <= set(MEASURES)
 
 
 def test_numbers_are_held_to_a_tolerance_or_a_bound_unless_they_cannot_be_tested(study):
@@ -174,13 +180,14 @@ def test_claims_of_closed_form_agree(formulas, claim):
 def test_formulas_are_those_of_the_books(formulas):
     c0 = 299_792_458.0
     ours = {key: c.ours for key, c in formulas.items()}
-    assert ours["C003/range_resolution"] == pytest.approx(c0 / (2 * 568.62e6))
+    assert ours["C003/range_resolution"] == pytest.approx(c0 / (2e6 * figures(2)["bandwidth"]))
     assert ours["C004/speed_resolution"] == pytest.approx(LAMBDA / (2 * 128 * 40e-6))
     assert ours["C007/unambiguous_range_i_q"] == pytest.approx(1024 * c0 / (2 * 4e9))
     assert ours["C008/unambiguous_speed"] == pytest.approx(LAMBDA / (4 * 40e-6))
-    loss = 10 * math.log10((4 * math.pi) ** 3 * 13.5**4 / LAMBDA**2) - 0.85
+    away = of_study(4)["pedestrian"]["range"]
+    loss = 10 * math.log10((4 * math.pi) ** 3 * away**4 / LAMBDA**2) - 0.85
     assert ours["C052/path_loss_at_13_5_m"] == pytest.approx(loss)
-    assert ours["C052/reach"] == pytest.approx(13.5 * 10 ** ((10 + 7.06 + 120 - loss) / 40), rel=1e-4)
+    assert ours["C052/reach"] == pytest.approx(away * 10 ** ((10 + PATCH + 120 - loss) / 40), rel=1e-4)
     # CA-CFAR: N (pfa^(-1/N) - 1), and -ln pfa without end of training cells.
     assert ours["C051/threshold_32_cells"] == pytest.approx(10 * math.log10(32 * (1e7 ** (1 / 32) - 1)), abs=1e-6)
     assert ours["C051/threshold_noise_known"] == pytest.approx(10 * math.log10(7 * math.log(10)), abs=1e-3)
@@ -194,12 +201,12 @@ def patterns(study):
 
 def test_gain_of_array_over_patch_is_that_of_16_elements_in_a_row_over_a_power_of_the_cosine(patterns):
     angle = np.radians([0.0, 1.6, 2.6, 5.0, 10.0, 39.0])
-    x = np.pi * 0.917 * np.sin(angle)
+    x = np.pi * SPACING * np.sin(angle)
     row = np.sin(16 * x[1:]) / (16 * np.sin(x[1:]))
-    exponent = math.log(0.5) / math.log(math.cos(math.radians(43.0)))
-    wanted = 2 * (28.75 - 7.06) + 20 * np.log10(row**2) - 20 * exponent * np.log10(np.cos(angle[1:]))
+    exponent = math.log(0.5) / math.log(math.cos(math.radians(0.5 * WIDTHS[0])))
+    wanted = 2 * (ARRAY - PATCH) + 20 * np.log10(row**2) - 20 * exponent * np.log10(np.cos(angle[1:]))
     found = both_ways(patterns, np.degrees(angle))
-    assert found[0] == pytest.approx(43.38, abs=1e-6)
+    assert found[0] == pytest.approx(2 * (ARRAY - PATCH), abs=1e-6)
     assert found[1:] == pytest.approx(wanted, abs=1e-6)
 
 
@@ -223,10 +230,10 @@ def test_link_budget_is_the_radar_equation_over_thermal_noise(bench):
     found = link_snr(bench, "street", "pedestrian_1")
     away = np.array([13.366, 3.04, 1.1 - 0.5])
     r = float(np.linalg.norm(away))
-    exponent = [math.log(0.5) / math.log(math.cos(math.radians(0.5 * w))) for w in (86.0, 86.27)]
+    exponent = [math.log(0.5) / math.log(math.cos(math.radians(0.5 * w))) for w in WIDTHS]
     lateral = away[1] ** 2 / (away[1] ** 2 + away[2] ** 2)
     off = exponent[0] * lateral + exponent[1] * (1 - lateral)
-    gain = 7.06 + 10 * off * math.log10(away[0] / r)
+    gain = PATCH + 10 * off * math.log10(away[0] / r)
     # Facing -y: the torso is seen from 90 deg less the azimuth off its heading.
     aspect = 90.0 - math.degrees(math.atan2(away[1], away[0]))
     rcs = 10**0.085 + (10**0.035 - 10**0.085) * aspect / 90.0
