@@ -41,8 +41,7 @@ def _overview(done: Sequence[Tried], path: Path) -> Path:
         rng = np.random.default_rng(0)
         for i, t in enumerate(done):
             for r in t.outcome.rows:
-                share = r.off / r.tolerance if r.tolerance > 0 else (0.0 if r.passed else np.inf)
-                x = float(np.clip(share, 1e-6, _MOST))
+                x = float(np.clip(r.share, 1e-6, _MOST))
                 look: dict[str, Any] = {"marker": "o", "color": _GOOD, "ms": 3.5, "alpha": 0.6}
                 if not r.passed:
                     look = {"marker": "X", "color": _BAD, "ms": 6.0}

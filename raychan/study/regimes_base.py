@@ -47,6 +47,15 @@ class Row:
         return max(0.0, self.seen - self.expected) if self.bound else abs(self.seen - self.expected)
 
     @property
+    def share(self) -> float:
+        """How far off it is in what is allowed: at most 1 where it passed."""
+        if self.bound and self.expected > 0.0 and np.isfinite(self.seen):
+            return max(self.seen, 0.0) / self.expected
+        if self.tolerance > 0.0:
+            return self.off / self.tolerance
+        return 0.0 if self.passed else float("inf")
+
+    @property
     def passed(self) -> bool:
         """Whether what was seen lies within the tolerance."""
         return self.off <= self.tolerance

@@ -78,8 +78,7 @@ def summary(done: Iterable[Tried]) -> list[tuple[str, ...]]:
     out: list[tuple[str, ...]] = []
     for t in done:
         rows = t.outcome.rows
-        worst = max((r for r in rows if r.tolerance > 0.0), key=lambda r: r.off / r.tolerance, default=None)
-        share = "" if worst is None else f"{worst.off / worst.tolerance:.2g}"
+        share = f"{max((r.share for r in rows), default=0.0):.2g}"
         out.append((t.regime.title, str(len(rows)), str(len(t.failed)), share, f"{t.seconds:.1f}"))
     return out
 
