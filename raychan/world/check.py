@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
+from raychan.radar.waveform import Waveform
 from raychan.tables import MIRROR
+from raychan.world.body import Body
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
-
-if TYPE_CHECKING:
-    from raychan.world.body import Body
-    from raychan.world.scene import Scene
+from raychan.world.schema import RadarTable
 
 
-def radar_outside(scene: Scene) -> None:
+def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
     """Raise SceneError where the radar is inside a body or below a mirror."""
-    if scene.radar is None:
+    if radar is None:
         return
-    at = np.array(scene.radar.position)
-    for body in scene.bodies:
+    at = np.array(radar.position)
+    for body in bodies:
         local, mesh = body.motion.to_body(at), body.geometry
         if body.kind == MIRROR:
             c = mesh.corners[0]
@@ -45,14 +44,12 @@ def nearest_point(body: Body, at: Floats) -> Floats:
     return np.asarray(body.motion.to_world(points[np.argmin(np.linalg.norm(points - local, axis=1))]))
 
 
-def aliases(scene: Scene) -> list[str]:
+def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> list[str]:
     """Return a warning for each body whose nearest point reads a folded range or range rate, and what it will read."""
-    if scene.radar is None:
-        return []
-    waveform, said = scene.sensor.waveform, []
-    at, own = np.array(scene.radar.position), np.array(scene.radar.velocity_mps)
+    said = []
+    at, own = np.array(radar.position), np.array(radar.velocity_mps)
     limit, top = waveform.unambiguous_range, waveform.unambiguous_rate
-    for body in scene.bodies:
+    for body in bodies:
         if body.kind == MIRROR or _near_and_slow(body, at, own, limit, top):
             continue
         place = nearest_point(body, at) if body.rcs is None else body.motion.to_world(body.target_point())

@@ -152,7 +152,7 @@ class Scene:
                 _ = body.motion, body.kind
             except SceneError as e:
                 raise e.at(key="bodies") from None
-        check.radar_outside(self)
+        check.radar_outside(self.bodies, self.radar)
         if self.radar is not None:
             _ = self.sensor
 
@@ -180,7 +180,7 @@ class Scene:
         moved.__dict__.pop("warnings", None)
         moved.text, moved._data = f"{self.text}\n{edit.LATER}{time!r}" if self.text else "", None
         try:
-            check.radar_outside(moved)
+            check.radar_outside(moved.bodies, moved.radar)
         except SceneError as e:
             late = f"{e.problem} {time:g} s on"
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
@@ -204,7 +204,7 @@ class Scene:
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
         }
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
-        return said + check.aliases(self)
+        return said if self.radar is None else said + check.aliases(self.bodies, self.radar, self.sensor.waveform)
 
     def _chosen(self, body: Body) -> list[Material]:
         """Return the materials of a body's parts: the scene's own first, then the built-in ones."""
