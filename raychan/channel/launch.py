@@ -177,8 +177,10 @@ def sight(
 
 def on_facets(surface: Surface, tubes: Tubes) -> Floats:
     """Return the points (n, 4, 3) [m] of tubes on their first surface, put down on the flat facets that rays meet."""
-    points = tubes.points.copy()
     rows = np.flatnonzero(surface.curved[tubes.facet])
+    if not len(rows):
+        return tubes.points
+    points = tubes.points.copy()
     points[rows, :3] = tubes.bary[rows] @ surface.facets.vertices[tubes.facet[rows]]
     points[rows, CENTRE] = points[rows, :3].mean(axis=1)
     return points

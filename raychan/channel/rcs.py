@@ -35,9 +35,7 @@ _RAYS = 200.0  # of two launches over a flat body, about, for an area of max_edg
 _COVER = 1.8  # of the change between two launches
 _COVER_ALONE = 1.05  # the same where a body hides nothing of itself, so that launches cannot both miss it
 _CURVED = 0.01  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
-_TERMINATOR = (
-    0.25  # of the wavelength / 2 pi: what the sudden end of light leaves a sphere of any radius (Mie has none)
-)
+_TERMINATOR = 0.25  # of 1 / k: what light's sudden end leaves a sphere of any radius in physical optics, not in Mie
 _NULL = 1e-4  # of the strongest polarisation: -80 dB
 _GROWTH = 2.6  # rays of the next refinement over those of all before it, about
 

@@ -58,11 +58,6 @@ class Waveform:
         return C0 / self.carrier
 
     @property
-    def mid_frequency(self) -> float:
-        """Frequency at the middle of the sweep [Hz]: the one at which a whole frame measures Doppler and angle."""
-        return self.carrier + 0.5 * self.bandwidth
-
-    @property
     def range_resolution(self) -> float:
         """c/2B: the range cell of a rectangular window [m]."""
         return C0 / (2.0 * self.bandwidth)

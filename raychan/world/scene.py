@@ -188,9 +188,7 @@ class Scene:
 
     def bare(self) -> Scene:
         """Return the scene without what is kept for it: a result that stays does not hold on to that."""
-        alone = copy(self)
-        alone.kept = {}
-        return alone
+        return copy(self)
 
     def sensor_at(self, time: float) -> Any:
         """Return the radar.Sensor where its velocity has brought it at a time [s]."""
