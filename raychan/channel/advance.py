@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from raychan.channel.fields import transfer
+from raychan.kernels.jit import njit
 from raychan.kernels.po import triangle_terms
 from raychan.tables import REFLECT, SCATTER, Facets, Routes
 from raychan.units import C0

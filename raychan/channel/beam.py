@@ -7,11 +7,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from raychan.frames import direction
+from raychan.kernels.jit import njit
 
 Floats = NDArray[np.float64]
 

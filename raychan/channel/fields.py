@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.frames import sizes
 from raychan.kernels.fresnel import coefficients
+from raychan.kernels.jit import njit
 from raychan.kernels.po import huygens, triangle_terms
 from raychan.kernels.polar import dot, reflect, transmit
 from raychan.kernels.rows import in_two

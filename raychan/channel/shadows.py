@@ -5,12 +5,12 @@ from __future__ import annotations
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.channel.edges import above, cross_into, dot, inside, starts_again
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
+from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]

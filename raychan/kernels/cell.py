@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from raychan.kernels.beat import wave
+from raychan.kernels.jit import njit
 
 
 @njit(cache=True, nogil=True, inline="always")

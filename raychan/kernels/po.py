@@ -6,8 +6,8 @@ import cmath
 import math
 
 import numpy as np
-from numba import njit
 
+from raychan.kernels.jit import njit
 from raychan.kernels.polar import Vec, cross, dot, mirror, reflect
 
 

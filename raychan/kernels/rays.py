@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _FAR = 32.0  # radii of the ball about all facets from which an origin is far off
 
