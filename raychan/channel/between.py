@@ -76,8 +76,9 @@ class Between:
 
 def between(surface: Surface) -> Between:
     """Return the grid of a surface's edges, made once."""
-    if surface.between is None:
-        surface.between = Between(surface)
+    with surface.making:
+        if surface.between is None:
+            surface.between = Between(surface)
     found: Between = surface.between
     return found
 

@@ -54,8 +54,9 @@ def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
 
 
 def _screens(surface: Surface) -> Any:
-    if surface.screens is None:
-        surface.screens = Screens(surface)
+    with surface.making:
+        if surface.screens is None:
+            surface.screens = Screens(surface)
     return surface.screens
 
 

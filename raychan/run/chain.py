@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from raychan.channel.beam import beam_of
 from raychan.channel.profile import profile
-from raychan.channel.solve import join, refinement, solve
+from raychan.channel.solve import Stats, join, refinement, solve
 from raychan.channel.surface import Surface, surface_of
 from raychan.frames import direction
+from raychan.kernels.rows import at_once
 from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
@@ -104,35 +106,39 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     floor, cell = drowned(sensor, settings), C0 / sensor.waveform.bandwidth
     with clock.stage("geometry"):
         surface, points = surface_of(scene), scene.points(0.0)
-    # The coarse launch comes first: it tells what is needed, and later how wrong the fine one may be.
-    chosen = None
-    with clock.stage("check"):
-        rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
-        everything = model.diffraction or model.mode == "auto"
-        others, more = solve(surface, points, sensor, carrier, rule, model.max_bounces, diffraction=everything)
-        if model.mode == "auto":
-            noise = noise_of_cell(sensor, settings)
-            chosen = choose(others, sensor, settings, noise, model.tolerance_db)
-            model = _changed(
-                model,
-                {
-                    "max_bounces": chosen.bounces,
-                    "max_transmissions": chosen.transmissions,
-                    "diffraction": chosen.diffraction,
-                },
-            )
+        beam_of(sensor)
+    rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
+    slots, bounces, chosen = rule.slots, model.max_bounces, None
+
+    def coarse(diffraction: bool) -> tuple[Paths, Stats]:
+        """Launch on another lattice: it tells how wrong the fine launch may be."""
+        return solve(surface, points, sensor, carrier, rule, bounces, diffraction=diffraction)
+
+    if model.mode == "auto":
+        # With all mechanisms, it first tells which are needed.
+        with clock.stage("check"):
+            others, more = coarse(True)
+            chosen = choose(others, sensor, settings, noise_of_cell(sensor, settings), model.tolerance_db)
+            kept = {"max_bounces": chosen.bounces, "max_transmissions": chosen.transmissions}
+            model = _changed(model, kept | {"diffraction": chosen.diffraction})
     with clock.stage("trace"):
-        rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions, cell=cell)
-        rule = dataclasses.replace(rule, slots=others.kind.shape[1])
-        again = needed(scene, model.retrace, rule.max_edge)
+        finer = refinement(carrier, model.tolerance_db, floor, model.max_transmissions, cell=cell)
+        finer = dataclasses.replace(finer, slots=slots)
+        again = needed(scene, model.retrace, finer.max_edge)
         routes: list[Routes] = []
-        each = routes.append if again else None
-        way = (model.max_bounces, clock.tell, model.diffraction, each)
-        paths, stats = solve(surface, points, sensor, carrier, rule, *way)
+
+        def fine() -> tuple[Paths, Stats]:
+            way = (model.max_bounces, clock.tell, model.diffraction, routes.append if again else None)
+            return solve(surface, points, sensor, carrier, finer, *way)
+
+        if chosen:
+            paths, stats = fine()
+        else:
+            (paths, stats), (others, more) = at_once(fine, lambda: coarse(model.diffraction))
     turned = None
     if again:
         with clock.stage("retrace"):
-            turned = retraced(scene, rule, model, Traced(paths, tuple(routes)), partial(clock.tell, "retrace"))
+            turned = retraced(scene, finer, model, Traced(paths, tuple(routes)), partial(clock.tell, "retrace"))
     cost = {
         "rays": stats.rays + more.rays + (turned.rays if turned else 0),
         "tubes": stats.tubes,
