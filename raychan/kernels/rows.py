@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
@@ -37,11 +37,11 @@ class _Own(threading.local):
 _own = _Own()
 
 
-@lru_cache(maxsize=2)
-def _helper(name: str) -> ThreadPoolExecutor:
+@lru_cache(maxsize=1)
+def _helper() -> ThreadPoolExecutor:
     # A forked child has no threads of its parent's: it makes its own.
     os.register_at_fork(after_in_child=_helper.cache_clear)
-    return ThreadPoolExecutor(1, name)
+    return ThreadPoolExecutor(1, "raychan-rows")
 
 
 def in_two(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
@@ -52,7 +52,7 @@ def in_two(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
     if n < least or (_own.beside is not None and not _own.beside.is_set()):
         work(slice(0, n))
         return
-    other = _helper("raychan-rows").submit(work, slice(n // 2, n))
+    other = _helper().submit(work, slice(n // 2, n))
     try:
         work(slice(0, n // 2))
     finally:
@@ -66,25 +66,34 @@ def at_once(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
     before the other's.
     """
     ended, stop = threading.Event(), threading.Event()
+    found: list[B] = []
+    failed: list[BaseException] = []
 
-    def second() -> B:
+    def second() -> None:
         _own.beside, _own.stop = ended, stop
         try:
-            return there()
+            found.append(there())
+        except BaseException as error:
+            failed.append(error)
         finally:
             ended.set()
-            _own.beside = _own.stop = None
 
-    other = _helper("raychan-beside").submit(second)
+    # No thread of a pool: one that an interruption leaves behind must not keep the process from ending.
+    other = threading.Thread(target=second, name="raychan-beside", daemon=True)
     _own.beside = ended
     try:
-        found = here()
+        other.start()
+        first = here()
         ended.set()
-        return found, other.result()
+        other.join()
     except BaseException:
         stop.set()
         ended.set()
-        wait([other])
+        if other.is_alive():
+            other.join()
         raise
     finally:
         _own.beside = None
+    if failed:
+        raise failed[0]
+    return first, found[0]
