@@ -82,3 +82,11 @@ def test_what_the_second_raises_is_raised():
 
     with pytest.raises(ValueError, match="there"):
         at_once(lambda: 1, there)
+
+
+def test_a_ctrl_c_that_compiled_code_handed_on_as_a_fault_is_one():
+    def here() -> None:
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    with pytest.raises(KeyboardInterrupt):
+        at_once(here, lambda: None)

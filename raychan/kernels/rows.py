@@ -86,11 +86,14 @@ def at_once(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
         first = here()
         ended.set()
         other.join()
-    except BaseException:
+    except BaseException as failure:
         stop.set()
         ended.set()
         if other.is_alive():
             other.join()
+        # Compiled code that a Ctrl-C reaches while it waits for the interpreter's lock gives back a result all the same.
+        if isinstance(failure, SystemError) and isinstance(failure.__cause__, KeyboardInterrupt):
+            raise KeyboardInterrupt from failure
         raise
     finally:
         _own.beside = None
