@@ -91,7 +91,7 @@ def at_once(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
         ended.set()
         if other.is_alive():
             other.join()
-        # Compiled code that a Ctrl-C reaches while it waits for the interpreter's lock gives back a result all the same.
+        # Compiled code that a Ctrl-C reaches while it waits for the interpreter gives back a result all the same.
         if isinstance(failure, SystemError) and isinstance(failure.__cause__, KeyboardInterrupt):
             raise KeyboardInterrupt from failure
         raise
