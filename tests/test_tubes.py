@@ -10,6 +10,7 @@ import trimesh
 from helpers import facets, quad
 from truth import corner, po
 
+import raychan
 from raychan.channel.legs import Leg
 from raychan.channel.rcs import facets_of, refinements
 from raychan.channel.shoot import tube_routes
@@ -295,3 +296,13 @@ def test_patches_of_a_coarse_sphere_lie_on_the_sphere(subdivisions, share):
 def test_flat_facets_stay_flat():
     surface = Surface(facets_of(trimesh.creation.box((1, 2, 3)), "pec", F))
     assert not surface.curved.any()
+
+
+def test_tubes_launched_in_batches_carry_what_those_launched_at_once_do(monkeypatch):
+    found = []
+    for batch in (1 << 17, 50):
+        monkeypatch.setattr("raychan.channel.launch._BATCH", batch)
+        plate = raychan.rcs(build("plate", {"width": 0.5, "height": 0.4}), F, 20.0, distance=3.0)
+        ball = raychan.rcs(trimesh.creation.icosphere(subdivisions=4, radius=0.2), F, 20.0, max_bounces=1)
+        found.append((*plate.sigma.ravel(), *ball.sigma.ravel()))
+    assert found[1] == pytest.approx(found[0], rel=1e-9)

@@ -34,14 +34,26 @@ def tube_routes(
 
     Args: so_far what launches over other legs have found.
     """
-    f = surface.facets
     direct = outs[0]
     # Where a wave still has to bounce it does not matter how the antenna looks at the place.
     blind = replace(direct, beam=None)
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
-    tubes = launch(surface, leg, direct, bodies, found, more)
     mirror_planes = _planes_in(surface, outs)
+    for tubes in launch(surface, leg, direct, bodies, found, more):
+        yield from _followed(surface, leg, blind, outs, tubes, mirror_planes, bounces, found)
+
+
+def _followed(
+    surface: Surface, leg: Leg, blind: Leg, outs: list[Leg], tubes: Tubes, mirror_planes: NDArray[np.bool_],
+    bounces: int, found: Found,
+) -> Iterator[Routes]:  # fmt: skip
+    """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out.
+
+    Args: blind the way back, without its antenna, by which tubes are weighed that bounce again; mirror_planes (p,)
+    which planes are mirrors of the legs.
+    """
+    f, rule = surface.facets, found.rule
     first = True
     while len(tubes):
         count, body = int(tubes.bounces[0]), f.body[tubes.facet]
