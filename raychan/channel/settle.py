@@ -30,13 +30,13 @@ def settle(
         view = sight(surface, out, tubes, matters, first, rule, level < GAPS)
         back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
         lit = back < 0.0
-        rough = lit & view.seen.any(axis=1) & (ph.rough > 1.0)
+        rough = lit & view.some & (ph.rough > 1.0)
         mixed = lit & view.mixed
         split = (mixed | rough) & matters & (level < rule.levels)
-        ready = ~split & lit & view.seen[:, CENTRE]
+        ready = ~split & lit & view.centre.seen
         kept.append(tubes.take(ready))
-        ways.append(view.corners[ready])
-        layers.append(view.passed[ready])
+        ways.append(view.centre.corners[ready])
+        layers.append(view.centre.passed[ready])
         if not split.any():
             break
         # Bends come first: they need an edge of their own.

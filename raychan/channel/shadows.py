@@ -33,22 +33,21 @@ class Shadows:
             shape = np.ceil((high - low) / cell).astype(np.int64) + 3
             self._grid = *_fill(self.edges, leg.image, leg.far, low, cell, shape), low, cell, shape
         self._from = leg.image, leg.far, surface.touch
+        self._facets = surface.normal, surface.smooth
 
-    def across(self, points: Floats, normal: Floats, smooth: Ints, wanted: NDArray[np.bool_], slack: Floats) -> Floats:
+    def across(self, points: Floats, facet: Ints, slack: Floats) -> Floats:
         """Return signed distances (n, 3) [m] of tubes' corners from the longest shadow edge on each; zeros: none.
 
-        Args: points (n, 4, 3) [m] corners and centres; normal (n, 3) of the planes they lie on; smooth (n,) the smooth
-        patches they are of; wanted (n,) which tubes to look at; slack (n,) [m] in front of the plane that still belongs
-        to its own patch.
+        Args: points (n, 4, 3) [m] corners and centres of tubes on facets (n,); slack (n,) [m] in front of a facet that
+        still belongs to its own patch.
         """
-        if not len(self.edges):
-            return np.zeros((len(points), 3))
         side = np.zeros((len(points), 3))
+        if not len(self.edges):
+            return side
 
         def some(rows: slice) -> None:
-            tubes = points[rows], normal[rows], smooth[rows], wanted[rows], slack[rows]
-            shadows = *self._from, self.edges, self._smooth, *self._grid
-            _across(*(*tubes, *shadows, side[rows]))
+            shadows = *self._facets, *self._from, self.edges, self._smooth, *self._grid
+            _across(*(points[rows], facet[rows], slack[rows], *shadows, side[rows]))
 
         in_two(len(points), some, _MANY)
         return side
@@ -151,16 +150,14 @@ def _fill(edges, image, far, low, cell, shape):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _across(  # type: ignore[no-untyped-def]
-    points, normal, smooth, wanted, slack, image, far, touch, edges, edge_smooth, first, index, low, cell, shape, out
+    points, facet, slack, normals, smooth, image, far, touch, edges, edge_smooth, first, index, low, cell, shape, out
 ):
     n = len(points)
     tried = np.full(len(edges), -1, np.int64)
     side, m, work, k = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     x, least, most = np.empty(3), np.empty(3), np.empty(3)
     for i in range(n):
-        if not wanted[i]:
-            continue
-        centre = points[i, 3]
+        centre, normal, patch = points[i, 3], normals[facet[i]], smooth[facet[i]]
         for c in range(3):
             least[c], most[c] = np.inf, -np.inf
         for q in range(4):
@@ -173,7 +170,7 @@ def _across(  # type: ignore[no-untyped-def]
         size = np.sqrt(dot(k, k))
         for c in range(3):
             k[c] /= size
-        sign = -1.0 if dot(k, normal[i]) > 0.0 else 1.0
+        sign = -1.0 if dot(k, normal) > 0.0 else 1.0
         bulge = 0.0 if far else 0.125 * np.sum((most - least) ** 2)
         margin = 0.5 * cell + bulge
         i0, i1 = _cells(least[0] - margin, most[0] + margin, low[0], cell, shape[0])
@@ -191,10 +188,10 @@ def _across(  # type: ignore[no-untyped-def]
                     a, b = edges[e, 0], edges[e, 1]
                     ha, hb = 0.0, 0.0
                     for c in range(3):
-                        ha += sign * (a[c] - centre[c]) * normal[i, c]
-                        hb += sign * (b[c] - centre[c]) * normal[i, c]
+                        ha += sign * (a[c] - centre[c]) * normal[c]
+                        hb += sign * (b[c] - centre[c]) * normal[c]
                     # Only what lies in front of the tube's plane throws a shadow on it.
-                    own = edge_smooth[e, 0] == smooth[i] or edge_smooth[e, 1] == smooth[i]
+                    own = edge_smooth[e, 0] == patch or edge_smooth[e, 1] == patch
                     near = slack[i] if own else min(slack[i], touch)
                     begin, end = above(ha - near, hb - near)
                     if begin == end:
