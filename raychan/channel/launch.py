@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.edges import meeting_lines
 from raychan.channel.found import Found
-from raychan.channel.legs import Leg
+from raychan.channel.legs import Leg, View
 from raychan.channel.seeds import seeds
 from raychan.channel.shadows import shadows_of
 from raychan.channel.surface import Surface
@@ -26,10 +26,9 @@ from raychan.channel.tubes import (
     phases_of,
     stand,
     unit,
-    vector_area,
 )
-from raychan.frames import sizes
 from raychan.kernels.patch import edge_to_cut, halved, lit_parts
+from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
 Floats = NDArray[np.float64]
@@ -99,7 +98,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     kept: list[Tubes] = []
     rule = found.rule
 
-    def keep(view: Sight, ready: Bools) -> None:
+    def keep(view: View, ready: Bools) -> None:
         kept.append(tubes.take(ready))
         _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready], rule)
 
@@ -109,96 +108,88 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     tubes, ph = tubes.take(rows), ph.take(rows)
     # First by the centre rays alone: what nobody sees must not count, and the strongest lit surface may stand behind
     # a wall.
-    view = sight(surface, leg, tubes, np.zeros(len(tubes), bool), True, rule)
-    seen = view.seen[:, CENTRE]
-    found.add(ph.take(seen))
+    view = centres(surface, leg, tubes, True, rule)
+    found.add(ph.take(view.seen))
     matters = (ph.bound > found.doubt(ph.length)) & (not surface.convex_alone)
-    keep(view, seen & ~matters)
+    keep(view, view.seen & ~matters)
+    known: View | None = view.take(matters)
     tubes, matters = tubes.take(matters), matters[matters]
     for level in range(rule.levels + 1):
         if not len(tubes):
             break
-        view = sight(surface, leg, tubes, matters, True, rule, level < GAPS)
-        split = view.mixed & matters & (level < rule.levels)
-        keep(view, ~split & view.seen[:, CENTRE])
+        s = sight(surface, leg, tubes, matters, True, rule, level < GAPS, known)
+        split = s.mixed & matters & (level < rule.levels)
+        keep(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)
-        tubes, _ = divide(surface, leg, tubes.take(rows), rows, view.side[rows], True, rule)
+        tubes, _ = divide(surface, leg, tubes.take(rows), rows, s.side[rows], True, rule)
         ph = phases_of(surface, leg, out, tubes, True, rule)
-        matters = ph.bound > found.doubt(ph.length)
+        known, matters = None, ph.bound > found.doubt(ph.length)
     return Tubes.join(kept)
 
 
 @dataclass(frozen=True)
 class Sight:
-    """How tubes are seen over a leg: `seen` (n, 4) rays, way of the centre ray (`corners`, `passed`), and `side` (n,
-    3): where a shadow's edge runs through a tube, zeros where none is known."""
+    """How tubes are seen over a leg: by their centre rays (a `View`), by `some` (n,) ray, `mixed` (n,) in part; `side`
+    (n, 3): where a shadow's edge runs through a tube, zeros where none is known."""
 
-    seen: Bools
-    corners: Floats
-    passed: Ints
+    centre: View
+    some: Bools
+    mixed: Bools
     side: Floats
 
-    @property
-    def mixed(self) -> Bools:
-        """Tubes that are seen in part."""
-        some, whole = self.seen.any(axis=1), self.seen.all(axis=1)
-        return (some & ~whole) | (self.side != 0.0).any(axis=1)
+
+def centres(surface: Surface, leg: Leg, tubes: Tubes, first: bool, rule: Refinement) -> View:
+    """Return how the centres of tubes are seen over a leg; first whether these stand on their first surface."""
+    points = on_facets(surface, tubes) if first else tubes.points
+    shape = surface.first, surface.normal, leg.image, leg.far
+    aim, target, near, _ = aims(points, tubes.points, tubes.facet, *shape, True, np.zeros(len(tubes), bool))
+    return leg.visible(surface, aim, target, near, rule.layers)
 
 
 def sight(
-    surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, first: bool, rule: Refinement, gaps: bool = True
+    surface: Surface,
+    leg: Leg,
+    tubes: Tubes,
+    matters: Bools,
+    first: bool,
+    rule: Refinement,
+    gaps: bool = True,
+    centre: View | None = None,
 ) -> Sight:
     """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter.
 
     Args: first whether they stand on their first surface; gaps whether to look for one through which a tube is seen
-    that none of its rays is.
+    that none of its rays is; centre how their centres are seen, cast if not given.
     """
     n = len(tubes)
-    # Corners lie on edges that other facets share: draw them in a little.
     points = on_facets(surface, tubes) if first else tubes.points
-    centre = points[:, CENTRE:]
-    aim = centre + 0.98 * (points - centre)
-    # Towards its terminator a curved surface is lit where its facets already turn away: then their own neighbours
-    # stand before them, by some of what it rises over them.
-    k, _ = leg.rays(tubes.points[:, CENTRE])
-    rise = tubes.points - surface.first[tubes.facet][:, None]
-    hover = np.abs(np.einsum("nij,nj->ni", rise, surface.normal[tubes.facet])).max(axis=1)
-    slope = np.abs(np.einsum("ij,ij->i", k, surface.normal[tubes.facet]))
-    slack = 1e-5 + 3.0 * hover / np.maximum(slope, 0.05)
-    whole = np.flatnonzero(matters & (not surface.convex_alone))
-    ray = np.concatenate([4 * np.arange(n) + CENTRE, (4 * whole[:, None] + np.arange(3)).ravel()])
-    view = leg.visible(surface, aim.reshape(-1, 3)[ray], tubes.facet[ray // 4], slack[ray // 4], rule.layers)
-    seen, block = np.repeat(view.seen[:n], 4).reshape(n, 4), np.full((n, 4), -1, np.int32)
-    seen.reshape(-1)[ray], block.reshape(-1)[ray] = view.seen, view.blocker
-    source = np.broadcast_to(leg.image, (n, 3))
-    # Between two bodies that hide all four rays there may be a gap; behind one there is none.
-    covers = surface.smooth[block]
-    one = (block >= 0).all(axis=1) & (covers == covers[:, :1]).all(axis=1)
-    partly = matters & (seen.any(axis=1) | (gaps & ~one))
+    where = tubes.facet, surface.first, surface.normal, leg.image, leg.far
+    corners = np.zeros(n, bool) if surface.convex_alone else matters
+    aim, target, near, slack = aims(points, tubes.points, *where, centre is None, corners)
+    view = leg.visible(surface, aim, target, near, rule.layers)
+    if centre is None:
+        centre, view = view.take(slice(n)), view.take(slice(n, None))
+    rays = view.seen, view.blocker, centre.seen, centre.blocker, corners
+    some, mixed, look = read_rays(*rays, matters, gaps, surface.smooth)
     side = np.zeros((n, 3))
-    if partly.any():
-        stand_on = surface.normal[tubes.facet], surface.smooth[tubes.facet]
-        side = shadows_of(surface, leg).across(points, *stand_on, partly, slack)
-    # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
-    known = seen | (block >= 0)
-    facet = np.where(block >= 0, block, tubes.facet[:, None])
-    met = np.where(known, surface.plane[facet], -1)
-    own = vector_area(points)
-    own /= np.maximum(sizes(own), 1e-300)[:, None]
-    meeting_lines(points, source, -k, leg.far, met, block, surface.first, surface.normal, own, side)
-    side[~partly] = 0.0
-    return Sight(seen, view.corners[:n], view.passed[:n], side)
+    rows, points, met, planes, source, back, own = partly_seen(
+        look, points, tubes.facet, *rays, surface.plane, leg.image, leg.far
+    )
+    if len(rows):
+        found = shadows_of(surface, leg).across(points, tubes.facet[rows], slack[rows])
+        # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
+        meeting_lines(points, source, back, leg.far, planes, met, surface.first, surface.normal, own, found)
+        side[rows] = found
+        mixed[rows] |= (found != 0.0).any(axis=1)
+    return Sight(centre, some, mixed, side)
 
 
 def on_facets(surface: Surface, tubes: Tubes) -> Floats:
     """Return the points (n, 4, 3) [m] of tubes on their first surface, put down on the flat facets that rays meet."""
-    rows = np.flatnonzero(surface.curved[tubes.facet])
-    if not len(rows):
+    if not surface.curved[tubes.facet].any():
         return tubes.points
-    points = tubes.points.copy()
-    points[rows, :3] = tubes.bary[rows] @ surface.facets.vertices[tubes.facet[rows]]
-    points[rows, CENTRE] = points[rows, :3].mean(axis=1)
-    return points
+    found: Floats = put_down(tubes.points, tubes.facet, tubes.bary, surface.curved, surface.facets.vertices)
+    return found
 
 
 def divide(

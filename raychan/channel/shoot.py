@@ -13,8 +13,9 @@ from raychan.channel.found import Found
 from raychan.channel.launch import launch
 from raychan.channel.legs import Leg
 from raychan.channel.mirrors import reachable
+from raychan.channel.settle import settle
 from raychan.channel.surface import Surface
-from raychan.channel.trace import bounce, settle
+from raychan.channel.trace import bounce
 from raychan.channel.tubes import Refinement, Tubes, phases_of
 from raychan.tables import MIRROR, TRANSMIT, Routes
 

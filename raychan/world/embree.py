@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.kernels.facets import extents, planes_of
-from raychan.kernels.rays import clear, companions, land, plane_distances, set_out
+from raychan.kernels.rays import arrive, companions, land, plane_distances, set_out
 from raychan.kernels.rows import in_two
 from raychan.tables import LAYER, Facets
 
@@ -147,10 +147,8 @@ class Tracer:
         the way (-1: none).
         """
         n = len(origin)
-        reached = np.zeros(n, bool)
+        reached, blocker = np.zeros(n, bool), np.full(n, _MISS, np.int32)
         passed = np.full((n, layers), _MISS, np.int32)
-        blocker = np.full(n, _MISS, np.int32)
-        count = np.zeros(n, np.int64)
         todo, start = np.arange(n), np.zeros(n)
         if self.hides_nothing:
             # What looks towards the ray's start is then seen from it; each such point still counts as a ray.
@@ -158,21 +156,16 @@ class Tracer:
             reached = towards & (target >= 0) & (skip < 0)
             todo = np.flatnonzero(~reached)
             self._count(n - len(todo))
+        shape = self.plane, self.smooth, self.facets.vertices, self.normal, _EDGE * _SLACK * self._size
+        ways = limit, slack, target, self.touch, *shape
+        bodies = (self.facets.body, np.zeros(0, np.int64) if inside is None else inside.astype(np.int64))
+        layer = self.is_layer if self._any_layer else np.zeros(0, bool)
         while len(todo):
-            o, d, aim = origin[todo], direction[todo], target[todo]
-            facet, t = self.cast(o, d, skip[todo], start[todo])
-            ways = o, d, limit[todo], slack[todo], aim, self.touch
-            margin = _EDGE * _SLACK * self._size
-            free = clear(facet, t, *ways, self.plane, self.smooth, self.facets.vertices, self.normal, margin)
-            if inside is not None:
-                free |= self.facets.body[np.maximum(facet, 0)] == inside[todo]
-            reached[todo[free]] = True
-            blocker[todo] = np.where(free, _MISS, facet)
-            if not self._any_layer or layers == 0:
-                break
-            more = ~free & self.is_layer[facet] & (count[todo] < layers)
-            todo, facet, t = todo[more], facet[more], t[more]
-            passed[todo, count[todo]] = facet
-            count[todo] += 1
-            start[todo] = t + self._nearest
+            rays: Any = origin, direction, skip, start
+            if len(todo) < n:
+                rays = tuple(x[todo] for x in rays)
+            facet, t = self.cast(*rays)
+            more = arrive(*(todo, facet, t, *rays[:2], *ways, *bodies, layer, reached, passed, blocker))
+            todo = todo[more]
+            start[todo] = t[more] + self._nearest
         return reached, passed, blocker
