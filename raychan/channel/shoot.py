@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.collect import routes_of
+from raychan.channel.collect import routes_of, same_way_back
 from raychan.channel.found import Found
 from raychan.channel.launch import launch
 from raychan.channel.legs import Leg
@@ -17,7 +17,7 @@ from raychan.channel.settle import settle
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce
 from raychan.channel.tubes import Refinement, Tubes, phases_of
-from raychan.tables import MIRROR, TRANSMIT, Routes
+from raychan.tables import MIRROR, Routes
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def _followed(
                 continue
             some = tubes.take(rows)
             if first and out == leg:
-                corners, passed = _same_way_back(some, leg, rule)
+                corners, passed = same_way_back(some, len(leg.mirrors), rule.layers)
             else:
                 some, corners, passed = settle(surface, leg, out, some, found, first)
             if len(some):
@@ -97,14 +97,3 @@ def _followed(
 def _planes_in(surface: Surface, legs: list[Leg]) -> NDArray[np.bool_]:
     used = {int(surface.plane[m.facet]) for leg in legs for m in leg.mirrors}
     return np.isin(surface.plane, list(used))
-
-
-def _same_way_back(tubes: Tubes, leg: Leg, rule: Refinement) -> tuple[Floats, NDArray[np.int32]]:
-    """Return the way out of first-bounce tubes over the leg they came by, from their history."""
-    n, m = len(tubes), len(leg.mirrors)
-    vertices, _, facets, kinds = tubes.history.tables(tubes.last, tubes.slots)
-    passed = np.full((n, rule.layers), -1, np.int32)
-    for j in range(rule.layers):
-        slot = m + j
-        passed[:, j] = np.where(kinds[:, slot] == TRANSMIT, facets[:, slot], -1)
-    return vertices[:, :m], passed

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ import numpy as np
 
 from raychan.channel.beam import beam_of
 from raychan.channel.profile import profile
-from raychan.channel.solve import Stats, join, refinement, solve
+from raychan.channel.solve import Stats, refinement, solve
 from raychan.channel.surface import Surface, surface_of
 from raychan.frames import direction
 from raychan.kernels.rows import at_once
@@ -25,11 +24,11 @@ from raychan.radar.windows import processing_gain, window
 from raychan.run.auto import Choice, choose
 from raychan.run.ledger import ledger
 from raychan.run.microdoppler import needed, retraced
-from raychan.run.pieces import Retraced, Traced, heard
+from raychan.run.pieces import Retraced, Traced
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
 from raychan.run.spread import claimed, launch_share, motion, without
-from raychan.signal.cube import synthesize
+from raychan.signal.cube import noisy, synthesize
 from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, Points, RangeDoppler, Routes
 from raychan.units import C0
 from raychan.world.scene import Scene
@@ -108,7 +107,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         surface, points = surface_of(scene), scene.points(0.0)
         beam_of(sensor)
     rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
-    slots, bounces, chosen = rule.slots, model.max_bounces, None
+    bounces, chosen = model.max_bounces, None
 
     def coarse(diffraction: bool) -> tuple[Paths, Stats]:
         """Launch on another lattice: it tells how wrong the fine launch may be."""
@@ -123,7 +122,6 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
             model = _changed(model, kept | {"diffraction": chosen.diffraction})
     with clock.stage("trace"):
         finer = refinement(carrier, model.tolerance_db, floor, model.max_transmissions, cell=cell)
-        finer = dataclasses.replace(finer, slots=slots)
         again = needed(scene, model.retrace, finer.max_edge)
         routes: list[Routes] = []
 
@@ -159,15 +157,18 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         noise = sensor.noise_power if sensor.noise else 0.0
         pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
     with clock.stage("receive"):
-        cube, rdmap, detections = receive(paths, sensor, settings, noise_rng, channel.turned)
         turned, others = channel.turned, channel.others
+        quiet = turned.cube if turned else synthesize(paths, sensor)
+        cube = noisy(quiet, sensor, noise_rng)
+        rdmap, detections = received(cube, sensor, settings)
         below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(sensor, settings)
         if turned is None:
-            error = MapError(map_error(paths, others, sensor, settings).power + below)
+            error = MapError(map_error(quiet, others, sensor, settings).power + below)
         else:
             brought, doubt = (quiet_map(x, sensor, settings) for x in (turned.turning, turned.error))
             share = launch_share(paths, others, turned.turns, sensor)
-            still = map_error(without(paths, turned.turns), without(others, turned.turns), sensor, settings)
+            rest, others_rest = (without(x, turned.turns) for x in (paths, others))
+            still = map_error(synthesize(rest, sensor), others_rest, sensor, settings)
             error = MapError(still.power + doubt + share * brought + below)
     receiver = Receiver(
         sensor.waveform,
@@ -205,12 +206,8 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     )
 
 
-def receive(
-    paths: Paths, sensor: Sensor, settings: Any, rng: np.random.Generator, turned: Retraced | None = None
-) -> tuple[Cube, RangeDoppler, Detections]:
-    """Return what the receiver makes of the paths, or of the samples of a frame with turning bodies; it sees nothing
-    else of the scene."""
-    cube = turned.cube(sensor, rng) if turned else synthesize(paths, sensor, rng)
+def received(cube: Cube, sensor: Sensor, settings: Any) -> tuple[RangeDoppler, Detections]:
+    """Return what the receiver makes of its samples; it sees nothing else of the scene."""
     rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
     # The scene file names range before rate; a map's axes are rate, then range.
     sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
@@ -225,7 +222,7 @@ def receive(
         elements=np.asarray(sensor.elements),
         **sizes,
     )
-    return cube, rdmap, detections
+    return rdmap, detections
 
 
 def drowned(sensor: Sensor, settings: Any) -> float:
@@ -250,12 +247,10 @@ def noise_of_cell(sensor: Sensor, settings: Any) -> float:
     return float(sensor.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
 
 
-def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any) -> MapError:
-    """Return the map of what two launches differ by: their difference sent through the same receiver, without noise."""
-    difference = join([heard(paths), heard(others.replace(amplitude=-others.amplitude))])
-    return MapError(
-        quiet_map(synthesize(difference, dataclasses.replace(sensor, noise=False)).samples, sensor, settings)
-    )
+def map_error(quiet: Cube, others: Paths, sensor: Sensor, settings: Any) -> MapError:
+    """Return the map of what two launches differ by: the samples of one without noise less those of the other's
+    paths."""
+    return MapError(quiet_map(quiet.samples - synthesize(others, sensor).samples, sensor, settings))
 
 
 def quiet_map(samples: Any, sensor: Sensor, settings: Any) -> Any:

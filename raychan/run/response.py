@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.kernels.cell import cell_waves, periodic
+from raychan.kernels.cell import cell_waves, periodic, sums_in_cells
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
+Sums = tuple[Complexes, Floats, NDArray[np.int64]]
 
 _FINE = 64  # points of the tabulated window response per resolution cell
 _STEP = 0.25  # range cells that a path may move within one piece of the frame
@@ -50,18 +51,30 @@ class Response:
 
         Args: amplitude, delay [s] at the frame's start and rate [m/s] of paths; range [m] and rate [m/s] of the cell.
         """
+        found: tuple[Complexes, Floats] = cell_waves(amplitude, delay, rate, (range, cell_rate), *self._tables(rate))
+        return found
+
+    def in_cells(
+        self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
+    ) -> Sums:
+        """Return the sums by groups of what paths (n,) bring to cells (c, 2) of the map, each range [m] and rate [m/s]:
+        see kernels.cell.cell_sums.
+
+        Args: group (n,) of each path, below `count`; else as for `in_cell`.
+        """
+        found: Sums = sums_in_cells(group, count, amplitude, delay, rate, cells, *self._tables(rate))
+        return found
+
+    def _tables(self, rate: Floats) -> tuple[Any, ...]:
+        """Return ramp, sizes and tables for `cell_waves`, in as many pieces of the frame as the fastest path needs."""
         wave, count = self.waveform, len(self._rate)
-        middle = wave.carrier + self._swept
         moved = float(np.abs(rate).max(initial=0.0)) * wave.repetition / wave.range_resolution * count
         pieces = max(1, min(count, int(np.ceil(moved / _STEP))))
         if pieces not in self._pieces:
             self._pieces[pieces] = self._rate_tables(pieces)
+        middle = wave.carrier + self._swept
         ramp = (wave.carrier, wave.slope, wave.centre, self._swept, middle, wave.repetition, wave.range_resolution, C0)
-        sizes = (len(self._range), count, _FINE)
-        found: tuple[Complexes, Floats] = cell_waves(
-            amplitude, delay, rate, (range, cell_rate), ramp, sizes, self._range_tables, self._pieces[pieces]
-        )
-        return found
+        return ramp, (len(self._range), count, _FINE), self._range_tables, self._pieces[pieces]
 
     @property
     def _swept(self) -> float:

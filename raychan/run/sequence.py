@@ -99,9 +99,8 @@ def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
     shift = time * np.asarray(scene.sensor.velocity, float)
 
     def moved(paths: Paths) -> Paths:
-        there: Paths = paths.replace(
-            vertices=(paths.vertices + shift).astype(np.float32), tx=paths.tx + shift, rx=paths.rx + shift
-        )
+        ways = paths.ways.replace(vertices=(paths.ways.vertices + shift).astype(np.float32))
+        there: Paths = paths.replace(ways=ways, tx=paths.tx + shift, rx=paths.rx + shift)
         return there
 
     points = scene.points()
