@@ -110,3 +110,16 @@ def join(parts: list[Paths]) -> Paths:
     }
     way = np.concatenate([p.way + np.int32(first) for p, first in zip(parts, begin, strict=True)])
     return dataclasses.replace(parts[0], **rows, way=way, ways=Ways(**ways))
+
+
+def strongest(paths: Paths, most: int) -> Paths:
+    """Return the paths of the ways, `most` at most, that carry most power; in their order."""
+    power = np.bincount(paths.way, np.abs(paths.amplitude) ** 2, len(paths.ways.kind))
+    if len(power) <= most:
+        return paths
+    keep = np.zeros(len(power), bool)
+    keep[np.argsort(-power, kind="stable")[:most]] = True
+    rows, number = keep[paths.way], np.cumsum(keep, dtype=np.int32) - 1
+    ways = Ways(**{f.name: getattr(paths.ways, f.name)[keep] for f in dataclasses.fields(Ways)})
+    columns = {name: getattr(paths, name)[rows] for name in ("delay", "amplitude", "rate")}
+    return dataclasses.replace(paths, **columns, way=number[paths.way[rows]], ways=ways)

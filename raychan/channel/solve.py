@@ -80,7 +80,26 @@ def solve(
     diffraction: bool = False,
     each: Callable[[Routes], None] | None = None,
 ) -> tuple[Paths, Stats]:
-    """Return the paths of a scene seen by a monostatic radar, and what they cost.
+    """Return the paths of a scene seen by a monostatic radar, and what they cost; args as for `solve_into`."""
+    parts: list[Paths] = []
+    stats = solve_into(parts.append, facets, points, radar, frequency, rule, bounces, progress, diffraction, each)
+    return join(parts), stats
+
+
+def solve_into(
+    gather: Callable[[Paths], None],
+    facets: Facets | Surface,
+    points: Points,
+    radar: Radar,
+    frequency: float,
+    rule: Refinement,
+    bounces: int,
+    progress: Progress | None = None,
+    diffraction: bool = False,
+    each: Callable[[Routes], None] | None = None,
+) -> Stats:
+    """Give the paths of a scene seen by a monostatic radar to `gather`, batch by batch, at least one; return what they
+    cost.
 
     Args: facets, or the surface made of them, which serves many solutions;
     frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
@@ -94,10 +113,10 @@ def solve(
     stats.add("build", since)
     legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, beam_of(radar))
     stats.legs = len(legs)
-    parts: list[Paths] = []
+    gather(nothing(facets, radar))
 
     def carry(routes: Routes) -> None:
-        parts.append(paths_of(routes, facets, radar, frequency))
+        gather(paths_of(routes, facets, radar, frequency))
         if each:
             each(routes)
 
@@ -106,7 +125,8 @@ def solve(
     if found is not None:
         carry(found)
     if diffraction:
-        parts += diffracted_paths(surface, points, radar, frequency, rule.slots, legs)
+        for paths in diffracted_paths(surface, points, radar, frequency, rule.slots, legs):
+            gather(paths)
     found = _foot_points(surface, legs, rule)
     if found is not None:
         carry(found)
@@ -130,7 +150,7 @@ def solve(
     stats.rays = surface.rays - before
     if progress:
         progress("trace", 1.0)
-    return join(parts or [nothing(facets, radar)]), stats
+    return stats
 
 
 def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes | None:

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from raychan.channel.beam import beam_of
-from raychan.channel.profile import profile
-from raychan.channel.solve import Stats, refinement, solve
+from raychan.channel.profile import profile_of
+from raychan.channel.solve import Stats, refinement, solve_into
 from raychan.channel.surface import Surface, surface_of
+from raychan.channel.tubes import Refinement
 from raychan.frames import direction
 from raychan.kernels.rows import at_once
 from raychan.process.detect import detect
@@ -22,6 +23,7 @@ from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
 from raychan.radar.windows import processing_gain, window
 from raychan.run.auto import Choice, choose
+from raychan.run.gather import Gather, Launched
 from raychan.run.ledger import ledger
 from raychan.run.microdoppler import needed, retraced
 from raychan.run.pieces import Retraced, Traced
@@ -29,7 +31,7 @@ from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
 from raychan.run.spread import claimed, launch_share, motion, without
 from raychan.signal.cube import noisy, synthesize
-from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, Points, RangeDoppler, Routes
+from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler, Routes
 from raychan.units import C0
 from raychan.world.scene import Scene
 
@@ -64,9 +66,9 @@ class Channel:
 
     surface: Surface
     points: Points
-    paths: Paths
-    others: Paths
-    """Of the coarse launch, which tells how wrong the fine one may be."""
+    launched: Launched
+    others: Launched
+    """The coarse launch, which tells how wrong the fine one may be."""
     model: Any
     """The scene's, with what was asked for and what mode = "auto" chose."""
     chosen: Choice | None
@@ -109,15 +111,20 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
     bounces, chosen = model.max_bounces, None
 
-    def coarse(diffraction: bool) -> tuple[Paths, Stats]:
+    def launch(rule: Refinement, bounces: int, diffraction: bool, **more: Any) -> tuple[Launched, Stats]:
+        gather = Gather(sensor, settings.range_window)
+        stats = solve_into(gather.add, surface, points, sensor, carrier, rule, bounces, diffraction=diffraction, **more)
+        return gather.done(), stats
+
+    def coarse(diffraction: bool) -> tuple[Launched, Stats]:
         """Launch on another lattice: it tells how wrong the fine launch may be."""
-        return solve(surface, points, sensor, carrier, rule, bounces, diffraction=diffraction)
+        return launch(rule, bounces, diffraction)
 
     if model.mode == "auto":
         # With all mechanisms, it first tells which are needed.
         with clock.stage("check"):
             others, more = coarse(True)
-            chosen = choose(others, sensor, settings, noise_of_cell(sensor, settings), model.tolerance_db)
+            chosen = choose(others.paths, sensor, settings, noise_of_cell(sensor, settings), model.tolerance_db)
             kept = {"max_bounces": chosen.bounces, "max_transmissions": chosen.transmissions}
             model = _changed(model, kept | {"diffraction": chosen.diffraction})
     with clock.stage("trace"):
@@ -125,18 +132,20 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         again = needed(scene, model.retrace, finer.max_edge)
         routes: list[Routes] = []
 
-        def fine() -> tuple[Paths, Stats]:
-            way = (model.max_bounces, clock.tell, model.diffraction, routes.append if again else None)
-            return solve(surface, points, sensor, carrier, finer, *way)
+        def fine() -> tuple[Launched, Stats]:
+            more = {"progress": clock.tell, "each": routes.append if again else None}
+            return launch(finer, model.max_bounces, model.diffraction, **more)
 
         if chosen:
-            paths, stats = fine()
+            launched, stats = fine()
         else:
-            (paths, stats), (others, more) = at_once(fine, lambda: coarse(model.diffraction))
+            (launched, stats), (others, more) = at_once(fine, lambda: coarse(model.diffraction))
     turned = None
     if again:
         with clock.stage("retrace"):
-            turned = retraced(scene, finer, model, Traced(paths, tuple(routes)), partial(clock.tell, "retrace"))
+            turned = retraced(
+                scene, finer, model, Traced(launched.paths, tuple(routes)), partial(clock.tell, "retrace")
+            )
     cost = {
         "rays": stats.rays + more.rays + (turned.rays if turned else 0),
         "tubes": stats.tubes,
@@ -144,7 +153,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         "tracings": len(turned.times) if turned else 1,
         "tolerance_db": model.tolerance_db,
     }
-    return Channel(surface, points, paths, others, model, chosen, cost, turned)
+    return Channel(surface, points, launched, others, model, chosen, cost, turned)
 
 
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
@@ -152,23 +161,23 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     # Streams are numbered by stage, so that one more random stage leaves the others as they are.
     noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     sensor, settings = scene.sensor, scene.processing
-    facets, paths = channel.surface.facets, channel.paths
+    facets, paths, others = channel.surface.facets, channel.launched.paths, channel.others.paths
     with clock.stage("profile"):
         noise = sensor.noise_power if sensor.noise else 0.0
-        pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
+        pdp = profile_of(channel.launched.response, sensor.waveform, noise, settings.range_window)
     with clock.stage("receive"):
-        turned, others = channel.turned, channel.others
-        quiet = turned.cube if turned else synthesize(paths, sensor)
+        turned = channel.turned
+        quiet = turned.cube if turned else channel.launched.quiet
         cube = noisy(quiet, sensor, noise_rng)
         rdmap, detections = received(cube, sensor, settings)
         below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(sensor, settings)
         if turned is None:
-            error = MapError(map_error(quiet, others, sensor, settings).power + below)
+            error = MapError(map_error(quiet, channel.others.quiet, sensor, settings).power + below)
         else:
             brought, doubt = (quiet_map(x, sensor, settings) for x in (turned.turning, turned.error))
             share = launch_share(paths, others, turned.turns, sensor)
             rest, others_rest = (without(x, turned.turns) for x in (paths, others))
-            still = map_error(synthesize(rest, sensor), others_rest, sensor, settings)
+            still = map_error(synthesize(rest, sensor), synthesize(others_rest, sensor), sensor, settings)
             error = MapError(still.power + doubt + share * brought + below)
     receiver = Receiver(
         sensor.waveform,
@@ -199,7 +208,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         timings=clock.timings,
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
         stats=channel.stats | {"reached_db": max((r.error_db for r in reasons), default=0.0)},
-        warnings=tuple(scene.warnings),
+        warnings=(*scene.warnings, *_told(channel.launched)),
         scene=scene.bare(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
@@ -247,10 +256,9 @@ def noise_of_cell(sensor: Sensor, settings: Any) -> float:
     return float(sensor.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
 
 
-def map_error(quiet: Cube, others: Paths, sensor: Sensor, settings: Any) -> MapError:
-    """Return the map of what two launches differ by: the samples of one without noise less those of the other's
-    paths."""
-    return MapError(quiet_map(quiet.samples - synthesize(others, sensor).samples, sensor, settings))
+def map_error(quiet: Cube, others: Cube, sensor: Sensor, settings: Any) -> MapError:
+    """Return the map of what two launches differ by: the samples of one less those of the other, without noise."""
+    return MapError(quiet_map(quiet.samples - others.samples, sensor, settings))
 
 
 def quiet_map(samples: Any, sensor: Sensor, settings: Any) -> Any:
@@ -264,6 +272,14 @@ def background(facets: Facets) -> tuple[str, ...]:
     """Return the names of bodies that are never targets: mirrors (the ground) and the radar's carrier 'ego...'."""
     names = zip(facets.body_names, facets.role, strict=True)
     return tuple(name for name, role in names if role == MIRROR or name.startswith("ego"))
+
+
+def _told(launched: Launched) -> list[str]:
+    """Return what to tell of a launch that had more paths than a result can hold."""
+    kept = len(launched.paths.delay)
+    if launched.whole:
+        return []
+    return [f"{launched.count:,} paths: all are in the samples, the {kept:,} strongest are kept to explain them"]
 
 
 def _changed(model: Any, changes: dict[str, Any]) -> Any:
