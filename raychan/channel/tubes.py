@@ -16,7 +16,9 @@ from raychan.channel.history import History
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.frames import sizes
-from raychan.kernels.patch import phases, rays_on
+from raychan.kernels.patch import rays_on
+from raychan.kernels.phases import phases
+from raychan.kernels.rows import in_two
 from raychan.tables import REFLECT
 
 Floats = NDArray[np.float64]
@@ -25,6 +27,7 @@ Bools = NDArray[np.bool_]
 
 CENTRE = 3
 MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
+_MANY = 4096  # tubes from which on a second thread pays
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
@@ -254,17 +257,21 @@ class Phases:
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
     """Return the phases of tubes over the way out, and what each can scatter back at most."""
-    six, bend, bound, area, rough = phases(
-        tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary, first, surface.facets.vertices,
-        surface.bulge, leg.image, leg.far, out.image, out.far, rule.wavenumber, tubes.strength, tubes.spread,
-        rule.phase, rule.turn, MOST_BEND,
-    )  # fmt: skip
-    gain = out.weight(tubes.points[:, CENTRE])
-    dull = np.flatnonzero(surface.dull[tubes.facet])
-    cosine = np.abs(np.einsum("ij,ij->i", tubes.normals[dull, CENTRE], tubes.k[dull, CENTRE]))
-    gain[dull] *= surface.strength(tubes.facet[dull], cosine, rule.wavenumber)
-    bound, area = gain * bound, gain * area
-    return Phases(six, bend, bound, area, rough, six[:, :3].mean(axis=1) / rule.wavenumber)
+    n, f = len(tubes), surface.facets
+    six, bend, (bound, area, rough, way) = np.empty((n, 6)), np.empty((n, 3)), np.empty((4, n))
+    rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary
+    held = tubes.strength, tubes.spread
+    written = six, bend, bound, area, rough, way
+    shape = f.vertices, surface.bulge, leg.image, leg.far, out.antenna, rule.wavenumber
+    m = f.materials
+    stuff = surface.dull, f.material, (m.kind, m.eps, m.thickness, m.roughness)
+
+    def some(rows: slice) -> None:
+        here, of, to = ([x[rows] for x in arrays] for arrays in (rays, held, written))
+        phases(*(*here, first, *shape, *of, (rule.phase, rule.turn, MOST_BEND), *stuff, *to))
+
+    in_two(n, some, _MANY)
+    return Phases(six, bend, bound, area, rough, way)
 
 
 def unit(v: Floats) -> Floats:
