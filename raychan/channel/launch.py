@@ -26,7 +26,7 @@ from raychan.channel.tubes import (
     stand,
     unit,
 )
-from raychan.kernels.patch import edge_to_cut, halved, lit_parts
+from raychan.kernels.patch import edge_to_cut, halved, lit_parts, may_be_lit
 from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
@@ -49,6 +49,8 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     allowed = bodies & (f.role == SCATTERER)
     allowed[list(leg.bodies)] = False
     facet = seeds(surface, leg, allowed)
+    if out != leg:
+        facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
     if not len(facet):
         return stand(surface, leg, facet, np.zeros((0, 3, 3)), rule.slots)
     facet, bary = _cut_for_phase(facet, shape, ways, rule, not more)

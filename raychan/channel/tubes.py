@@ -87,12 +87,16 @@ class Tubes:
 
     def take(self, index: NDArray[np.generic]) -> Tubes:
         """Return the tubes at `index` (mask or numbers)."""
-        return Tubes(**{name: getattr(self, name)[index] for name in _ROWS}, history=self.history)
+        rows = numbers(index)
+        return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _ROWS}, history=self.history)
 
     @staticmethod
     def join(parts: list[Tubes]) -> Tubes:
         """Return all tubes of several sets of one launch as one."""
-        rows = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _ROWS}
+        some = [p for p in parts if len(p)] or parts[:1]
+        if len(some) == 1:
+            return some[0]
+        rows = {name: np.concatenate([getattr(p, name) for p in some]) for name in _ROWS}
         return Tubes(**rows, history=parts[0].history)
 
     def append(self, rows: NDArray[np.generic], vertex: Floats, normal: Floats, facet: Ints, kind: int) -> None:
@@ -252,7 +256,8 @@ class Phases:
 
     def take(self, index: NDArray[np.generic]) -> Phases:
         """Return the phases of the tubes at `index` (mask or numbers)."""
-        return Phases(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        rows = numbers(index)
+        return Phases(**{f.name: getattr(self, f.name).take(rows, axis=0) for f in fields(self)})
 
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
@@ -272,6 +277,11 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
 
     in_two(n, some, _MANY)
     return Phases(six, bend, bound, area, rough, way)
+
+
+def numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:
+    """Return the numbers of the rows at `index` (mask or numbers): to take rows by these is up to ten times faster."""
+    return np.flatnonzero(index) if index.dtype == np.bool_ else np.asarray(index, np.intp)
 
 
 def unit(v: Floats) -> Floats:

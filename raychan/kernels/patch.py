@@ -177,6 +177,40 @@ def _lit(v, n, b, is_open, w, image, far, way_image, way_far, cosine, p, normal,
         cosine[q] = -sign * _dot(k, normal)
 
 
+@njit(cache=True, inline="always")
+def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
+    """Return 1 if all of a facet's true surface is turned to the image, -1 if all away, 0 if that is not sure."""
+    low, high = np.inf, -np.inf
+    for i in range(3):
+        swell = 0.0
+        for j in range(3):
+            # The edges' bulges weigh a third in all at most.
+            swell = max(swell, abs(_dot(n[i], b[j])) / 3.0)
+        for j in range(3):
+            height = 0.0
+            for c in range(3):
+                height += n[i, c] * (image[c] if far else image[c] - v[j, c])
+            low, high = min(low, height - swell), max(high, height + swell)
+    return 1 if low > 0.0 else (-1 if high < 0.0 else 0)
+
+
+@njit(cache=True, inline="always")
+def _lit_whole(v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
+    """Return 1 if all of a facet faces the end of a way, -1 if nothing of it does, 0 if that is not sure."""
+    towards = _faces(v, n, b, way_image, way_far)
+    return towards * _faces(v, n, b, image, far) if is_open else towards
+
+
+@njit(cache=True, nogil=True)
+def may_be_lit(facet, v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
+    """Tell of which facets (n,) some part may face the end of a way (see `lit_parts`)."""
+    out = np.empty(len(facet), np.bool_)
+    for i in range(len(facet)):
+        f = facet[i]
+        out[i] = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, way_image, way_far) >= 0
+    return out
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def lit_parts(facet, bary, v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
     """Return (facet, bary) of the parts of patches that face the end of a way, cut along the terminator.
@@ -187,9 +221,16 @@ def lit_parts(facet, bary, v, n, b, is_open, image, far, way_image, way_far):  #
     facets, barys = np.empty(3 * m, facet.dtype), np.empty((3 * m, 3, 3))
     p, normal, k, cosine, side = np.empty((4, 3)), np.empty(3), np.empty(3), np.empty(4), np.empty(3)
     part = np.empty((3, 3, 3))
-    count = 0
+    count, f, whole = 0, -1, 0
     for i in range(m):
-        f = facet[i]
+        if facet[i] != f:
+            f = facet[i]
+            whole = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, way_image, way_far)
+        if whole != 0:
+            if whole > 0:
+                facets[count], barys[count] = f, bary[i]
+                count += 1
+            continue
         _lit(v[f], n[f], b[f], is_open[f], bary[i], image, far, way_image, way_far, cosine, p, normal, k)
         corner = cosine[:3]
         if not (corner.max() > 1e-9 and corner.min() < -1e-9):
