@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,11 @@ class View:
     def take(self, index: NDArray[np.generic] | slice) -> View:
         """Return how the points at `index` (mask, numbers or slice) are seen."""
         return View(self.seen[index], self.corners[index], self.passed[index], self.blocker[index])
+
+    @staticmethod
+    def join(parts: list[View]) -> View:
+        """Return how the points of several views are seen as one."""
+        return View(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(View)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,11 +64,11 @@ def tube_routes(
             some = tubes.take(rows)
             if first and out == leg:
                 corners, passed = _same_way_back(some, leg, rule)
+                if not surface.convex_alone:
+                    found.add(phases_of(surface, leg, out, some, first, rule))
             else:
                 some, corners, passed = settle(surface, leg, out, some, found, first)
             if len(some):
-                if not surface.convex_alone:
-                    found.add(phases_of(surface, leg, out, some, first, rule))
                 yield routes_of(surface, leg, out, some, first, corners, passed)
         if count >= bounces or surface.convex_alone:
             return

@@ -259,6 +259,11 @@ class Phases:
         rows = numbers(index)
         return Phases(**{f.name: getattr(self, f.name).take(rows, axis=0) for f in fields(self)})
 
+    @staticmethod
+    def join(parts: list[Phases]) -> Phases:
+        """Return the phases of several sets of tubes as one."""
+        return Phases(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Phases)})
+
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
     """Return the phases of tubes over the way out, and what each can scatter back at most."""
