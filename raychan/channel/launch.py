@@ -27,7 +27,7 @@ from raychan.channel.tubes import (
     stand,
     unit,
 )
-from raychan.kernels.patch import edge_to_cut, halved, lit_parts
+from raychan.kernels.patch import edge_to_cut, halved, lit_parts, may_be_lit
 from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
@@ -50,7 +50,10 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     ways = leg.image, leg.far, out.image, out.far
     allowed = bodies & (f.role == SCATTERER)
     allowed[list(leg.bodies)] = False
-    for facet, bary in _cut_for_phase(seeds(surface, leg, allowed), shape, ways, rule, not more):
+    facet = seeds(surface, leg, allowed)
+    if out != leg:
+        facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
+    for facet, bary in _cut_for_phase(facet, shape, ways, rule, not more):
         facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
         if out != leg:
             facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)

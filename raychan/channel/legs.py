@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.beam import Beam
 from raychan.channel.surface import Surface
-from raychan.kernels.chains import bounces, may_leave, possible, rays_from, stretch
+from raychan.kernels.chains import bounces, may_leave, possible, rays_from, stretch, weights
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -61,6 +61,11 @@ class View:
         """Return how the points at `index` (mask, numbers or slice) are seen."""
         return View(self.seen[index], self.corners[index], self.passed[index], self.blocker[index])
 
+    @staticmethod
+    def join(parts: list[View]) -> View:
+        """Return how the points of several views are seen as one."""
+        return View(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(View)))
+
 
 @dataclass(frozen=True, eq=False)
 class Leg:
@@ -98,9 +103,15 @@ class Leg:
 
     def weight(self, points: Floats) -> Floats:
         """Return the field (n,) that the end's antenna sends to points over this leg, relative to its strongest."""
-        if self.beam is None:
-            return np.ones(len(points))
-        return self.beam(self._look(points)[0])
+        found: Floats = weights(np.ascontiguousarray(points), *self.antenna)
+        return found
+
+    @property
+    def antenna(self) -> tuple[Any, ...]:
+        """What the kernels ask of the end's antenna: images, far, normals of the mirrors, table of its beam (empty:
+        alike everywhere)."""
+        images, _, normals = self._chain[:3]
+        return images, self.far, normals, np.zeros((0, 0)) if self.beam is None else self.beam.table
 
     def dark(self, points: Floats, radius: Floats) -> Bools:
         """Tell to which balls (n,), about points (n, 3) [m], the end's antenna sends nothing at all over this leg."""

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from raychan.channel.found import Found
 from raychan.channel.launch import GAPS, divide, sight
-from raychan.channel.legs import Leg
+from raychan.channel.legs import Leg, View
 from raychan.channel.surface import Surface
-from raychan.channel.tubes import CENTRE, Tubes, halves, phases_of
+from raychan.channel.tubes import Phases, Tubes, halves, phases_of
+from raychan.kernels.sight import BENT, READY, SHADED, sort_out
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -20,29 +21,28 @@ def settle(
 ) -> tuple[Tubes, Floats, Ints]:
     """Cut tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
 
-    Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
+    What is seen counts as found. Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way
+    out.
     """
-    kept, ways, layers = [], [], []
+    kept: list[tuple[Tubes, View, Phases]] = []
     rule = found.rule
     for level in range(rule.levels + 1):
         ph = phases_of(surface, leg, out, tubes, first, rule)
         matters = ph.bound > found.doubt(ph.length)
         view = sight(surface, out, tubes, matters, first, rule, level < GAPS)
-        back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
-        lit = back < 0.0
-        rough = lit & view.some & (ph.rough > 1.0)
-        mixed = lit & view.mixed
-        split = (mixed | rough) & matters & (level < rule.levels)
-        ready = ~split & lit & view.centre.seen
-        kept.append(tubes.take(ready))
-        ways.append(view.centre.corners[ready])
-        layers.append(view.centre.passed[ready])
-        if not split.any():
+        cut = matters if level < rule.levels else np.zeros_like(matters)
+        seen = view.centre.seen, view.some, view.mixed
+        what = sort_out(tubes.points, tubes.normals, out.image, out.far, *seen, ph.rough, cut)
+        ready, bent, shaded = (np.flatnonzero(what == w) for w in (READY, BENT, SHADED))
+        kept.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
+        if not len(bent) and not len(shaded):
             break
-        # Bends come first: they need an edge of their own.
-        bent, shaded = np.flatnonzero(split & rough), np.flatnonzero(split & ~rough)
         edge = np.argmax(np.abs(ph.bend[bent]), axis=1)
         halved = halves(surface, leg, tubes.take(bent), edge, first, rule.jitter)
         parted, _ = divide(surface, leg, tubes.take(shaded), shaded, view.side[shaded], first, rule)
         tubes = Tubes.join([halved, parted])
-    return Tubes.join(kept), np.concatenate(ways), np.concatenate(layers)
+    some, views, phases = zip(*kept, strict=True)
+    if not surface.convex_alone:
+        found.add(Phases.join(list(phases)))
+    way = View.join(list(views))
+    return Tubes.join(list(some)), way.corners, way.passed

@@ -76,11 +76,11 @@ def _followed(
             some = tubes.take(rows)
             if first and out == leg:
                 corners, passed = same_way_back(some, len(leg.mirrors), rule.layers)
+                if not surface.convex_alone:
+                    found.add(phases_of(surface, leg, out, some, first, rule))
             else:
                 some, corners, passed = settle(surface, leg, out, some, found, first)
             if len(some):
-                if not surface.convex_alone:
-                    found.add(phases_of(surface, leg, out, some, first, rule))
                 yield routes_of(surface, leg, out, some, first, corners, passed)
         if count >= bounces or surface.convex_alone:
             return

@@ -41,7 +41,7 @@ class Surface(Tracer):
         self.between: Any = None
         self.screens: Any = None
         # What was found out about a leg, once.
-        self.shadows: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
+        self.shadows: dict[Any, Any] = {}
         self.reach: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
         joints = joints or ([self._joints()] if n else [])
         self._joined = list(zip(joints, np.cumsum([0, *(len(j.plane) for j in joints)]), strict=False))

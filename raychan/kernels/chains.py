@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from raychan.kernels.beam import field_towards
 from raychan.kernels.jit import njit
 from raychan.kernels.patch import length_to
 
@@ -140,3 +141,28 @@ def rays_from(points, image, far):  # type: ignore[no-untyped-def]
         for c in range(3):
             k[i, c] = -image[c] if far else (points[i, c] - image[c]) / length[i]
     return k, length
+
+
+@njit(cache=True, inline="always")
+def weight(p, images, far, normal, table, look):  # type: ignore[no-untyped-def]
+    """Return the field that the end's antenna, with a table of its beam (empty: alike everywhere), sends to p."""
+    if len(table) == 0:
+        return 1.0
+    m = len(normal)
+    size = 1.0 if far else length_to(p, images[m], False)
+    for c in range(3):
+        look[c] = -images[m, c] if far else (p[c] - images[m, c]) / size
+    for i in range(m - 1, -1, -1):
+        twice = 2.0 * (look[0] * normal[i, 0] + look[1] * normal[i, 1] + look[2] * normal[i, 2])
+        for c in range(3):
+            look[c] -= twice * normal[i, c]
+    return field_towards(look, table)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def weights(points, images, far, normal, table):  # type: ignore[no-untyped-def]
+    """Return the fields (n,) of `weight` at points (n, 3) [m]."""
+    out, look = np.empty(len(points)), np.empty(3)
+    for i in range(len(points)):
+        out[i] = weight(points[i], images, far, normal, table, look)
+    return out
