@@ -53,11 +53,11 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     facet = seeds(surface, leg, allowed)
     if out != leg:
         facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
-    for facet, bary in _cut_for_phase(facet, shape, ways, rule, not more):
-        facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
+    for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
+        part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
         if out != leg:
-            facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
-        yield _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found, more)
+            part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways)
+        yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary, rule.slots), found, more)
 
 
 def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> Iterator[tuple[Ints, Floats]]:

@@ -85,9 +85,8 @@ def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # typ
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type: ignore[no-untyped-def]
-    weight = math.sqrt(wave.real**2 + wave.imag**2)
+    weight = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
     total[c, g] += wave
-    size[c, 0, g] += 1.0
     size[c, 1, g] += weight
     size[c, 2, g] += weight * at_range
     size[c, 3, g] += weight * rate
@@ -97,20 +96,30 @@ def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sums_in_cells(  # type: ignore[no-untyped-def]
-    group, count, amplitude, delay, rate, cells, ramp, sizes, across, along
+    group, amplitude, delay, rate, cells, least, most_of, total, size, strongest, ramp, sizes, across, along
 ):
-    """Return the `cell_sums` of what echoes (n,) bring to each of several cells (c, 2); arguments as for
-    `cell_waves`."""
-    found = len(cells)
-    total, size = np.zeros((found, count), np.complex128), np.zeros((found, 4, count))
-    strongest, most = np.full((found, count), -1), np.full((found, count), -1.0)
+    """Write the `cell_sums` (c, ...) of what echoes (n,) bring to each of several cells (c, 2).
+
+    Args: least (c,) of the response to an echo that counts; most_of (s,) the largest that the range response and its
+    slope are so many cells from the peak and farther; else as for `cell_waves` and `cell_sums`.
+    """
+    samples, chirps, _ = sizes
+    middle, resolution = ramp[4], ramp[6]
+    most = np.full(strongest.shape, -1.0)
+    total[:], size[:], strongest[:] = 0.0, 0.0, -1
     for i in range(delay.size):
         at_range, turn = _stands(delay[i], rate[i], ramp)
         turn *= amplitude[i]
-        for c in range(found):
+        half = 0.5 * abs(rate[i]) * ramp[5] / resolution * chirps
+        for c in range(len(cells)):
+            size[c, 0, group[i]] += 1.0
+            away = abs(at_range - cells[c, 0] + (rate[i] - cells[c, 1]) * middle / ramp[1]) / resolution
+            away -= samples * math.floor(away / samples)
+            away = max(min(away, samples - away) - half, 0.0)
+            if most_of[int(away)] * (1.0 + half) < least[c]:
+                continue
             wave = turn * _answer(at_range, rate[i], cells[c, 0], cells[c, 1], ramp, sizes, across, along)
             _count(c, group[i], i, wave, at_range, rate[i], total, size, strongest, most)
-    return total, size, strongest
 
 
 @njit(cache=True, nogil=True)
@@ -123,5 +132,6 @@ def cell_sums(group, count, waves, ranges, rates):  # type: ignore[no-untyped-de
     total, size = np.zeros((1, count), np.complex128), np.zeros((1, 4, count))
     strongest, most = np.full((1, count), -1), np.full((1, count), -1.0)
     for i in range(group.size):
+        size[0, 0, group[i]] += 1.0
         _count(0, group[i], i, waves[i], ranges[i], rates[i], total, size, strongest, most)
     return total, size, strongest

@@ -139,9 +139,9 @@ def provenance(
     """Return one explanation for each detection, of the cell where its peak stands, at the place that it reports."""
     known, response = chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
-    at = np.stack([rdmap.range[columns], rdmap.rate[rows]], axis=1)
-    sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.rate, at)
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
+    at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
+    sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.rate, at)
     found = []
     for i in range(len(at)):
         about = (float(at[i, 0]), float(at[i, 1]), float(powers[i]), float(errors[i]))
