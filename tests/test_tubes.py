@@ -15,7 +15,7 @@ from raychan.channel.legs import Leg
 from raychan.channel.rcs import facets_of, refinements
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
-from raychan.kernels.footprint import elements
+from raychan.kernels.footprint import surface_element
 from raychan.kernels.po import triangle_terms
 from raychan.world.shapes import build
 
@@ -151,8 +151,10 @@ def test_elements_of_the_true_surface_add_up_to_its_area_and_point_along_its_nor
     surface = Surface(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
     every = np.arange(len(surface.area), dtype=np.int32)
     bary, weights = nodes(2, 4)
-    at = np.repeat(bary[None], len(every), axis=0)
-    normal = elements(every, at, surface.facets.vertices, surface.bulge)
+    normal = np.empty((len(every), len(bary), 3))
+    for f in every:
+        for q, at in enumerate(bary):
+            surface_element(surface.facets.vertices[f], surface.bulge[f], at, normal[f, q])
     assert (0.5 * np.linalg.norm(normal, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
     points = on_patch(surface, bary)
     along = normal / np.linalg.norm(normal, axis=2, keepdims=True)

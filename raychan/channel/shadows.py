@@ -65,11 +65,12 @@ def shadows_of(surface: Surface, leg: Leg) -> Shadows:
     last = (leg.mirrors[-1].facet, leg.mirrors[-1].normal.tobytes()) if leg.mirrors else None
     key = np.asarray(leg.image, float).tobytes(), leg.far, last
     known: dict[Any, Shadows] = surface.shadows
-    if key not in known:
-        if len(known) >= _KEPT:
-            del known[next(iter(known))]
-        known[key] = Shadows(surface, leg)
-    return known[key]
+    with surface.making:
+        if key not in known:
+            if len(known) >= _KEPT:
+                del known[next(iter(known))]
+            known[key] = Shadows(surface, leg)
+        return known[key]
 
 
 @njit(cache=True, nogil=True)
