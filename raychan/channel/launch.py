@@ -26,7 +26,8 @@ from raychan.channel.tubes import (
     stand,
     unit,
 )
-from raychan.kernels.patch import edge_to_cut, halved, lit_parts, may_be_lit
+from raychan.kernels.lit import lit_parts, may_be_lit
+from raychan.kernels.patch import edge_to_cut, halved
 from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
@@ -54,9 +55,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     if not len(facet):
         return stand(surface, leg, facet, np.zeros((0, 3, 3)), rule.slots)
     facet, bary = _cut_for_phase(facet, shape, ways, rule, not more)
-    facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
-    if out != leg:
-        facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
+    facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways, out != leg)
     return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found, more)
 
 
