@@ -27,7 +27,8 @@ from raychan.channel.tubes import (
     stand,
     unit,
 )
-from raychan.kernels.patch import edge_to_cut, halved, lit_parts, may_be_lit
+from raychan.kernels.lit import lit_parts, may_be_lit
+from raychan.kernels.patch import edge_to_cut, halved
 from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
@@ -54,9 +55,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     if out != leg:
         facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
     for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
-        part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
-        if out != leg:
-            part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways)
+        part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways, out != leg)
         yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary, rule.slots), found, more)
 
 

@@ -27,10 +27,7 @@ class Shadows:
     these the two coordinates that vary most."""
 
     def __init__(self, surface: Surface, leg: Leg) -> None:
-        nowhere = np.zeros(3)
-        mirror = (True, leg.mirrors[-1].point, leg.mirrors[-1].normal) if leg.mirrors else (False, nowhere, nowhere)
-        facets = surface.edge_faces, surface.edge_ends, surface.first, surface.normal, surface.smooth
-        self.edges, self._smooth = _silhouette(*(*facets, leg.image, leg.far, *mirror))
+        self.edges, self._smooth = _silhouette(surface, leg)
         self._from = surface.normal, surface.smooth, leg.image, leg.far, surface.touch
         if len(self.edges):
             low, high = _bounds(self.edges, leg.image, leg.far)
@@ -73,41 +70,31 @@ def shadows_of(surface: Surface, leg: Leg) -> Shadows:
         return known[key]
 
 
-@njit(cache=True, nogil=True)
-def _silhouette(pair, ends, first, normal, smooth, image, far, behind, point, over):  # type: ignore[no-untyped-def]
-    """Return the edges (m, 2, 3) [m] at which a body turns away, and the rims of open sheets, and the smooth patches
-    (m, 2) that meet there.
+def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
+    """Return the edges (m, 2, 3) [m] at which a body turns away, and the rims of open sheets, in front of the last
+    mirror; and the smooth patches (m, 2) that meet there."""
+    kept = np.flatnonzero(_turning(surface.edge_faces, surface.first, surface.normal, leg.image, leg.far))
+    pair = surface.edge_faces[kept]
+    edges, smooth = surface.edge_ends[kept], surface.smooth[np.where(pair < 0, pair[:, ::-1], pair)]
+    if leg.mirrors:
+        m = leg.mirrors[-1]
+        ahead = ((edges - m.point) @ m.normal > 0.0).any(axis=1)
+        edges, smooth = edges[ahead], smooth[ahead]
+    return np.ascontiguousarray(edges), np.ascontiguousarray(smooth)
 
-    Args: pair (e, 2) facets on both sides of edges, -1 beyond a rim; ends (e, 2, 3) [m]; first, normal (f, 3), smooth
-    (f,) of facets; behind whether to leave out what lies behind a mirror with a point and a normal `over`.
-    """
-    front, kept = np.empty(len(first), np.bool_), np.empty(len(pair), np.int32)
-    for f in range(len(first)):
+
+@njit(cache=True, nogil=True)
+def _turning(pair, first, normal, image, far):  # type: ignore[no-untyped-def]
+    """Tell of edges whether one of their facets (e, 2) faces the source and the other does not, or is none."""
+    front, out = np.empty(len(first), np.bool_), np.empty(len(pair), np.bool_)
+    for i in range(len(first)):
         towards = 0.0
         for c in range(3):
-            towards += normal[f, c] * (image[c] if far else image[c] - first[f, c])
-        front[f] = towards > 0.0
-    count = 0
+            towards += normal[i, c] * (image[c] if far else image[c] - first[i, c])
+        front[i] = towards > 0.0
     for e in range(len(pair)):
-        a, b = pair[e]
-        if b >= 0 and front[a] == front[b]:
-            continue
-        ahead = not behind
-        for q in range(2):
-            height = 0.0
-            for c in range(3):
-                height += (ends[e, q, c] - point[c]) * over[c]
-            ahead |= height > 0.0
-        if ahead:
-            kept[count] = e
-            count += 1
-    edges, patches = np.empty((count, 2, 3)), np.empty((count, 2), np.int32)
-    for i in range(count):
-        e = kept[i]
-        edges[i] = ends[e]
-        a, b = pair[e]
-        patches[i, 0], patches[i, 1] = smooth[a], smooth[b if b >= 0 else a]
-    return edges, patches
+        out[e] = pair[e, 1] < 0 or front[pair[e, 0]] != front[pair[e, 1]]
+    return out
 
 
 @njit(cache=True, inline="always")

@@ -1,0 +1,159 @@
+"""Lit: which parts of patches face the ends of a way (numba loops); arguments as for `patch`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from raychan.kernels.patch import dot, middle, place_on
+
+
+@njit(cache=True, inline="always")
+def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
+    """Return 1 if all of a facet's true surface is turned to the image, -1 if all away, 0 if that is not sure."""
+    low, high = np.inf, -np.inf
+    for i in range(3):
+        swell = 0.0
+        for j in range(3):
+            # The edges' bulges weigh a third in all at most.
+            swell = max(swell, abs(dot(n[i], b[j])) / 3.0)
+        for j in range(3):
+            height = 0.0
+            for c in range(3):
+                height += n[i, c] * (image[c] if far else image[c] - v[j, c])
+            low, high = min(low, height - swell), max(high, height + swell)
+    return 1 if low > 0.0 else (-1 if high < 0.0 else 0)
+
+
+@njit(cache=True, inline="always")
+def _lit_whole(v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
+    """Return 1 if all of a facet faces the end of a way, -1 if nothing of it does, 0 if that is not sure."""
+    towards = _faces(v, n, b, way_image, way_far)
+    return towards * _faces(v, n, b, image, far) if is_open else towards
+
+
+@njit(cache=True, nogil=True)
+def may_be_lit(facet, v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
+    """Tell of which facets (n,) some part may face the end of a way (see `lit_parts`)."""
+    out = np.empty(len(facet), np.bool_)
+    for i in range(len(facet)):
+        f = facet[i]
+        out[i] = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, way_image, way_far) >= 0
+    return out
+
+
+@njit(cache=True, inline="always")
+def _towards(v, n, b, x, y, z, image, far):  # type: ignore[no-untyped-def]
+    """Return the cosine of incidence at barycentric (x, y, z) of the true surface: above 0 where it faces the image."""
+    xy, yz, zx = x * y, y * z, z * x
+    along, size, reach = 0.0, 0.0, 0.0
+    for c in range(3):
+        p = x * v[0, c] + y * v[1, c] + z * v[2, c] - xy * b[0, c] - yz * b[1, c] - zx * b[2, c]
+        k = image[c] if far else image[c] - p
+        m = x * n[0, c] + y * n[1, c] + z * n[2, c]
+        along += k * m
+        size += m * m
+        reach += k * k
+    return along / math.sqrt(size * reach)
+
+
+@njit(cache=True, inline="always")
+def _parts_towards(v, n, b, is_open, w, image, far, way_image, way_far, side, p, out):  # type: ignore[no-untyped-def]
+    """Write the parts of a patch that face the end of a way into out (3, 3, 3); return how many.
+
+    Args: side (3,), p (3, 3) for work.
+    """
+    x, y, z = middle(w)
+    sign = -1.0 if is_open and _towards(v, n, b, x, y, z, image, far) < 0.0 else 1.0
+    low, high, total = np.inf, -np.inf, 0.0
+    for q in range(3):
+        side[q] = sign * _towards(v, n, b, w[q, 0], w[q, 1], w[q, 2], way_image, way_far)
+        low, high, total = min(low, side[q]), max(high, side[q]), total + side[q]
+    if not (high > 1e-9 and low < -1e-9):
+        out[0] = w
+        return 1 if total > 0.0 else 0
+    for q in range(3):
+        if side[q] == 0.0:
+            side[q] = 1e-12
+    _three(w, side, out)
+    count = 0
+    for j in range(3):
+        x, y, z = middle(out[j])
+        sign = -1.0 if is_open and _towards(v, n, b, x, y, z, image, far) < 0.0 else 1.0
+        if sign * _towards(v, n, b, x, y, z, way_image, way_far) <= 0.0:
+            continue
+        for q in range(3):
+            place_on(v, b, out[j, q, 0], out[j, q, 1], out[j, q, 2], p[q])
+        if _twice_area(p) > 2e-14:
+            out[count] = out[j]
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lit_parts(facet, bary, v, n, b, is_open, image, far, out_image, out_far, both):  # type: ignore[no-untyped-def]
+    """Return (facet, bary) of the parts of patches that face the source and the end of the way out, cut along the
+    terminators.
+
+    Args: is_open (m,) facets of open sheets, which face the source from either side; both whether the way out is
+    another one than the way in.
+    """
+    m = len(facet)
+    room = m + m // 4 + 9
+    facets, barys = np.empty(room, facet.dtype), np.empty((room, 3, 3))
+    p, side, part, some = np.empty((3, 3)), np.empty(3), np.empty((3, 3, 3)), np.empty((3, 3, 3))
+    count, f, lit, back = 0, -1, 0, 1
+    for i in range(m):
+        if facet[i] != f:
+            f = facet[i]
+            lit = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, image, far)
+            if both:
+                back = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, out_image, out_far)
+        if lit < 0 or back < 0:
+            continue
+        if count + 9 + m - i > len(facets):
+            facets = np.append(facets, np.empty(m // 4 + 9, facet.dtype))
+            barys = np.concatenate((barys, np.empty((m // 4 + 9, 3, 3))))
+        found = 1
+        part[0] = bary[i]
+        if lit == 0:
+            found = _parts_towards(v[f], n[f], b[f], is_open[f], bary[i], image, far, image, far, side, p, part)
+        for j in range(found):
+            more = 1
+            some[0] = part[j]
+            if back == 0:
+                more = _parts_towards(
+                    v[f], n[f], b[f], is_open[f], part[j], image, far, out_image, out_far, side, p, some
+                )
+            for x in range(more):
+                facets[count], barys[count] = f, some[x]
+                count += 1
+    return facets[:count], barys[:count]
+
+
+@njit(cache=True, inline="always")
+def _three(w, side, part):  # type: ignore[no-untyped-def]
+    """Write the three parts of a triangle cut where `side` (3,) changes sign: the lone corner's first."""
+    positive = int(side[0] > 0.0) + int(side[1] > 0.0) + int(side[2] > 0.0)
+    lone = 0
+    for c in range(3):
+        if (side[c] > 0.0) == (positive == 1):
+            lone = c
+            break
+    b, c = (lone + 1) % 3, (lone + 2) % 3
+    to_b, to_c = side[lone] / (side[lone] - side[b]), side[lone] / (side[lone] - side[c])
+    for x in range(3):
+        u = w[lone, x] * (1.0 - to_b) + w[b, x] * to_b
+        t = w[lone, x] * (1.0 - to_c) + w[c, x] * to_c
+        part[0, 0, x], part[0, 1, x], part[0, 2, x] = w[lone, x], u, t
+        part[1, 0, x], part[1, 1, x], part[1, 2, x] = u, w[b, x], w[c, x]
+        part[2, 0, x], part[2, 1, x], part[2, 2, x] = u, w[c, x], t
+
+
+@njit(cache=True, inline="always")
+def _twice_area(p):  # type: ignore[no-untyped-def]
+    ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
+    bx, by, bz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
+    return math.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2)
