@@ -15,8 +15,9 @@ from raychan.channel.legs import Leg
 from raychan.channel.rcs import facets_of, refinements
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
-from raychan.kernels.footprint import surface_element
+from raychan.kernels.footprint import element_of
 from raychan.kernels.po import triangle_terms
+from raychan.kernels.quadrature import mean_parts, points_for
 from raychan.world.shapes import build
 
 F = 77e9
@@ -95,14 +96,28 @@ def test_mean_over_a_triangle_of_quadratic_phase_is_its_quadrature(slope, bend):
 
 def test_pieces_of_a_quadratic_phase_close_in_with_the_square_of_their_size():
     # Too bent for a Gauss rule, and running in no direction: cut in pieces.
-    phases = np.array([0.0, 3.0, -2.0, 12.0, 9.0, -11.0])
+    phases = np.array([0.0, 20.0, -28.0, 24.0, 10.0, -30.0])
     exact = WEIGHTS @ np.exp(-1j * quadratic(phases, BARY))
     out = np.empty(3, complex)
     errors = []
-    for linear in (0.4, 0.4 / 4, 0.4 / 16):
+    for linear in (0.8, 0.8 / 4, 0.8 / 16):
         triangle_terms(phases, linear, out)
         errors.append(abs(out.sum() - exact))
     assert errors[2] < errors[0] / 8 and errors[2] < 1e-3
+
+
+@pytest.mark.parametrize("reach", [4.0, 9.0, 10.0, 35.0, 62.0, 92.0])
+def test_mean_and_corner_terms_of_a_phase_that_stands_still_are_the_quadrature_to_2e_6(reach):
+    rng = np.random.default_rng(6)
+    out = np.empty(3, complex)
+    for _ in range(10):
+        phases = linear_phases(rng.uniform(-1, 1, 3))
+        phases[3:] += rng.choice([-1, 1], 3) * rng.uniform(0.7, 1, 3)
+        bends = phases[3:] - 0.5 * (phases[:3] + np.roll(phases[:3], -1))
+        size = reach / (np.ptp(phases[:3]) + 4.0 * abs(bends).max())
+        phases, bends = size * phases, size * bends
+        mean_parts(phases, *bends, points_for(reach), out)
+        assert out == pytest.approx((WEIGHTS * np.exp(-1j * quadratic(phases, BARY))) @ BARY, abs=2e-6)
 
 
 def test_mean_of_a_quadratic_phase_hangs_on_no_setting_where_it_is_not_cut_in_pieces():
@@ -149,12 +164,11 @@ def on_patch(surface, bary):
 
 def test_elements_of_the_true_surface_add_up_to_its_area_and_point_along_its_normals():
     surface = Surface(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
-    every = np.arange(len(surface.area), dtype=np.int32)
     bary, weights = nodes(2, 4)
-    normal = np.empty((len(every), len(bary), 3))
-    for f in every:
-        for q, at in enumerate(bary):
-            surface_element(surface.facets.vertices[f], surface.bulge[f], at, normal[f, q])
+    normal = np.empty((len(surface.area), len(bary), 3))
+    for of_facet, v, b in zip(normal, surface.facets.vertices, surface.bulge, strict=True):
+        for out, w in zip(of_facet, bary, strict=True):
+            element_of(v, b, w, out)
     assert (0.5 * np.linalg.norm(normal, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
     points = on_patch(surface, bary)
     along = normal / np.linalg.norm(normal, axis=2, keepdims=True)

@@ -24,7 +24,7 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-_LINEAR = 0.01  # rad: how far the phase of a piece of the footprint may bend in the integral
+_LINEAR = 1e-4  # rad: how far the phase of a piece of the footprint may bend in the integral
 
 
 @dataclass(frozen=True)

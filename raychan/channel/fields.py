@@ -18,7 +18,7 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-_LINEAR = 0.01  # rad: how far the phase of a piece of the footprint may bend in the integral
+_LINEAR = 1e-4  # rad: how far the phase of a piece of the footprint may bend in the integral
 
 FieldOf = Callable[[Floats], Complexes]
 """Directions (n, 3) that an antenna looks to -> its vector fields (n, p, 3), one for each of p polarisations."""

@@ -94,29 +94,40 @@ def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type
         strongest[c, g], most[c, g] = i, weight
 
 
+@njit(cache=True, inline="always")
+def _apart(cells, n):  # type: ignore[no-untyped-def]
+    """Return how far a response over n cells is from its peak, or that of a period on."""
+    if cells > n:
+        cells -= n * math.floor(cells / n)
+    return min(cells, n - cells)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def sums_in_cells(  # type: ignore[no-untyped-def]
-    group, amplitude, delay, rate, cells, least, most_of, total, size, strongest, ramp, sizes, across, along
+    group, amplitude, delay, rate, cells, least, beyond, total, size, strongest, ramp, sizes, across, along
 ):
     """Write the `cell_sums` (c, ...) of what echoes (n,) bring to each of several cells (c, 2).
 
-    Args: least (c,) of the response to an echo that counts; most_of (s,) the largest that the range response and its
-    slope are so many cells from the peak and farther; else as for `cell_waves` and `cell_sums`.
+    Args: least (c,) that an echo brings to a cell and counts; beyond (s,) and (2, m) the largest that range and rate
+    responses are so many cells from the peak and farther; else as for `cell_waves` and `cell_sums`.
     """
     samples, chirps, _ = sizes
-    middle, resolution = ramp[4], ramp[6]
+    _, slope, _, _, middle, repetition, resolution, light = ramp
+    over_ranges, over_rates = beyond
+    per_rate = 2.0 * middle / light * chirps * repetition
     most = np.full(strongest.shape, -1.0)
     total[:], size[:], strongest[:] = 0.0, 0.0, -1
     for i in range(delay.size):
         at_range, turn = _stands(delay[i], rate[i], ramp)
         turn *= amplitude[i]
-        half = 0.5 * abs(rate[i]) * ramp[5] / resolution * chirps
+        moved, weight = abs(rate[i]) * repetition / resolution, abs(amplitude[i])
         for c in range(len(cells)):
             size[c, 0, group[i]] += 1.0
-            away = abs(at_range - cells[c, 0] + (rate[i] - cells[c, 1]) * middle / ramp[1]) / resolution
-            away -= samples * math.floor(away / samples)
-            away = max(min(away, samples - away) - half, 0.0)
-            if most_of[int(away)] * (1.0 + half) < least[c]:
+            off = rate[i] - cells[c, 1]
+            near = _apart(abs(at_range - cells[c, 0] + off * middle / slope) / resolution, samples)
+            near, slow = max(near - 0.5 * moved * chirps, 0.0), _apart(abs(off) * per_rate, chirps)
+            held, late = over_rates[0, int(slow)], over_rates[1, int(slow)]
+            if weight * over_ranges[int(near)] * (held + moved * late) < least[c]:
                 continue
             wave = turn * _answer(at_range, rate[i], cells[c, 0], cells[c, 1], ramp, sizes, across, along)
             _count(c, group[i], i, wave, at_range, rate[i], total, size, strongest, most)

@@ -10,7 +10,7 @@ from raychan.kernels.jit import njit
 
 
 @njit(cache=True, inline="always")
-def surface_element(v, b, w, out):  # type: ignore[no-untyped-def]
+def element_of(v, b, w, out):  # type: ignore[no-untyped-def]
     """Write the vector [m^2] normal to the true surface at w (3,): its area for a unit of the last two coordinates.
 
     Args: v (3, 3) [m] corners, b (3, 3) [m] bulges of the edges (Nagata 2005, eq. 10).
@@ -96,7 +96,7 @@ def footprints(tubes, middle, half_way, bent, facets, image, far, out):  # type:
             centre /= length[i, 3] * back[3]
         for j in range(3):
             if bent and curved[f]:
-                surface_element(vertices[f], bulge[f], w[j], element)
+                element_of(vertices[f], bulge[f], w[j], element)
                 strength = _mean_cosine(element, k[i, j], back_k[j]) * (0.5 * abs(share) / least)
                 if side < 0.0:
                     strength = -strength

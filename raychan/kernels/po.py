@@ -9,6 +9,7 @@ import numpy as np
 from raychan.kernels.beat import wave
 from raychan.kernels.jit import njit
 from raychan.kernels.polar import Vec, cross, dot, mirror, reflect
+from raychan.kernels.quadrature import mean_parts, points_for
 
 
 @njit(cache=True)
@@ -135,11 +136,10 @@ def _corner_terms(
 
 _MOST = 20  # pieces along an edge: enough for the most that a tube which counts may bend
 _FINE = 1e-5  # of the mean over a triangle in phase: what may be left out
-_PANEL = 6.0  # rad that the Gauss rule follows to 1e-6
-_PANELS = 3  # along an edge, beyond which pieces are cheaper
-_CALM = 2.5  # rad that one of four points follows to 1e-6
+_PANEL = 6.0  # rad that the Gauss rule along an edge follows to 1e-6
+_NEAR = 18.0  # rad up to which nothing is cut in pieces
+_PER_PIECE = 16  # points of a Gauss rule in the time of a piece
 _SIX = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
-_FOUR = np.stack(np.polynomial.legendre.leggauss(4)) * 0.5 + np.array([[0.5], [0.0]])
 
 
 @njit(cache=True, inline="always")
@@ -218,26 +218,6 @@ def _quadratic(phases, d01, d12, d20, v, w):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gauss(phases, d01, d12, d20, rule, panels, out) -> int:  # type: ignore[no-untyped-def]
-    """Fill in the mean's parts by a Gauss rule (2, n) across and along, on some panels; return how many points."""
-    t0, t1, t2 = 0j, 0j, 0j
-    h = 1.0 / panels
-    for i in range(panels):
-        for q in range(rule.shape[1]):
-            w = (i + rule[0, q]) * h
-            for j in range(panels):
-                for r in range(rule.shape[1]):
-                    v = (1.0 - w) * (j + rule[0, r]) * h
-                    phase = _quadratic(phases, d01, d12, d20, v, w)
-                    e = 2.0 * h * h * rule[1, q] * rule[1, r] * (1.0 - w) * _turned(phase)
-                    t0 += (1.0 - v - w) * e
-                    t1 += v * e
-                    t2 += w * e
-    out[0], out[1], out[2] = t0, t1, t2
-    return rule.shape[1] * rule.shape[1] * panels * panels
-
-
-@njit(cache=True)
 def _pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped-def]
     """Fill in the mean's parts by m^2 equal pieces, linear on each, with the mean bend of a piece put in its phase."""
     h = 1.0 / m
@@ -302,11 +282,11 @@ def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untype
     if span > _PANEL and _running(phases, (d01, d12, d20), out):
         return 1
     reach = span + 4.0 * bend
-    if reach <= _CALM:
-        return _gauss(phases, d01, d12, d20, _FOUR, 1, out)
-    if reach <= _PANELS * _PANEL:
-        return _gauss(phases, d01, d12, d20, _SIX, math.ceil(reach / _PANEL), out)
-    return _pieces(phases, d01, d12, d20, min(math.ceil(math.sqrt(bend / linear)), _MOST), out)
+    points, pieces = points_for(reach), min(math.ceil(math.sqrt(bend / linear)), _MOST)
+    if points > 0 and (reach <= _NEAR or points * points <= _PER_PIECE * pieces * pieces):
+        mean_parts(phases, d01, d12, d20, points, out)
+        return points * points
+    return _pieces(phases, d01, d12, d20, pieces, out)
 
 
 @njit(cache=True, nogil=True)

@@ -19,7 +19,7 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 Sums = tuple[Complexes, Floats, NDArray[np.int64]]
 
 _FINE = 64  # points of the tabulated window response per resolution cell
-_LEAST = 1e-4  # of a cell's amplitude: what all paths that are left out may bring to it
+_LEAST = 1e-3  # of a cell's amplitude: what all paths that are left out may bring to it
 _STEP = 0.25  # range cells that a path may move within one piece of the frame
 
 
@@ -37,15 +37,6 @@ class Response:
         """The range response and its slope by range cells."""
         table = _table(self._range / self._range.sum())
         return np.stack([table, np.gradient(table, 1.0 / _FINE)], axis=1)
-
-    @cached_property
-    def _beyond(self) -> Floats:
-        """The largest that the range response and its slope are (s,) cells from the peak and farther."""
-        n = len(self._range)
-        size = np.abs(self._range_tables).max(axis=1)
-        by_cell = np.maximum.reduceat(size, np.arange(0, n * _FINE, _FINE))
-        by_cell = np.maximum(by_cell, by_cell[::-1])[: n // 2 + 1]
-        return np.asarray(np.maximum.accumulate(by_cell[::-1])[::-1])
 
     def in_profile(self, delay: Floats, range: float) -> tuple[Complexes, Floats]:
         """Return the response (n,) of the range window to paths of delays (n,) [s] at a range [m], their phase at mid
@@ -71,16 +62,18 @@ class Response:
         """Return the sums by groups of what paths (n,) bring to cells of the map: see kernels.cell.cell_sums.
 
         Args: group (n,) of each path, below `count`; cells (c, 3), each range [m], rate [m/s] and amplitude: what all
-        paths together bring is known to 1e-4 of that at least; else as for `in_cell`.
+        paths together bring is known to 1e-3 of that at least; else as for `in_cell`.
         """
         shape = len(cells), count
         total, size, strongest = np.empty(shape, complex), np.empty((shape[0], 4, count)), np.empty(shape, np.int64)
-        least = _LEAST * cells[:, 2] / max(float(np.abs(amplitude).sum()), 1e-300)
+        least = _LEAST * cells[:, 2] / max(len(rate), 1)
         tables = self._tables(rate)
+        in_range = np.abs(self._range_tables).max(axis=1)
+        beyond = _beyond(in_range), np.stack([_beyond(x) for x in np.abs(tables[3][0]).sum(axis=0).T])
 
         def some(at: slice) -> None:
             sums_in_cells(
-                group, amplitude, delay, rate, cells[at], least[at], self._beyond, total[at], size[at], strongest[at],
+                group, amplitude, delay, rate, cells[at], least[at], beyond, total[at], size[at], strongest[at],
                 *tables,
             )  # fmt: skip
 
@@ -120,3 +113,11 @@ def _table(weights: Floats) -> Complexes:
     raw = np.fft.fft(weights, n * _FINE)
     # The phase is counted from the middle of the samples, where a symmetric window is real.
     return np.append(raw, raw[0]) * np.exp(1j * np.pi * (n - 1) / n * np.arange(n * _FINE + 1) / _FINE)
+
+
+def _beyond(size: Floats) -> Floats:
+    """Return the largest that a response, given as a table of its sizes, is (s,) cells from the peak and farther."""
+    n = len(size) // _FINE
+    by_cell = np.maximum.reduceat(size, np.arange(0, n * _FINE, _FINE))
+    by_cell = np.maximum(by_cell, by_cell[::-1])[: n // 2 + 1]
+    return np.asarray(np.maximum.accumulate(by_cell[::-1])[::-1])
