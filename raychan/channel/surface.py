@@ -36,6 +36,7 @@ class Surface(Tracer):
         n = len(facets.vertices)
         m = facets.materials
         self.dull = ((m.kind != PEC) & (np.abs(m.eps) < _METAL))[facets.material]
+        self.matter = facets.material, (m.kind, m.eps, m.thickness, m.roughness)
         self.bulge, self.curved = bulges(facets.vertices, facets.normals)
         # What others made of all this, once.
         self.between: Any = None
