@@ -7,7 +7,7 @@ from weakref import proxy
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.edges import above, cross_into, dot, inside, starts_again
+from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, starts_again, within
 from raychan.channel.surface import Surface
 from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
@@ -48,30 +48,34 @@ class Between:
 
     def across(
         self,
+        rows: NDArray[np.signedinteger],
         points: Floats,
         k: Floats,
-        source: Floats,
+        length: Floats,
         far: bool,
         flat: Bools,
         hit: Ints,
         reach: Floats,
         side: Floats,
     ) -> None:
-        """Fill in rows of side (n, 3) that are zero: corners' distances [m] from the longest shadow edge on a tube.
+        """Fill in those `rows` of side (n, 3) that are zero: corners' distances [m] from the longest shadow edge on a
+        tube.
 
-        Args: points (n, 4, 3) [m] footprints; k (n, 4, 3) directions after reflection, from a source (n, 3) [m] where
-        all mirrors were flat (n,); hit (n,) facet on which the centre lands, -1 for none, after reach (n,) [m].
+        Args: points (n, 4, 3) [m] footprints; k (n, 4, 3) directions after reflection, from a source length (n, 4) [m]
+        behind where all mirrors were flat (n,); hit (n, 4) facets on which rays land, -1 for none, after reach
+        (n, 4) [m].
         """
         s = self.surface
+        rows = rows[~side[rows].any(axis=1)]
 
-        def some(rows: slice) -> None:
+        def some(part: slice) -> None:
             _across(
-                points[rows], k[rows], source[rows], far, flat[rows], hit[rows], reach[rows],
-                s.edge_ends, s.edge_faces, s.first, s.normal, self.first, self.index, self.low, self.cell, self.shape,
-                self.crowd, self.centre, self.radius, side[rows],
+                rows[part], points, k, length, far, flat, hit, reach, s.extent, s.edge_ends, s.edge_faces, s.first,
+                s.normal, self.first, self.index, self.low, self.cell, self.shape, self.crowd, self.centre, self.radius,
+                side,
             )  # fmt: skip
 
-        in_two(len(points), some, _MANY)
+        in_two(len(rows), some, _MANY)
 
 
 def between(surface: Surface) -> Between:
@@ -185,13 +189,15 @@ def _crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _across(  # type: ignore[no-untyped-def]
+    rows,
     points,
     ks,
-    source,
+    length,
     far,
     flat,
     hit,
     reach,
+    extent,
     ends,
     faces,
     first_point,
@@ -207,17 +213,19 @@ def _across(  # type: ignore[no-untyped-def]
     out,
 ):
     tried = np.full(len(ends), -1, np.int64)
-    side, m, work, k = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    section = np.empty((4, 3))
+    side, source, planes, section = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 3))
     begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
-    for i in range(len(points)):
-        if out[i].any():
-            continue
-        centre = points[i, 3]
-        k[:] = ks[i, 3]
-        plane, at_plane = normal[max(hit[i], 0)], first_point[max(hit[i], 0)]
+    for i in rows:
+        centre, k = points[i, 3], ks[i, 3]
+        lands = hit[i, 3] >= 0
+        parallel = far or not flat[i]
+        for c in range(3):
+            source[c] = centre[c] - length[i, 3] * k[c]
+        plane, at_plane = normal[max(hit[i, 3], 0)], first_point[max(hit[i, 3], 0)]
         sign = -1.0 if dot(k, plane) > 0.0 else 1.0
-        begin_at, end_at = _span(points[i], ks[i], reach[i], ball, radius)
+        here = pyramid(points[i], source, k, parallel, planes)
+        section[:] = points[i]
+        begin_at, end_at = _span(points[i], ks[i], reach[i, 3] if lands else extent, ball, radius)
         steps = int((end_at - begin_at) / cell) + 1 if end_at > begin_at else 0
         best = 0.0
         step = (end_at - begin_at) / max(steps, 1)
@@ -247,7 +255,7 @@ def _across(  # type: ignore[no-untyped-def]
                         if tried[e] == i:
                             continue
                         tried[e] = i
-                        if not _outline(faces[e], source[i], k, far, first_point, normal):
+                        if not _outline(faces[e], source, k, parallel, first_point, normal):
                             continue
                         a, b = ends[e, 0], ends[e, 1]
                         # The part beyond the mirror, and before the plane of landing.
@@ -258,34 +266,22 @@ def _across(  # type: ignore[no-untyped-def]
                             ha += sign * (a[c] - at_plane[c]) * plane[c]
                             hb += sign * (b[c] - at_plane[c]) * plane[c]
                         begin, end = above(da, db)
-                        low_end, high_end = above(ha, hb) if hit[i] >= 0 else (0.0, 1.0)
+                        low_end, high_end = above(ha, hb) if lands else (0.0, 1.0)
                         begin, end = max(begin, low_end), min(end, high_end)
                         if begin >= end:
                             continue
-                        # Off a curved mirror the rays count as parallel, in the section that they have here.
-                        depth = 0.0
-                        for c in range(3):
-                            depth += (a[c] + 0.5 * (begin + end) * (b[c] - a[c]) - centre[c]) * k[c]
-                        for q in range(4):
+                        if not flat[i]:
+                            # Off a curved mirror the rays count as parallel, in the section that they have here.
+                            depth = 0.0
                             for c in range(3):
-                                section[q, c] = points[i, q, c]
-                                if not flat[i]:
-                                    section[q, c] += depth * (ks[i, q, c] - k[c])
-                        begin, end = inside(a, b, section, centre, source[i], k, far, begin, end, work)
-                        length = (end - begin) * np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-                        if length <= best:
-                            continue
-                        if far:
-                            cross_into(b - a, k, m)
-                        else:
-                            cross_into(b - a, source[i] - a, m)
-                        size = np.sqrt(dot(m, m))
-                        if size == 0.0:
-                            continue
-                        for q in range(3):
-                            side[q] = 0.0
-                            for c in range(3):
-                                side[q] += (section[q, c] - a[c]) * m[c] / size
-                        if side.min() < 0.0 < side.max():
-                            best = length
+                                depth += (a[c] + 0.5 * (begin + end) * (b[c] - a[c]) - centre[c]) * k[c]
+                            for q in range(3):
+                                for c in range(3):
+                                    section[q, c] = points[i, q, c] + depth * (ks[i, q, c] - k[c])
+                            pyramid(section, source, k, True, planes)
+                        scale = scale_at(a, b, source, k, parallel, here)
+                        begin, end = within(a, b, section, planes, scale, begin, end)
+                        part = (end - begin) * size_of(a, b)
+                        if part > best and apart(a, b, section, source, k, parallel, side):
+                            best = part
                             out[i] = side

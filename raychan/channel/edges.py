@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from raychan.kernels.jit import njit
 
 _MANY = 64  # edges around a plane beyond which halving is cheaper than looking at each
-INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
+_INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
 
 
 @njit(cache=True, inline="always")
@@ -15,44 +17,76 @@ def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
-def cross_into(a, b, out):  # type: ignore[no-untyped-def]
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True)
-def inside(a, b, corners, centre, source, k, far, begin, end, n):  # type: ignore[no-untyped-def]
-    """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays."""
-    scale = 1.0
-    if not far:
-        edge, here = 0.0, 0.0
-        for c in range(3):
-            edge += (0.5 * (a[c] + b[c]) - source[c]) * k[c]
-            here += (centre[c] - source[c]) * k[c]
-        scale = min(max(edge / here, 0.01), 100.0)
+@njit(cache=True, inline="always")
+def pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
+    """Write the normals of the planes through the image and a tube's sides, one over the centre's height long, inward;
+    return how far the centre lies ahead along k [m]."""
     for e in range(3):
         p, q = corners[e], corners[(e + 1) % 3]
+        sx, sy, sz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
         if far:
-            cross_into(q - p, k, n)
+            wx, wy, wz = k[0], k[1], k[2]
         else:
-            cross_into(p - source, q - source, n)
-        whole, fa, fb = 0.0, 0.0, 0.0
+            wx, wy, wz = image[0] - p[0], image[1] - p[1], image[2] - p[2]
+        x, y, z = sy * wz - sz * wy, sz * wx - sx * wz, sx * wy - sy * wx
+        whole = (corners[3, 0] - p[0]) * x + (corners[3, 1] - p[1]) * y + (corners[3, 2] - p[2]) * z
+        # A tube without width has no inside.
+        over = 1.0 / whole if whole != 0.0 else np.nan
+        planes[e, 0], planes[e, 1], planes[e, 2] = x * over, y * over, z * over
+    return (corners[3, 0] - image[0]) * k[0] + (corners[3, 1] - image[1]) * k[1] + (corners[3, 2] - image[2]) * k[2]
+
+
+@njit(cache=True, inline="always")
+def scale_at(a, b, image, k, far, here):  # type: ignore[no-untyped-def]
+    """Return the tube's width at the middle of segment ab over that at its footprint, `here` [m] ahead of the image."""
+    if far:
+        return 1.0
+    edge = 0.0
+    for c in range(3):
+        edge += (0.5 * (a[c] + b[c]) - image[c]) * k[c]
+    return min(max(edge / here, 0.01), 100.0)
+
+
+@njit(cache=True, inline="always")
+def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped-def]
+    """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays."""
+    for e in range(3):
+        fa, fb = -_INSIDE * scale, -_INSIDE * scale
         for c in range(3):
-            whole += (centre[c] - p[c]) * n[c]
-            fa += (a[c] - p[c]) * n[c]
-            fb += (b[c] - p[c]) * n[c]
-        if whole == 0.0:
-            return 0.0, 0.0
-        fa, fb = fa / whole - INSIDE * scale, fb / whole - INSIDE * scale
-        if fa < 0.0 and fb < 0.0:
+            fa += (a[c] - corners[e, c]) * planes[e, c]
+            fb += (b[c] - corners[e, c]) * planes[e, c]
+        if not (fa >= 0.0 or fb >= 0.0):
             return 0.0, 0.0
         if fa < 0.0:
             begin = max(begin, fa / (fa - fb))
         elif fb < 0.0:
             end = min(end, fa / (fa - fb))
     return begin, max(end, begin)
+
+
+@njit(cache=True, inline="always")
+def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances from the plane through the image and segment ab; return whether that
+    parts them."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    if far:
+        wx, wy, wz = k[0], k[1], k[2]
+    else:
+        wx, wy, wz = image[0] - a[0], image[1] - a[1], image[2] - a[2]
+    x, y, z = dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
+    size = math.sqrt(x * x + y * y + z * z)
+    if size == 0.0:
+        return False
+    low, high = np.inf, -np.inf
+    for q in range(3):
+        side[q] = ((corners[q, 0] - a[0]) * x + (corners[q, 1] - a[1]) * y + (corners[q, 2] - a[2]) * z) / size
+        low, high = min(low, side[q]), max(high, side[q])
+    return low < 0.0 < high
+
+
+@njit(cache=True, inline="always")
+def size_of(a, b):  # type: ignore[no-untyped-def]
+    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
 @njit(cache=True, inline="always")
@@ -101,64 +135,89 @@ def starts_again(first):  # type: ignore[no-untyped-def]
     first[0] = 0
 
 
+@njit(cache=True)
+def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side, work):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances from a line where two of the planes that the rays met meet."""
+    for r in range(3):
+        a, b = plane[r], plane[r + 1]
+        if a < 0 or b < 0 or a == b:
+            continue
+        fa, fb = facet[r], facet[r + 1]
+        pa, na = (first[fa], normal[fa]) if fa >= 0 else (points[3], own)
+        pb, nb = (first[fb], normal[fb]) if fb >= 0 else (points[3], own)
+        if _between(points, source, k, far, plane, pa, na, pb, nb, a, b, work):
+            side[:] = work
+            break
+
+
 @njit(cache=True, nogil=True)
 def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side):  # type: ignore[no-untyped-def]
     """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into
     each other.
 
-    Args as for `edge_within`; facet (n, 4) met by each ray, -1 for the tube's own plane, of normal own (n, 3); first,
-    normal (m, 3): a point and the normal of each facet.
+    Args: points (n, 4, 3) [m] corners and centre; source (n, 3) [m] where the rays come from, or k (n, 3) their
+    direction when far; plane (n, 4) where each ray lands (-1: nowhere); facet (n, 4) met by each ray, -1 for the tube's
+    own plane, of normal own (n, 3); first, normal (m, 3): a point and the normal of each facet.
     """
     work = np.empty(3)
     for i in range(points.shape[0]):
-        if side[i].any():
+        if not side[i].any():
+            _meeting_line(points[i], source[i], k[i], far, plane[i], facet[i], first, normal, own[i], side[i], work)
+
+
+@njit(cache=True, inline="always")
+def _longest(corners, source, k, far, plane, first_edge, outline, planes, side, work):  # type: ignore[no-untyped-def]
+    """Write into side (3,), if there is one, the distances of the corners from the edge of which the longest part lies
+    inside a tube; return whether there is."""
+    here = pyramid(corners, source, k, far, planes)
+    best = 0.0
+    for r in range(4):
+        g = plane[r]
+        if g < 0 or (r > 0 and g == plane[r - 1]) or first_edge[g + 1] - first_edge[g] > _MANY:
             continue
-        for r in range(3):
-            a, b = plane[i, r], plane[i, r + 1]
-            if a < 0 or b < 0 or a == b:
+        for e in range(first_edge[g], first_edge[g + 1]):
+            a, b = outline[e, 0], outline[e, 1]
+            da, db = 0.0, 0.0
+            for c in range(3):
+                da += (a[c] - corners[3, c]) * k[c]
+                db += (b[c] - corners[3, c]) * k[c]
+            begin, end = above(da, db)
+            if begin == end:
                 continue
-            fa, fb = facet[i, r], facet[i, r + 1]
-            pa, na = (first[fa], normal[fa]) if fa >= 0 else (points[i, 3], own[i])
-            pb, nb = (first[fb], normal[fb]) if fb >= 0 else (points[i, 3], own[i])
-            if _between(points[i], source[i], k[i], far, plane[i], pa, na, pb, nb, a, b, work):
-                side[i] = work
-                break
+            begin, end = within(a, b, corners, planes, scale_at(a, b, source, k, far, here), begin, end)
+            if begin == end or (end - begin) * size_of(a, b) <= best:
+                continue
+            if apart(a, b, corners, source, k, far, work):
+                best = (end - begin) * size_of(a, b)
+                side[:] = work
+    return best > 0.0
 
 
 @njit(cache=True, nogil=True)
-def edge_within(points, source, k, far, plane, first_edge, outline):  # type: ignore[no-untyped-def]
-    """Return signed distances (n, 3) [m] of each tube's corners from the plane through its source and an edge inside
-    it.
+def edges_within(  # type: ignore[no-untyped-def]
+    rows, points, ways, length, flat, far, hit, reach, extent, plane, first_edge, outline, first, normal, side
+):  # fmt: skip
+    """Write into rows of side (n, 3) signed distances [m] of a tube's corners from the plane through its source and an
+    edge inside it: of those around the planes that were hit the one of which the longest part lies inside, or else the
+    line where two of these planes meet.
 
-    Args: points (n, 4, 3) [m] corners and centre; source (n, 3) [m] where the rays come from, or k (n, 3) their
-    direction when far; plane (n, 4) where each ray lands (-1: nowhere); first_edge, outline: the edges around planes.
-    Of the edges around the planes that were hit, the one of which the longest part lies inside; zeros when none does.
+    Args: rows (m,) of the tubes to look at; points, ways (n, 4, 3) corners and centre [m], and directions; length
+    (n, 4) [m] so far; flat (n,) whether rays come from one point, or one direction if far; hit, reach (n, 4) facet on
+    which each ray lands, -1 for none (so far as `extent` [m]), and after how far; plane, first, normal of facets.
     """
-    n = points.shape[0]
-    best_side = np.zeros((n, 3))
-    side, m, work = np.empty(3), np.empty(3), np.empty(3)
-    for i in range(n):
-        best = 0.0
-        for r in range(4):
-            g = plane[i, r]
-            if g < 0 or (r > 0 and g == plane[i, r - 1]) or first_edge[g + 1] - first_edge[g] > _MANY:
-                continue
-            for e in range(first_edge[g], first_edge[g + 1]):
-                a, b = outline[e, 0], outline[e, 1]
-                begin, end = above(dot(a - points[i, 3], k[i]), dot(b - points[i, 3], k[i]))
-                if begin == end:
-                    continue
-                begin, end = inside(a, b, points[i], points[i, 3], source[i], k[i], far, begin, end, work)
-                length = (end - begin) * np.sqrt(np.sum((b - a) ** 2))
-                if length <= best:
-                    continue
-                cross_into(b - a, k[i] if far else source[i] - a, m)
-                size = np.sqrt(dot(m, m))
-                if size == 0.0:
-                    continue
-                for q in range(3):
-                    side[q] = dot(points[i, q] - a, m) / size
-                if side.min() < 0.0 and side.max() > 0.0:
-                    best = length
-                    best_side[i] = side
-    return best_side
+    at, source, landed = np.empty((4, 3)), np.empty(3), np.empty(4, np.int64)
+    planes, work = np.empty((3, 3)), np.empty(3)
+    for i in rows:
+        k = ways[i, 3]
+        t = reach[i, 3] if hit[i, 3] >= 0 else extent
+        parallel = far or not flat[i]
+        for c in range(3):
+            source[c] = points[i, 3, c] - length[i, 3] * k[c]
+        for q in range(4):
+            landed[q] = plane[hit[i, q]] if hit[i, q] >= 0 else -1
+            for c in range(3):
+                # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the
+                # section that the tube has where it lands.
+                at[q, c] = points[i, q, c] + (0.0 if flat[i] else t * (ways[i, q, c] - k[c]))
+        if not _longest(at, source, k, parallel, landed, first_edge, outline, planes, side[i], work):
+            _meeting_line(at, source, k, parallel, landed, hit[i], first, normal, k, side[i], work)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.cut import divide
 from raychan.channel.edges import meeting_lines
 from raychan.channel.found import Found
 from raychan.channel.legs import Leg, View
@@ -20,9 +21,6 @@ from raychan.channel.tubes import (
     MOST_BEND,
     Refinement,
     Tubes,
-    along_line,
-    edge_lengths,
-    halves,
     phases_of,
     stand,
     unit,
@@ -123,7 +121,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
         split = s.mixed & matters & (level < rule.levels)
         keep(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)
-        tubes, _ = divide(surface, leg, tubes.take(rows), rows, s.side[rows], True, rule)
+        tubes, _ = divide(surface, leg, tubes, rows, s.side, True, rule.jitter)
         ph = phases_of(surface, leg, out, tubes, True, rule)
         known, matters = None, ph.bound > found.doubt(ph.length)
     return Tubes.join(kept)
@@ -192,23 +190,6 @@ def on_facets(surface: Surface, tubes: Tubes) -> Floats:
         return tubes.points
     found: Floats = put_down(tubes.points, tubes.facet, tubes.bary, surface.curved, surface.facets.vertices)
     return found
-
-
-def divide(
-    surface: Surface,
-    leg: Leg,
-    tubes: Tubes,
-    rows: NDArray[np.signedinteger],
-    side: Floats,
-    first: bool,
-    rule: Refinement,
-) -> tuple[Tubes, NDArray[np.signedinteger]]:
-    """Cut tubes along the edge that runs through them, or in half; return the parts and the entry of `rows` of each."""
-    sharp = (side != 0.0).any(axis=1)
-    blunt = tubes.take(~sharp)
-    half = halves(surface, leg, blunt, np.argmax(edge_lengths(blunt), axis=1), first, rule.jitter)
-    third, real = along_line(surface, leg, tubes.take(sharp), side[sharp], first)
-    return Tubes.join([half, third]), np.concatenate([np.tile(rows[~sharp], 2), np.tile(rows[sharp], 3)[real]])
 
 
 def _write_leg(surface: Surface, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints, rule: Refinement) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.cut import divide, halves
 from raychan.channel.found import Found
-from raychan.channel.launch import GAPS, divide, sight
+from raychan.channel.launch import GAPS, sight
 from raychan.channel.legs import Leg, View
 from raychan.channel.surface import Surface
-from raychan.channel.tubes import Phases, Tubes, halves, phases_of
+from raychan.channel.tubes import Phases, Tubes, phases_of
 from raychan.kernels.sight import BENT, READY, SHADED, sort_out
 
 Floats = NDArray[np.float64]
@@ -38,8 +39,8 @@ def settle(
         if not len(bent) and not len(shaded):
             break
         edge = np.argmax(np.abs(ph.bend[bent]), axis=1)
-        halved = halves(surface, leg, tubes.take(bent), edge, first, rule.jitter)
-        parted, _ = divide(surface, leg, tubes.take(shaded), shaded, view.side[shaded], first, rule)
+        halved = halves(surface, leg, tubes, bent, edge, first, rule.jitter)
+        parted, _ = divide(surface, leg, tubes, shaded, view.side, first, rule.jitter)
         tubes = Tubes.join([halved, parted])
     some, views, phases = zip(*kept, strict=True)
     if not surface.convex_alone:

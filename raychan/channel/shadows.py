@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.edges import INSIDE, above, cross_into, dot, starts_again
+from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, starts_again, within
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.kernels.jit import njit
@@ -162,53 +162,13 @@ def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped
     return first, index
 
 
-@njit(cache=True, inline="always")
-def _pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
-    """Write the normals of the planes through the image and a tube's sides, one over the centre's height long, inward;
-    return how far the centre lies ahead along k [m]."""
-    side, way, n, here = np.empty(3), np.empty(3), np.empty(3), 0.0
-    for e in range(3):
-        p, q = corners[e], corners[(e + 1) % 3]
-        for c in range(3):
-            side[c] = q[c] - p[c]
-            way[c] = k[c] if far else image[c] - p[c]
-        cross_into(side, way, n)
-        whole = 0.0
-        for c in range(3):
-            whole += (corners[3, c] - p[c]) * n[c]
-        # A tube without width has no inside.
-        for c in range(3):
-            planes[e, c] = n[c] / whole if whole != 0.0 else np.nan
-    for c in range(3):
-        here += (corners[3, c] - image[c]) * k[c]
-    return here
-
-
-@njit(cache=True, inline="always")
-def _within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped-def]
-    """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays (see `inside` of
-    edges)."""
-    for e in range(3):
-        fa, fb = -INSIDE * scale, -INSIDE * scale
-        for c in range(3):
-            fa += (a[c] - corners[e, c]) * planes[e, c]
-            fb += (b[c] - corners[e, c]) * planes[e, c]
-        if not (fa >= 0.0 or fb >= 0.0):
-            return 0.0, 0.0
-        if fa < 0.0:
-            begin = max(begin, fa / (fa - fb))
-        elif fb < 0.0:
-            end = min(end, fa / (fa - fb))
-    return begin, max(end, begin)
-
-
 @njit(cache=True, nogil=True)
 def _across(  # type: ignore[no-untyped-def]
     points, facet, slack, normals, smooth, image, far, touch, edges, edge_smooth, first, index, axes, low, cell, shape,
     out,
 ):  # fmt: skip
     tried = np.full(len(edges), -1, np.int64)
-    side, m, k, planes = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
+    side, k, planes = np.empty(3), np.empty(3), np.empty((3, 3))
     x, least, most = np.empty(3), np.empty(3), np.empty(3)
     for i in range(len(points)):
         centre, normal, patch = points[i, 3], normals[facet[i]], smooth[facet[i]]
@@ -231,7 +191,7 @@ def _across(  # type: ignore[no-untyped-def]
         u, v = axes
         i0, i1 = _cells(least[u] - margin, most[u] + margin, low[0], cell, shape[0])
         j0, j1 = _cells(least[v] - margin, most[v] + margin, low[1], cell, shape[1])
-        here = _pyramid(points[i], image, k, far, planes)
+        here = pyramid(points[i], image, k, far, planes)
         best = 0.0
         for ci in range(i0, i1):
             start = ci * shape[1]
@@ -247,33 +207,13 @@ def _across(  # type: ignore[no-untyped-def]
                 begin, end = above(sign * dot(a, normal) - near, sign * dot(b, normal) - near)
                 if begin == end:
                     continue
-                scale = 1.0
-                if not far:
-                    edge = 0.0
-                    for c in range(3):
-                        edge += (0.5 * (a[c] + b[c]) - image[c]) * k[c]
-                    scale = min(max(edge / here, 0.01), 100.0)
-                begin, end = _within(a, b, points[i], planes, scale, begin, end)
+                begin, end = within(a, b, points[i], planes, scale_at(a, b, image, k, far, here), begin, end)
                 if begin == end:
                     continue
-                length = (end - begin) * math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+                length = (end - begin) * size_of(a, b)
                 if length <= best:
                     continue
-                if far:
-                    cross_into(b - a, k, m)
-                else:
-                    cross_into(b - a, image - a, m)
-                size = math.sqrt(dot(m, m))
-                if size == 0.0:
-                    continue
-                lowest, highest = np.inf, -np.inf
-                for q in range(3):
-                    f = 0.0
-                    for c in range(3):
-                        f += (points[i, q, c] - a[c]) * m[c]
-                    side[q] = f / size
-                    lowest, highest = min(lowest, side[q]), max(highest, side[q])
-                if lowest < 0.0 < highest:
+                if apart(a, b, points[i], image, k, far, side):
                     best = length
                     out[i] = side
 

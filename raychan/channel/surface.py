@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from raychan.frames import sizes
 from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
-from raychan.kernels.rows import once
+from raychan.kernels.rows import made_once
 from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.embree import Tracer
 from raychan.world.joints import Joints, joined, places
@@ -36,6 +36,7 @@ class Surface(Tracer):
         n = len(facets.vertices)
         m = facets.materials
         self.dull = ((m.kind != PEC) & (np.abs(m.eps) < _METAL))[facets.material]
+        self.matter = facets.material, (m.kind, m.eps, m.thickness, m.roughness)
         self.bulge, self.curved = bulges(facets.vertices, facets.normals)
         # What others made of all this, once.
         self.between: Any = None
@@ -80,7 +81,7 @@ class Surface(Tracer):
         found: Floats = ends(self.facets.vertices, np.ascontiguousarray(half))
         return found
 
-    @once
+    @made_once
     def _outlines(self) -> tuple[Floats, NDArray[np.int64], Ints]:
         outer = self._halves("outer")
         count = np.bincount(self.plane[outer // 3], minlength=len(self.plane))
@@ -107,7 +108,7 @@ class Surface(Tracer):
         """Facets (e,) to which the edges of `outline` belong."""
         return self._outlines[2]
 
-    @once
+    @made_once
     def _silhouettes(self) -> tuple[Floats, Ints]:
         if self.convex_alone:
             # No shadow falls on a body that hides nothing of itself.
@@ -137,24 +138,24 @@ class Surface(Tracer):
         """Facets (e, 2) on both sides of `edge_ends`, -1 beyond a rim."""
         return self._silhouettes[1]
 
-    @once
+    @made_once
     def wedge_facet(self) -> Ints:
         """Faces 0 and n (w, 2) of convex edges; the rims of open sheets are half planes."""
         rim = self._halves("rim") // 3
         return np.concatenate([self._halves("pair", "sharp") // 3, np.stack([rim, rim], axis=1)]).astype(np.int32)
 
-    @once
+    @made_once
     def wedge(self) -> Floats:
         """Ends (w, 2, 3) [m] of the edges of `wedge_facet`."""
         return self.ends(np.concatenate([self._halves("pair", "sharp")[:, 0], self._halves("rim")]))
 
-    @once
+    @made_once
     def wedge_n(self) -> Floats:
         """Exterior angle (w,) over pi of the edges of `wedge_facet`."""
         turns = [j.turn[j.sharp] for j, _ in self._joined]
         return 1.0 + np.concatenate([*turns, np.ones(len(self._halves("rim")))])
 
-    @once
+    @made_once
     def clusters(self) -> Clusters:
         """The facets in clusters of neighbours, each of one body."""
         parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self._joined]
@@ -164,7 +165,7 @@ class Surface(Tracer):
         hull = hulls(order, first, f.vertices, f.normals, self.normal, self.bulge)
         return Clusters(order, first, *hull)
 
-    @once
+    @made_once
     def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Centre (b, 3) [m] and radius (b,) [m] of a ball about each body, and which bodies (b,) have no facet."""
         low, high = np.moveaxis(self.extents, 1, 0)

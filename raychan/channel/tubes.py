@@ -28,7 +28,6 @@ Bools = NDArray[np.bool_]
 CENTRE = 3
 MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
 _MANY = 4096  # tubes from which on a second thread pays
-_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
 @dataclass(frozen=True)
@@ -62,9 +61,9 @@ class Tubes:
 
     `strength` left of the field by mirrors and layers; `points` [m], `k` unit directions of arrival, `length` [m]
     from the transmitter, `normals` of the true surface on the lit side, `spread` [1/m] field at the footprint, `flat`
-    all mirrors so far were planes, `bary` corners on
-    the first facet, `slots` of history in use, `bounces` counted with this one, `caustics` passed, `last` row of the
-    `history` that tubes of one launch share.
+    all mirrors so far were planes, `bary` (n, 3, 3) corners on the first facet, (n, 0, 3) once they left it, `slots` of
+    history in use, `bounces` counted with this one, `caustics` passed, `last` row of the `history` that tubes of one
+    launch share.
     """
 
     points: Floats
@@ -91,12 +90,23 @@ class Tubes:
         return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _ROWS}, history=self.history)
 
     @staticmethod
-    def join(parts: list[Tubes]) -> Tubes:
-        """Return all tubes of several sets of one launch as one."""
+    def join(parts: list[Tubes], kept: NDArray[np.intp] | None = None) -> Tubes:
+        """Return all tubes of several sets of one launch as one, or of all these those `kept`, in order."""
         some = [p for p in parts if len(p)] or parts[:1]
-        if len(some) == 1:
-            return some[0]
-        rows = {name: np.concatenate([getattr(p, name) for p in some]) for name in _ROWS}
+        bounds = np.cumsum([0, *(len(p) for p in some)])
+        if kept is None or len(kept) == bounds[-1]:
+            if len(some) == 1:
+                return some[0]
+            rows = {name: np.concatenate([getattr(p, name) for p in some]) for name in _ROWS}
+            return Tubes(**rows, history=parts[0].history)
+        at = np.searchsorted(kept, bounds)
+        rows = {}
+        for name in _ROWS:
+            columns = [getattr(p, name) for p in some]
+            rows[name] = np.empty((len(kept), *columns[0].shape[1:]), columns[0].dtype)
+            for column, before, i, j in zip(columns, bounds, at, at[1:], strict=False):
+                # What is in range may go straight to its place.
+                column.take(kept[i:j] - before, axis=0, out=rows[name][i:j], mode="clip")
         return Tubes(**rows, history=parts[0].history)
 
     def append(self, rows: NDArray[np.generic], vertex: Floats, normal: Floats, facet: Ints, kind: int) -> None:
@@ -115,7 +125,7 @@ _ROWS = tuple(f.name for f in fields(Tubes) if f.name != "history")
 def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> Tubes:
     """Return first-bounce tubes on the true surface at barycentric corners (n, 3, 3), seen from the end of `leg`."""
     n = len(facet)
-    points, k, length, normals = _first_rays(surface, leg, facet, bary)
+    points, k, length, normals = first_rays(surface, leg, facet, bary)
     return Tubes(
         points=points,
         k=k,
@@ -134,86 +144,11 @@ def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> 
     )
 
 
-def _first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return points, directions, lengths and normals of the rays of a leg to barycentric corners (n, 3, 3) and their
+    centres."""
     f = surface.facets
     return rays_on(facet, bary, f.vertices, f.normals, surface.bulge, surface.open_facet, leg.image, leg.far)
-
-
-def halves(surface: Surface, leg: Leg, tubes: Tubes, edge: Ints, first: bool, jitter: float = 0.0) -> Tubes:
-    """Return both halves of tubes cut from the middle of edge 0, 1 or 2 to the corner opposite."""
-    row = np.arange(len(tubes))
-    share = 0.5 + jitter * np.where(row % 2, 1.0, -1.0)
-    i, j = _EDGES[edge].T
-    parts = []
-    for moved in (j, i):
-        w = np.broadcast_to(np.eye(3), (len(tubes), 3, 3)).copy()
-        w[row, moved, i], w[row, moved, j] = share, 1.0 - share
-        parts.append(parts_of(surface, leg, tubes, w, first))
-    return Tubes.join(parts)
-
-
-def along_line(surface: Surface, leg: Leg, tubes: Tubes, side: Floats, first: bool) -> tuple[Tubes, Bools]:
-    """Return the three parts of tubes cut along a straight line of their footprint, and which of 3 n have an area.
-
-    Args: side (n, 3) signed distances of the corners from the line; one corner has a sign of its own.
-    """
-    row = np.arange(len(tubes))
-    positive = side > 0.0
-    lone = np.argmax(positive == (positive.sum(axis=1) == 1)[:, None], axis=1)
-    b, c = (lone + 1) % 3, (lone + 2) % 3
-    to_b = side[row, lone] / (side[row, lone] - side[row, b])
-    to_c = side[row, lone] / (side[row, lone] - side[row, c])
-    corner = np.eye(3)
-    u = corner[lone] * (1.0 - to_b)[:, None] + corner[b] * to_b[:, None]
-    v = corner[lone] * (1.0 - to_c)[:, None] + corner[c] * to_c[:, None]
-    triples = ((corner[lone], u, v), (u, corner[b], corner[c]), (u, corner[c], v))
-    out = Tubes.join([parts_of(surface, leg, tubes, np.stack(t, axis=1), first) for t in triples])
-    real = sizes(vector_area(out.points)) > 1e-14
-    return out.take(real), real
-
-
-def parts_of(surface: Surface, leg: Leg, tubes: Tubes, weights: Floats, first: bool) -> Tubes:
-    """Return part tubes whose corner i is the mean of the parent's corners by weights[:, i] (n, 3, 3).
-
-    New corners lie on edges of the parent. On the first surface (`first`) their rays are computed anew on the
-    true surface; later ones are means along the plane footprint, with the length by the cubic Hermite rule.
-    """
-    child = tubes.take(np.arange(len(tubes)))
-    child.bary = weights @ tubes.bary
-    if first:
-        child.points, child.k, child.length, child.normals = _first_rays(surface, leg, child.facet, child.bary)
-        child.spread = leg.spread(child.length[:, CENTRE])
-        return child
-    p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
-    child.points[:, :3] = weights @ p
-    child.k[:, :3] = unit(weights @ k)
-    child.normals[:, :3] = unit(weights @ tubes.normals[:, :3])
-    for i, j in _EDGES:
-        d = p[:, j] - p[:, i]
-        gi, gj = np.einsum("nj,nj->n", k[:, i], d), np.einsum("nj,nj->n", k[:, j], d)
-        for corner in range(3):
-            t = weights[:, corner, j]
-            on = (t > 0.0) & (weights[:, corner, i] > 0.0)
-            h = length[:, i] + t * (length[:, j] - length[:, i])
-            slope = length[:, j] - length[:, i]
-            h = h + t * (1 - t) * ((1 - t) * (gi - slope) - t * (gj - slope))
-            child.length[on, corner] = h[on]
-    whole = np.argmax(weights, axis=2)
-    pure = weights.max(axis=2) == 1.0
-    child.length[:, :3] = np.where(pure, np.take_along_axis(length, whole, axis=1), child.length[:, :3])
-    _centre(child)
-    return child
-
-
-def _centre(tubes: Tubes) -> None:
-    """Set the centre ray of each tube from its corners; its length as the mean of parabolas along the three medians."""
-    p, k = tubes.points[:, :3], tubes.k[:, :3]
-    c = p.mean(axis=1)
-    kc = unit(k.sum(axis=1))
-    reach = np.einsum("nij,nij->ni", k + kc[:, None], c[:, None] - p)
-    tubes.points[:, CENTRE], tubes.k[:, CENTRE] = c, kc
-    tubes.length[:, CENTRE] = (tubes.length[:, :3] + 0.5 * reach).mean(axis=1)
-    tubes.normals[:, CENTRE] = unit(tubes.normals[:, :3].sum(axis=1))
 
 
 def vector_area(points: Floats) -> Floats:
@@ -221,16 +156,10 @@ def vector_area(points: Floats) -> Floats:
     return 0.5 * np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
 
 
-def edge_lengths(tubes: Tubes) -> Floats:
-    """Return the three edges (n, 3) [m] of each footprint."""
-    p = tubes.points[:, :3]
-    return sizes(np.roll(p, -1, axis=1) - p)
-
-
 def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
     """Return the middles of the three edges (n, 3, 3) [m] and the lengths there (n, 3) [m]."""
     if first:
-        points, _, length, _ = _first_rays(
+        points, _, length, _ = first_rays(
             surface, leg, tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1))
         )
         return points[:, :3], length[:, :3]
@@ -273,12 +202,10 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
     held = tubes.strength, tubes.spread
     written = six, bend, bound, area, rough, way
     shape = f.vertices, surface.bulge, leg.image, leg.far, out.antenna, rule.wavenumber
-    m = f.materials
-    stuff = surface.dull, f.material, (m.kind, m.eps, m.thickness, m.roughness)
 
     def some(rows: slice) -> None:
         here, of, to = ([x[rows] for x in arrays] for arrays in (rays, held, written))
-        phases(*(*here, first, *shape, *of, (rule.phase, rule.turn, MOST_BEND), *stuff, *to))
+        phases(*(*here, first, *shape, *of, (rule.phase, rule.turn, MOST_BEND), surface.dull, *surface.matter, *to))
 
     in_two(n, some, _MANY)
     return Phases(six, bend, bound, area, rough, way)

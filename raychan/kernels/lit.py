@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from raychan.kernels.jit import njit
 from raychan.kernels.patch import dot, middle, place_on
 
 

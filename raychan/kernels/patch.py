@@ -70,7 +70,7 @@ def length_to(p, image, far):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _largest(a, b, c):  # type: ignore[no-untyped-def]
+def largest(a, b, c):  # type: ignore[no-untyped-def]
     if a * _ALIKE >= b and a * _ALIKE >= c:
         return 0
     return 1 if b * _ALIKE >= c else 2
@@ -137,13 +137,13 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
             e0, e1, e2 = distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0])
         limit = 1.0 + 0.5 * (high - low)
         if off > limit:
-            out[i] = _largest(bend0, bend1, bend2)
+            out[i] = largest(bend0, bend1, bend2)
         elif turned > limit:
             # Where the phase bends no more, only a cut across the turn brings it down.
             n0, n1 = distance(normal[0], normal[1]), distance(normal[1], normal[2])
-            out[i] = _largest(n0, n1, distance(normal[2], normal[0]))
+            out[i] = largest(n0, n1, distance(normal[2], normal[0]))
         elif max(e0, e1, e2) > max_edge:
-            out[i] = _largest(e0, e1, e2)
+            out[i] = largest(e0, e1, e2)
         else:
             out[i] = -1
     return out

@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _SIZES = (8, 16, 24, 32)  # points along an edge, each a multiple of a vector unit's width
 _REACH = (9.0, 35.0, 62.0, 92.0)  # rad by which the phase may run and bend in all for 1e-6
