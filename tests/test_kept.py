@@ -161,7 +161,7 @@ def ball(at, radius=0.5):
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (0.3, 3.0, -1.0), (6.0, 0.2, 0.1), (30.0, -4.0, 9.0)])
 def test_clusters_pass_over_only_facets_that_turn_away(end):
-    surface = Surface(facets([ball((6.0, 0.0, 0.0), 1.5), ball((9.0, 1.0, 2.0))], smooth=True))
+    surface = Surface(facets([ball((6.0, 0.0, 0.0), 1.5), ball((9.0, 4.5, 2.0))], smooth=True))
     for leg in (Leg(end=np.array(end)), Leg(end=np.array([0.6, 0.0, 0.8]), far=True)):
         for bodies in (np.array([True, True]), np.array([False, True])):
             np.testing.assert_array_equal(seeds(surface, leg, bodies), wanted(surface, leg, bodies))

@@ -1,5 +1,5 @@
 """Seeds: the facets that could be met over a leg; clusters of them that all turn away are passed over whole, and so are
-those out of a mirror's reach, behind a wall, or where the antenna does not look."""
+those out of a mirror's reach, behind a wall or a solid body, or where the antenna does not look."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
     may = np.zeros(len(f.body), np.bool_)
     if not len(may) or not bodies.any():
         return np.zeros(0, np.int32)
-    c, walls = surface.clusters, _screens(surface).over(leg)
+    c, screens = surface.clusters, _screens(surface)
+    walls, balls = screens.over(leg), screens.within(leg)
     dark = leg.dark(c.centre, c.radius)
     facets = f.vertices, f.normals, f.body, surface.area, surface.open_facet, bodies
     mirror = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
@@ -42,7 +43,7 @@ def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
 
     def some(rows: slice) -> None:
         hull = c.centre[rows], c.radius[rows], c.axis[rows], c.spread[rows]
-        _mark(*(dark[rows], c.order, c.first[rows.start : rows.stop + 1], *hull, *facets, *way, *walls, may))
+        _mark(*(dark[rows], c.order, c.first[rows.start : rows.stop + 1], *hull, *facets, *way, *walls, *balls, may))
 
     in_two(len(c.radius), some, _MANY)
     rows = np.flatnonzero(may).astype(np.int32)
@@ -108,10 +109,37 @@ def _hidden(centre, radius, body, point, normal, owner, first, edge, inward):  #
     return False
 
 
+@njit(cache=True, inline="always")
+def _eclipsed(centre, radius, body, image, far, core, size, owner):  # type: ignore[no-untyped-def]
+    """Tell whether a ball lies wholly in the shadow of a core of another body: within its cone or, from far, cylinder,
+    and behind where rays enter the core."""
+    for w in range(len(owner)):
+        if owner[w] == body or (far and radius >= size[w]):
+            continue
+        along, here, there = 0.0, 0.0, 0.0
+        for c in range(3):
+            a = core[w, c] - (centre[c] if far else image[c])
+            b = image[c] if far else centre[c] - image[c]
+            along, here, there = along + a * b, here + a * a, there + b * b
+        if far:
+            # The image is the direction towards the end: a core nearer to it lies higher.
+            if along > radius and here - along * along < (size[w] - radius) ** 2:
+                return True
+            continue
+        # Rays enter the core nearer than where they touch it.
+        rim, apart = here - size[w] * size[w], math.sqrt(there)
+        if rim <= 0.0 or apart <= radius or (apart - radius) ** 2 <= rim:
+            continue
+        off = math.acos(min(max(along / math.sqrt(here * there), -1.0), 1.0))
+        if off + _half(radius, apart) < _half(size[w], math.sqrt(here)) - _WIDE:
+            return True
+    return False
+
+
 @njit(cache=True, nogil=True)
 def _mark(  # type: ignore[no-untyped-def]
     dark, order, first, centre, radius, axis, spread, v, n, body, area, is_open, bodies, image, far, mirrored, at,
-    normal, middle, reach, walls, normals, owners, begins, edges, inwards, touch, may,
+    normal, middle, reach, walls, normals, owners, begins, edges, inwards, touch, cores, sizes, solids, may,
 ):  # fmt: skip
     """Mark the facets that could be met: of clusters order[first[i] : first[i + 1]] with their balls and cones."""
     d, work = np.empty(3), np.empty(3)
@@ -129,6 +157,8 @@ def _mark(  # type: ignore[no-untyped-def]
             continue
         swell = 1.001 * radius[i] + touch
         if _hidden(centre[i], swell, body[lead], walls, normals, owners, begins, edges, inwards):
+            continue
+        if _eclipsed(centre[i], swell, body[lead], image, far, cores, sizes, solids):
             continue
         for j in range(first[i], first[i + 1]):
             f = order[j]

@@ -15,11 +15,14 @@ from raychan.frames import sizes
 from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
 from raychan.tables import MIRROR, PEC, Facets
+from raychan.world.cores import closed_pieces, cores_of
 from raychan.world.embree import Tracer
 from raychan.world.joints import Joints, joined, places
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+
+Balls = tuple[Floats, Floats, Ints]
 
 _METAL = 1e3  # relative permittivity from which a surface returns nearly all
 
@@ -28,13 +31,15 @@ class Surface(Tracer):
     """A tracer that also knows which facets share a plane or a smooth patch, and the curved surface through corner
     normals.
 
-    Args: facets; joints of each body's facets, bodies one after the other; found anew if not given.
+    Args: facets; joints of each body's facets, bodies one after the other, and balls inside bodies, centre (k, 3) [m],
+    radius (k,) [m], body (k,); both found anew if not given.
     """
 
-    def __init__(self, facets: Facets, joints: Sequence[Joints] = ()) -> None:
+    def __init__(self, facets: Facets, joints: Sequence[Joints] = (), cores: Balls | None = None) -> None:
         super().__init__(facets)
         n = len(facets.vertices)
         m = facets.materials
+        self._cores = cores
         self.dull = ((m.kind != PEC) & (np.abs(m.eps) < _METAL))[facets.material]
         self.bulge, self.curved = bulges(facets.vertices, facets.normals)
         # What others made of all this, once.
@@ -165,6 +170,20 @@ class Surface(Tracer):
         return Clusters(order, first, *hull)
 
     @cached_property
+    def cores(self) -> Balls:
+        """Centre (k, 3) [m], radius (k,) [m] and body (k,) of balls inside closed opaque bodies."""
+        if self._cores is not None:
+            return self._cores
+        f = self.facets
+        opaque = ~self.is_layer & (f.role[f.body] != MIRROR)
+        solid = np.concatenate(
+            [np.zeros(0, bool), *(closed_pieces(j, opaque[i : i + len(j.plane)]) for j, i in self._joined)]
+        )
+        found = [cores_of(f.vertices[solid & (f.body == b)]) for b in range(len(f.role))]
+        owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(r) for _, r in found])
+        return np.concatenate([c for c, _ in found]), np.concatenate([r for _, r in found]), owner
+
+    @cached_property
     def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Centre (b, 3) [m] and radius (b,) [m] of a ball about each body, and which bodies (b,) have no facet."""
         low, high = np.moveaxis(self.extents, 1, 0)
@@ -220,6 +239,8 @@ class Stands(Protocol):
     @property
     def joints(self) -> Sequence[Joints]: ...
     @property
+    def cores(self) -> Balls: ...
+    @property
     def kept(self) -> dict[Any, Any]: ...
     def facets(self) -> Facets: ...
 
@@ -227,6 +248,6 @@ class Stands(Protocol):
 def surface_of(scene: Stands) -> Surface:
     """Return the surface of a scene's bodies as they stand at time 0, built once and kept with the scene."""
     if Surface not in scene.kept:
-        scene.kept[Surface] = Surface(scene.facets(), scene.joints)
+        scene.kept[Surface] = Surface(scene.facets(), scene.joints, scene.cores)
     kept: Surface = scene.kept[Surface]
     return kept

@@ -161,8 +161,9 @@ class _Work:
         carrier, facets = self.sensor.waveform.carrier, now.facets()
         if known is None:
             found: list[Routes] = []
+            surface = Surface(facets, now.joints, now.cores)
             paths, stats = solve(
-                Surface(facets, now.joints), now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
+                surface, now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
                 self.model.diffraction, found.append,
             )  # fmt: skip
             self.rays += stats.rays

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.kernels.facets import turned
-from raychan.tables import Facets, Points
+from raychan.tables import LAYER, MIRROR, Facets, Points
 from raychan.world import check, edit
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, nearest
@@ -257,6 +258,17 @@ class Scene:
     def joints(self) -> list[Joints]:
         """How the facets of each body hang together."""
         return [b.geometry.joints for b in self.bodies]
+
+    @property
+    def cores(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
+        """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of balls inside bodies at time 0."""
+        found = []
+        for i, b in enumerate(self.bodies):
+            if b.kind != MIRROR:
+                centre, radius = b.geometry.cores(tuple(m.kind != LAYER for m in self._chosen(b)))
+                found.append((b.motion.to_world(centre), radius, np.full(len(radius), i, np.int32)))
+        centres, radii, owners = zip(*found, strict=True) if found else ((), (), ())
+        return _stack(list(centres), (3,), float), _stack(list(radii), (), float), _stack(list(owners), (), np.int32)
 
     def points(self, time: float = 0.0) -> Points:
         """Return the targets given by their RCS at a time [s]."""
