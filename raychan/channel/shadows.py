@@ -67,7 +67,10 @@ def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
     mirror; and the smooth patches (m, 2) that meet there."""
     kept = np.flatnonzero(_turning(surface.edge_faces, surface.first, surface.normal, leg.image, leg.far))
     pair = surface.edge_faces[kept]
-    edges, smooth = surface.edge_ends[kept], surface.smooth[np.where(pair < 0, pair[:, ::-1], pair)]
+    edges, smooth = (
+        surface.ends(surface.fabric.silhouettes[0][kept]),
+        surface.smooth[np.where(pair < 0, pair[:, ::-1], pair)],
+    )
     if leg.mirrors:
         m = leg.mirrors[-1]
         ahead = ((edges - m.point) @ m.normal > 0.0).any(axis=1)

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.kernels.facets import extents, planes_of
-from raychan.kernels.rays import clear, companions, land, plane_distances, set_out
+from raychan.kernels.rays import clear, companions, land, near_ball, plane_distances, set_out
 from raychan.kernels.rows import in_two
 from raychan.tables import LAYER, Facets
+from raychan.world.still import Still, columns, once
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -30,25 +31,57 @@ _TOUCH = 2e-5  # surfaces nearer than this lie on each other
 _NEAREST = 1e-6  # a hit closer than this is the surface the ray leaves
 
 
+class Group:
+    """Embree's scene of some facets; made for the first ray.
+
+    Args: facets, of which those of `rows` (n,) (None: all), about as far as extents (b, 2, 3) [m] of their bodies go.
+    """
+
+    def __init__(self, facets: Facets, extents: Floats, rows: Ints | None) -> None:
+        low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
+        self.centre, self.radius = 0.5 * (low + high), 0.5001 * float(np.linalg.norm(high - low))
+        self._rows, self._vertices, self._scene = rows, facets.vertices, None
+
+    def run(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Ints:
+        """Return the facet (n,) that each ray from the group's centre meets first, -1 for none."""
+        scene = self._scene or self.built()
+        hit: Ints = scene.run(origin, direction)
+        return hit if self._rows is None else np.where(hit >= 0, self._rows[hit], _MISS)
+
+    def built(self) -> Any:
+        """Return Embree's scene."""
+        if self._scene is None:
+            from embreex.mesh_construction import TriangleMesh
+            from embreex.rtcore_scene import EmbreeScene
+
+            v = self._vertices if self._rows is None else self._vertices[self._rows]
+            scene = EmbreeScene(robust=True)
+            self._mesh = TriangleMesh(scene, np.ascontiguousarray(v - self.centre, np.float32))
+            scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+            self._scene, self._vertices = scene, np.zeros((0, 3, 3))
+        return self._scene
+
+
 class Tracer:
     """A scene of facets that answers rays; holds counts of the rays it cast."""
 
-    def __init__(self, facets: Facets) -> None:
+    def __init__(self, facets: Facets, still: Still | None = None) -> None:
         self.facets = facets
-        v = facets.vertices
+        v, n = facets.vertices, len(facets.vertices)
         self.first = v[:, 0]
-        self.normal, self.area = planes_of(v)
-        self.extents = extents(v, facets.body, len(facets.role))
-        self.is_layer = facets.materials.kind[facets.material] == LAYER if len(v) else np.zeros(0, bool)
+        self.normal, self.area = columns(still, "planes", lambda rows: planes_of(v[rows]))
+        self.extents = _extents(facets, still)
+        kind = facets.materials.kind
+        self.is_layer = once(still, "layer", lambda: kind[facets.material] == LAYER if n else np.zeros(0, bool))
         self.rays = 0
         # Which facets are one surface; each for itself until someone knows better.
-        self.plane = self.smooth = np.arange(len(v), dtype=np.int32)
+        self.plane = self.smooth = once(still, "apart", lambda: np.arange(n, dtype=np.int32))
         self._any_layer = bool(self.is_layer.any())
         # Whether facets never hide each other from a point that looks at their lit sides.
         self.hides_nothing = False
-        self._scene: Any = None
         self.extent, self._size, self.touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
-        if len(v):
+        self._groups: list[Group] = []
+        if n:
             low, high = self.extents[:, 0].min(axis=0), self.extents[:, 1].max(axis=0)
             self._centre = 0.5 * (low + high)
             self.extent = float(np.linalg.norm(high - low))
@@ -56,18 +89,12 @@ class Tracer:
             # Far from the origin coordinates themselves are only known to their float64 spacing.
             blur = 8.0 * float(np.spacing(np.maximum(-low, high).max()))
             self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
-
-    def _built(self) -> Any:
-        """Return Embree's scene, made for the first ray."""
-        if self._scene is None:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
-
-            scene = EmbreeScene(robust=True)
-            self._mesh = TriangleMesh(scene, np.ascontiguousarray(self.facets.vertices - self._centre, np.float32))
-            scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-            self._scene = scene
-        return self._scene
+            self._groups = [Group(facets, self.extents, None)]
+            if still is not None:
+                rest = still.once("group", lambda: Group(facets, np.delete(self.extents, still.moving, 0), still.rest))
+                self._groups = [rest]
+                if len(still.rows):
+                    self._groups.append(Group(facets, self.extents[still.moving], still.rows))
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
@@ -85,29 +112,45 @@ class Tracer:
         if not len(self.first) or n == 0:
             return facet, distance
         begin = np.zeros(n) if start is None else np.asarray(start, float)
-        scene, casts = self._built(), []
+        casts = []
+        for group in self._groups:
+            group.built()
 
         def some(rows: slice) -> None:
             for i in range(rows.start, rows.stop, _CHUNK):
                 at = slice(i, min(i + _CHUNK, rows.stop))
-                casts.append(self._cast(scene, origin[at], direction[at], skip[at], begin[at], facet[at], distance[at]))
+                ways = origin[at], direction[at], skip[at], begin[at]
+                casts.append(self._cast(self._groups[0], *ways, facet[at], distance[at]))
+                for group in self._groups[1:]:
+                    self._nearer(group, *ways, facet[at], distance[at])
 
         in_two(n, some, _MANY)
-        # A ray and its two companions count as one.
+        # A ray and its two companions count as one, however many groups it is cast at.
         self.rays += sum(casts)
         return facet, distance
 
+    def _nearer(
+        self, group: Group, origin: Floats, direction: Floats, skip: Ints, begin: Floats, facet: Ints, distance: Floats
+    ) -> None:
+        """Write what rays meet of another group, where that is nearer."""
+        rows = near_ball(origin, direction, distance, group.centre, group.radius)
+        found, t = np.full(len(rows), _MISS, np.int32), np.full(len(rows), np.inf)
+        self._cast(group, origin[rows], direction[rows], skip[rows], begin[rows], found, t)
+        # Of two in the same place the first counts, whichever group it is of.
+        closer = (t < distance[rows]) | ((t == distance[rows]) & (found < facet[rows]) & (found >= 0))
+        facet[rows[closer]], distance[rows[closer]] = found[closer], t[closer]
+
     def _cast(
-        self, scene: Any, origin: Floats, direction: Floats, skip: Ints, begin: Floats, facet: Ints, distance: Floats
+        self, group: Group, origin: Floats, direction: Floats, skip: Ints, begin: Floats, facet: Ints, distance: Floats
     ) -> int:
         """Write the facets and distances of a chunk of rays; return how many were cast."""
         # Rays leave a little ahead, in float32 terms; the float64 origin stays the true one.
-        ball = self._centre, 0.5001 * self.extent
+        ball = group.centre, group.radius
         ahead, pace = set_out(origin, direction, skip, begin, *ball, _SLACK, self._size)
         todo, count = np.arange(len(origin)), 0
         shape = self.facets.vertices, self.first, self.normal
         for _ in range(8):
-            hit = scene.run(*companions(todo, origin, direction, ahead, pace, self._centre))
+            hit = group.run(*companions(todo, origin, direction, ahead, pace, group.centre))
             count += len(todo)
             ways = origin, direction, skip, begin, ahead, pace, _EDGE, self._nearest
             todo = land(todo, hit, *ways, *shape, facet, distance)
@@ -164,3 +207,14 @@ class Tracer:
             count[todo] += 1
             start[todo] = t + self._nearest
         return reached, passed, blocker
+
+
+def _extents(facets: Facets, still: Still | None) -> Floats:
+    """Return the lowest and highest corner (b, 2, 3) [m] of each body."""
+    count = len(facets.role)
+    found: Floats = once(still, "extents", lambda: extents(facets.vertices, facets.body, count))
+    if still is not None:
+        moved = extents(facets.vertices[still.rows], facets.body[still.rows], count)
+        found = found.copy()
+        found[still.moving] = moved[still.moving]
+    return found
