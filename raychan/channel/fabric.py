@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.kernels.outline import by_cluster
 from raychan.tables import LAYER, MIRROR, Facets
 from raychan.world.joints import Joints
 
@@ -85,6 +86,13 @@ class Fabric:
         parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self.joined]
         order, first = (np.concatenate(x) for x in zip(*parts, strict=True))
         return order, np.append(first, len(order))
+
+    @cached_property
+    def outlining(self) -> tuple[Ints, Ints, NDArray[np.int64], Ints, NDArray[np.int64]]:
+        """Facets (e, 2) of `silhouettes` with its edges by cluster (see kernels.outline.by_cluster)."""
+        faces = self.silhouettes[1]
+        edges, first, beside, begin = by_cluster(faces, *self.clusters)
+        return faces, edges, first, beside, begin
 
 
 def _numbers(labels: list[Ints], counts: list[int]) -> Ints:

@@ -15,6 +15,7 @@ from raychan.channel.fabric import Fabric
 from raychan.frames import sizes
 from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
+from raychan.kernels.outline import turning
 from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.cores import closed_pieces, cores_of
 from raychan.world.embree import Tracer
@@ -99,6 +100,17 @@ class Surface(Tracer):
     def edge_faces(self) -> Ints:
         """Facets (e, 2) on both sides of `edge_ends`, -1 beyond a rim."""
         return self.fabric.silhouettes[1]
+
+    def turning(self, image: Floats, far: bool) -> tuple[Ints, Ints]:
+        """Return the edges at which bodies turn away from a place (3,) [m], or from a direction when far, and the rims
+        of open sheets: their half edges (e,) and the facets (e, 2) on both sides, -1 beyond a rim."""
+        half, faces = self.fabric.silhouettes
+        if not len(half):
+            return half, faces
+        c = self.clusters
+        hull = c.centre, c.radius, c.axis, c.spread
+        found = np.sort(turning(*self.fabric.outlining, *hull, self.first, self.normal, np.asarray(image, float), far))
+        return half[found], faces[found]
 
     @cached_property
     def wedge_facet(self) -> Ints:
