@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,10 +48,16 @@ class Fabric:
         at = [x + np.int32(3 * i) for x, (_, i) in zip(found, self.joined, strict=True)]
         return np.concatenate(at) if at else np.zeros((0, 2) if name == "pair" else 0, np.int32)
 
-    @property
+    @cached_property
     def borders(self) -> Bools:
         """Which half edges (3 n,) are not inside a plane: 3 f + k runs from corner k of facet f to the next."""
         return np.concatenate([np.zeros(0, bool), *(j.border for j, _ in self.joined)])
+
+    @cached_property
+    def around(self) -> NDArray[np.int64]:
+        """How many edges (p,) run around each plane."""
+        count = self.borders.reshape(-1, 3).sum(axis=1)
+        return np.bincount(self.plane, weights=count, minlength=len(self.plane)).astype(np.int64)
 
     @cached_property
     def outlines(self) -> tuple[Ints, NDArray[np.int64]]:
@@ -88,11 +95,10 @@ class Fabric:
         return order, np.append(first, len(order))
 
     @cached_property
-    def outlining(self) -> tuple[Ints, Ints, NDArray[np.int64], Ints, NDArray[np.int64]]:
+    def outlining(self) -> tuple[NDArray[Any], ...]:
         """Facets (e, 2) of `silhouettes` with its edges by cluster (see kernels.outline.by_cluster)."""
         faces = self.silhouettes[1]
-        edges, first, beside, begin = by_cluster(faces, *self.clusters)
-        return faces, edges, first, beside, begin
+        return faces, *by_cluster(faces, *self.clusters)
 
 
 def _numbers(labels: list[Ints], counts: list[int]) -> Ints:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.frames import sizes
-from raychan.tables import MIRROR
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -28,9 +26,8 @@ class Screens:
 
     def __init__(self, surface: Surface) -> None:
         f = surface.facets
-        solid, borders = ~surface.is_layer & (f.role[f.body] != MIRROR), surface.fabric.borders
-        area, count = _planes(surface.plane, surface.area, solid, surface.curved, borders)
-        large = (area >= _LEAST_AREA) & (count <= _MOST_EDGES)
+        area = surface.wall_area
+        large = (area >= _LEAST_AREA) & (surface.fabric.around <= _MOST_EDGES)
         if len(f.role) < 2:
             # A body hides others only: how far its own surface may lie before its facets is not known here.
             large[:] = False
@@ -38,7 +35,7 @@ class Screens:
         rows = rows[np.argsort(surface.plane[rows], kind="stable")]
         numbers, lead = np.unique(surface.plane[rows], return_index=True)
         half = (3 * rows[:, None] + np.arange(3)).ravel()
-        half = half[borders[half]]
+        half = half[surface.fabric.borders[half]]
         self.touch = 1e-4 + surface.touch
         self.area, self.edge = area[numbers], surface.ends(half)
         self.first = np.searchsorted(surface.plane[half // 3], np.append(numbers, len(area)))
@@ -86,16 +83,3 @@ class Screens:
         pick = np.argsort(-view, kind="stable")[:_MOST]
         pick = pick[view[pick] > 0.0]
         return centre[pick], radius[pick], owner[pick]
-
-
-@njit(cache=True, nogil=True)
-def _planes(plane, area, solid, curved, borders):  # type: ignore[no-untyped-def]
-    """Return of planes, numbered from 0 on, the area (p,) [m^2] that is flat and solid, and how many edges (p,) are
-    around each."""
-    total, count = np.zeros(len(plane)), np.zeros(len(plane), np.int64)
-    for f in range(len(plane)):
-        if solid[f] and not curved[f]:
-            total[plane[f]] += area[f]
-        for k in range(3):
-            count[plane[f]] += 1 if borders[3 * f + k] else 0
-    return total, count

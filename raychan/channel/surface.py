@@ -108,8 +108,8 @@ class Surface(Tracer):
         if not len(half):
             return half, faces
         c = self.clusters
-        hull = c.centre, c.radius, c.axis, c.spread
-        found = np.sort(turning(*self.fabric.outlining, *hull, self.first, self.normal, np.asarray(image, float), far))
+        seen = c.centre, c.radius, c.axis, c.spread, self.first, self.normal, np.asarray(image, float), far
+        found = np.sort(turning(*(*self.fabric.outlining, *seen)))
         return half[found], faces[found]
 
     @cached_property
@@ -145,6 +145,23 @@ class Surface(Tracer):
             for column, part in zip(out, hulls(order, first[begin : end + 1], *shape), strict=True):
                 column[begin:end] = part
         return Clusters(order, first, *out)
+
+    @cached_property
+    def wall_area(self) -> Floats:
+        """Area (p,) [m^2] of each plane that is flat and lets nothing through, mirrors aside."""
+        f, still = self.facets, self._still
+
+        def found(rows: Any) -> Floats:
+            solid = ~self.curved[rows] & ~self.is_layer[rows] & (f.role[f.body[rows]] != MIRROR)
+            weights = np.where(solid, self.area[rows], 0.0)
+            return np.asarray(np.bincount(self.plane[rows], weights, len(self.plane)), float)
+
+        if still is None:
+            return found(slice(None))
+        out = still.once("walls", lambda: found(slice(None))).copy()
+        anew = self.plane[still.rows]
+        out[anew] = found(still.rows)[anew]
+        return out
 
     @cached_property
     def cores(self) -> Balls:

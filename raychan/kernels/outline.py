@@ -16,7 +16,7 @@ _WIDE = 1e-6  # rad: rounding must not tell a cluster's side where a facet graze
 @njit(cache=True, nogil=True)
 def by_cluster(faces, order, start):  # type: ignore[no-untyped-def]
     """Return edges by the cluster of their first facet, as (edges (e,), first (k + 1,)), and the other clusters beside
-    each, as (beside (b,), begin (k + 1,)): itself where it has a rim.
+    each, as (beside (b,), begin (k + 1,)): itself where it has a rim; and the cluster of each facet (f,).
 
     Args: facets order[start[i] : start[i + 1]] make a cluster.
     """
@@ -49,14 +49,14 @@ def by_cluster(faces, order, start):  # type: ignore[no-untyped-def]
             beside[count] = j
             count += 1
         begin[i + 1] = count
-    return edges, first, beside[:count].copy(), begin
+    return edges, first, beside[:count].copy(), begin, cluster
 
 
 @njit(cache=True, nogil=True)
-def turning(faces, edges, first, beside, begin, centre, radius, axis, spread, point, normal, image, far):  # type: ignore[no-untyped-def]
+def turning(faces, edges, first, beside, begin, cluster, centre, radius, axis, spread, point, normal, image, far):  # type: ignore[no-untyped-def]
     """Return the edges (n,) of which one facet faces the image and the other does not, or is none; in no order.
 
-    Args: edges to begin as `by_cluster` gives them; centre (k, 3), radius (k,) [m], axis (k, 3), spread (k,) [rad] of
+    Args: edges to cluster as `by_cluster` gives them; centre (k, 3), radius (k,) [m], axis (k, 3), spread (k,) [rad] of
     clusters' balls and cones; point, normal (f, 3) of facets; image (3,) [m], or the direction to it when far.
     """
     k = len(radius)
@@ -86,6 +86,8 @@ def turning(faces, edges, first, beside, begin, centre, radius, axis, spread, po
             continue
         for at in range(first[i], first[i + 1]):
             e = edges[at]
+            if side[i] != 0 and faces[e, 1] >= 0 and side[cluster[faces[e, 1]]] == side[i]:
+                continue
             front = 0
             for q in range(2):
                 f = faces[e, q]
