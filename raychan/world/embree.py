@@ -7,12 +7,15 @@ facets before it is cast to float32, so a scene far from the origin gives the an
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from copy import copy
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.kernels.facets import extents, planes_of
+from raychan.kernels.facets import extents, planes_of, turned
 from raychan.kernels.rays import clear, companions, land, near_ball, plane_distances, set_out
 from raychan.kernels.rows import in_two
 from raychan.tables import LAYER, Facets
@@ -31,35 +34,56 @@ _TOUCH = 2e-5  # surfaces nearer than this lie on each other
 _NEAREST = 1e-6  # a hit closer than this is the surface the ray leaves
 
 
-class Group:
-    """Embree's scene of some facets; made for the first ray.
+class Triangles:
+    """Embree's scene of triangles, made for the first ray. Args: corners gives them, (n, 3, 3) [m]; centre (3,) [m]."""
 
-    Args: facets, of which those of `rows` (n,) (None: all), about as far as extents (b, 2, 3) [m] of their bodies go.
+    def __init__(self, corners: Callable[[], Floats], centre: Floats) -> None:
+        self._corners: Callable[[], Floats] | None = corners
+        self.centre = centre
+
+    @cached_property
+    def scene(self) -> Any:
+        """What answers rays from the centre."""
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        assert self._corners is not None
+        scene = EmbreeScene(robust=True)
+        self._mesh = TriangleMesh(scene, np.ascontiguousarray(self._corners() - self.centre, np.float32))
+        scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+        self._corners = None
+        return scene
+
+
+class Group:
+    """Facets that are cast at together, in the world's frame or one of their own.
+
+    Args: corners gives them, (n, 3, 3) [m]; extents (b, 2, 3) [m] that they do not reach beyond; rows (n,) their
+    numbers among all, None if they are all.
     """
 
-    def __init__(self, facets: Facets, extents: Floats, rows: Ints | None) -> None:
+    def __init__(self, corners: Callable[[], Floats], extents: Floats, rows: Ints | None) -> None:
         low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
         self.centre, self.radius = 0.5 * (low + high), 0.5001 * float(np.linalg.norm(high - low))
-        self._rows, self._vertices, self._scene = rows, facets.vertices, None
+        self.mesh, self._rows = Triangles(corners, self.centre), rows
+        self._frame: tuple[Floats, Floats] | None = None
+
+    def placed(self, turn: Floats, origin: Floats) -> Group:
+        """Return the same facets where their frame stands now: turn (3, 3) to world axes, origin (3,) [m]."""
+        now = copy(self)
+        now.centre, now._frame = turn @ self.mesh.centre + origin, (np.ascontiguousarray(turn.T), -turn.T @ origin)
+        return now
+
+    def own(self, origin: Floats, direction: Floats) -> tuple[Floats, Floats]:
+        """Return origins and directions (n, 3) of rays in the group's frame."""
+        if self._frame is None:
+            return origin, direction
+        return turned(origin, *self._frame), turned(direction, self._frame[0], np.zeros(3))
 
     def run(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Ints:
-        """Return the facet (n,) that each ray from the group's centre meets first, -1 for none."""
-        scene = self._scene or self.built()
-        hit: Ints = scene.run(origin, direction)
+        """Return the facet (n,) that each ray, from the mesh's centre in its frame, meets first, -1 for none."""
+        hit: Ints = self.mesh.scene.run(origin, direction)
         return hit if self._rows is None else np.where(hit >= 0, self._rows[hit], _MISS)
-
-    def built(self) -> Any:
-        """Return Embree's scene."""
-        if self._scene is None:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
-
-            v = self._vertices if self._rows is None else self._vertices[self._rows]
-            scene = EmbreeScene(robust=True)
-            self._mesh = TriangleMesh(scene, np.ascontiguousarray(v - self.centre, np.float32))
-            scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-            self._scene, self._vertices = scene, np.zeros((0, 3, 3))
-        return self._scene
 
 
 class Tracer:
@@ -89,12 +113,22 @@ class Tracer:
             # Far from the origin coordinates themselves are only known to their float64 spacing.
             blur = 8.0 * float(np.spacing(np.maximum(-low, high).max()))
             self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
-            self._groups = [Group(facets, self.extents, None)]
-            if still is not None:
-                rest = still.once("group", lambda: Group(facets, np.delete(self.extents, still.moving, 0), still.rest))
-                self._groups = [rest]
-                if len(still.rows):
-                    self._groups.append(Group(facets, self.extents[still.moving], still.rows))
+            self._groups = [Group(lambda: v, self.extents, None)] if still is None else self._parted(still)
+
+    def _parted(self, still: Still) -> list[Group]:
+        """Return what stands still, what is large and moves, and all that is small and moves, each by itself."""
+        v, extents = self.facets.vertices, self.extents
+        groups = []
+        if len(still.rest):
+            there = np.delete(extents, still.moving, 0)
+            groups.append(still.once("group", lambda: Group(lambda: v[still.rest], there, still.rest)))
+        for r in still.rigid:
+            low, high = r.mesh.bounds
+            one = partial(Group, lambda m=r.mesh: m.corners, np.array([[low, high]]), r.rows)
+            groups.append(still.once(f"group {r.body}", one).placed(r.turn, r.origin))
+        if len(still.few):
+            groups.append(Group(lambda: v[still.few_rows], extents[still.few], still.few_rows))
+        return groups
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
@@ -114,7 +148,7 @@ class Tracer:
         begin = np.zeros(n) if start is None else np.asarray(start, float)
         casts = []
         for group in self._groups:
-            group.built()
+            _ = group.mesh.scene
 
         def some(rows: slice) -> None:
             for i in range(rows.start, rows.stop, _CHUNK):
@@ -147,10 +181,11 @@ class Tracer:
         # Rays leave a little ahead, in float32 terms; the float64 origin stays the true one.
         ball = group.centre, group.radius
         ahead, pace = set_out(origin, direction, skip, begin, *ball, _SLACK, self._size)
+        near = group.own(origin, direction)
         todo, count = np.arange(len(origin)), 0
         shape = self.facets.vertices, self.first, self.normal
         for _ in range(8):
-            hit = group.run(*companions(todo, origin, direction, ahead, pace, group.centre))
+            hit = group.run(*companions(todo, *near, ahead, pace, group.mesh.centre))
             count += len(todo)
             ways = origin, direction, skip, begin, ahead, pace, _EDGE, self._nearest
             todo = land(todo, hit, *ways, *shape, facet, distance)

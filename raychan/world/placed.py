@@ -23,18 +23,26 @@ def placed(bodies: Sequence[Body], index: Index, frequency: float, time: float, 
     Args: index all materials, all part names, and for each body the material and the part number of its parts;
     frequency [Hz] of the materials; still what is kept of bodies that do not move.
     """
-    if still is None:
+
+    def every() -> Facets:
         return _placed(bodies, range(len(bodies)), index, frequency, time)
-    if still.facets is None:
-        every = _placed(bodies, range(len(bodies)), index, frequency, time)
-        vertices, normals = still.keep("facets", (every.vertices, every.normals))
-        still.facets = every.rebuilt(vertices=vertices, normals=normals)
-        return every
+
+    if still is None or not len(still.rest):
+        return every()
+    base = still.once("facets", lambda: _shared(every(), still))
     part = _placed(bodies, [int(b) for b in still.moving], index, frequency, time)
     vertices, normals = still.copies("facets", (part.vertices, part.normals))
-    return still.facets.rebuilt(
+    now: Facets = base.rebuilt(
         vertices=vertices, normals=normals, origin=part.origin, velocity=part.velocity, spin=part.spin
     )
+    return now
+
+
+def _shared(facets: Facets, still: Still) -> Facets:
+    """Return the same record of columns that are kept."""
+    vertices, normals = still.keep("facets", (facets.vertices, facets.normals))
+    kept: Facets = facets.rebuilt(vertices=vertices, normals=normals)
+    return kept
 
 
 def _placed(bodies: Sequence[Body], which: Sequence[int], index: Index, frequency: float, time: float) -> Facets:

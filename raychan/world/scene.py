@@ -236,10 +236,11 @@ class Scene:
 
     @property
     def still(self) -> Still | None:
-        """What is kept of the bodies that stand still; None where that does not pay."""
+        """What is kept of the bodies through all instants; None where that does not pay."""
         if Still not in self._still:
             self._still[Still] = Still.of(self.bodies)
-        return self._still[Still]
+        still = self._still[Still]
+        return still and still.at(self.bodies)
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""

@@ -3,35 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.tables import Facets
 from raychan.world.body import Body
+from raychan.world.mesh import Mesh
 from raychan.world.sheet import Sheet
 
+Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 T = TypeVar("T")
 Arrays = tuple[NDArray[Any], ...]
 
-MANY = 30_000  # facets that stand still from which on they are kept
+MANY = 30_000  # facets from which on they are kept
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A body of many facets that moves: its number, its rows of facets (n,), its mesh, and where that stands: turn
+    (3, 3) from body to world axes, origin (3,) [m]."""
+
+    body: int
+    rows: NDArray[np.int32]
+    mesh: Mesh
+    turn: Floats
+    origin: Floats
 
 
 class Still:
-    """The rows of facets of bodies that stand still. What is kept is the same whichever instant was asked for first."""
+    """What is kept of bodies through all instants, and `rigid` those of many facets that move. What is kept is the same
+    whichever instant was asked for first."""
 
     def __init__(self, moving: Bools, count: NDArray[np.int64]) -> None:
         self.moving = np.flatnonzero(moving)
         at = np.concatenate([[0], np.cumsum(count)])
-        pieces = [np.arange(at[b], at[b + 1], dtype=np.int32) for b in self.moving]
-        # The facets that move, and those that do not.
-        self.rows = np.concatenate([np.zeros(0, np.int32), *pieces])
+        self._rows = {int(b): np.arange(at[b], at[b + 1], dtype=np.int32) for b in self.moving}
+        # The facets that move, of these those of small bodies, and the facets that do not.
+        self.rows = np.concatenate([np.zeros(0, np.int32), *self._rows.values()])
+        self.few = np.flatnonzero(moving & (count < MANY))
+        self.few_rows = np.concatenate([np.zeros(0, np.int32), *(self._rows[int(b)] for b in self.few)])
         rest = np.ones(at[-1], bool)
         rest[self.rows] = False
         self.rest = np.flatnonzero(rest).astype(np.int32)
-        self.facets: Facets | None = None
+        self.rigid: tuple[Rigid, ...] = ()
         self._kept: dict[str, Any] = {}
         self._sheets: dict[str, tuple[Sheet, ...]] = {}
 
@@ -42,7 +60,15 @@ class Still:
         if not moving.any():
             return None
         count = np.array([len(b.geometry.faces) for b in bodies], np.int64)
-        return Still(moving, count) if count[~moving].sum() >= MANY else None
+        pays = count[~moving].sum() >= MANY or (count[moving] >= MANY).any()
+        return Still(moving, count) if pays else None
+
+    def at(self, bodies: Sequence[Body]) -> Still:
+        """Return the same with bodies where they stand now."""
+        now = copy(self)
+        large = [(int(b), bodies[b]) for b in np.setdiff1d(self.moving, self.few)]
+        now.rigid = tuple(Rigid(i, self._rows[i], b.geometry, b.motion.rotation(), b.motion.origin()) for i, b in large)
+        return now
 
     def once(self, name: str, make: Callable[[], T]) -> T:
         """Return what `make` finds, which is the same wherever bodies stand; made once."""
@@ -54,6 +80,8 @@ class Still:
     def columns(self, name: str, make: Callable[[Any], Arrays]) -> Arrays:
         """Return columns (n, ...) that `make` finds for rows of facets, each by itself: for all the first time, later
         only for those that move."""
+        if not len(self.rest):
+            return make(slice(None))
         if name not in self._sheets:
             return self.keep(name, make(slice(None)))
         return self.copies(name, make(self.rows))
