@@ -135,7 +135,7 @@ class Surface(Tracer):
         order, first = self.fabric.clusters
         f = self.facets
         shape = f.vertices, f.normals, self.normal, self.bulge
-        if self._still is None:
+        if self._still is None or not self._still.shares:
             return Clusters(order, first, *hulls(order, first, *shape))
         hull = self._still.once("hulls", lambda: hulls(order, first, *shape))
         out = tuple(x.copy() for x in hull)
@@ -156,7 +156,7 @@ class Surface(Tracer):
             weights = np.where(solid, self.area[rows], 0.0)
             return np.asarray(np.bincount(self.plane[rows], weights, len(self.plane)), float)
 
-        if still is None:
+        if still is None or not still.shares:
             return found(slice(None))
         out = still.once("walls", lambda: found(slice(None))).copy()
         anew = self.plane[still.rows]

@@ -247,9 +247,10 @@ class Tracer:
 def _extents(facets: Facets, still: Still | None) -> Floats:
     """Return the lowest and highest corner (b, 2, 3) [m] of each body."""
     count = len(facets.role)
-    found: Floats = once(still, "extents", lambda: extents(facets.vertices, facets.body, count))
-    if still is not None:
-        moved = extents(facets.vertices[still.rows], facets.body[still.rows], count)
+    shared = still if still is not None and still.shares else None
+    found: Floats = once(shared, "extents", lambda: extents(facets.vertices, facets.body, count))
+    if shared is not None:
+        moved = extents(facets.vertices[shared.rows], facets.body[shared.rows], count)
         found = found.copy()
-        found[still.moving] = moved[still.moving]
+        found[shared.moving] = moved[shared.moving]
     return found

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.kernels.facets import turned
+from raychan.kernels.facets import stand
 from raychan.tables import Facets
 from raychan.world.body import Body
 from raychan.world.material import Material, resolve
@@ -27,7 +27,7 @@ def placed(bodies: Sequence[Body], index: Index, frequency: float, time: float, 
     def every() -> Facets:
         return _placed(bodies, range(len(bodies)), index, frequency, time)
 
-    if still is None or not len(still.rest):
+    if still is None or not still.shares:
         return every()
     base = still.once("facets", lambda: _shared(every(), still))
     part = _placed(bodies, [int(b) for b in still.moving], index, frequency, time)
@@ -51,11 +51,13 @@ def _placed(bodies: Sequence[Body], which: Sequence[int], index: Index, frequenc
     meshes = [bodies[b].geometry for b in which]
     turns = [bodies[b].motion.rotation(time) for b in which]
     origins = np.array([b.motion.origin(time) for b in bodies]).reshape(-1, 3)
-    places = [turned(m.vertices, r, origins[b])[m.faces] for b, m, r in zip(which, meshes, turns, strict=True)]
-    looks = [turned(m.normals.reshape(-1, 3), r, np.zeros(3)) for m, r in zip(meshes, turns, strict=True)]
+    at = np.concatenate([[0], np.cumsum([len(m.faces) for m in meshes], dtype=np.int64)])
+    vertices, normals = np.empty((at[-1], 3, 3)), np.empty((at[-1], 3, 3))
+    for b, m, turn, i, j in zip(which, meshes, turns, at, at[1:], strict=False):
+        stand(m.vertices, m.faces, m.normals, turn, origins[b], vertices[i:j], normals[i:j])
     return Facets(
-        vertices=stack(places, (3, 3), float),
-        normals=stack(looks, (3,), float).reshape(-1, 3, 3),
+        vertices=vertices,
+        normals=normals,
         body=stack([np.full(len(m.faces), b, np.int32) for b, m in zip(which, meshes, strict=True)], (), np.int32),
         part=stack([numbers[b][1][m.part] for b, m in zip(which, meshes, strict=True)], (), np.int32),
         material=stack([numbers[b][0][m.part] for b, m in zip(which, meshes, strict=True)], (), np.int32),

@@ -49,6 +49,8 @@ class Still:
         rest = np.ones(at[-1], bool)
         rest[self.rows] = False
         self.rest = np.flatnonzero(rest).astype(np.int32)
+        # Whether rows are kept: where most facets move, all are as soon made anew.
+        self.shares = len(self.rest) > len(self.rows)
         self.rigid: tuple[Rigid, ...] = ()
         self._kept: dict[str, Any] = {}
         self._sheets: dict[str, tuple[Sheet, ...]] = {}
@@ -80,7 +82,7 @@ class Still:
     def columns(self, name: str, make: Callable[[Any], Arrays]) -> Arrays:
         """Return columns (n, ...) that `make` finds for rows of facets, each by itself: for all the first time, later
         only for those that move."""
-        if not len(self.rest):
+        if not self.shares:
             return make(slice(None))
         if name not in self._sheets:
             return self.keep(name, make(slice(None)))
