@@ -56,7 +56,7 @@ def builds(monkeypatch):
     """Counts how many tracers are made."""
     made = []
     init = Tracer.__init__
-    monkeypatch.setattr(Tracer, "__init__", lambda self, f: (made.append(len(f.body)), init(self, f))[1])
+    monkeypatch.setattr(Tracer, "__init__", lambda self, f, *a: (made.append(len(f.body)), init(self, f, *a))[1])
     return made
 
 
@@ -161,10 +161,27 @@ def ball(at, radius=0.5):
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (0.3, 3.0, -1.0), (6.0, 0.2, 0.1), (30.0, -4.0, 9.0)])
 def test_clusters_pass_over_only_facets_that_turn_away(end):
-    surface = Surface(facets([ball((6.0, 0.0, 0.0), 1.5), ball((9.0, 1.0, 2.0))], smooth=True))
+    surface = Surface(facets([ball((6.0, 0.0, 0.0), 1.5), ball((9.0, 4.5, 2.0))], smooth=True))
     for leg in (Leg(end=np.array(end)), Leg(end=np.array([0.6, 0.0, 0.8]), far=True)):
         for bodies in (np.array([True, True]), np.array([False, True])):
             np.testing.assert_array_equal(seeds(surface, leg, bodies), wanted(surface, leg, bodies))
+
+
+@pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (6.0, 0.2, 0.1), (9.3, 1.1, 2.0), (30.0, -4.0, 9.0)])
+def test_edges_turn_where_one_facet_looks_here_and_the_other_does_not(end):
+    sheet = quad([[4, 3, -1], [4, 5, -1], [4, 5, 1], [4, 3, 1]])
+    truck = rc.Body(name="truck", shape="truck", position=(20.0, 3.0, 0.0), yaw_deg=30.0)
+    balls = facets([ball((6.0, 0.0, 0.0), 1.5), sheet, ball((9.0, 1.0, 2.0))], smooth=True)
+    for surface in (Surface(balls), surface_of(rc.Scene(bodies=[truck, rc.Body(name="bin", shape="trash_bin")]))):
+        half, faces = surface.fabric.silhouettes
+        for image, far in ((np.array(end), False), (np.array([0.6, 0.0, 0.8]), True)):
+            towards = surface.normal @ image if far else ((image - surface.first) * surface.normal).sum(axis=1)
+            front = towards > 0.0
+            wanted = (faces[:, 1] < 0) | (front[faces[:, 0]] != front[faces[:, 1]])
+            found = surface.turning(image, far)
+            assert 0 < len(found[0]) < len(half)
+            np.testing.assert_array_equal(found[0], half[wanted])
+            np.testing.assert_array_equal(found[1], faces[wanted])
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

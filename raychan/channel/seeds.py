@@ -1,5 +1,5 @@
 """Seeds: the facets that could be met over a leg; clusters of them that all turn away are passed over whole, and so are
-those out of a mirror's reach, behind a wall, or where the antenna does not look."""
+those out of a mirror's reach, behind a wall or a solid body, or where the antenna does not look."""
 
 from __future__ import annotations
 
@@ -28,24 +28,30 @@ _WIDE = 1e-6  # rad: rounding must not hide what grazes
 def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
     """Return the facets of bodies (b,) that could be met over a leg, in order."""
     f = surface.facets
-    may = np.zeros(len(f.body), np.bool_)
-    if not len(may) or not bodies.any():
+    if not len(f.body) or not bodies.any():
         return np.zeros(0, np.int32)
-    c, walls = surface.clusters, _screens(surface).over(leg)
-    dark = leg.dark(c.centre, c.radius)
-    facets = f.vertices, f.normals, f.body, surface.area, surface.open_facet, bodies
+    c, screens = surface.clusters, _screens(surface)
+    walls, balls = screens.over(leg), screens.within(leg)
     mirror = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
     if leg.mirrors and not leg.far:
         m = leg.mirrors[-1]
         mirror = m.point, m.normal, m.centre, m.radius
-    way = np.asarray(leg.image, float), leg.far, bool(leg.mirrors) and not leg.far, *mirror
+    image = np.asarray(leg.image, float)
+    way = image, leg.far, bool(leg.mirrors) and not leg.far, *mirror
+    lead = c.order[c.first[:-1]]
+    of, wanted = f.body[lead], bodies[f.body[lead]]
+    alive = np.zeros(len(lead), np.bool_)
 
     def some(rows: slice) -> None:
         hull = c.centre[rows], c.radius[rows], c.axis[rows], c.spread[rows]
-        _mark(*(dark[rows], c.order, c.first[rows.start : rows.stop + 1], *hull, *facets, *way, *walls, may))
+        about = wanted[rows], of[rows], surface.open_facet[lead[rows]], *hull
+        _alive(*(*about, *way, *walls, *balls, alive[rows]))
 
-    in_two(len(c.radius), some, _MANY)
-    rows = np.flatnonzero(may).astype(np.int32)
+    in_two(len(lead), some, _MANY)
+    left = np.flatnonzero(alive)
+    left = left[~leg.dark(c.centre[left], c.radius[left])]
+    shape = f.vertices, f.normals, surface.area, surface.open_facet
+    rows = np.sort(_lit(left, c.order, c.first, *shape, image, leg.far))
     if leg.mirrors:
         v = f.vertices[rows]
         middle = v.mean(axis=1)
@@ -109,28 +115,65 @@ def _hidden(centre, radius, body, point, normal, owner, first, edge, inward):  #
     return False
 
 
+@njit(cache=True, inline="always")
+def _eclipsed(centre, radius, body, image, far, core, size, owner):  # type: ignore[no-untyped-def]
+    """Tell whether a ball lies wholly in the shadow of a core of another body: within its cone or, from far, cylinder,
+    and behind where rays enter the core."""
+    for w in range(len(owner)):
+        if owner[w] == body or (far and radius >= size[w]):
+            continue
+        along, here, there = 0.0, 0.0, 0.0
+        for c in range(3):
+            a = core[w, c] - (centre[c] if far else image[c])
+            b = image[c] if far else centre[c] - image[c]
+            along, here, there = along + a * b, here + a * a, there + b * b
+        if far:
+            # The image is the direction towards the end: a core nearer to it lies higher.
+            if along > radius and here - along * along < (size[w] - radius) ** 2:
+                return True
+            continue
+        # Rays enter the core nearer than where they touch it.
+        rim, apart = here - size[w] * size[w], math.sqrt(there)
+        if rim <= 0.0 or apart <= radius or (apart - radius) ** 2 <= rim:
+            continue
+        off = math.acos(min(max(along / math.sqrt(here * there), -1.0), 1.0))
+        if off + _half(radius, apart) < _half(size[w], math.sqrt(here)) - _WIDE:
+            return True
+    return False
+
+
 @njit(cache=True, nogil=True)
-def _mark(  # type: ignore[no-untyped-def]
-    dark, order, first, centre, radius, axis, spread, v, n, body, area, is_open, bodies, image, far, mirrored, at,
-    normal, middle, reach, walls, normals, owners, begins, edges, inwards, touch, may,
+def _alive(  # type: ignore[no-untyped-def]
+    wanted, body, is_open, centre, radius, axis, spread, image, far, mirrored, at, normal, middle, reach, walls,
+    normals, owners, begins, edges, inwards, touch, cores, sizes, solids, out,
 ):  # fmt: skip
-    """Mark the facets that could be met: of clusters order[first[i] : first[i + 1]] with their balls and cones."""
+    """Tell of clusters (k,), each with a ball and a cone of normals, which may hold a facet that could be met."""
     d, work = np.empty(3), np.empty(3)
     for i in range(len(radius)):
-        lead = order[first[i]]
-        if dark[i] or not bodies[body[lead]]:
+        if not wanted[i]:
             continue
         for c in range(3):
             d[c] = -image[c] if far else centre[i, c] - image[c]
-        if not is_open[lead]:
+        if not is_open[i]:
             around = 0.0 if far else _half(radius[i], math.sqrt(dot(d, d)))
             if _angle(d, axis[i]) + spread[i] + around < 0.5 * math.pi - _WIDE:
                 continue
         if mirrored and not _over(centre[i], radius[i], d, image, at, normal, middle, reach, work):
             continue
         swell = 1.001 * radius[i] + touch
-        if _hidden(centre[i], swell, body[lead], walls, normals, owners, begins, edges, inwards):
+        if _hidden(centre[i], swell, body[i], walls, normals, owners, begins, edges, inwards):
             continue
+        out[i] = not _eclipsed(centre[i], swell, body[i], image, far, cores, sizes, solids)
+
+
+@njit(cache=True, nogil=True)
+def _lit(clusters, order, first, v, n, area, is_open, image, far):  # type: ignore[no-untyped-def]
+    """Return the facets of clusters that face the image at a corner at least, or are open, in no order."""
+    total = 0
+    for i in clusters:
+        total += first[i + 1] - first[i]
+    out, count = np.empty(total, np.int32), 0
+    for i in clusters:
         for j in range(first[i], first[i + 1]):
             f = order[j]
             if not area[f] > 0.0:
@@ -141,4 +184,7 @@ def _mark(  # type: ignore[no-untyped-def]
                 for c in range(3):
                     towards += (-image[c] if far else v[f, q, c] - image[c]) * n[f, q, c]
                 lit |= towards < 0.0
-            may[f] = lit
+            if lit:
+                out[count] = f
+                count += 1
+    return out[:count].copy()

@@ -73,28 +73,13 @@ def shadows_of(surface: Surface, leg: Leg) -> Shadows:
 def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
     """Return the edges (m, 2, 3) [m] at which a body turns away, and the rims of open sheets, in front of the last
     mirror; and the smooth patches (m, 2) that meet there."""
-    kept = np.flatnonzero(_turning(surface.edge_faces, surface.first, surface.normal, leg.image, leg.far))
-    pair = surface.edge_faces[kept]
-    edges, smooth = surface.edge_ends[kept], surface.smooth[np.where(pair < 0, pair[:, ::-1], pair)]
+    half, pair = surface.turning(leg.image, leg.far)
+    edges, smooth = surface.ends(half), surface.smooth[np.where(pair < 0, pair[:, ::-1], pair)]
     if leg.mirrors:
         m = leg.mirrors[-1]
         ahead = ((edges - m.point) @ m.normal > 0.0).any(axis=1)
         edges, smooth = edges[ahead], smooth[ahead]
     return np.ascontiguousarray(edges), np.ascontiguousarray(smooth)
-
-
-@njit(cache=True, nogil=True)
-def _turning(pair, first, normal, image, far):  # type: ignore[no-untyped-def]
-    """Tell of edges whether one of their facets (e, 2) faces the source and the other does not, or is none."""
-    front, out = np.empty(len(first), np.bool_), np.empty(len(pair), np.bool_)
-    for i in range(len(first)):
-        towards = 0.0
-        for c in range(3):
-            towards += normal[i, c] * (image[c] if far else image[c] - first[i, c])
-        front[i] = towards > 0.0
-    for e in range(len(pair)):
-        out[e] = pair[e, 1] < 0 or front[pair[e, 0]] != front[pair[e, 1]]
-    return out
 
 
 @njit(cache=True, inline="always")

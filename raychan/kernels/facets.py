@@ -27,6 +27,19 @@ def turned(rows, matrix, shift):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def stand(vertices, faces, looks, matrix, shift, v, n):  # type: ignore[no-untyped-def]
+    """Write the corners v (m, 3, 3) of faces (m, 3) of vertices (k, 3), turned by a matrix (3, 3) and shifted by (3,),
+    and their normals n (m, 3, 3), turned alike."""
+    there = turned(vertices, matrix, shift)
+    for f in range(len(faces)):
+        for q in range(3):
+            x, y, z = looks[f, q, 0], looks[f, q, 1], looks[f, q, 2]
+            for c in range(3):
+                v[f, q, c] = there[faces[f, q], c]
+                n[f, q, c] = matrix[c, 0] * x + matrix[c, 1] * y + matrix[c, 2] * z
+
+
+@njit(cache=True, nogil=True)
 def planes_of(v):  # type: ignore[no-untyped-def]
     """Return unit normals (m, 3), zero where a facet has no area, and areas (m,) [m^2]."""
     m = len(v)

@@ -50,6 +50,24 @@ def _holds(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def near_ball(origin, direction, most, centre, radius):  # type: ignore[no-untyped-def]
+    """Return the rays (k,) of those (n,) that may meet a ball, centre (3,) and radius [m], before `most` (n,) [m]."""
+    rows = np.empty(len(origin), np.int64)
+    count = 0
+    for i in range(len(origin)):
+        along, apart = 0.0, 0.0
+        for c in range(3):
+            d = centre[c] - origin[i, c]
+            along += d * direction[i, c]
+            apart += d * d
+        aside = apart - along * along
+        if along > -radius and along - radius < most[i] and aside < radius * radius * (1.0 + 1e-9) + 1e-9 * apart:
+            rows[count] = i
+            count += 1
+    return rows[:count].copy()
+
+
+@njit(cache=True, nogil=True)
 def set_out(origin, direction, skip, start, centre, radius, slack, size):  # type: ignore[no-untyped-def]
     """Return how far ahead (n,) [m] rays are cast, and their pace (n,) [m]: a few float32 spacings.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from raychan.channel.advance import Poses, carried, strengths
 from raychan.channel.fields import departures
 from raychan.channel.solve import solve
-from raychan.channel.surface import Surface
+from raychan.channel.surface import surface_at, surface_of
 from raychan.channel.tubes import Refinement
 from raychan.kernels.beat import ramp_sums
 from raychan.radar.sensor import Sensor
@@ -158,11 +158,12 @@ class _Work:
         """Trace the scene at a chirp."""
         now = self.scene.at(chirp * self.step)
         self.times.append(chirp * self.step)
-        carrier, facets = self.sensor.waveform.carrier, now.facets()
+        carrier = self.sensor.waveform.carrier
+        surface = surface_at(now) if known is None else surface_of(now)
         if known is None:
             found: list[Routes] = []
             paths, stats = solve(
-                Surface(facets, now.joints), now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
+                surface, now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
                 self.model.diffraction, found.append,
             )  # fmt: skip
             self.rays += stats.rays
@@ -177,7 +178,7 @@ class _Work:
             chirp,
             now,
             routes,
-            tuple(strengths(r, facets, now.sensor, carrier) for r in routes),
+            tuple(strengths(r, surface.facets, now.sensor, carrier) for r in routes),
             take(known.paths, rest[known.paths.way]),
         )
 

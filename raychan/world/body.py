@@ -89,9 +89,14 @@ class Body:
         yaw, pitch, roll, turn, *spin = map(float, angles)
         return Motion((x, y, z), yaw, pitch, roll, (u, v, w), turn, (spin[0], spin[1], spin[2]))
 
+    @property
+    def moves(self) -> bool:
+        """Whether it moves or turns."""
+        return any(self.motion.velocity) or bool(self.motion.spin().any())
+
     def at(self, time: float) -> Body:
         """Return the body where it is at a time [s], itself if it does not move; the mesh is shared."""
-        if not (any(self.motion.velocity) or self.motion.spin().any()):
+        if not self.moves:
             return self
         then = self.motion.at(time)
         yaw, pitch, roll = (float(np.degrees(a)) for a in (then.yaw, then.pitch, then.roll))

@@ -8,15 +8,19 @@ facets before it is cast to float32, so a scene far from the origin gives the an
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from copy import copy
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.kernels.facets import extents, planes_of
-from raychan.kernels.rays import arrive, companions, land, plane_distances, set_out
-from raychan.kernels.rows import in_two
+from raychan.kernels.facets import extents, planes_of, turned
+from raychan.kernels.rays import arrive, companions, land, near_ball, plane_distances, set_out
+from raychan.kernels.rows import in_two, made_once
 from raychan.tables import LAYER, Facets
+from raychan.world.still import Still, columns, once
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -31,27 +35,81 @@ _TOUCH = 2e-5  # surfaces nearer than this lie on each other
 _NEAREST = 1e-6  # a hit closer than this is the surface the ray leaves
 
 
+class Triangles:
+    """Embree's scene of triangles, made for the first ray. Args: corners gives them, (n, 3, 3) [m]; centre (3,) [m]."""
+
+    def __init__(self, corners: Callable[[], Floats], centre: Floats) -> None:
+        self._corners: Callable[[], Floats] | None = corners
+        self.centre = centre
+        self.making = threading.RLock()
+
+    @made_once
+    def scene(self) -> Any:
+        """What answers rays from the centre."""
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        assert self._corners is not None
+        scene = EmbreeScene(robust=True)
+        self._mesh = TriangleMesh(scene, np.ascontiguousarray(self._corners() - self.centre, np.float32))
+        scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+        self._corners = None
+        return scene
+
+
+class Group:
+    """Facets that are cast at together, in the world's frame or one of their own.
+
+    Args: corners gives them, (n, 3, 3) [m]; extents (b, 2, 3) [m] that they do not reach beyond; rows (n,) their
+    numbers among all, None if they are all.
+    """
+
+    def __init__(self, corners: Callable[[], Floats], extents: Floats, rows: Ints | None) -> None:
+        low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
+        self.centre, self.radius = 0.5 * (low + high), 0.5001 * float(np.linalg.norm(high - low))
+        self.mesh, self._rows = Triangles(corners, self.centre), rows
+        self._frame: tuple[Floats, Floats] | None = None
+
+    def placed(self, turn: Floats, origin: Floats) -> Group:
+        """Return the same facets where their frame stands now: turn (3, 3) to world axes, origin (3,) [m]."""
+        now = copy(self)
+        now.centre, now._frame = turn @ self.mesh.centre + origin, (np.ascontiguousarray(turn.T), -turn.T @ origin)
+        return now
+
+    def own(self, origin: Floats, direction: Floats) -> tuple[Floats, Floats]:
+        """Return origins and directions (n, 3) of rays in the group's frame."""
+        if self._frame is None:
+            return origin, direction
+        return turned(origin, *self._frame), turned(direction, self._frame[0], np.zeros(3))
+
+    def run(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Ints:
+        """Return the facet (n,) that each ray, from the mesh's centre in its frame, meets first, -1 for none."""
+        hit: Ints = self.mesh.scene.run(origin, direction)
+        return hit if self._rows is None else np.where(hit >= 0, self._rows[hit], _MISS)
+
+
 class Tracer:
     """A scene of facets that answers rays, and counts them by thread."""
 
-    def __init__(self, facets: Facets) -> None:
+    def __init__(self, facets: Facets, still: Still | None = None) -> None:
         self.facets = facets
-        v = facets.vertices
+        v, n = facets.vertices, len(facets.vertices)
         self.first = v[:, 0]
-        self.normal, self.area = planes_of(v)
-        self.extents = extents(v, facets.body, len(facets.role))
-        self.is_layer = facets.materials.kind[facets.material] == LAYER if len(v) else np.zeros(0, bool)
+        self.normal, self.area = columns(still, "planes", lambda rows: planes_of(v[rows]))
+        self.extents = _extents(facets, still)
+        kind = facets.materials.kind
+        self.is_layer = once(still, "layer", lambda: kind[facets.material] == LAYER if n else np.zeros(0, bool))
         self._counts = threading.local()
         # Which facets are one surface; each for itself until someone knows better.
-        self.plane = self.smooth = np.arange(len(v), dtype=np.int32)
+        self.plane = self.smooth = once(still, "apart", lambda: np.arange(n, dtype=np.int32))
         self._any_layer = bool(self.is_layer.any())
         # Whether facets never hide each other from a point that looks at their lit sides.
         self.hides_nothing = False
-        self._scene: Any = None
         # Held while something is made that serves all threads.
         self.making = threading.RLock()
         self.extent, self._size, self.touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
-        if len(v):
+        self._groups: list[Group] = []
+        if n:
             low, high = self.extents[:, 0].min(axis=0), self.extents[:, 1].max(axis=0)
             self._centre = 0.5 * (low + high)
             self.extent = float(np.linalg.norm(high - low))
@@ -59,6 +117,7 @@ class Tracer:
             # Far from the origin coordinates themselves are only known to their float64 spacing.
             blur = 8.0 * float(np.spacing(np.maximum(-low, high).max()))
             self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
+            self._groups = [Group(lambda: v, self.extents, None)] if still is None else self._parted(still)
 
     @property
     def rays(self) -> int:
@@ -68,18 +127,20 @@ class Tracer:
     def _count(self, rays: int) -> None:
         self._counts.rays = self.rays + rays
 
-    def _built(self) -> Any:
-        """Return Embree's scene, made for the first ray."""
-        with self.making:
-            if self._scene is None:
-                from embreex.mesh_construction import TriangleMesh
-                from embreex.rtcore_scene import EmbreeScene
-
-                scene = EmbreeScene(robust=True)
-                self._mesh = TriangleMesh(scene, np.ascontiguousarray(self.facets.vertices - self._centre, np.float32))
-                scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-                self._scene = scene
-            return self._scene
+    def _parted(self, still: Still) -> list[Group]:
+        """Return what stands still, what is large and moves, and all that is small and moves, each by itself."""
+        v, extents = self.facets.vertices, self.extents
+        groups = []
+        if len(still.rest):
+            there = np.delete(extents, still.moving, 0)
+            groups.append(still.once("group", lambda: Group(lambda: v[still.rest], there, still.rest)))
+        for r in still.rigid:
+            low, high = r.mesh.bounds
+            one = partial(Group, lambda m=r.mesh: m.corners, np.array([[low, high]]), r.rows)
+            groups.append(still.once(f"group {r.body}", one).placed(r.turn, r.origin))
+        if len(still.few):
+            groups.append(Group(lambda: v[still.few_rows], extents[still.few], still.few_rows))
+        return groups
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
@@ -97,29 +158,46 @@ class Tracer:
         if not len(self.first) or n == 0:
             return facet, distance
         begin = np.zeros(n) if start is None else np.asarray(start, float)
-        scene, casts = self._built(), []
+        casts = []
+        for group in self._groups:
+            _ = group.mesh.scene
 
         def some(rows: slice) -> None:
             for i in range(rows.start, rows.stop, _CHUNK):
                 at = slice(i, min(i + _CHUNK, rows.stop))
-                casts.append(self._cast(scene, origin[at], direction[at], skip[at], begin[at], facet[at], distance[at]))
+                ways = origin[at], direction[at], skip[at], begin[at]
+                casts.append(self._cast(self._groups[0], *ways, facet[at], distance[at]))
+                for group in self._groups[1:]:
+                    self._nearer(group, *ways, facet[at], distance[at])
 
         in_two(n, some, _MANY)
-        # A ray and its two companions count as one.
+        # A ray and its two companions count as one, however many groups it is cast at.
         self._count(sum(casts))
         return facet, distance
 
+    def _nearer(
+        self, group: Group, origin: Floats, direction: Floats, skip: Ints, begin: Floats, facet: Ints, distance: Floats
+    ) -> None:
+        """Write what rays meet of another group, where that is nearer."""
+        rows = near_ball(origin, direction, distance, group.centre, group.radius)
+        found, t = np.full(len(rows), _MISS, np.int32), np.full(len(rows), np.inf)
+        self._cast(group, origin[rows], direction[rows], skip[rows], begin[rows], found, t)
+        # Of two in the same place the first counts, whichever group it is of.
+        closer = (t < distance[rows]) | ((t == distance[rows]) & (found < facet[rows]) & (found >= 0))
+        facet[rows[closer]], distance[rows[closer]] = found[closer], t[closer]
+
     def _cast(
-        self, scene: Any, origin: Floats, direction: Floats, skip: Ints, begin: Floats, facet: Ints, distance: Floats
+        self, group: Group, origin: Floats, direction: Floats, skip: Ints, begin: Floats, facet: Ints, distance: Floats
     ) -> int:
         """Write the facets and distances of a chunk of rays; return how many were cast."""
         # Rays leave a little ahead, in float32 terms; the float64 origin stays the true one.
-        ball = self._centre, 0.5001 * self.extent
+        ball = group.centre, group.radius
         ahead, pace = set_out(origin, direction, skip, begin, *ball, _SLACK, self._size)
+        near = group.own(origin, direction)
         todo, count = np.arange(len(origin)), 0
         shape = self.facets.vertices, self.first, self.normal
         for _ in range(8):
-            hit = scene.run(*companions(todo, origin, direction, ahead, pace, self._centre))
+            hit = group.run(*companions(todo, *near, ahead, pace, group.mesh.centre))
             count += len(todo)
             ways = origin, direction, skip, begin, ahead, pace, _EDGE, self._nearest
             todo = land(todo, hit, *ways, *shape, facet, distance)
@@ -169,3 +247,15 @@ class Tracer:
             todo = todo[more]
             start[todo] = t[more] + self._nearest
         return reached, passed, blocker
+
+
+def _extents(facets: Facets, still: Still | None) -> Floats:
+    """Return the lowest and highest corner (b, 2, 3) [m] of each body."""
+    count = len(facets.role)
+    shared = still if still is not None and still.shares else None
+    found: Floats = once(shared, "extents", lambda: extents(facets.vertices, facets.body, count))
+    if shared is not None:
+        moved = extents(facets.vertices[shared.rows], facets.body[shared.rows], count)
+        found = found.copy()
+        found[shared.moving] = moved[shared.moving]
+    return found

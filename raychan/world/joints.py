@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,11 @@ class Joints:
     convex: bool
     order: Ints
     first: NDArray[np.int64]
+
+    @cached_property
+    def piece(self) -> Ints:
+        """Number (n,) of the piece that each facet hangs together with."""
+        return _components(self.pair, len(self.plane))
 
     @property
     def planes(self) -> int:

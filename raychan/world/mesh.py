@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from raychan.world.cores import closed_pieces, cores_of
 from raychan.world.errors import SceneError
 from raychan.world.flatten import merge_flat
 from raychan.world.joints import Joints, joined, places
@@ -71,6 +72,20 @@ class Mesh:
     def joints(self) -> Joints:
         """How the faces hang together."""
         return joined(places(self.vertices)[self.faces], self.part, self.corners, self.normals)
+
+    def cores(self, opaque: tuple[bool, ...]) -> tuple[Floats, Floats]:
+        """Return centres (k, 3) [m] and radii (k,) [m] of balls inside, whose shadow the mesh's own holds.
+
+        Args: opaque: which parts let nothing through.
+        """
+        if opaque not in self._cores:
+            solid = closed_pieces(self.joints, np.array(opaque, bool)[self.part])
+            self._cores[opaque] = cores_of(self.corners[solid])
+        return self._cores[opaque]
+
+    @cached_property
+    def _cores(self) -> dict[tuple[bool, ...], tuple[Floats, Floats]]:
+        return {}
 
     @property
     def corners(self) -> Floats:

@@ -10,18 +10,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from raychan.kernels.facets import turned
-from raychan.tables import Facets, Points
+from raychan.tables import LAYER, MIRROR, Facets, Points
 from raychan.world import check, edit
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, nearest
 from raychan.world.joints import Joints
 from raychan.world.made import body_of, material_of
-from raychan.world.material import Material, material, names, resolve, validity
+from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.mount import sensor_of
+from raychan.world.placed import placed, stack
 from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile, checked
+from raychan.world.still import Still
 
 __all__ = ["Body", "Scene", "SceneError"]
 
@@ -64,6 +66,8 @@ class Scene:
         # What other floors make of the bodies as they stand at time 0, by its class; never changed, and dropped with
         # the scenes that share it.
         self.kept: dict[Any, Any] = {}
+        # The same of what stands still, for this scene and all that it becomes as time goes on.
+        self._still: dict[type, Still | None] = {}
         try:
             self._prepare()
         except SceneError as e:
@@ -131,7 +135,7 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy, perhaps in another process, makes its own.
-        return self.__dict__ | {"kept": {}}
+        return self.__dict__ | {"kept": {}, "_still": {}}
 
     def _stands_as(self, other: Scene) -> bool:
         """Tell whether both scenes have the same bodies at the same places, of the same materials."""
@@ -173,6 +177,7 @@ class Scene:
         moved = copy(self)
         moved.bodies = tuple(b.at(time) for b in self.bodies)
         moved.kept = self.kept if moved._stands_as(self) else {}
+        moved._still = self._still
         if self.radar is not None:
             there = np.asarray(self.radar.position) + time * np.asarray(self.radar.velocity_mps)
             moved.radar = self.radar.model_copy(update={"position": there.tolist()})
@@ -217,7 +222,7 @@ class Scene:
 
     @cached_property
     def _index(self) -> tuple[list[Material], list[str], list[tuple[Any, Any]]]:
-        """All materials, all part names, and for each body the material and the part number of its faces."""
+        """All materials, all part names, and for each body the material and the part number of its parts."""
         materials: dict[Material, int] = {}
         parts: dict[str, int] = {}
         rows = []
@@ -226,37 +231,36 @@ class Scene:
             lone = len(mesh.part_names) == 1
             part = [parts.setdefault("" if lone and p == "body" else p, len(parts)) for p in mesh.part_names]
             kind = [materials.setdefault(m, len(materials)) for m in self._chosen(body)]
-            rows.append((np.array(kind, np.int32)[mesh.part], np.array(part, np.int32)[mesh.part]))
+            rows.append((np.array(kind, np.int32), np.array(part, np.int32)))
         return list(materials), list(parts), rows
+
+    @property
+    def still(self) -> Still | None:
+        """What is kept of the bodies through all instants; None where that does not pay."""
+        if Still not in self._still:
+            self._still[Still] = Still.of(self.bodies)
+        still = self._still[Still]
+        return still and still.at(self.bodies)
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        materials, parts, rows = self._index
-        turns = [b.motion.rotation(time) for b in self.bodies]
-        meshes = [b.geometry for b in self.bodies]
-        origins = [b.motion.origin(time) for b in self.bodies]
-        places = [turned(m.vertices, r, o)[m.faces] for m, r, o in zip(meshes, turns, origins, strict=True)]
-        looks = [turned(m.normals.reshape(-1, 3), r, np.zeros(3)) for m, r in zip(meshes, turns, strict=True)]
-        body = [np.full(len(m.faces), i, np.int32) for i, m in enumerate(meshes)]
-        return Facets(
-            vertices=_stack(places, (3, 3), float),
-            normals=_stack(looks, (3,), float).reshape(-1, 3, 3),
-            body=_stack(body, (), np.int32),
-            part=_stack([p for _, p in rows], (), np.int32),
-            material=_stack([m for m, _ in rows], (), np.int32),
-            role=np.array([b.kind for b in self.bodies], np.int8),
-            origin=np.array(origins).reshape(-1, 3),
-            velocity=np.array([b.motion.velocity for b in self.bodies], float).reshape(-1, 3),
-            spin=np.array([b.motion.spin(time) for b in self.bodies]).reshape(-1, 3),
-            materials=resolve(materials, self.frequency),
-            body_names=tuple(b.name for b in self.bodies),
-            part_names=tuple(parts),
-        )
+        return placed(self.bodies, self._index, self.frequency, time, self.still)
 
     @property
     def joints(self) -> list[Joints]:
         """How the facets of each body hang together."""
         return [b.geometry.joints for b in self.bodies]
+
+    @property
+    def cores(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
+        """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of balls inside bodies at time 0."""
+        found = []
+        for i, b in enumerate(self.bodies):
+            if b.kind != MIRROR:
+                centre, radius = b.geometry.cores(tuple(m.kind != LAYER for m in self._chosen(b)))
+                found.append((b.motion.to_world(centre), radius, np.full(len(radius), i, np.int32)))
+        centres, radii, owners = zip(*found, strict=True) if found else ((), (), ())
+        return stack(list(centres), (3,), float), stack(list(radii), (), float), stack(list(owners), (), np.int32)
 
     def points(self, time: float = 0.0) -> Points:
         """Return the targets given by their RCS at a time [s]."""
@@ -274,7 +278,3 @@ class Scene:
             sigma=np.array([np.interp(knots, *t) for t in tables]).reshape(-1, len(knots)),
             heading=np.array([b.motion.heading(time) for _, b in rows], float),
         )
-
-
-def _stack(pieces: list[Any], shape: tuple[int, ...], dtype: Any) -> Any:
-    return np.concatenate(pieces) if pieces else np.zeros((0, *shape), dtype)
