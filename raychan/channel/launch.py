@@ -105,7 +105,8 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     ph = phases_of(surface, leg, out, tubes, True, rule)
     # What returns little by itself may still carry the next bounces.
     rows = found.that_count(ph.area if more else ph.bound, ph.length)
-    tubes, ph = tubes.take(rows), ph.take(rows)
+    if len(rows) < len(tubes):
+        tubes, ph = tubes.take(rows), ph.take(rows)
     # First by the centre rays alone: what nobody sees must not count, and the strongest lit surface may stand behind
     # a wall.
     view = centres(surface, leg, tubes, True, rule)
