@@ -11,13 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from raychan.frames import direction
+from raychan.frames import direction, theta_phi
 from raychan.radar.antenna import Antenna, CosinePattern, Isotropic, UniformArray
 from raychan.radar.pattern import MeasuredPattern, PatternError, characteristics, gain_dbi
+from raychan.radar.sensor import Sensor
+from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.world.mount import antenna_of
 from raychan.world.schema import AntennaTable
 
+WAVE = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128)
 SCENES = Path(__file__).parents[1] / "scenes"
 AHEAD = np.array([[1.0, 0.0, 0.0]])
 EVERY = {
@@ -27,6 +30,17 @@ EVERY = {
     "array": UniformArray(4, 3, 0.6, 0.5, "hann", "rect", CosinePattern(100.0, 90.0)),
     "backed": UniformArray(2, 2, 1.047, 0.544, element=Isotropic()),
 }
+
+
+def test_a_sensor_turns_theta_and_phi_parts_into_world_axes():
+    looks = np.concatenate([fibonacci_sphere(200), np.eye(3), -np.eye(3)])
+    for antenna in (*EVERY.values(), CosinePattern(86.0, 60.0, "H")):
+        sensor = Sensor(np.zeros(3), antenna, antenna, WAVE, 1.0, 10.0, yaw=0.7, pitch=-0.3, roll=1.1)
+        local = looks @ sensor.axes
+        theta, phi = theta_phi(local)
+        parts = antenna.field(local)
+        wanted = (parts[:, :1] * theta + parts[:, 1:] * phi) @ sensor.axes.T
+        np.testing.assert_allclose(sensor.tx_field(looks), wanted, atol=1e-12)
 
 
 def gain(antenna, directions):

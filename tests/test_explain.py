@@ -15,6 +15,7 @@ from raychan.radar.sensor import Sensor
 from raychan.run.provenance import chains, explain, explain_cell, response_of
 from raychan.signal.cube import synthesize
 from raychan.tables import REFLECT, SCATTER, TRANSMIT, take
+from raychan.units import C0
 
 GROUND, SUV, TRUCK, WALKER = range(4)
 DIRECT_SUV = [(SUV, SCATTER)]
@@ -47,6 +48,31 @@ def test_prediction_is_the_map_itself(name, speed, bandwidth):
         cell_range, rate, power = float(rdmap.range[j]), float(rdmap.rate[i]), float(rdmap.power[i, j])
         got = explain_cell(p, known, response, rx, cell_range, rate, power).predicted
         assert np.sqrt(got) == pytest.approx(np.sqrt(power), abs=0.02 * np.sqrt(rdmap.power.max()))
+
+
+@pytest.mark.parametrize("name", ["rect", "hann"])
+@pytest.mark.parametrize("speed", [0.0, 40.0])
+def test_cells_explained_together_are_what_each_is_alone_though_far_paths_are_left_out(name, speed):
+    rng = np.random.default_rng(2)
+    n, every = 300, [DIRECT_SUV, BY_GROUND, BY_GROUND[::-1], GHOST]
+    size = 10.0 ** rng.uniform(-4, 0, n)
+    p = paths(
+        rng.uniform(2, 17, n), speed + rng.uniform(-10, 10, n), size * np.exp(1j * rng.uniform(0, 6.3, n)), every * 75
+    )
+    rx = receiver(name)
+    known, response = chains(p, rx.background), response_of(rx)
+    strong = np.argsort(-size)[:12]
+    cells = np.stack([0.5 * C0 * p.delay[strong], p.rate[strong], size[strong]], axis=1)
+    total, sizes, strongest = response.in_cells(known.part, 4, p.amplitude, p.delay, p.rate, cells)
+    for i, (r, v, wave) in enumerate(cells):
+        alone, at = response.in_cell(p.amplitude, p.delay, p.rate, r, v)
+        for g in range(4):
+            mine = known.part == g
+            assert abs(total[i, g] - alone[mine].sum()) < 1e-3 * wave
+            assert sizes[i, 0, g] == mine.sum()
+            assert sizes[i, 2, g] == pytest.approx((np.abs(alone) * at)[mine].sum(), abs=1e-3 * wave * at.max())
+        lead = known.part[int(np.argmax(np.abs(alone)))]
+        assert strongest[i, lead] == np.argmax(np.abs(alone))
 
 
 def test_a_lone_path_gives_its_own_power_at_its_own_cell():

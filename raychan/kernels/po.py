@@ -144,8 +144,7 @@ _SIX = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.
 
 @njit(cache=True, inline="always")
 def _inner(w: float, c: float) -> complex:
-    """Return the share of one end in the integral of exp(-j phi) along a line, over its exp(-j phi): there phi' = w,
-    and phi'' = c everywhere."""
+    """Return one end's share in the integral of exp(-j phi) along a line, over exp(-j phi): phi' = w, phi'' = c."""
     x = c / (w * w)
     return 1j / w * complex(1.0 - 3.0 * x * x, x)
 
