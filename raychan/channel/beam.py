@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from raychan.frames import direction
+from raychan.kernels.beam import fields_towards
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +33,7 @@ class Beam:
 
     def __call__(self, look: Floats) -> Floats:
         """Return the relative field (n,) in unit directions (n, 3), world axes, away from the radar."""
-        found: Floats = _between(np.ascontiguousarray(look), self.table)
+        found: Floats = fields_towards(np.ascontiguousarray(look), self.table)
         return found
 
     def dark(self, look: Floats, around: Floats) -> NDArray[np.bool_]:
@@ -61,19 +60,3 @@ def beam_of(radar: Any) -> Beam:
     if Beam not in kept:
         kept[Beam] = Beam(radar)
     return kept[Beam]
-
-
-@njit(cache=True, nogil=True)
-def _between(look, table):  # type: ignore[no-untyped-def]
-    """Return the table's value (n,) in each direction, linear in both angles."""
-    out = np.empty(len(look))
-    steps = table.shape[0] - 1
-    for i in range(len(look)):
-        up = (math.asin(min(max(look[i, 2], -1.0), 1.0)) / math.pi + 0.5) * steps
-        round_ = (math.atan2(look[i, 1], look[i, 0]) / math.pi + 1.0) * steps
-        a, b = min(int(up), steps - 1), min(int(round_), 2 * steps - 1)
-        x, y = up - a, round_ - b
-        low = (1.0 - y) * table[a, b] + y * table[a, b + 1]
-        high = (1.0 - y) * table[a + 1, b] + y * table[a + 1, b + 1]
-        out[i] = (1.0 - x) * low + x * high
-    return out

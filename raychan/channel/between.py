@@ -5,11 +5,11 @@ from __future__ import annotations
 from weakref import proxy
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.channel.edges import above, cross_into, dot, inside, starts_again
 from raychan.channel.surface import Surface
+from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
 from raychan.tables import MIRROR
 
@@ -76,8 +76,9 @@ class Between:
 
 def between(surface: Surface) -> Between:
     """Return the grid of a surface's edges, made once."""
-    if surface.between is None:
-        surface.between = Between(surface)
+    with surface.making:
+        if surface.between is None:
+            surface.between = Between(surface)
     found: Between = surface.between
     return found
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _MANY = 64  # edges around a plane beyond which halving is cheaper than looking at each
-_INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
+INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
 
 
 @njit(cache=True, inline="always")
@@ -44,7 +45,7 @@ def inside(a, b, corners, centre, source, k, far, begin, end, n):  # type: ignor
             fb += (b[c] - p[c]) * n[c]
         if whole == 0.0:
             return 0.0, 0.0
-        fa, fb = fa / whole - _INSIDE * scale, fb / whole - _INSIDE * scale
+        fa, fb = fa / whole - INSIDE * scale, fb / whole - INSIDE * scale
         if fa < 0.0 and fb < 0.0:
             return 0.0, 0.0
         if fa < 0.0:

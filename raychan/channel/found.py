@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from raychan.channel.tubes import Phases, Refinement
 from raychan.kernels.po import quadratic_means
+from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
 
 _MANY = 4096  # tubes under which letting some go saves nothing
+_THREADS = 1000  # tubes from which on a second thread pays
 _NOTHING = 1e-100  # 1/m
 _DEPTH = 1e-2  # of the strongest cell: weaker ones are no finer than such a one, should there be no noise
 _SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
@@ -37,7 +39,12 @@ class Found:
         """Count tubes that are seen: in each cell the scalar sum of all, or their rms sum where that cancels."""
         if not len(ph.six):
             return
-        each = ph.area * quadratic_means(ph.six, 0.5)
+        each = np.empty(len(ph.six), complex)
+
+        def some(rows: slice) -> None:
+            each[rows] = ph.area[rows] * quadratic_means(ph.six[rows], 0.5)
+
+        in_two(len(each), some, _THREADS)
         cell = self._cell(ph.length)
         # A cell more at the end, which stays empty, for all that is longer.
         n = max(len(self._level), int(cell.max()) + 3)

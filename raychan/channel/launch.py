@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.edges import meeting_lines
 from raychan.channel.found import Found
-from raychan.channel.legs import Leg
+from raychan.channel.legs import Leg, View
 from raychan.channel.seeds import seeds
 from raychan.channel.shadows import shadows_of
 from raychan.channel.surface import Surface
@@ -25,21 +26,21 @@ from raychan.channel.tubes import (
     phases_of,
     stand,
     unit,
-    vector_area,
 )
-from raychan.frames import sizes
-from raychan.kernels.patch import edge_to_cut, halved, lit_parts
+from raychan.kernels.patch import edge_to_cut, halved, lit_parts, may_be_lit
+from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+_BATCH = 1 << 17  # tubes launched at once: few scenes have more on one leg
 GAPS = 1  # cuts of a hidden tube in search of a part that is seen
 
 
-def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, more: bool) -> Tubes:
-    """Return the tubes of first bounces seen over `leg`, fine enough for a return over `out`.
+def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, more: bool) -> Iterator[Tubes]:
+    """Yield the tubes of first bounces seen over `leg`, fine enough for a return over `out`, in batches.
 
     Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do; found what was so far;
     more whether the tubes will bounce again.
@@ -50,33 +51,49 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     allowed = bodies & (f.role == SCATTERER)
     allowed[list(leg.bodies)] = False
     facet = seeds(surface, leg, allowed)
-    if not len(facet):
-        return stand(surface, leg, facet, np.zeros((0, 3, 3)), rule.slots)
-    facet, bary = _cut_for_phase(facet, shape, ways, rule, not more)
-    facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
     if out != leg:
-        facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
-    return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found, more)
+        facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
+    for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
+        part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
+        if out != leg:
+            part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways)
+        yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary, rule.slots), found, more)
 
 
-def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> tuple[Ints, Floats]:
-    """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts.
+def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> Iterator[tuple[Ints, Floats]]:
+    """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts; yield
+    facets and corners of the parts in batches, so that memory does not grow with their number.
 
     Args: across whether only an edge's length across the rays counts: tubes that bounce again are needed as short.
     """
-    bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
-    done, spent, level = [(facet[:0], bary[:0])], 0, 0
-    while len(facet):
+    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
+    left = [(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), 0)]
+    done: list[tuple[Ints, Floats]] = []
+    held, spent = 0, 0
+    while left:
+        facet, bary, level = left.pop()
+        if len(facet) > _BATCH:
+            half = len(facet) // 2
+            left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
+            continue
         spent += len(facet)
-        limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
         edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
         if spent > rule.max_tubes:
             edge[:] = -1
-        done.append((facet[edge < 0], bary[edge < 0]))
-        more = edge >= 0
-        facet, bary = halved(facet[more], bary[more], edge[more], rule.jitter, level)
-        level += 1
-    return np.concatenate([f for f, _ in done]), np.concatenate([b for _, b in done])
+        ready, more = edge < 0, edge >= 0
+        if held + np.count_nonzero(ready) > _BATCH:
+            yield _joined(done)
+            done, held = [], 0
+        done.append((facet[ready], bary[ready]))
+        held += len(done[-1][0])
+        if more.any():
+            left.append((*halved(facet[more], bary[more], edge[more], rule.jitter, level), level + 1))
+    if held:
+        yield _joined(done)
+
+
+def _joined(parts: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
+    return np.concatenate([f for f, _ in parts]), np.concatenate([b for _, b in parts])
 
 
 def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, more: bool) -> Tubes:
@@ -84,7 +101,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     kept: list[Tubes] = []
     rule = found.rule
 
-    def keep(view: Sight, ready: Bools) -> None:
+    def keep(view: View, ready: Bools) -> None:
         kept.append(tubes.take(ready))
         _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready], rule)
 
@@ -94,96 +111,88 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     tubes, ph = tubes.take(rows), ph.take(rows)
     # First by the centre rays alone: what nobody sees must not count, and the strongest lit surface may stand behind
     # a wall.
-    view = sight(surface, leg, tubes, np.zeros(len(tubes), bool), True, rule)
-    seen = view.seen[:, CENTRE]
-    found.add(ph.take(seen))
+    view = centres(surface, leg, tubes, True, rule)
+    found.add(ph.take(view.seen))
     matters = (ph.bound > found.doubt(ph.length)) & (not surface.convex_alone)
-    keep(view, seen & ~matters)
+    keep(view, view.seen & ~matters)
+    known: View | None = view.take(matters)
     tubes, matters = tubes.take(matters), matters[matters]
     for level in range(rule.levels + 1):
         if not len(tubes):
             break
-        view = sight(surface, leg, tubes, matters, True, rule, level < GAPS)
-        split = view.mixed & matters & (level < rule.levels)
-        keep(view, ~split & view.seen[:, CENTRE])
+        s = sight(surface, leg, tubes, matters, True, rule, level < GAPS, known)
+        split = s.mixed & matters & (level < rule.levels)
+        keep(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)
-        tubes, _ = divide(surface, leg, tubes.take(rows), rows, view.side[rows], True, rule)
+        tubes, _ = divide(surface, leg, tubes.take(rows), rows, s.side[rows], True, rule)
         ph = phases_of(surface, leg, out, tubes, True, rule)
-        matters = ph.bound > found.doubt(ph.length)
+        known, matters = None, ph.bound > found.doubt(ph.length)
     return Tubes.join(kept)
 
 
 @dataclass(frozen=True)
 class Sight:
-    """How tubes are seen over a leg: `seen` (n, 4) rays, way of the centre ray (`corners`, `passed`), and `side` (n,
-    3): where a shadow's edge runs through a tube, zeros where none is known."""
+    """How tubes are seen over a leg: by their centre rays (a `View`), by `some` (n,) ray, `mixed` (n,) in part; `side`
+    (n, 3): where a shadow's edge runs through a tube, zeros where none is known."""
 
-    seen: Bools
-    corners: Floats
-    passed: Ints
+    centre: View
+    some: Bools
+    mixed: Bools
     side: Floats
 
-    @property
-    def mixed(self) -> Bools:
-        """Tubes that are seen in part."""
-        some, whole = self.seen.any(axis=1), self.seen.all(axis=1)
-        return (some & ~whole) | (self.side != 0.0).any(axis=1)
+
+def centres(surface: Surface, leg: Leg, tubes: Tubes, first: bool, rule: Refinement) -> View:
+    """Return how the centres of tubes are seen over a leg; first whether these stand on their first surface."""
+    points = on_facets(surface, tubes) if first else tubes.points
+    shape = surface.first, surface.normal, leg.image, leg.far
+    aim, target, near, _ = aims(points, tubes.points, tubes.facet, *shape, True, np.zeros(len(tubes), bool))
+    return leg.visible(surface, aim, target, near, rule.layers)
 
 
 def sight(
-    surface: Surface, leg: Leg, tubes: Tubes, matters: Bools, first: bool, rule: Refinement, gaps: bool = True
+    surface: Surface,
+    leg: Leg,
+    tubes: Tubes,
+    matters: Bools,
+    first: bool,
+    rule: Refinement,
+    gaps: bool = True,
+    centre: View | None = None,
 ) -> Sight:
     """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter.
 
     Args: first whether they stand on their first surface; gaps whether to look for one through which a tube is seen
-    that none of its rays is.
+    that none of its rays is; centre how their centres are seen, cast if not given.
     """
     n = len(tubes)
-    # Corners lie on edges that other facets share: draw them in a little.
     points = on_facets(surface, tubes) if first else tubes.points
-    centre = points[:, CENTRE:]
-    aim = centre + 0.98 * (points - centre)
-    # Towards its terminator a curved surface is lit where its facets already turn away: then their own neighbours
-    # stand before them, by some of what it rises over them.
-    k, _ = leg.rays(tubes.points[:, CENTRE])
-    rise = tubes.points - surface.first[tubes.facet][:, None]
-    hover = np.abs(np.einsum("nij,nj->ni", rise, surface.normal[tubes.facet])).max(axis=1)
-    slope = np.abs(np.einsum("ij,ij->i", k, surface.normal[tubes.facet]))
-    slack = 1e-5 + 3.0 * hover / np.maximum(slope, 0.05)
-    whole = np.flatnonzero(matters & (not surface.convex_alone))
-    ray = np.concatenate([4 * np.arange(n) + CENTRE, (4 * whole[:, None] + np.arange(3)).ravel()])
-    view = leg.visible(surface, aim.reshape(-1, 3)[ray], tubes.facet[ray // 4], slack[ray // 4], rule.layers)
-    seen, block = np.repeat(view.seen[:n], 4).reshape(n, 4), np.full((n, 4), -1, np.int32)
-    seen.reshape(-1)[ray], block.reshape(-1)[ray] = view.seen, view.blocker
-    source = np.broadcast_to(leg.image, (n, 3))
-    # Between two bodies that hide all four rays there may be a gap; behind one there is none.
-    covers = surface.smooth[block]
-    one = (block >= 0).all(axis=1) & (covers == covers[:, :1]).all(axis=1)
-    partly = matters & (seen.any(axis=1) | (gaps & ~one))
+    where = tubes.facet, surface.first, surface.normal, leg.image, leg.far
+    corners = np.zeros(n, bool) if surface.convex_alone else matters
+    aim, target, near, slack = aims(points, tubes.points, *where, centre is None, corners)
+    view = leg.visible(surface, aim, target, near, rule.layers)
+    if centre is None:
+        centre, view = view.take(slice(n)), view.take(slice(n, None))
+    rays = view.seen, view.blocker, centre.seen, centre.blocker, corners
+    some, mixed, look = read_rays(*rays, matters, gaps, surface.smooth)
     side = np.zeros((n, 3))
-    if partly.any():
-        stand_on = surface.normal[tubes.facet], surface.smooth[tubes.facet]
-        side = shadows_of(surface, leg).across(points, *stand_on, partly, slack)
-    # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
-    known = seen | (block >= 0)
-    facet = np.where(block >= 0, block, tubes.facet[:, None])
-    met = np.where(known, surface.plane[facet], -1)
-    own = vector_area(points)
-    own /= np.maximum(sizes(own), 1e-300)[:, None]
-    meeting_lines(points, source, -k, leg.far, met, block, surface.first, surface.normal, own, side)
-    side[~partly] = 0.0
-    return Sight(seen, view.corners[:n], view.passed[:n], side)
+    rows, points, met, planes, source, back, own = partly_seen(
+        look, points, tubes.facet, *rays, surface.plane, leg.image, leg.far
+    )
+    if len(rows):
+        found = shadows_of(surface, leg).across(points, tubes.facet[rows], slack[rows])
+        # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
+        meeting_lines(points, source, back, leg.far, planes, met, surface.first, surface.normal, own, found)
+        side[rows] = found
+        mixed[rows] |= (found != 0.0).any(axis=1)
+    return Sight(centre, some, mixed, side)
 
 
 def on_facets(surface: Surface, tubes: Tubes) -> Floats:
     """Return the points (n, 4, 3) [m] of tubes on their first surface, put down on the flat facets that rays meet."""
-    rows = np.flatnonzero(surface.curved[tubes.facet])
-    if not len(rows):
+    if not surface.curved[tubes.facet].any():
         return tubes.points
-    points = tubes.points.copy()
-    points[rows, :3] = tubes.bary[rows] @ surface.facets.vertices[tubes.facet[rows]]
-    points[rows, CENTRE] = points[rows, :3].mean(axis=1)
-    return points
+    found: Floats = put_down(tubes.points, tubes.facet, tubes.bary, surface.curved, surface.facets.vertices)
+    return found
 
 
 def divide(

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.beam import Beam
 from raychan.channel.surface import Surface
-from raychan.frames import sizes
-from raychan.kernels.chains import may_leave, possible
+from raychan.kernels.chains import bounces, may_leave, possible, rays_from, stretch, weights
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -57,6 +57,15 @@ class View:
     passed: Ints
     blocker: Ints
 
+    def take(self, index: NDArray[np.generic] | slice) -> View:
+        """Return how the points at `index` (mask, numbers or slice) are seen."""
+        return View(self.seen[index], self.corners[index], self.passed[index], self.blocker[index])
+
+    @staticmethod
+    def join(parts: list[View]) -> View:
+        """Return how the points of several views are seen as one."""
+        return View(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(View)))
+
 
 @dataclass(frozen=True, eq=False)
 class Leg:
@@ -85,11 +94,8 @@ class Leg:
 
     def rays(self, points: Floats) -> tuple[Floats, Floats]:
         """Return unit directions (..., 3) at the points, travelling from the end, and lengths [m]."""
-        if self.far:
-            return np.broadcast_to(-self.image, points.shape), -points @ self.image
-        d = points - self.image
-        length = sizes(d)
-        return d / length[..., None], length
+        k, length = rays_from(np.ascontiguousarray(points).reshape(-1, 3), self.image, self.far)
+        return k.reshape(points.shape), length.reshape(points.shape[:-1])
 
     def spread(self, length: Floats) -> Floats:
         """Return the field's spreading [1/m] (1 for a plane wave)."""
@@ -97,9 +103,15 @@ class Leg:
 
     def weight(self, points: Floats) -> Floats:
         """Return the field (n,) that the end's antenna sends to points over this leg, relative to its strongest."""
-        if self.beam is None:
-            return np.ones(len(points))
-        return self.beam(self._look(points)[0])
+        found: Floats = weights(np.ascontiguousarray(points), *self.antenna)
+        return found
+
+    @property
+    def antenna(self) -> tuple[Any, ...]:
+        """What the kernels ask of the end's antenna: images, far, normals of the mirrors, table of its beam (empty:
+        alike everywhere)."""
+        images, _, normals = self._chain[:3]
+        return images, self.far, normals, np.zeros((0, 0)) if self.beam is None else self.beam.table
 
     def dark(self, points: Floats, radius: Floats) -> Bools:
         """Tell to which balls (n,), about points (n, 3) [m], the end's antenna sends nothing at all over this leg."""
@@ -117,18 +129,8 @@ class Leg:
 
     def bounces(self, points: Floats) -> Floats:
         """Return the mirror points (n, m, 3) [m] of the way to each point, end's side first."""
-        images = self._chain[0]
-        out = np.empty((len(points), len(self.mirrors), 3))
-        towards = points
-        for i in range(len(self.mirrors) - 1, -1, -1):
-            m, source = self.mirrors[i], images[i + 1]
-            d = source - towards
-            with np.errstate(divide="ignore", invalid="ignore"):
-                t = np.dot(m.point, m.normal) - towards @ m.normal
-                t = t / (d @ m.normal)
-            towards = towards + np.where(np.isfinite(t), t, 0.0)[:, None] * d
-            out[:, i] = towards
-        return out
+        found: Floats = bounces(points, *self._chain[:3])
+        return found
 
     def may_reach(self, points: Floats, size: Floats) -> Bools:
         """Tell which balls about points (n, 3) of radius `size` (n,) [m] could be met: in front of the last mirror,
@@ -151,46 +153,22 @@ class Leg:
         """
         n = len(points)
         corners = self.bounces(points)
-        seen = np.ones(n, bool)
-        none = np.full(n, -1, np.int32)
-        start = np.broadcast_to(np.asarray(self.end, float), (n, 3))
-        skip = none
+        chain = *self._chain[:3], self.far, 2.0 * surface.extent + 1.0
+        rows, skip = np.arange(n), np.full(n, -1, np.int32)
         for i, m in enumerate(self.mirrors):
-            stop = corners[:, i]
-            d, length = _towards(start, stop)
-            # Both ends of each stretch lie on the lit side of the mirror, and the mirror itself is hit first.
-            lit = (start - m.point) @ m.normal > 0.0
-            if i:
-                lit &= (stop - self.mirrors[i - 1].point) @ self.mirrors[i - 1].normal > 0.0
-            rows = np.flatnonzero(seen & lit & (length > 0.0))
-            hit, _ = surface.cast(start[rows], d[rows], skip[rows])
+            rows, start, d, _ = stretch(i, rows, points, corners, *chain)
+            hit, _ = surface.cast(start, d, skip[rows])
+            # The mirror itself is hit first.
             ok = (hit >= 0) & (surface.plane[hit] == surface.plane[m.facet])
-            seen[:] = False
-            seen[rows[ok]] = True
-            skip = none.copy()
-            skip[rows[ok]] = hit[ok]
-            start = stop
-        if self.mirrors:
-            seen &= (points - self.mirrors[-1].point) @ self.mirrors[-1].normal > 0.0
-        if self.far:
-            reach = 2.0 * surface.extent + 1.0
-            d = np.broadcast_to(-self.image, points.shape)
-            start, length = points - reach * d, np.full(n, reach)
-        else:
-            d, length = _towards(start, points)
-        rows = np.flatnonzero(seen)
-        passed = np.full((n, layers), -1, np.int32)
-        within = None if inside is None else inside[rows]
-        reached, passed[rows], in_way = surface.walk(
-            start[rows], d[rows], length[rows], slack[rows], skip[rows], facet[rows], layers, within
-        )
-        seen[rows[~reached]] = False
-        blocker = none.copy()
-        blocker[rows] = in_way
-        return View(seen, corners, passed, blocker)
-
-
-def _towards(start: Floats, stop: Floats) -> tuple[Floats, Floats]:
-    d = stop - start
-    length = sizes(d)
-    return d / np.where(length > 0, length, 1.0)[:, None], length
+            rows = rows[ok]
+            skip[rows] = hit[ok]
+        rows, start, d, length = stretch(len(self.mirrors), rows, points, corners, *chain)
+        aims: Any = start, d, length, slack, skip, facet, layers, inside
+        if len(rows) < n:
+            aims = *aims[:3], slack[rows], skip[rows], facet[rows], layers, None if inside is None else inside[rows]
+        reached, passed, in_way = surface.walk(*aims)
+        if len(rows) == n:
+            return View(reached, corners, passed, in_way)
+        view = View(np.zeros(n, bool), corners, np.full((n, layers), -1, np.int32), np.full(n, -1, np.int32))
+        view.seen[rows], view.passed[rows], view.blocker[rows] = reached, passed, in_way
+        return view

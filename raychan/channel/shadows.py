@@ -2,64 +2,72 @@
 
 from __future__ import annotations
 
-from weakref import WeakKeyDictionary
+import math
+from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from raychan.channel.edges import above, cross_into, dot, inside, starts_again
+from raychan.channel.edges import INSIDE, above, cross_into, dot, starts_again
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
+from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_MANY = 2000  # tubes from which on a second thread pays
-_CELLS = 128  # along the longest side of the grid of directions
+_MANY = 200  # tubes from which on a second thread pays
+_KEPT = 64  # legs; each takes a megabyte or two
+_CELLS = 512  # along the longest side of the grid of directions
 
 
 class Shadows:
-    """The silhouette edges of all bodies as seen over one leg, in a grid of directions from the leg's last image."""
+    """The silhouette edges of all bodies as seen over one leg, in a grid of directions from the leg's last image: of
+    these the two coordinates that vary most."""
 
     def __init__(self, surface: Surface, leg: Leg) -> None:
         self.edges, self._smooth = _silhouette(surface, leg)
+        self._from = surface.normal, surface.smooth, leg.image, leg.far, surface.touch
         if len(self.edges):
-            a, b = (_directions(self.edges[:, i], leg) for i in range(2))
-            low, high = np.minimum(a, b).min(axis=0), np.maximum(a, b).max(axis=0)
+            low, high = _bounds(self.edges, leg.image, leg.far)
+            axes = np.sort(np.argsort(high - low, kind="stable")[1:])
+            low, high = low[axes], high[axes]
             cell = max(float((high - low).max()) / _CELLS, 1e-9)
             low -= 2.0 * cell
             shape = np.ceil((high - low) / cell).astype(np.int64) + 3
-            self._grid = *_fill(self.edges, leg.image, leg.far, low, cell, shape), low, cell, shape
-        self._from = leg.image, leg.far, surface.touch
+            self._grid = *_fill(self.edges, leg.image, leg.far, axes, low, cell, shape), axes, low, cell, shape
 
-    def across(self, points: Floats, normal: Floats, smooth: Ints, wanted: NDArray[np.bool_], slack: Floats) -> Floats:
+    def across(self, points: Floats, facet: Ints, slack: Floats) -> Floats:
         """Return signed distances (n, 3) [m] of tubes' corners from the longest shadow edge on each; zeros: none.
 
-        Args: points (n, 4, 3) [m] corners and centres; normal (n, 3) of the planes they lie on; smooth (n,) the smooth
-        patches they are of; wanted (n,) which tubes to look at; slack (n,) [m] in front of the plane that still belongs
-        to its own patch.
+        Args: points (n, 4, 3) [m] corners and centres of tubes on facets (n,); slack (n,) [m] in front of a facet that
+        still belongs to its own patch.
         """
-        if not len(self.edges):
-            return np.zeros((len(points), 3))
         side = np.zeros((len(points), 3))
+        if not len(self.edges):
+            return side
 
         def some(rows: slice) -> None:
-            tubes = points[rows], normal[rows], smooth[rows], wanted[rows], slack[rows]
             shadows = *self._from, self.edges, self._smooth, *self._grid
-            _across(*(*tubes, *shadows, side[rows]))
+            _across(*(points[rows], facet[rows], slack[rows], *shadows, side[rows]))
 
         in_two(len(points), some, _MANY)
         return side
 
 
 def shadows_of(surface: Surface, leg: Leg) -> Shadows:
-    """Return the shadows of a leg, made once for a surface."""
-    known: WeakKeyDictionary[Leg, Shadows] = surface.shadows
-    if leg not in known:
-        known[leg] = Shadows(surface, leg)
-    return known[leg]
+    """Return the shadows of a leg, made once for all legs of the same last image and mirror: a surface keeps the newest
+    few."""
+    last = (leg.mirrors[-1].facet, leg.mirrors[-1].normal.tobytes()) if leg.mirrors else None
+    key = np.asarray(leg.image, float).tobytes(), leg.far, last
+    known: dict[Any, Shadows] = surface.shadows
+    with surface.making:
+        if key not in known:
+            if len(known) >= _KEPT:
+                del known[next(iter(known))]
+            known[key] = Shadows(surface, leg)
+        return known[key]
 
 
 def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
@@ -74,78 +82,121 @@ def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
     return np.ascontiguousarray(edges), np.ascontiguousarray(smooth)
 
 
-def _directions(points: Floats, leg: Leg) -> Floats:
-    """Return places (n, 3) on the unit sphere about the leg's image, or on the plane across a direction."""
-    if leg.far:
-        return points - np.outer(points @ leg.image, leg.image)
-    return leg.rays(points)[0]
-
-
 @njit(cache=True, inline="always")
 def _place(p, image, far, out):  # type: ignore[no-untyped-def]
+    """Write the place of p on the unit sphere about the image, or on the plane across a direction; return how far off
+    it lies [m]."""
     if far:
         along = dot(p, image)
         for c in range(3):
             out[c] = p[c] - along * image[c]
-    else:
-        size = np.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
-        for c in range(3):
-            out[c] = (p[c] - image[c]) / max(size, 1e-12)
+        return 1.0
+    size = math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
+    for c in range(3):
+        out[c] = (p[c] - image[c]) / max(size, 1e-12)
+    return size
 
 
 @njit(cache=True, nogil=True)
-def _fill(edges, image, far, low, cell, shape):  # type: ignore[no-untyped-def]
+def _bounds(edges, image, far):  # type: ignore[no-untyped-def]
+    """Return the least and the most (3,) of the places of all ends."""
+    low, high, x = np.full(3, np.inf), np.full(3, -np.inf), np.empty(3)
+    for e in range(len(edges)):
+        for q in range(2):
+            _place(edges[e, q], image, far, x)
+            for c in range(3):
+                low[c], high[c] = min(low[c], x[c]), max(high[c], x[c])
+    return low, high
+
+
+@njit(cache=True, nogil=True)
+def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped-def]
     """Return the edges in each cell of the grid as (first, index): edges are walked in steps under half a cell."""
-    total = shape[0] * shape[1] * shape[2]
-    first = np.zeros(total + 1, np.int64)
-    index = np.zeros(0, np.int32)
+    first = np.zeros(shape[0] * shape[1] + 1, np.int32)
+    cells, owner = np.empty(4 * len(edges), np.int32), np.empty(4 * len(edges), np.int32)
+    count = 0
     p, x = np.empty(3), np.empty(3)
-    for fill in range(2):
-        last = np.full(total, -1, np.int32)
-        for e in range(len(edges)):
-            a, b = edges[e, 0], edges[e, 1]
-            s, step = 0.0, 1.0
-            while True:
-                for c in range(3):
-                    p[c] = a[c] + s * (b[c] - a[c])
-                _place(p, image, far, x)
-                i, j, k = int((x[0] - low[0]) / cell), int((x[1] - low[1]) / cell), int((x[2] - low[2]) / cell)
-                at = (i * shape[1] + j) * shape[2] + k
-                if 0 <= i < shape[0] and 0 <= j < shape[1] and 0 <= k < shape[2] and last[at] != e:
-                    last[at] = e
-                    if fill == 0:
-                        first[at + 1] += 1
-                    else:
-                        index[first[at]] = e
-                        first[at] += 1
-                if s >= 1.0:
-                    break
-                # A step turns by no more than its length over the distance.
-                reach = 1.0
-                if not far:
-                    reach = np.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
-                size = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-                step = max(0.5 * cell * reach / max(size, 1e-12), 1e-4)
-                s = min(1.0, s + step)
-        if fill == 0:
-            first = np.cumsum(first)
-            index = np.empty(first[-1], np.int32)
+    for e in range(len(edges)):
+        a, b = edges[e, 0], edges[e, 1]
+        size = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+        s, last = 0.0, -1
+        while True:
+            for c in range(3):
+                p[c] = a[c] + s * (b[c] - a[c])
+            reach = _place(p, image, far, x)
+            i, j = int((x[axes[0]] - low[0]) / cell), int((x[axes[1]] - low[1]) / cell)
+            at = i * shape[1] + j
+            if 0 <= i < shape[0] and 0 <= j < shape[1] and last != at:
+                last = at
+                if count == len(cells):
+                    cells, owner = np.append(cells, np.empty_like(cells)), np.append(owner, np.empty_like(owner))
+                cells[count], owner[count] = at, e
+                count += 1
+                first[at + 1] += 1
+            if s >= 1.0:
+                break
+            # A step turns by no more than its length over the distance.
+            s = min(1.0, s + max(0.5 * cell * reach / max(size, 1e-12), 1e-4))
+    for at in range(len(first) - 1):
+        first[at + 1] += first[at]
+    index = np.empty(count, np.int32)
+    for j in range(count):
+        index[first[cells[j]]] = owner[j]
+        first[cells[j]] += 1
     starts_again(first)
     return first, index
 
 
+@njit(cache=True, inline="always")
+def _pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
+    """Write the normals of the planes through the image and a tube's sides, one over the centre's height long, inward;
+    return how far the centre lies ahead along k [m]."""
+    side, way, n, here = np.empty(3), np.empty(3), np.empty(3), 0.0
+    for e in range(3):
+        p, q = corners[e], corners[(e + 1) % 3]
+        for c in range(3):
+            side[c] = q[c] - p[c]
+            way[c] = k[c] if far else image[c] - p[c]
+        cross_into(side, way, n)
+        whole = 0.0
+        for c in range(3):
+            whole += (corners[3, c] - p[c]) * n[c]
+        # A tube without width has no inside.
+        for c in range(3):
+            planes[e, c] = n[c] / whole if whole != 0.0 else np.nan
+    for c in range(3):
+        here += (corners[3, c] - image[c]) * k[c]
+    return here
+
+
+@njit(cache=True, inline="always")
+def _within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped-def]
+    """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays (see `inside` of
+    edges)."""
+    for e in range(3):
+        fa, fb = -INSIDE * scale, -INSIDE * scale
+        for c in range(3):
+            fa += (a[c] - corners[e, c]) * planes[e, c]
+            fb += (b[c] - corners[e, c]) * planes[e, c]
+        if not (fa >= 0.0 or fb >= 0.0):
+            return 0.0, 0.0
+        if fa < 0.0:
+            begin = max(begin, fa / (fa - fb))
+        elif fb < 0.0:
+            end = min(end, fa / (fa - fb))
+    return begin, max(end, begin)
+
+
 @njit(cache=True, nogil=True)
 def _across(  # type: ignore[no-untyped-def]
-    points, normal, smooth, wanted, slack, image, far, touch, edges, edge_smooth, first, index, low, cell, shape, out
-):
-    n = len(points)
+    points, facet, slack, normals, smooth, image, far, touch, edges, edge_smooth, first, index, axes, low, cell, shape,
+    out,
+):  # fmt: skip
     tried = np.full(len(edges), -1, np.int64)
-    side, m, work, k = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    side, m, k, planes = np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     x, least, most = np.empty(3), np.empty(3), np.empty(3)
-    for i in range(n):
-        if not wanted[i]:
-            continue
-        centre = points[i, 3]
+    for i in range(len(points)):
+        centre, normal, patch = points[i, 3], normals[facet[i]], smooth[facet[i]]
         for c in range(3):
             least[c], most[c] = np.inf, -np.inf
         for q in range(4):
@@ -155,56 +206,61 @@ def _across(  # type: ignore[no-untyped-def]
         # The ray's direction at the centre, and the height of the plane towards the source.
         for c in range(3):
             k[c] = -image[c] if far else centre[c] - image[c]
-        size = np.sqrt(dot(k, k))
+        size = math.sqrt(dot(k, k))
         for c in range(3):
             k[c] /= size
-        sign = -1.0 if dot(k, normal[i]) > 0.0 else 1.0
+        sign = -1.0 if dot(k, normal) > 0.0 else 1.0
+        level = sign * dot(centre, normal)
         bulge = 0.0 if far else 0.125 * np.sum((most - least) ** 2)
         margin = 0.5 * cell + bulge
-        i0, i1 = _cells(least[0] - margin, most[0] + margin, low[0], cell, shape[0])
-        j0, j1 = _cells(least[1] - margin, most[1] + margin, low[1], cell, shape[1])
-        k0, k1 = _cells(least[2] - margin, most[2] + margin, low[2], cell, shape[2])
+        u, v = axes
+        i0, i1 = _cells(least[u] - margin, most[u] + margin, low[0], cell, shape[0])
+        j0, j1 = _cells(least[v] - margin, most[v] + margin, low[1], cell, shape[1])
+        here = _pyramid(points[i], image, k, far, planes)
         best = 0.0
         for ci in range(i0, i1):
-            for cj in range(j0, j1):
-                start = (ci * shape[1] + cj) * shape[2]
-                for at in range(first[start + k0], first[start + max(k1, k0)]):
-                    e = index[at]
-                    if tried[e] == i:
-                        continue
-                    tried[e] = i
-                    a, b = edges[e, 0], edges[e, 1]
-                    ha, hb = 0.0, 0.0
+            start = ci * shape[1]
+            for at in range(first[start + j0], first[start + max(j1, j0)]):
+                e = index[at]
+                if tried[e] == i:
+                    continue
+                tried[e] = i
+                a, b = edges[e, 0], edges[e, 1]
+                # Only what lies in front of the tube's plane throws a shadow on it.
+                own = edge_smooth[e, 0] == patch or edge_smooth[e, 1] == patch
+                near = level + (slack[i] if own else min(slack[i], touch))
+                begin, end = above(sign * dot(a, normal) - near, sign * dot(b, normal) - near)
+                if begin == end:
+                    continue
+                scale = 1.0
+                if not far:
+                    edge = 0.0
                     for c in range(3):
-                        ha += sign * (a[c] - centre[c]) * normal[i, c]
-                        hb += sign * (b[c] - centre[c]) * normal[i, c]
-                    # Only what lies in front of the tube's plane throws a shadow on it.
-                    own = edge_smooth[e, 0] == smooth[i] or edge_smooth[e, 1] == smooth[i]
-                    near = slack[i] if own else min(slack[i], touch)
-                    begin, end = above(ha - near, hb - near)
-                    if begin == end:
-                        continue
-                    begin, end = inside(a, b, points[i], centre, image, k, far, begin, end, work)
-                    length = (end - begin) * np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-                    if length <= best:
-                        continue
-                    if far:
-                        cross_into(b - a, k, m)
-                    else:
-                        cross_into(b - a, image - a, m)
-                    size = np.sqrt(dot(m, m))
-                    if size == 0.0:
-                        continue
-                    lowest, highest = np.inf, -np.inf
-                    for q in range(3):
-                        f = 0.0
-                        for c in range(3):
-                            f += (points[i, q, c] - a[c]) * m[c]
-                        side[q] = f / size
-                        lowest, highest = min(lowest, side[q]), max(highest, side[q])
-                    if lowest < 0.0 < highest:
-                        best = length
-                        out[i] = side
+                        edge += (0.5 * (a[c] + b[c]) - image[c]) * k[c]
+                    scale = min(max(edge / here, 0.01), 100.0)
+                begin, end = _within(a, b, points[i], planes, scale, begin, end)
+                if begin == end:
+                    continue
+                length = (end - begin) * math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+                if length <= best:
+                    continue
+                if far:
+                    cross_into(b - a, k, m)
+                else:
+                    cross_into(b - a, image - a, m)
+                size = math.sqrt(dot(m, m))
+                if size == 0.0:
+                    continue
+                lowest, highest = np.inf, -np.inf
+                for q in range(3):
+                    f = 0.0
+                    for c in range(3):
+                        f += (points[i, q, c] - a[c]) * m[c]
+                    side[q] = f / size
+                    lowest, highest = min(lowest, side[q]), max(highest, side[q])
+                if lowest < 0.0 < highest:
+                    best = length
+                    out[i] = side
 
 
 @njit(cache=True, inline="always")

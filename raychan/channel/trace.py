@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from raychan.channel.between import between
 from raychan.channel.edges import edge_within, meeting_lines
 from raychan.channel.found import Found
-from raychan.channel.launch import GAPS, divide, on_facets, sight, write_layers
+from raychan.channel.launch import divide, on_facets, write_layers
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import (
     CENTRE,
     Refinement,
     Tubes,
-    halves,
     phases_of,
     vector_area,
 )
@@ -219,36 +218,3 @@ def _land(surface: Surface, leg: Leg, tubes: Tubes, k: Floats, hit: Ints, throug
     tubes.points, tubes.k, tubes.length, tubes.flat, tubes.facet = points, k, length, flat, facet
     tubes.bounces = tubes.bounces + np.int8(1)
     return tubes
-
-
-def settle(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, first: bool = False
-) -> tuple[Tubes, Floats, Ints]:
-    """Cut tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
-
-    Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
-    """
-    kept, ways, layers = [], [], []
-    rule = found.rule
-    for level in range(rule.levels + 1):
-        ph = phases_of(surface, leg, out, tubes, first, rule)
-        matters = ph.bound > found.doubt(ph.length)
-        view = sight(surface, out, tubes, matters, first, rule, level < GAPS)
-        back = np.einsum("nj,nj->n", out.rays(tubes.points[:, CENTRE])[0], tubes.normals[:, CENTRE])
-        lit = back < 0.0
-        rough = lit & view.seen.any(axis=1) & (ph.rough > 1.0)
-        mixed = lit & view.mixed
-        split = (mixed | rough) & matters & (level < rule.levels)
-        ready = ~split & lit & view.seen[:, CENTRE]
-        kept.append(tubes.take(ready))
-        ways.append(view.corners[ready])
-        layers.append(view.passed[ready])
-        if not split.any():
-            break
-        # Bends come first: they need an edge of their own.
-        bent, shaded = np.flatnonzero(split & rough), np.flatnonzero(split & ~rough)
-        edge = np.argmax(np.abs(ph.bend[bent]), axis=1)
-        halved = halves(surface, leg, tubes.take(bent), edge, first, rule.jitter)
-        parted, _ = divide(surface, leg, tubes.take(shaded), shaded, view.side[shaded], first, rule)
-        tubes = Tubes.join([halved, parted])
-    return Tubes.join(kept), np.concatenate(ways), np.concatenate(layers)

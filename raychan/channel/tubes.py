@@ -16,7 +16,9 @@ from raychan.channel.history import History
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.frames import sizes
-from raychan.kernels.patch import phases, rays_on
+from raychan.kernels.patch import rays_on
+from raychan.kernels.phases import phases
+from raychan.kernels.rows import in_two
 from raychan.tables import REFLECT
 
 Floats = NDArray[np.float64]
@@ -25,6 +27,7 @@ Bools = NDArray[np.bool_]
 
 CENTRE = 3
 MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
+_MANY = 4096  # tubes from which on a second thread pays
 _EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
@@ -49,7 +52,7 @@ class Refinement:
     levels: int = 12
     slots: int = 8
     layers: int = 2
-    max_tubes: int = 2_000_000
+    max_tubes: int = 100_000_000
     jitter: float = 0.0
 
 
@@ -84,12 +87,16 @@ class Tubes:
 
     def take(self, index: NDArray[np.generic]) -> Tubes:
         """Return the tubes at `index` (mask or numbers)."""
-        return Tubes(**{name: getattr(self, name)[index] for name in _ROWS}, history=self.history)
+        rows = numbers(index)
+        return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _ROWS}, history=self.history)
 
     @staticmethod
     def join(parts: list[Tubes]) -> Tubes:
         """Return all tubes of several sets of one launch as one."""
-        rows = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _ROWS}
+        some = [p for p in parts if len(p)] or parts[:1]
+        if len(some) == 1:
+            return some[0]
+        rows = {name: np.concatenate([getattr(p, name) for p in some]) for name in _ROWS}
         return Tubes(**rows, history=parts[0].history)
 
     def append(self, rows: NDArray[np.generic], vertex: Floats, normal: Floats, facet: Ints, kind: int) -> None:
@@ -249,22 +256,37 @@ class Phases:
 
     def take(self, index: NDArray[np.generic]) -> Phases:
         """Return the phases of the tubes at `index` (mask or numbers)."""
-        return Phases(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        rows = numbers(index)
+        return Phases(**{f.name: getattr(self, f.name).take(rows, axis=0) for f in fields(self)})
+
+    @staticmethod
+    def join(parts: list[Phases]) -> Phases:
+        """Return the phases of several sets of tubes as one."""
+        return Phases(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Phases)})
 
 
 def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
     """Return the phases of tubes over the way out, and what each can scatter back at most."""
-    six, bend, bound, area, rough = phases(
-        tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary, first, surface.facets.vertices,
-        surface.bulge, leg.image, leg.far, out.image, out.far, rule.wavenumber, tubes.strength, tubes.spread,
-        rule.phase, rule.turn, MOST_BEND,
-    )  # fmt: skip
-    gain = out.weight(tubes.points[:, CENTRE])
-    dull = np.flatnonzero(surface.dull[tubes.facet])
-    cosine = np.abs(np.einsum("ij,ij->i", tubes.normals[dull, CENTRE], tubes.k[dull, CENTRE]))
-    gain[dull] *= surface.strength(tubes.facet[dull], cosine, rule.wavenumber)
-    bound, area = gain * bound, gain * area
-    return Phases(six, bend, bound, area, rough, six[:, :3].mean(axis=1) / rule.wavenumber)
+    n, f = len(tubes), surface.facets
+    six, bend, (bound, area, rough, way) = np.empty((n, 6)), np.empty((n, 3)), np.empty((4, n))
+    rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary
+    held = tubes.strength, tubes.spread
+    written = six, bend, bound, area, rough, way
+    shape = f.vertices, surface.bulge, leg.image, leg.far, out.antenna, rule.wavenumber
+    m = f.materials
+    stuff = surface.dull, f.material, (m.kind, m.eps, m.thickness, m.roughness)
+
+    def some(rows: slice) -> None:
+        here, of, to = ([x[rows] for x in arrays] for arrays in (rays, held, written))
+        phases(*(*here, first, *shape, *of, (rule.phase, rule.turn, MOST_BEND), *stuff, *to))
+
+    in_two(n, some, _MANY)
+    return Phases(six, bend, bound, area, rough, way)
+
+
+def numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:
+    """Return the numbers of the rows at `index` (mask or numbers): to take rows by these is up to ten times faster."""
+    return np.flatnonzero(index) if index.dtype == np.bool_ else np.asarray(index, np.intp)
 
 
 def unit(v: Floats) -> Floats:

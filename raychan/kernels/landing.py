@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from raychan.kernels.jit import njit
 from raychan.kernels.patch import length_to
 
 

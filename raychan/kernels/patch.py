@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _ALIKE = 1.0 + 1e-9  # sizes nearer than this are one: rounding must not choose between them
 
@@ -20,7 +21,7 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _place(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
+def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
     """Write into p the point of the true surface at barycentric (x, y, z)."""
     xy, yz, zx = x * y, y * z, z * x
     for c in range(3):
@@ -66,7 +67,7 @@ def _largest(a, b, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _distance(p, q):  # type: ignore[no-untyped-def]
+def distance(p, q):  # type: ignore[no-untyped-def]
     return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
 
 
@@ -98,13 +99,13 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         f, w = facet[i], bary[i]
         for c in range(3):
             d = (c + 1) % 3
-            _place(v[f], b[f], w[c, 0], w[c, 1], w[c, 2], p[c])
+            place_on(v[f], b[f], w[c, 0], w[c, 1], w[c, 2], p[c])
             _face(n[f], w[c, 0], w[c, 1], w[c, 2], normal[c])
-            _place(
+            place_on(
                 v[f], b[f], 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2]), p[3 + c]
             )
         x, y, z = (w[0] + w[1] + w[2]) / 3.0
-        _place(v[f], b[f], x, y, z, p[6])
+        place_on(v[f], b[f], x, y, z, p[6])
         _face(n[f], x, y, z, normal[3])
         low, high = np.inf, -np.inf
         for q in range(7):
@@ -119,18 +120,18 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         off = max(abs(miss) / phase, max(bend0, bend1, bend2) / most_bend)
         turned = 0.0
         for c in range(3):
-            turned = max(turned, _distance(normal[c], normal[3]) / turn)
+            turned = max(turned, distance(normal[c], normal[3]) / turn)
         if across:
             e0, e1, e2 = _seen(p[0], p[1], image, far), _seen(p[1], p[2], image, far), _seen(p[2], p[0], image, far)
         else:
-            e0, e1, e2 = _distance(p[0], p[1]), _distance(p[1], p[2]), _distance(p[2], p[0])
+            e0, e1, e2 = distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0])
         limit = 1.0 + 0.5 * (high - low)
         if off > limit:
             out[i] = _largest(bend0, bend1, bend2)
         elif turned > limit:
             # Where the phase bends no more, only a cut across the turn brings it down.
-            n0, n1 = _distance(normal[0], normal[1]), _distance(normal[1], normal[2])
-            out[i] = _largest(n0, n1, _distance(normal[2], normal[0]))
+            n0, n1 = distance(normal[0], normal[1]), distance(normal[1], normal[2])
+            out[i] = _largest(n0, n1, distance(normal[2], normal[0]))
         elif max(e0, e1, e2) > max_edge:
             out[i] = _largest(e0, e1, e2)
         else:
@@ -168,13 +169,47 @@ def _lit(v, n, b, is_open, w, image, far, way_image, way_far, cosine, p, normal,
             x, y, z = (w[0] + w[1] + w[2]) / 3.0
         else:
             x, y, z = w[q, 0], w[q, 1], w[q, 2]
-        _place(v, b, x, y, z, p[q])
+        place_on(v, b, x, y, z, p[q])
         _face(n, x, y, z, normal)
         if q == 3 and is_open:
             _ray(p[q], image, far, k)
             sign = -1.0 if _dot(k, normal) > 0.0 else 1.0
         _ray(p[q], way_image, way_far, k)
         cosine[q] = -sign * _dot(k, normal)
+
+
+@njit(cache=True, inline="always")
+def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
+    """Return 1 if all of a facet's true surface is turned to the image, -1 if all away, 0 if that is not sure."""
+    low, high = np.inf, -np.inf
+    for i in range(3):
+        swell = 0.0
+        for j in range(3):
+            # The edges' bulges weigh a third in all at most.
+            swell = max(swell, abs(_dot(n[i], b[j])) / 3.0)
+        for j in range(3):
+            height = 0.0
+            for c in range(3):
+                height += n[i, c] * (image[c] if far else image[c] - v[j, c])
+            low, high = min(low, height - swell), max(high, height + swell)
+    return 1 if low > 0.0 else (-1 if high < 0.0 else 0)
+
+
+@njit(cache=True, inline="always")
+def _lit_whole(v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
+    """Return 1 if all of a facet faces the end of a way, -1 if nothing of it does, 0 if that is not sure."""
+    towards = _faces(v, n, b, way_image, way_far)
+    return towards * _faces(v, n, b, image, far) if is_open else towards
+
+
+@njit(cache=True, nogil=True)
+def may_be_lit(facet, v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
+    """Tell of which facets (n,) some part may face the end of a way (see `lit_parts`)."""
+    out = np.empty(len(facet), np.bool_)
+    for i in range(len(facet)):
+        f = facet[i]
+        out[i] = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, way_image, way_far) >= 0
+    return out
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -187,9 +222,16 @@ def lit_parts(facet, bary, v, n, b, is_open, image, far, way_image, way_far):  #
     facets, barys = np.empty(3 * m, facet.dtype), np.empty((3 * m, 3, 3))
     p, normal, k, cosine, side = np.empty((4, 3)), np.empty(3), np.empty(3), np.empty(4), np.empty(3)
     part = np.empty((3, 3, 3))
-    count = 0
+    count, f, whole = 0, -1, 0
     for i in range(m):
-        f = facet[i]
+        if facet[i] != f:
+            f = facet[i]
+            whole = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, way_image, way_far)
+        if whole != 0:
+            if whole > 0:
+                facets[count], barys[count] = f, bary[i]
+                count += 1
+            continue
         _lit(v[f], n[f], b[f], is_open[f], bary[i], image, far, way_image, way_far, cosine, p, normal, k)
         corner = cosine[:3]
         if not (corner.max() > 1e-9 and corner.min() < -1e-9):
@@ -249,7 +291,7 @@ def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyp
                 x, y, z = (w[0] + w[1] + w[2]) / 3.0
             else:
                 x, y, z = w[q, 0], w[q, 1], w[q, 2]
-            _place(v[f], b[f], x, y, z, p[i, q])
+            place_on(v[f], b[f], x, y, z, p[i, q])
             _face(n[f], x, y, z, normal[i, q])
             length[i, q] = _ray(p[i, q], image, far, k[i, q])
         if is_open[f] and _dot(normal[i, 3], k[i, 3]) > 0.0:
@@ -257,57 +299,3 @@ def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyp
                 for c in range(3):
                     normal[i, q, c] = -normal[i, q, c]
     return p, k, length, normal
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def phases(  # type: ignore[no-untyped-def]
-    points, k, length, normals, facet, bary, first, v, b, image, far, out_image, out_far, wavenumber,
-    strength, spread, phase, turn, most_bend,
-):  # fmt: skip
-    """Return the two-way phases of tubes at corners and mid-edges, and what each tube may scatter.
-
-    Args: first: mid-edges lie on the true surface and are reached straight; else on the chord, with the length by the
-    cubic Hermite rule. Returns: six (n, 6) [rad], bend (n, 3) [rad], bound and area (n,) [1/m], rough (n,): above 1
-    where phase or normal bend more than a quadratic follows (limits as for `edge_to_cut`).
-    """
-    m = len(facet)
-    six, bend = np.empty((m, 6)), np.empty((m, 3))
-    bound, area, rough = np.empty(m), np.empty(m), np.empty(m)
-    middle = np.empty(3)
-    for i in range(m):
-        low, high = np.inf, -np.inf
-        for c in range(3):
-            six[i, c] = wavenumber * (length[i, c] + length_to(points[i, c], out_image, out_far))
-            low, high = min(low, six[i, c]), max(high, six[i, c])
-        span = high - low
-        for c in range(3):
-            d = (c + 1) % 3
-            if first:
-                w, f = bary[i], facet[i]
-                x, y, z = 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2])
-                _place(v[f], b[f], x, y, z, middle)
-                way = length_to(middle, image, far)
-            else:
-                turned = 0.0
-                for x in range(3):
-                    middle[x] = 0.5 * (points[i, c, x] + points[i, d, x])
-                    turned += (k[i, c, x] - k[i, d, x]) * (points[i, d, x] - points[i, c, x])
-                way = 0.5 * (length[i, c] + length[i, d]) + 0.125 * turned
-            six[i, 3 + c] = wavenumber * (way + length_to(middle, out_image, out_far))
-            bend[i, c] = six[i, 3 + c] - 0.5 * (six[i, c] + six[i, d])
-            low, high = min(low, six[i, 3 + c]), max(high, six[i, 3 + c])
-        back = length_to(points[i, 3], out_image, out_far)
-        miss = wavenumber * (length[i, 3] + back) - (six[i, 0] + six[i, 1] + six[i, 2]) / 3.0
-        miss -= (bend[i, 0] + bend[i, 1] + bend[i, 2]) * (4.0 / 9.0)
-        p, q, r = points[i, 0], points[i, 1], points[i, 2]
-        ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-        way_in = k[i, 3]
-        across = (ay * bz - az * by) * way_in[0] + (az * bx - ax * bz) * way_in[1] + (ax * by - ay * bx) * way_in[2]
-        area[i] = wavenumber / (4.0 * math.pi) * abs(across) * strength[i] * spread[i] / (1.0 if out_far else back)
-        bound[i] = area[i] / (1.0 + 0.5 * span)
-        off = max(abs(miss) / phase, max(abs(bend[i, 0]), abs(bend[i, 1]), abs(bend[i, 2])) / most_bend)
-        for c in range(3):
-            off = max(off, _distance(normals[i, c], normals[i, 3]) / turn)
-        rough[i] = off / (1.0 + 0.5 * (high - low))
-    return six, bend, bound, area, rough

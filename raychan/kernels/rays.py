@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _FAR = 32.0  # radii of the ball about all facets from which an origin is far off
 
 
 @njit(cache=True, inline="always")
-def _plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
+def plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
     """Return the distance from x + along d to the plane through v of normal n, along d."""
     slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
     if slope == 0.0:
@@ -31,7 +32,7 @@ def plane_distances(facet, origin, direction, first, normal):  # type: ignore[no
     out = np.empty(len(facet))
     for i in range(len(facet)):
         f = facet[i]
-        out[i] = _plane_distance(normal[f], first[f], origin[i], 0.0, direction[i])
+        out[i] = plane_distance(normal[f], first[f], origin[i], 0.0, direction[i])
     return out
 
 
@@ -136,15 +137,15 @@ def land(  # type: ignore[no-untyped-def]
             other = hit[3 * j + s]
             if other < 0 or other == h:
                 continue
-            old = np.inf if h < 0 else _plane_distance(normal[h], first[h], x, ahead[i], d)
-            new = _plane_distance(normal[other], first[other], x, ahead[i], d)
+            old = np.inf if h < 0 else plane_distance(normal[h], first[h], x, ahead[i], d)
+            new = plane_distance(normal[other], first[other], x, ahead[i], d)
             if 0.0 < new < old - pace[i] and _holds(
                 vertices[other], normal[other], x, ahead[i] + new, d, edge * pace[i]
             ):
                 h = other
         if h < 0:
             continue
-        t = _plane_distance(normal[h], first[h], x, 0.0, d)
+        t = plane_distance(normal[h], first[h], x, 0.0, d)
         if h != skip[i] and t > start[i] + nearest:
             facet[i], distance[i] = h, t
             continue
@@ -155,31 +156,64 @@ def land(  # type: ignore[no-untyped-def]
     return again[:count].copy()
 
 
-@njit(cache=True, nogil=True)
-def clear(  # type: ignore[no-untyped-def]
-    facet, t, origin, direction, limit, slack, target, touch, plane, smooth, vertices, normal, margin
+@njit(cache=True, inline="always")
+def _clear(  # type: ignore[no-untyped-def]
+    a, b, t, x, d, limit, slack, touch, plane, smooth, vertices, normal, margin
 ):
-    """Tell of rays (n,) that met `facet` at t [m] whether they reached their `limit` [m].
+    """Tell whether a ray aimed at facet b (-1: none) that met facet a at t [m] reached its `limit` [m].
 
-    Only the target's own smooth surface may lie before it by `slack` (n,) [m], others by `touch` [m]. Where another
+    Only the target's own smooth surface may lie before it by `slack` [m], others by `touch` [m]. Where another
     surface lies in the plane of the target, at the same place, that counts and the target does not: what is drawn
     twice returns once. Facets of one plane overlap where the point lies within both, by `margin` [m].
     """
-    out = np.ones(len(facet), np.bool_)
-    for i in range(len(facet)):
-        a, b = facet[i], target[i]
-        if a < 0 or a == b:
+    if a < 0 or a == b:
+        return True
+    own = b >= 0 and smooth[a] == smooth[b]
+    close = min(slack, touch)
+    free = t >= limit - (slack if own else close)
+    if b < 0 or abs(t - limit) >= close:
+        return free
+    if abs(normal[a, 0] * normal[b, 0] + normal[a, 1] * normal[b, 1] + normal[a, 2] * normal[b, 2]) <= 1.0 - 1e-9:
+        return free
+    if plane[a] != plane[b] and not own:
+        return False
+    return free and not (
+        _holds(vertices[a], normal[a], x, t, d, -margin) and _holds(vertices[b], normal[b], x, t, d, -margin)
+    )
+
+
+@njit(cache=True, nogil=True)
+def arrive(  # type: ignore[no-untyped-def]
+    todo, facet, t, origin, direction, limit, slack, target, touch, plane, smooth, vertices, normal, margin, body,
+    inside, is_layer, reached, passed, blocker,
+):  # fmt: skip
+    """Write what became of the rays `todo` (m,) that met `facet` (m,) at t (m,) [m]; return which of these (k,) go on
+    behind a thin layer.
+
+    Args: origin, direction (m, 3); limit, slack [m], target facet and the body that it stands `inside`, which never
+    blocks (n,; empty: none); is_layer (f,), empty where nothing is; reached (n,), passed (n, layers), blocker (n,).
+    """
+    more = np.empty(len(todo), np.int64)
+    count = 0
+    for j in range(len(todo)):
+        i, a = todo[j], facet[j]
+        free = _clear(
+            a, target[i], t[j], origin[j], direction[j], limit[i], slack[i], touch, plane, smooth, vertices, normal,
+            margin,
+        )  # fmt: skip
+        if not free and len(inside):
+            free = body[a] == inside[i]
+        if free:
+            reached[i] = True
+            blocker[i] = -1
             continue
-        own = b >= 0 and smooth[a] == smooth[b]
-        close = min(slack[i], touch)
-        out[i] = t[i] >= limit[i] - (slack[i] if own else close)
-        if b < 0 or abs(t[i] - limit[i]) >= close:
+        blocker[i] = a
+        if not len(is_layer) or not is_layer[a]:
             continue
-        if abs(normal[a, 0] * normal[b, 0] + normal[a, 1] * normal[b, 1] + normal[a, 2] * normal[b, 2]) <= 1.0 - 1e-9:
-            continue
-        if (plane[a] != plane[b] and not own) or (
-            _holds(vertices[a], normal[a], origin[i], t[i], direction[i], -margin)
-            and _holds(vertices[b], normal[b], origin[i], t[i], direction[i], -margin)
-        ):
-            out[i] = False
-    return out
+        for q in range(passed.shape[1]):
+            if passed[i, q] < 0:
+                passed[i, q] = a
+                more[count] = j
+                count += 1
+                break
+    return more[:count].copy()

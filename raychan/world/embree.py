@@ -7,19 +7,20 @@ facets before it is cast to float32, so a scene far from the origin gives the an
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from copy import copy
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.kernels.facets import extents, planes_of, turned
-from raychan.kernels.rays import clear, companions, land, near_ball, plane_distances, set_out
-from raychan.kernels.rows import in_two
+from raychan.kernels.rays import arrive, companions, land, near_ball, plane_distances, set_out
+from raychan.kernels.rows import in_two, once
 from raychan.tables import LAYER, Facets
-from raychan.world.still import Still, columns, once
+from raychan.world.still import Still, columns, lasting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -39,9 +40,9 @@ class Triangles:
 
     def __init__(self, corners: Callable[[], Floats], centre: Floats) -> None:
         self._corners: Callable[[], Floats] | None = corners
-        self.centre = centre
+        self.centre, self.making = centre, threading.RLock()
 
-    @cached_property
+    @once
     def scene(self) -> Any:
         """What answers rays from the centre."""
         from embreex.mesh_construction import TriangleMesh
@@ -87,7 +88,7 @@ class Group:
 
 
 class Tracer:
-    """A scene of facets that answers rays; holds counts of the rays it cast."""
+    """A scene of facets that answers rays, and counts them by thread."""
 
     def __init__(self, facets: Facets, still: Still | None = None) -> None:
         self.facets = facets
@@ -96,13 +97,15 @@ class Tracer:
         self.normal, self.area = columns(still, "planes", lambda rows: planes_of(v[rows]))
         self.extents = _extents(facets, still)
         kind = facets.materials.kind
-        self.is_layer = once(still, "layer", lambda: kind[facets.material] == LAYER if n else np.zeros(0, bool))
-        self.rays = 0
+        self.is_layer = lasting(still, "layer", lambda: kind[facets.material] == LAYER if n else np.zeros(0, bool))
+        self._counts = threading.local()
         # Which facets are one surface; each for itself until someone knows better.
-        self.plane = self.smooth = once(still, "apart", lambda: np.arange(n, dtype=np.int32))
+        self.plane = self.smooth = lasting(still, "apart", lambda: np.arange(n, dtype=np.int32))
         self._any_layer = bool(self.is_layer.any())
         # Whether facets never hide each other from a point that looks at their lit sides.
         self.hides_nothing = False
+        # Held while something is made that serves all threads.
+        self.making = threading.RLock()
         self.extent, self._size, self.touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
         self._groups: list[Group] = []
         if n:
@@ -121,14 +124,22 @@ class Tracer:
         groups = []
         if len(still.rest):
             there = np.delete(extents, still.moving, 0)
-            groups.append(still.once("group", lambda: Group(lambda: v[still.rest], there, still.rest)))
+            groups.append(still.lasting("group", lambda: Group(lambda: v[still.rest], there, still.rest)))
         for r in still.rigid:
             low, high = r.mesh.bounds
             one = partial(Group, lambda m=r.mesh: m.corners, np.array([[low, high]]), r.rows)
-            groups.append(still.once(f"group {r.body}", one).placed(r.turn, r.origin))
+            groups.append(still.lasting(f"group {r.body}", one).placed(r.turn, r.origin))
         if len(still.few):
             groups.append(Group(lambda: v[still.few_rows], extents[still.few], still.few_rows))
         return groups
+
+    @property
+    def rays(self) -> int:
+        """Rays cast so far by this thread."""
+        return int(getattr(self._counts, "rays", 0))
+
+    def _count(self, rays: int) -> None:
+        self._counts.rays = self.rays + rays
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
@@ -160,7 +171,7 @@ class Tracer:
 
         in_two(n, some, _MANY)
         # A ray and its two companions count as one, however many groups it is cast at.
-        self.rays += sum(casts)
+        self._count(sum(casts))
         return facet, distance
 
     def _nearer(
@@ -213,34 +224,27 @@ class Tracer:
         the way (-1: none).
         """
         n = len(origin)
-        reached = np.zeros(n, bool)
+        reached, blocker = np.zeros(n, bool), np.full(n, _MISS, np.int32)
         passed = np.full((n, layers), _MISS, np.int32)
-        blocker = np.full(n, _MISS, np.int32)
-        count = np.zeros(n, np.int64)
         todo, start = np.arange(n), np.zeros(n)
         if self.hides_nothing:
             # What looks towards the ray's start is then seen from it; each such point still counts as a ray.
             towards = np.einsum("ij,ij->i", direction, self.normal[target]) < 0.0
             reached = towards & (target >= 0) & (skip < 0)
             todo = np.flatnonzero(~reached)
-            self.rays += n - len(todo)
+            self._count(n - len(todo))
+        shape = self.plane, self.smooth, self.facets.vertices, self.normal, _EDGE * _SLACK * self._size
+        ways = limit, slack, target, self.touch, *shape
+        bodies = (self.facets.body, np.zeros(0, np.int64) if inside is None else inside.astype(np.int64))
+        layer = self.is_layer if self._any_layer else np.zeros(0, bool)
         while len(todo):
-            o, d, aim = origin[todo], direction[todo], target[todo]
-            facet, t = self.cast(o, d, skip[todo], start[todo])
-            ways = o, d, limit[todo], slack[todo], aim, self.touch
-            margin = _EDGE * _SLACK * self._size
-            free = clear(facet, t, *ways, self.plane, self.smooth, self.facets.vertices, self.normal, margin)
-            if inside is not None:
-                free |= self.facets.body[np.maximum(facet, 0)] == inside[todo]
-            reached[todo[free]] = True
-            blocker[todo] = np.where(free, _MISS, facet)
-            if not self._any_layer or layers == 0:
-                break
-            more = ~free & self.is_layer[facet] & (count[todo] < layers)
-            todo, facet, t = todo[more], facet[more], t[more]
-            passed[todo, count[todo]] = facet
-            count[todo] += 1
-            start[todo] = t + self._nearest
+            rays: Any = origin, direction, skip, start
+            if len(todo) < n:
+                rays = tuple(x[todo] for x in rays)
+            facet, t = self.cast(*rays)
+            more = arrive(*(todo, facet, t, *rays[:2], *ways, *bodies, layer, reached, passed, blocker))
+            todo = todo[more]
+            start[todo] = t[more] + self._nearest
         return reached, passed, blocker
 
 
@@ -248,7 +252,7 @@ def _extents(facets: Facets, still: Still | None) -> Floats:
     """Return the lowest and highest corner (b, 2, 3) [m] of each body."""
     count = len(facets.role)
     shared = still if still is not None and still.shares else None
-    found: Floats = once(shared, "extents", lambda: extents(facets.vertices, facets.body, count))
+    found: Floats = lasting(shared, "extents", lambda: extents(facets.vertices, facets.body, count))
     if shared is not None:
         moved = extents(facets.vertices[shared.rows], facets.body[shared.rows], count)
         found = found.copy()
