@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.kernels.outline import by_cluster
+from raychan.kernels.rows import once
 from raychan.tables import LAYER, MIRROR, Facets
 from raychan.world.joints import Joints
 
@@ -27,6 +28,8 @@ class Fabric:
 
     def __init__(self, facets: Facets, joints: Sequence[Joints]) -> None:
         n = len(facets.body)
+        # Held while something is made that serves all threads.
+        self.making = threading.RLock()
         self.joined = list(zip(joints, np.cumsum([0, *(len(j.plane) for j in joints)]), strict=False))
         self.plane = _numbers([j.plane for j in joints], [j.planes for j in joints])
         self.smooth = _numbers([j.smooth for j in joints], [j.patches for j in joints])
@@ -48,25 +51,25 @@ class Fabric:
         at = [x + np.int32(3 * i) for x, (_, i) in zip(found, self.joined, strict=True)]
         return np.concatenate(at) if at else np.zeros((0, 2) if name == "pair" else 0, np.int32)
 
-    @cached_property
+    @once
     def borders(self) -> Bools:
         """Which half edges (3 n,) are not inside a plane: 3 f + k runs from corner k of facet f to the next."""
         return np.concatenate([np.zeros(0, bool), *(j.border for j, _ in self.joined)])
 
-    @cached_property
+    @once
     def around(self) -> NDArray[np.int64]:
         """How many edges (p,) run around each plane."""
         count = self.borders.reshape(-1, 3).sum(axis=1)
         return np.bincount(self.plane, weights=count, minlength=len(self.plane)).astype(np.int64)
 
-    @cached_property
+    @once
     def outlines(self) -> tuple[Ints, NDArray[np.int64]]:
         """Half edges (e,) around the planes, and where those of each plane begin (p + 1,)."""
         outer = self.halves("outer")
         count = np.bincount(self.plane[outer // 3], minlength=len(self.plane))
         return outer, np.concatenate([[0], np.cumsum(count)])
 
-    @cached_property
+    @once
     def silhouettes(self) -> tuple[Ints, Ints]:
         """Half edges (e,) that can be a body's outline, and the facets (e, 2) on both sides, -1 beyond a rim."""
         if self.convex_alone:
@@ -87,14 +90,14 @@ class Fabric:
         faces = np.concatenate([pair // 3, np.stack([rim // 3, np.full(len(rim), -1)], axis=1)])
         return np.concatenate([pair[:, 0], rim]), faces.astype(np.int32)
 
-    @cached_property
+    @once
     def clusters(self) -> tuple[Ints, NDArray[np.int64]]:
         """Facets (n,) in the order of clusters of neighbours, and where each of these begins (k + 1,)."""
         parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self.joined]
         order, first = (np.concatenate(x) for x in zip(*parts, strict=True))
         return order, np.append(first, len(order))
 
-    @cached_property
+    @once
     def outlining(self) -> tuple[NDArray[Any], ...]:
         """Facets (e, 2) of `silhouettes` with its edges by cluster (see kernels.outline.by_cluster)."""
         faces = self.silhouettes[1]

@@ -15,12 +15,12 @@ from raychan.frames import sizes
 from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
 from raychan.kernels.outline import turning
-from raychan.kernels.rows import made_once
+from raychan.kernels.rows import once
 from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.cores import closed_pieces, cores_of
 from raychan.world.embree import Tracer
 from raychan.world.joints import Joints, joined, places
-from raychan.world.still import Still, columns, once
+from raychan.world.still import Still, columns, lasting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -49,7 +49,7 @@ class Surface(Tracer):
         v, n, m = facets.vertices, facets.normals, facets.materials
         self._still, self._cores = still, cores
         poor = (m.kind != PEC) & (np.abs(m.eps) < _METAL)
-        self.dull = once(still, "dull", lambda: poor[facets.material])
+        self.dull = lasting(still, "dull", lambda: poor[facets.material])
         self.matter = facets.material, (m.kind, m.eps, m.thickness, m.roughness)
         self.bulge, self.curved = columns(still, "bulges", lambda rows: bulges(v[rows], n[rows]))
         # What others made of all this, once.
@@ -58,7 +58,7 @@ class Surface(Tracer):
         # What was found out about a leg, once.
         self.shadows: dict[Any, Any] = {}
         self.reach: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
-        self.fabric = once(still, "fabric", lambda: Fabric(facets, joints or ([self._joints()] if len(v) else [])))
+        self.fabric = lasting(still, "fabric", lambda: Fabric(facets, joints or ([self._joints()] if len(v) else [])))
         self.plane, self.smooth = self.fabric.plane, self.fabric.smooth
         self.closed, self.open_facet = self.fabric.closed, self.fabric.open_facet
         self.convex_alone, self.hides_nothing = self.fabric.convex_alone, self.fabric.hides_nothing
@@ -75,7 +75,7 @@ class Surface(Tracer):
         found: Floats = ends(self.facets.vertices, np.ascontiguousarray(half))
         return found
 
-    @made_once
+    @once
     def outline(self) -> Floats:
         """Edges (e, 2, 3) [m] around the planes, not those shared within one or a smooth patch: of plane p those of
         `outline[first_edge[p] : first_edge[p + 1]]`."""
@@ -91,7 +91,7 @@ class Surface(Tracer):
         """Facets (e,) to which the edges of `outline` belong."""
         return self.fabric.outlines[0] // 3
 
-    @made_once
+    @once
     def edge_ends(self) -> Floats:
         """Ends (e, 2, 3) [m] of every edge that can be a body's outline. Hollow edges hide nothing; between coplanar
         facets none is seen. Where a pane meets its frame, the frame ends as at a rim."""
@@ -113,24 +113,24 @@ class Surface(Tracer):
         found = np.sort(turning(*(*self.fabric.outlining, *seen)))
         return half[found], faces[found]
 
-    @made_once
+    @once
     def wedge_facet(self) -> Ints:
         """Faces 0 and n (w, 2) of convex edges; the rims of open sheets are half planes."""
         rim = self.fabric.halves("rim") // 3
         return np.concatenate([self.fabric.halves("pair", "sharp") // 3, np.stack([rim, rim], axis=1)]).astype(np.int32)
 
-    @made_once
+    @once
     def wedge(self) -> Floats:
         """Ends (w, 2, 3) [m] of the edges of `wedge_facet`."""
         return self.ends(np.concatenate([self.fabric.halves("pair", "sharp")[:, 0], self.fabric.halves("rim")]))
 
-    @made_once
+    @once
     def wedge_n(self) -> Floats:
         """Exterior angle (w,) over pi of the edges of `wedge_facet`."""
         turns = [j.turn[j.sharp] for j, _ in self.fabric.joined]
         return 1.0 + np.concatenate([*turns, np.ones(len(self.fabric.halves("rim")))])
 
-    @made_once
+    @once
     def clusters(self) -> Clusters:
         """The facets in clusters of neighbours, each of one body."""
         order, first = self.fabric.clusters
@@ -138,7 +138,7 @@ class Surface(Tracer):
         shape = f.vertices, f.normals, self.normal, self.bulge
         if self._still is None or not self._still.shares:
             return Clusters(order, first, *hulls(order, first, *shape))
-        hull = self._still.once("hulls", lambda: hulls(order, first, *shape))
+        hull = self._still.lasting("hulls", lambda: hulls(order, first, *shape))
         out = tuple(x.copy() for x in hull)
         body = f.body[order[first[:-1]]]
         for b in self._still.moving:
@@ -147,7 +147,7 @@ class Surface(Tracer):
                 column[begin:end] = part
         return Clusters(order, first, *out)
 
-    @made_once
+    @once
     def wall_area(self) -> Floats:
         """Area (p,) [m^2] of each plane that is flat and lets nothing through, mirrors aside."""
         f, still = self.facets, self._still
@@ -159,12 +159,12 @@ class Surface(Tracer):
 
         if still is None or not still.shares:
             return found(slice(None))
-        out = still.once("walls", lambda: found(slice(None))).copy()
+        out = still.lasting("walls", lambda: found(slice(None))).copy()
         anew = self.plane[still.rows]
         out[anew] = found(still.rows)[anew]
         return out
 
-    @made_once
+    @once
     def cores(self) -> Balls:
         """Centre (k, 3) [m], radius (k,) [m] and body (k,) of balls inside closed opaque bodies."""
         if self._cores is not None:
@@ -178,7 +178,7 @@ class Surface(Tracer):
         owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(r) for _, r in found])
         return np.concatenate([c for c, _ in found]), np.concatenate([r for _, r in found]), owner
 
-    @made_once
+    @once
     def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Centre (b, 3) [m] and radius (b,) [m] of a ball about each body, and which bodies (b,) have no facet."""
         low, high = np.moveaxis(self.extents, 1, 0)

@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _WIDE = 1e-6  # rad: rounding must not tell a cluster's side where a facet grazes
 

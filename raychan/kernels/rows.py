@@ -13,7 +13,7 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 
-class made_once(cached_property):  # type: ignore[type-arg]
+class once(cached_property):  # type: ignore[type-arg]
     """A property of an object made once, by one thread: the object's lock `making` is held meanwhile."""
 
     def __get__(self, instance: Any, owner: Any = None) -> Any:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from raychan.kernels.facets import extents, planes_of, turned
 from raychan.kernels.rays import arrive, companions, land, near_ball, plane_distances, set_out
-from raychan.kernels.rows import in_two, made_once
+from raychan.kernels.rows import in_two, once
 from raychan.tables import LAYER, Facets
-from raychan.world.still import Still, columns, once
+from raychan.world.still import Still, columns, lasting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -40,10 +40,9 @@ class Triangles:
 
     def __init__(self, corners: Callable[[], Floats], centre: Floats) -> None:
         self._corners: Callable[[], Floats] | None = corners
-        self.centre = centre
-        self.making = threading.RLock()
+        self.centre, self.making = centre, threading.RLock()
 
-    @made_once
+    @once
     def scene(self) -> Any:
         """What answers rays from the centre."""
         from embreex.mesh_construction import TriangleMesh
@@ -98,10 +97,10 @@ class Tracer:
         self.normal, self.area = columns(still, "planes", lambda rows: planes_of(v[rows]))
         self.extents = _extents(facets, still)
         kind = facets.materials.kind
-        self.is_layer = once(still, "layer", lambda: kind[facets.material] == LAYER if n else np.zeros(0, bool))
+        self.is_layer = lasting(still, "layer", lambda: kind[facets.material] == LAYER if n else np.zeros(0, bool))
         self._counts = threading.local()
         # Which facets are one surface; each for itself until someone knows better.
-        self.plane = self.smooth = once(still, "apart", lambda: np.arange(n, dtype=np.int32))
+        self.plane = self.smooth = lasting(still, "apart", lambda: np.arange(n, dtype=np.int32))
         self._any_layer = bool(self.is_layer.any())
         # Whether facets never hide each other from a point that looks at their lit sides.
         self.hides_nothing = False
@@ -119,6 +118,21 @@ class Tracer:
             self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
             self._groups = [Group(lambda: v, self.extents, None)] if still is None else self._parted(still)
 
+    def _parted(self, still: Still) -> list[Group]:
+        """Return what stands still, what is large and moves, and all that is small and moves, each by itself."""
+        v, extents = self.facets.vertices, self.extents
+        groups = []
+        if len(still.rest):
+            there = np.delete(extents, still.moving, 0)
+            groups.append(still.lasting("group", lambda: Group(lambda: v[still.rest], there, still.rest)))
+        for r in still.rigid:
+            low, high = r.mesh.bounds
+            one = partial(Group, lambda m=r.mesh: m.corners, np.array([[low, high]]), r.rows)
+            groups.append(still.lasting(f"group {r.body}", one).placed(r.turn, r.origin))
+        if len(still.few):
+            groups.append(Group(lambda: v[still.few_rows], extents[still.few], still.few_rows))
+        return groups
+
     @property
     def rays(self) -> int:
         """Rays cast so far by this thread."""
@@ -126,21 +140,6 @@ class Tracer:
 
     def _count(self, rays: int) -> None:
         self._counts.rays = self.rays + rays
-
-    def _parted(self, still: Still) -> list[Group]:
-        """Return what stands still, what is large and moves, and all that is small and moves, each by itself."""
-        v, extents = self.facets.vertices, self.extents
-        groups = []
-        if len(still.rest):
-            there = np.delete(extents, still.moving, 0)
-            groups.append(still.once("group", lambda: Group(lambda: v[still.rest], there, still.rest)))
-        for r in still.rigid:
-            low, high = r.mesh.bounds
-            one = partial(Group, lambda m=r.mesh: m.corners, np.array([[low, high]]), r.rows)
-            groups.append(still.once(f"group {r.body}", one).placed(r.turn, r.origin))
-        if len(still.few):
-            groups.append(Group(lambda: v[still.few_rows], extents[still.few], still.few_rows))
-        return groups
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
@@ -253,7 +252,7 @@ def _extents(facets: Facets, still: Still | None) -> Floats:
     """Return the lowest and highest corner (b, 2, 3) [m] of each body."""
     count = len(facets.role)
     shared = still if still is not None and still.shares else None
-    found: Floats = once(shared, "extents", lambda: extents(facets.vertices, facets.body, count))
+    found: Floats = lasting(shared, "extents", lambda: extents(facets.vertices, facets.body, count))
     if shared is not None:
         moved = extents(facets.vertices[shared.rows], facets.body[shared.rows], count)
         found = found.copy()

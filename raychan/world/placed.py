@@ -29,7 +29,7 @@ def placed(bodies: Sequence[Body], index: Index, frequency: float, time: float, 
 
     if still is None or not still.shares:
         return every()
-    base = still.once("facets", lambda: _shared(every(), still))
+    base = still.lasting("facets", lambda: _shared(every(), still))
     part = _placed(bodies, [int(b) for b in still.moving], index, frequency, time)
     vertices, normals = still.copies("facets", (part.vertices, part.normals))
     now: Facets = base.rebuilt(

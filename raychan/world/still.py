@@ -72,7 +72,7 @@ class Still:
         now.rigid = tuple(Rigid(i, self._rows[i], b.geometry, b.motion.rotation(), b.motion.origin()) for i, b in large)
         return now
 
-    def once(self, name: str, make: Callable[[], T]) -> T:
+    def lasting(self, name: str, make: Callable[[], T]) -> T:
         """Return what `make` finds, which is the same wherever bodies stand; made once."""
         if name not in self._kept:
             self._kept[name] = make()
@@ -101,9 +101,9 @@ class Still:
         return out
 
 
-def once(still: Still | None, name: str, make: Callable[[], T]) -> T:
+def lasting(still: Still | None, name: str, make: Callable[[], T]) -> T:
     """Return what `make` finds, or found before where something is kept."""
-    return make() if still is None else still.once(name, make)
+    return make() if still is None else still.lasting(name, make)
 
 
 def columns(still: Still | None, name: str, make: Callable[[Any], Arrays]) -> Arrays:
