@@ -139,7 +139,7 @@ import os, signal, sys
 import raychan.run.chain, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-raychan.run.chain.solve = lambda *a, **k: launched(lambda: os.kill(os.getpid(), signal.SIGINT))
+raychan.run.chain.solve_into = lambda *a, **k: launched(lambda: os.kill(os.getpid(), signal.SIGINT))
 sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
 """
 )
@@ -160,7 +160,7 @@ import raychan.run.chain, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 stop = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))
-raychan.run.chain.solve = lambda *a, **k: launched(lambda: (stop(), time.sleep(50)))
+raychan.run.chain.solve_into = lambda *a, **k: launched(lambda: (stop(), time.sleep(50)))
 raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
 """
 )

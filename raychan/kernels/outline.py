@@ -36,7 +36,7 @@ def by_cluster(faces, order, start):  # type: ignore[no-untyped-def]
         i = cluster[faces[e, 0]]
         edges[fill[i]] = e
         fill[i] += 1
-    begin, beside, count = np.zeros(k + 1, np.int64), np.empty(1024, np.int32), 0
+    begin, beside, count = np.zeros(k + 1, np.int64), np.empty(1 << 10, np.int32), 0
     last = np.full(k, -1, np.int32)
     for i in range(k):
         for at in range(first[i], first[i + 1]):
@@ -78,7 +78,7 @@ def turning(faces, edges, first, beside, begin, cluster, centre, radius, axis, s
             side[i] = 1
         elif math.pi - off < room:
             side[i] = -1
-    out, count = np.empty(1024, np.int64), 0
+    out, count = np.empty(1 << 10, np.int64), 0
     for i in range(k):
         same = side[i] != 0
         for at in range(begin[i], begin[i + 1]):
