@@ -15,6 +15,8 @@ from raychan.signal.cube import synthesize
 from raychan.tables import DIFFRACT, TRANSMIT, Paths, take
 from raychan.units import db, undb
 
+_LEVEL = 1e-4  # of the sum of all amplitudes: what levels of whole mechanisms are told to
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -41,7 +43,7 @@ def peak(paths: Paths, rows: NDArray[np.bool_], sensor: Sensor, settings: Any) -
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
     if not rows.any():
         return 0.0
-    cube = synthesize(take(paths, rows), dataclasses.replace(sensor, noise=False))
+    cube = synthesize(take(paths, rows), dataclasses.replace(sensor, noise=False), tolerance=_LEVEL)
     rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
     return float(rdmap.power.max())
 

@@ -116,9 +116,12 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         stats = solve_into(gather.add, surface, points, sensor, carrier, rule, bounces, diffraction=diffraction, **more)
         return gather.done(), stats
 
-    def coarse(diffraction: bool) -> tuple[Launched, Stats]:
-        """Launch on another lattice: it tells how wrong the fine launch may be."""
-        return launch(rule, bounces, diffraction)
+    def coarse(diffraction: bool, heard: bool = False) -> tuple[Launched, Stats]:
+        """Launch on another lattice: it tells how wrong the fine launch may be; `heard`: its samples are wanted."""
+        launched, cost = launch(rule, bounces, diffraction)
+        if heard:
+            _ = launched.quiet
+        return launched, cost
 
     if model.mode == "auto":
         # With all mechanisms, it first tells which are needed.
@@ -139,7 +142,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         if chosen:
             launched, stats = fine()
         else:
-            (launched, stats), (others, more) = at_once(fine, lambda: coarse(model.diffraction))
+            (launched, stats), (others, more) = at_once(fine, lambda: coarse(model.diffraction, heard=not again))
     turned = None
     if again:
         with clock.stage("retrace"):
@@ -189,11 +192,12 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     )
     with clock.stage("explain"):
         weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
-        left_out = ledger(paths, channel.surface, channel.points, sensor, settings, channel.model, weakest)
+        reasons, left_out = at_once(
+            lambda: provenance(paths, rdmap, detections, receiver, error.power),
+            lambda: ledger(paths, channel.surface, channel.points, sensor, settings, channel.model, weakest),
+        )
         if turned:
             left_out["intra-frame motion"] = motion(turned)
-        reasons = provenance(paths, rdmap, detections, receiver, error.power)
-        if turned:
             reasons = claimed(reasons, paths, turned.turns, brought, error.power, detections, receiver)
     return Result(
         paths=paths,

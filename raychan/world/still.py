@@ -19,7 +19,7 @@ Bools = NDArray[np.bool_]
 T = TypeVar("T")
 Arrays = tuple[NDArray[Any], ...]
 
-MANY = 30_000  # facets from which on they are kept
+MANY = 200_000  # facets from which on they are kept
 
 
 @dataclass(frozen=True)
