@@ -71,9 +71,8 @@ def shares_inside(tubes, i, source, ends, margin=0.0, steps=4000):
     t = (np.arange(steps) + 0.5) / steps
     x = ends[:, :1] + t[:, None] * (ends[:, 1:] - ends[:, :1])
     weights = np.linalg.solve((tubes.points[i, :3] - source).T, (x - source).reshape(-1, 3).T).T
-    inside = (weights > -margin * weights.sum(axis=1, keepdims=True)).all(axis=1) & (
-        (x.reshape(-1, 3) - tubes.points[i, 3]) @ tubes.k[i, 3] > 0.0
-    )
+    ahead = (x.reshape(-1, 3) - tubes.points[i, 3]) @ tubes.k[i, 3] > 0.0
+    inside = ahead & (weights > -margin * weights.sum(axis=1, keepdims=True)).all(axis=1)
     return inside.reshape(len(ends), steps).mean(axis=1) * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
 
