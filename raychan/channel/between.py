@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from weakref import proxy
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, starts_again, within
+from raychan.channel.edge_grid import fill_grid, packed
+from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, within
 from raychan.channel.surface import Surface
 from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
@@ -20,7 +22,10 @@ Bools = NDArray[np.bool_]
 _MOST_CELLS = 2_000_000
 _LEAST_CELL = 0.02  # m
 _BLOCK = 8  # cells a side that are passed over at once where they hold no edge
-_WIDE = 1000  # cells abreast beyond which a tube is halved before anyone asks what stands in it
+_WIDE = 200  # cells in a layer beyond which a tube is halved before anyone asks what stands in it
+_ABREAST = 10  # cells beyond which this holds for a fan of rays of which some run along the layers
+_ALONG = 0.1  # cosine to the axis under which rays do
+_BESIDE = 0.25  # cells that a tube is taken to be wider: edges are in the cells that they pass within half of one
 _MANY = 500  # tubes from which on a second thread pays
 _CLEAR = 1e-5  # m: what lies nearer to a surface belongs to it
 
@@ -37,7 +42,8 @@ class Between:
         self.cell = max(_LEAST_CELL, (volume / _MOST_CELLS) ** (1.0 / 3.0))
         self.low = low - self.cell
         self.shape = np.ceil((high - self.low) / self.cell).astype(np.int64) + 2
-        self.first, self.index = _fill(ends, self.low, self.cell, self.shape)
+        self.first, self.index = fill_grid(ends, self.low, self.cell, self.shape)
+        self.edges, self.planes = packed(self.index, ends, surface.edge_faces, surface.normal)
         held = np.flatnonzero(np.diff(self.first))
         blocks = np.stack(np.unravel_index(held, tuple(self.shape))) // _BLOCK
         self.crowd = np.zeros(tuple(self.shape // _BLOCK + 1), np.bool_)
@@ -70,9 +76,9 @@ class Between:
 
         def some(part: slice) -> None:
             _across(
-                rows[part], points, k, length, far, flat, hit, reach, s.extent, s.edge_ends, s.edge_faces, s.first,
-                s.normal, self.first, self.index, self.low, self.cell, self.shape, self.crowd, self.centre, self.radius,
-                side,
+                rows[part], points, k, length, far, flat, hit, reach, s.extent, s.first, s.normal,
+                self.edges, self.planes, self.first, self.index, self.low, self.cell, self.shape, self.crowd,
+                self.centre, self.radius, side,
             )  # fmt: skip
 
         in_two(len(rows), some, _MANY)
@@ -87,56 +93,9 @@ def between(surface: Surface) -> Between:
     return found
 
 
-@njit(cache=True, nogil=True)
-def _fill(ends, low, cell, shape):  # type: ignore[no-untyped-def]
-    """Return the edges in each cell as (first, index): edges are walked in steps of half a cell."""
-    total = shape[0] * shape[1] * shape[2]
-    first = np.zeros(total + 1, np.int64)
-    index = np.zeros(0, np.int32)
-    for fill in range(2):
-        for e in range(len(ends)):
-            a, b = ends[e, 0], ends[e, 1]
-            size = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            steps = int(2.0 * size / cell) + 1
-            last = -1
-            for s in range(steps + 1):
-                t = s / steps
-                i = int((a[0] + t * (b[0] - a[0]) - low[0]) / cell)
-                j = int((a[1] + t * (b[1] - a[1]) - low[1]) / cell)
-                k = int((a[2] + t * (b[2] - a[2]) - low[2]) / cell)
-                at = (i * shape[1] + j) * shape[2] + k
-                if at == last:
-                    continue
-                last = at
-                if fill == 0:
-                    first[at + 1] += 1
-                else:
-                    index[first[at]] = e
-                    first[at] += 1
-        if fill == 0:
-            first = np.cumsum(first)
-            index = np.empty(first[-1], np.int32)
-    starts_again(first)
-    return first, index
-
-
 @njit(cache=True, inline="always")
-def _outline(faces, source, k, far, first, normal):  # type: ignore[no-untyped-def]
-    """Tell whether the faces of an edge look to different sides as seen from the source."""
-    if faces[1] < 0:
-        return True
-    front = 0
-    for f in range(2):
-        look = 0.0
-        for c in range(3):
-            look += normal[faces[f], c] * (-k[c] if far else source[c] - first[faces[f], c])
-        front += 1 if look > 0.0 else 0
-    return front == 1
-
-
-@njit(cache=True, inline="always")
-def _span(points, ks, reach, ball, radius):  # type: ignore[no-untyped-def]
-    """Return from where to where (to `reach`) a tube passes through the balls about bodies; equal: nowhere."""
+def _widths(points, ks):  # type: ignore[no-untyped-def]
+    """Return how far a tube's corners lie from its centre [m], and how far its rays spread for each metre."""
     wide, spread = 0.0, 0.0
     for q in range(3):
         a, b = 0.0, 0.0
@@ -145,6 +104,12 @@ def _span(points, ks, reach, ball, radius):  # type: ignore[no-untyped-def]
             b += (ks[q, c] - ks[3, c]) ** 2
         wide, spread = max(wide, a), max(spread, b)
     wide, spread = np.sqrt(wide), np.sqrt(spread)
+    return wide, spread
+
+
+@njit(cache=True, inline="always")
+def _span(points, ks, wide, spread, reach, ball, radius):  # type: ignore[no-untyped-def]
+    """Return from where to where (to `reach`) a tube passes through the balls about bodies; equal: nowhere."""
     begin, end = np.inf, 0.0
     for j in range(len(ball)):
         along, apart = 0.0, 0.0
@@ -164,16 +129,41 @@ def _span(points, ks, reach, ball, radius):  # type: ignore[no-untyped-def]
     return (begin, end) if begin < end else (0.0, 0.0)
 
 
-@njit(cache=True, inline="always")
-def _cells(points, ks, near, far_off, low, cell, shape, begin, end):  # type: ignore[no-untyped-def]
-    """Write the box of cells that a tube passes from `near` to `far_off` along its rays."""
+@njit(cache=True, inline="always", error_model="numpy")
+def _layer(points, ks, axis, at, count, near, far_off, low, cell, shape, begin, end):  # type: ignore[no-untyped-def]
+    """Write the box of cells that a tube passes from `near` to `far_off` along its rays in `count` layers of cells
+    across an axis, from layer `at` on; return how many there are in one layer."""
+    floor, room, per = low[axis] + cell * (at - _BESIDE), 1, 1.0 / cell
     for c in range(3):
-        least, most = np.inf, -np.inf
-        for q in range(4):
-            x, y = points[q, c] + near * ks[q, c], points[q, c] + far_off * ks[q, c]
-            least, most = min(least, x, y), max(most, x, y)
-        begin[c] = max(int((least - 0.25 * cell - low[c]) / cell), 0)
-        end[c] = min(int((most + 0.25 * cell - low[c]) / cell) + 1, shape[c])
+        begin[c], end[c] = shape[c], 0
+    for q in range(4):
+        along, start, stop = ks[q, axis], near, far_off
+        # A ray that runs along the layers counts whole.
+        if abs(along) > _ALONG:
+            over = 1.0 / along
+            one = (floor - points[q, axis]) * over
+            other = one + (count + 2.0 * _BESIDE) * cell * over
+            start = min(max(min(one, other), near), far_off)
+            stop = min(max(max(one, other), near), far_off)
+        for c in range(3):
+            x, y = points[q, c] + start * ks[q, c], points[q, c] + stop * ks[q, c]
+            begin[c] = min(begin[c], max(int((min(x, y) - low[c]) * per - _BESIDE), 0))
+            end[c] = max(end[c], min(int((max(x, y) - low[c]) * per + _BESIDE) + 1, shape[c]))
+    begin[axis], end[axis] = max(at, 0), min(at + count, shape[axis])
+    for c in range(3):
+        room *= max(end[c] - begin[c], 0) if c != axis else 1
+    return room
+
+
+@njit(cache=True, inline="always")
+def _layers(points, ks, axis, near, far_off, low, cell, shape):  # type: ignore[no-untyped-def]
+    """Return the first and the last layer across an axis that a tube passes."""
+    least, most = np.inf, -np.inf
+    for q in range(4):
+        x, y = points[q, axis] + near * ks[q, axis], points[q, axis] + far_off * ks[q, axis]
+        least, most = min(least, x, y), max(most, x, y)
+    first = max(int((least - low[axis]) / cell - _BESIDE), 0)
+    return first, min(int((most - low[axis]) / cell + _BESIDE), shape[axis] - 1)
 
 
 @njit(cache=True, inline="always")
@@ -187,7 +177,7 @@ def _crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _across(  # type: ignore[no-untyped-def]
     rows,
     points,
@@ -198,10 +188,10 @@ def _across(  # type: ignore[no-untyped-def]
     hit,
     reach,
     extent,
-    ends,
-    faces,
     first_point,
     normal,
+    edges,
+    sheets,
     first,
     index,
     low,
@@ -212,7 +202,7 @@ def _across(  # type: ignore[no-untyped-def]
     radius,
     out,
 ):
-    tried = np.full(len(ends), -1, np.int64)
+    tried = np.full(len(edges), -1, np.int32)
     side, source, planes, section = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 3))
     begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
     for i in rows:
@@ -225,24 +215,32 @@ def _across(  # type: ignore[no-untyped-def]
         sign = -1.0 if dot(k, plane) > 0.0 else 1.0
         here = pyramid(points[i], source, k, parallel, planes)
         section[:] = points[i]
-        begin_at, end_at = _span(points[i], ks[i], reach[i, 3] if lands else extent, ball, radius)
-        steps = int((end_at - begin_at) / cell) + 1 if end_at > begin_at else 0
+        wide, spread = _widths(points[i], ks[i])
+        far_end = reach[i, 3] if lands else extent
+        begin_at, end_at = _span(points[i], ks[i], wide, spread, far_end, ball, radius)
+        axis = 0
+        for c in range(1, 3):
+            axis = c if abs(k[c]) > abs(k[axis]) else axis
+        for q in range(3):
+            if ks[i, q, axis] * math.copysign(1.0, k[axis]) <= _ALONG:
+                end_at = min(end_at, _ABREAST * cell / spread)
+        (x, y, z), w = (-k, 0.0) if parallel else (source, 1.0)
         best = 0.0
-        step = (end_at - begin_at) / max(steps, 1)
+        low_layer, high_layer = _layers(points[i], ks[i], axis, begin_at, end_at, low, cell, shape)
+        layers = high_layer - low_layer + 1 if end_at > begin_at else 0
         clear_until = 0
-        for s in range(steps):
+        for s in range(layers):
             if s < clear_until:
                 continue
-            near = begin_at + s * step
+            # From the mirror on: what is far off is left out where the tube grows too wide.
+            at_layer = low_layer + s if k[axis] > 0.0 else high_layer - s
             if s % _BLOCK == 0:
-                _cells(points[i], ks[i], near, near + _BLOCK * step, low, cell, shape, begin_cell, end_cell)
+                block = at_layer if k[axis] > 0.0 else at_layer - _BLOCK + 1
+                _layer(points[i], ks[i], axis, block, _BLOCK, begin_at, end_at, low, cell, shape, begin_cell, end_cell)
                 if not _crowded(crowd, begin_cell, end_cell):
                     clear_until = s + _BLOCK
                     continue
-            _cells(points[i], ks[i], near, near + step, low, cell, shape, begin_cell, end_cell)
-            room = 1
-            for c in range(3):
-                room *= max(end_cell[c] - begin_cell[c], 0)
+            room = _layer(points[i], ks[i], axis, at_layer, 1, begin_at, end_at, low, cell, shape, begin_cell, end_cell)
             if room > _WIDE:
                 break
             for ci in range(begin_cell[0], end_cell[0]):
@@ -252,12 +250,13 @@ def _across(  # type: ignore[no-untyped-def]
                         continue
                     for at in range(first[row + begin_cell[2]], first[row + end_cell[2]]):
                         e = index[at]
-                        if tried[e] == i:
+                        # An edge is an outline where its faces look to different sides of the source.
+                        one = sheets[e, 0, 0] * x + sheets[e, 0, 1] * y + sheets[e, 0, 2] * z - w * sheets[e, 0, 3]
+                        other = sheets[e, 1, 0] * x + sheets[e, 1, 1] * y + sheets[e, 1, 2] * z - w * sheets[e, 1, 3]
+                        if (one > 0.0) == (other > 0.0) or tried[e] == i:
                             continue
                         tried[e] = i
-                        if not _outline(faces[e], source, k, parallel, first_point, normal):
-                            continue
-                        a, b = ends[e, 0], ends[e, 1]
+                        a, b = edges[e, 0], edges[e, 1]
                         # The part beyond the mirror, and before the plane of landing.
                         da, db, ha, hb = -_CLEAR, -_CLEAR, -_CLEAR, -_CLEAR
                         for c in range(3):
@@ -268,7 +267,8 @@ def _across(  # type: ignore[no-untyped-def]
                         begin, end = above(da, db)
                         low_end, high_end = above(ha, hb) if lands else (0.0, 1.0)
                         begin, end = max(begin, low_end), min(end, high_end)
-                        if begin >= end:
+                        size = size_of(a, b)
+                        if (end - begin) * size <= best:
                             continue
                         if not flat[i]:
                             # Off a curved mirror the rays count as parallel, in the section that they have here.
@@ -281,7 +281,7 @@ def _across(  # type: ignore[no-untyped-def]
                             pyramid(section, source, k, True, planes)
                         scale = scale_at(a, b, source, k, parallel, here)
                         begin, end = within(a, b, section, planes, scale, begin, end)
-                        part = (end - begin) * size_of(a, b)
+                        part = (end - begin) * size
                         if part > best and apart(a, b, section, source, k, parallel, side):
                             best = part
                             out[i] = side

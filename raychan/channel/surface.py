@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.fabric import Fabric
-from raychan.frames import sizes
 from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
 from raychan.kernels.outline import turning
@@ -186,11 +185,6 @@ class Surface(Tracer):
         low, high = np.where(empty[:, None], 0.0, low), np.where(empty[:, None], 0.0, high)
         return 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1), empty
 
-    def normal_at(self, facet: Ints, bary: Floats) -> Floats:
-        """Return unit normals (n, ..., 3) of the true surface at barycentric coordinates."""
-        v = np.einsum("n...i,nij->n...j", bary, self.facets.normals[facet])
-        return v / sizes(v)[..., None]
-
     def strength(self, facet: Ints, cosine: Floats, wavenumber: float, passing: bool = False) -> Floats:
         """Return the larger of |R_s|, |R_p| (or of |T_s|, |T_p| when `passing`) at facets (n,) for cosines of
         incidence."""
@@ -198,21 +192,6 @@ class Surface(Tracer):
         row = self.facets.material[facet]
         c = np.abs(coefficients_array(m.kind[row], m.eps[row], m.thickness[row], m.roughness[row], cosine, wavenumber))
         return c[:, 2:].max(axis=1) if passing else c[:, :2].max(axis=1)
-
-    def barycentric(self, facet: Ints, point: Floats) -> Floats:
-        """Return barycentric coordinates (n, ..., 3) of points in the planes of their facets."""
-        v = self.facets.vertices[facet]
-        e1, e2 = v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]
-        n = np.cross(e1, e2)
-        twice = np.einsum("ij,ij->i", n, n)
-        r = point - v[:, 0].reshape(len(v), *([1] * (point.ndim - 2)), 3)
-        b1 = np.einsum("n...j,nj->n...", r, np.cross(e2, n)) / _column(twice, r)
-        b2 = np.einsum("n...j,nj->n...", r, np.cross(n, e1)) / _column(twice, r)
-        return np.stack([1.0 - b1 - b2, b1, b2], axis=-1)
-
-
-def _column(x: Floats, like: Floats) -> Floats:
-    return x.reshape(len(x), *([1] * (like.ndim - 2)))
 
 
 @dataclass(frozen=True, eq=False)
