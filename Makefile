@@ -13,16 +13,16 @@ help:
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
 	@echo "make clean  remove $(VENV), out and caches"
 
-demo: $(VENV)/.installed $(VENV)/.compiled
+demo: $(VENV)/.installed
 	$(BIN)/raychan run scenes/urban.toml --out out/urban
 
-test: $(VENV)/.installed-dev $(VENV)/.compiled
+test: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
-bench: $(VENV)/.installed $(VENV)/.compiled
+bench: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
 # A stamp younger than pyproject.toml says that the environment is up to date.
@@ -33,11 +33,6 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@ $(VENV)/.installed
-
-# Numba keeps compiled code by the file of each function, not by those that it calls: any change makes all of it stale.
-$(VENV)/.compiled: $(wildcard raychan/*/*.py) | $(BIN)/python
-	@find raychan -name '*.nb[ic]' -delete
-	@touch $@
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

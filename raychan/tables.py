@@ -152,24 +152,72 @@ class Routes(Record):
 
 
 @dataclass(frozen=True)
+class Ways(Record):
+    """Where paths went; a row a way, d slots a chain."""
+
+    departure: NDArray[np.float32] = column("w 3", np.float32, doc="unit direction of departure, world axes")
+    arrival: Floats = column("w 3", doc="unit direction towards which the receiver looks, world axes")
+    body: Ints = column("w d", np.int16)
+    part: Ints = column("w d", np.int16)
+    kind: Ints = column("w d", np.int8)
+    vertices: NDArray[np.float32] = column("w d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
+
+
+@dataclass(frozen=True)
 class Paths(Record):
-    """What the routes carry; a row a path (or tube), d slots a chain."""
+    """What the routes carry; a row a path (or tube). Paths over the corners of one footprint share a way.
+
+    `departure`, `arrival`, `body`, `part`, `kind` and `vertices` are columns of `ways`, put out a row a path when asked
+    for.
+    """
 
     delay: Floats = column("n", unit="s")
     amplitude: Complexes = column(
         "n", np.complex128, doc="received over transmitted voltage wave, antennas in, carrier phase in"
     )
     rate: Floats = column("n", unit="m/s", doc="range rate: half the rate of the length; positive = receding")
-    departure: Floats = column("n 3", doc="unit direction of departure, world axes")
-    arrival: Floats = column("n 3", doc="unit direction towards which the receiver looks, world axes")
-    body: Ints = column("n d", np.int16)
-    part: Ints = column("n d", np.int16)
-    kind: Ints = column("n d", np.int8)
-    vertices: NDArray[np.float32] = column("n d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
+    way: Ints = column("n", np.int32, doc="row of `ways`")
+    ways: Ways
     body_names: tuple[str, ...]
     part_names: tuple[str, ...]
     tx: Floats = column("3", unit="m")
     rx: Floats = column("3", unit="m")
+
+    @classmethod
+    def of(cls, **columns: Any) -> Paths:
+        """Return paths of columns of which each has a row a path, those of `Ways` among them."""
+        ways = Ways(**{f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)})
+        return cls(way=np.arange(len(columns["delay"]), dtype=np.int32), ways=ways, **columns)
+
+    @property
+    def departure(self) -> NDArray[np.float32]:
+        """Unit directions of departure (n, 3), world axes."""
+        return self.ways.departure[self.way]
+
+    @property
+    def arrival(self) -> Floats:
+        """Unit directions (n, 3) towards which the receiver looks, world axes."""
+        return self.ways.arrival[self.way]
+
+    @property
+    def body(self) -> Ints:
+        """Bodies met (n, d), -1 in unused slots."""
+        return self.ways.body[self.way]
+
+    @property
+    def part(self) -> Ints:
+        """Parts met (n, d), -1 in unused slots."""
+        return self.ways.part[self.way]
+
+    @property
+    def kind(self) -> Ints:
+        """What happened at each vertex (n, d), NONE in unused slots."""
+        return self.ways.kind[self.way]
+
+    @property
+    def vertices(self) -> NDArray[np.float32]:
+        """Vertices (n, d, 3) [m]; unused slots repeat the receiver."""
+        return self.ways.vertices[self.way]
 
 
 @dataclass(frozen=True)

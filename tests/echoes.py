@@ -26,7 +26,7 @@ def echoes(ranges, rates=0.0, amplitudes=1.0, azimuth=0.0) -> Paths:
     n = len(r)
     look = np.stack([np.cos(az), np.sin(az), np.zeros(n)], axis=1)
     none = np.full((n, 1), -1)
-    return Paths(
+    return Paths.of(
         delay=2.0 * r / C0, amplitude=a.astype(complex), rate=v.astype(float), departure=look, arrival=look,
         body=none, part=none, kind=none * 0, vertices=np.zeros((n, 1, 3)),
         body_names=(), part_names=(), tx=np.zeros(3), rx=np.zeros(3),

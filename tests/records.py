@@ -34,7 +34,7 @@ def paths(ranges, rates, amplitudes, chains) -> Paths:
             body[i, j], kind[i, j] = b, k
             vertices[i, j] = (ranges[i], 0.1 * b, 0.5)
     forward = np.tile([1.0, 0.0, 0.0], (n, 1))
-    return Paths(
+    return Paths.of(
         delay=2.0 * np.asarray(ranges, float) / C0, amplitude=np.asarray(amplitudes, complex),
         rate=np.asarray(rates, float), departure=forward, arrival=forward, body=body, kind=kind,
         part=np.where(body < 0, -1, np.isin(body, (1, 2))),

@@ -123,14 +123,26 @@ def python(code):
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
 
 
-_STOPPED = """
+_BESIDE = """
+import threading, time
+from raychan.kernels.rows import in_two
+def launched(here):
+    # One launch is interrupted, the one beside it goes on and on.
+    while threading.current_thread() is not threading.main_thread():
+        in_two(1, lambda rows: time.sleep(0.01))
+    here()
+"""
+_STOPPED = (
+    _BESIDE
+    + """
 import os, signal, sys
-import raychan.channel.solve, raychan.cli
+import raychan.run.chain, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-raychan.channel.solve.solve = lambda *a, **k: os.kill(os.getpid(), signal.SIGINT)
+raychan.run.chain.solve = lambda *a, **k: launched(lambda: os.kill(os.getpid(), signal.SIGINT))
 sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
 """
+)
 
 
 def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
@@ -140,15 +152,18 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [scene.name]
 
 
-_STOPPED_IN_C = """
+_STOPPED_IN_C = (
+    _BESIDE
+    + """
 import ctypes, os, signal, time
-import raychan.channel.solve, raychan.cli
+import raychan.run.chain, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 stop = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))
-raychan.channel.solve.solve = lambda *a, **k: (stop(), time.sleep(50))
+raychan.run.chain.solve = lambda *a, **k: launched(lambda: (stop(), time.sleep(50)))
 raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
 """
+)
 
 
 def test_ctrl_c_is_not_lost_in_a_callback_from_c(scene, tmp_path):

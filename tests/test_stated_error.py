@@ -26,7 +26,7 @@ def test_a_maps_stated_error_covers_the_true_one_in_most_cells(name):
     )
     truth, _ = solve(channel.surface, channel.points, sensor, wave.carrier, fine, 2)
     silent = replace(sensor, noise=False)
-    found, true = (quiet_map(synthesize(p, silent).samples, sensor, settings) for p in (channel.paths, truth))
+    found, true = (quiet_map(synthesize(p, silent).samples, sensor, settings) for p in (channel.launched.paths, truth))
     difference = result_of(scene, channel, 0, Clock()).error.power
     rows = found > 20.0 * noise_of_cell(sensor, settings)
     stated = np.array([stated_error(complex(a), b) for a, b in np.sqrt(np.stack([found, difference])[:, rows]).T])

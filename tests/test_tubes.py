@@ -10,11 +10,12 @@ import trimesh
 from helpers import facets, quad
 from truth import corner, po
 
+import raychan
 from raychan.channel.legs import Leg
 from raychan.channel.rcs import facets_of, refinements
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
-from raychan.kernels.footprint import elements
+from raychan.kernels.footprint import surface_element
 from raychan.kernels.po import triangle_terms
 from raychan.world.shapes import build
 
@@ -150,8 +151,10 @@ def test_elements_of_the_true_surface_add_up_to_its_area_and_point_along_its_nor
     surface = Surface(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
     every = np.arange(len(surface.area), dtype=np.int32)
     bary, weights = nodes(2, 4)
-    at = np.repeat(bary[None], len(every), axis=0)
-    normal = elements(every, at, surface.facets.vertices, surface.bulge)
+    normal = np.empty((len(every), len(bary), 3))
+    for f in every:
+        for q, at in enumerate(bary):
+            surface_element(surface.facets.vertices[f], surface.bulge[f], at, normal[f, q])
     assert (0.5 * np.linalg.norm(normal, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
     points = on_patch(surface, bary)
     along = normal / np.linalg.norm(normal, axis=2, keepdims=True)
@@ -295,3 +298,13 @@ def test_patches_of_a_coarse_sphere_lie_on_the_sphere(subdivisions, share):
 def test_flat_facets_stay_flat():
     surface = Surface(facets_of(trimesh.creation.box((1, 2, 3)), "pec", F))
     assert not surface.curved.any()
+
+
+def test_tubes_launched_in_batches_carry_what_those_launched_at_once_do(monkeypatch):
+    found = []
+    for batch in (1 << 17, 50):
+        monkeypatch.setattr("raychan.channel.launch._BATCH", batch)
+        plate = raychan.rcs(build("plate", {"width": 0.5, "height": 0.4}), F, 20.0, distance=3.0)
+        ball = raychan.rcs(trimesh.creation.icosphere(subdivisions=4, radius=0.2), F, 20.0, max_bounces=1)
+        found.append((*plate.sigma.ravel(), *ball.sigma.ravel()))
+    assert found[1] == pytest.approx(found[0], rel=1e-9)

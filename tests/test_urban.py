@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from printed import table
 
-from raychan.run.chain import background, receive, simulate
+from raychan.run.chain import background, received, simulate
 from raychan.run.provenance import provenance
+from raychan.signal.cube import synthesize
 from raychan.world.scene import Scene
 
 SCENE = Path(__file__).parents[1] / "scenes" / "urban.toml"
@@ -32,7 +33,7 @@ def detected(run, request):
         return run.detections, run.provenance
     scene = run.scene
     rng = np.random.default_rng(np.random.SeedSequence(request.param).spawn(1)[0])
-    _, rdmap, found = receive(run.paths, scene.sensor, scene.processing, rng)
+    rdmap, found = received(synthesize(run.paths, scene.sensor, rng), scene.sensor, scene.processing)
     return found, provenance(run.paths, rdmap, found, run.receiver, run.error.power)
 
 

@@ -12,11 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from raychan.channel.fields import transfer
+from raychan.kernels.jit import njit
 from raychan.kernels.po import triangle_terms
+from raychan.kernels.rows import in_two
 from raychan.tables import REFLECT, SCATTER, Facets, Routes
 from raychan.units import C0
 
@@ -43,11 +45,11 @@ class Poses:
 _SOON = 1e-4  # s: over which a rate is a difference; its error is far below a rate cell for any turn
 
 
-def corner_rates(routes: Routes, facets: Facets, velocity: Floats) -> Floats:
-    """Return range rates (n, 3) [m/s] of the ways over the corners of footprints: half the rate of their length.
+def corner_rates(routes: Routes, rows: NDArray[np.int64], facets: Facets, velocity: Floats) -> Floats:
+    """Return range rates (r, 3) [m/s] of the ways over the corners of some footprints: half the rate of their length.
 
-    Args: velocity (3,) [m/s] of the radar. They differ over a body that turns or crosses, and what neighbouring tubes
-    have at the corner they share cancels only if it keeps moving alike.
+    Args: rows (r,) of the routes; velocity (3,) [m/s] of the radar. Rates differ over a body that turns or crosses, and
+    what neighbouring tubes have at the corner they share cancels only if it keeps moving alike.
     """
     late = _SOON * np.array([-0.5, 0.5])[:, None, None]
     poses = Poses(
@@ -56,12 +58,16 @@ def corner_rates(routes: Routes, facets: Facets, velocity: Floats) -> Floats:
         place=facets.origin + late * facets.velocity,
         radar=routes.tx + late[:, 0] * np.asarray(velocity, float),
     )
-    ways = np.empty((2, len(routes.kind), 3))
-    _corner_ways(
-        routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points, poses.origin,
-        poses.turn, poses.place, poses.radar, ways,
-    )  # fmt: skip
-    return np.asarray(0.5 * (ways[1] - ways[0]) / _SOON)
+    out = np.empty((len(rows), 3))
+
+    def some(at: slice) -> None:
+        _corner_rates(
+            rows[at], routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points,
+            poses.origin, poses.turn, poses.place, poses.radar, out[at],
+        )  # fmt: skip
+
+    in_two(len(rows), some)
+    return out
 
 
 def _turned(turn: Floats) -> Floats:
@@ -122,7 +128,7 @@ def _apart(a, b):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _ways(vertices, normals, kind, body, at, used, points, turn, origin, place, end, out):  # type: ignore[no-untyped-def]
-    """Write the lengths (7,) of one route through its footprint's points and its vertex at one instant."""
+    """Write the lengths (p + 1,) of one route through p points of its footprint and its vertex at one instant."""
     forth = (end[0], end[1], end[2])
     back = forth
     for j in range(at):
@@ -136,31 +142,33 @@ def _ways(vertices, normals, kind, body, at, used, points, turn, origin, place, 
             back = _image(back, vertices[j], normals[j], body[j], turn, origin, place)
     b = body[at]
     centre = _moved(vertices[at], b, turn, origin, place)
-    out[6] = _apart(forth, centre) + _apart(back, centre)
+    last = len(points)
+    out[last] = _apart(forth, centre) + _apart(back, centre)
     if kind[at] != SCATTER:
-        out[:6] = out[6]
+        out[:last] = out[last]
         return
-    for c in range(6):
+    for c in range(last):
         p = _moved(points[c], b, turn, origin, place)
         out[c] = _apart(forth, p) + _apart(back, p)
 
 
-@njit(cache=True, parallel=True)
-def _corner_ways(  # type: ignore[no-untyped-def]
-    vertices, normals, kind, body, scatter, points, origin, turn, place, radar, out
+@njit(cache=True, nogil=True)
+def _corner_rates(  # type: ignore[no-untyped-def]
+    rows, vertices, normals, kind, body, scatter, points, origin, turn, place, radar, out
 ):
-    n, d = kind.shape
-    for i in prange(n):
-        now = np.empty(7)
+    d = kind.shape[1]
+    now, then = np.empty(4), np.empty(4)
+    for r in range(len(rows)):
+        i = rows[r]
         used = 0
         while used < d and kind[i, used] > 0:
             used += 1
-        at = scatter[i] if scatter[i] >= 0 else used
-        for t in range(2):
-            _ways(
-                vertices[i], normals[i], kind[i], body[i], at, used, points[i], turn[t], origin, place[t], radar[t], now
-            )
-            out[t, i, :] = now[:3]
+        at = scatter[i]
+        corners = points[i, :3]
+        _ways(vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[0], origin, place[0], radar[0], then)
+        _ways(vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[1], origin, place[1], radar[1], now)
+        for c in range(3):
+            out[r, c] = 0.5 * (now[c] - then[c]) / _SOON
 
 
 APART = 3e-4  # m of path: footprints longer than this in range give each corner its own delay

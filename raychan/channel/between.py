@@ -6,12 +6,12 @@ import math
 from weakref import proxy
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.channel.edge_grid import fill_grid, packed
 from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, within
 from raychan.channel.surface import Surface
+from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
 from raychan.tables import MIRROR
 
@@ -86,8 +86,9 @@ class Between:
 
 def between(surface: Surface) -> Between:
     """Return the grid of a surface's edges, made once."""
-    if surface.between is None:
-        surface.between = Between(surface)
+    with surface.making:
+        if surface.between is None:
+            surface.between = Between(surface)
     found: Between = surface.between
     return found
 

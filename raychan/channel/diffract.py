@@ -168,7 +168,7 @@ def diffracted_paths(
             amplitude[r] = 0.5 / k * np.sqrt(sigma / (4.0 * np.pi)) * (i.field @ o.field)
             length[r], away[r], look[r] = i.length + o.length, i.leaves, o.leaves
         out.append(
-            Paths(
+            Paths.of(
                 delay=length / C0,
                 amplitude=amplitude,
                 rate=rate,

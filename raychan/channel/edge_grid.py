@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from raychan.channel.edges import starts_again
+from raychan.kernels.jit import njit
 
 
 @njit(cache=True, nogil=True)

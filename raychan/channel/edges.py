@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _MANY = 64  # edges around a plane beyond which halving is cheaper than looking at each
 _INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it

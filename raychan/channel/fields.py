@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from raychan.frames import sizes
 from raychan.kernels.fresnel import coefficients
+from raychan.kernels.jit import njit
 from raychan.kernels.po import huygens, triangle_terms
 from raychan.kernels.polar import dot, reflect, transmit
 from raychan.kernels.rows import in_two
@@ -27,16 +26,9 @@ FieldOf = Callable[[Floats], Complexes]
 
 def departures(routes: Routes) -> tuple[Floats, Floats]:
     """Return unit directions (n, 3) in which the transmitter sends and to which the receiver looks."""
-    n, d = routes.kind.shape
-    row = np.arange(n)
-    if routes.far:
-        return np.broadcast_to(-routes.tx, (n, 3)), np.broadcast_to(-routes.rx, (n, 3))
-    count = (routes.kind > 0).sum(axis=1)
-    any_vertex = (count > 0)[:, None]
-    first = np.where(any_vertex, routes.vertices[:, 0] if d else routes.rx, routes.rx)
-    last = np.where(any_vertex, routes.vertices[row, count - 1] if d else routes.tx, routes.tx)
-    out, back = first - routes.tx, last - routes.rx
-    return out / sizes(out)[:, None], back / sizes(back)[:, None]
+    away, look = np.empty((2, len(routes.kind), 3))
+    _departures(routes.tx, routes.rx, routes.far, routes.vertices, routes.kind, away, look)
+    return away, look
 
 
 def transfer(
@@ -85,6 +77,23 @@ def _heading(a, b):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _cosine(k, n):  # type: ignore[no-untyped-def]
     return abs(k[0] * n[0] + k[1] * n[1] + k[2] * n[2])
+
+
+@njit(cache=True, nogil=True)
+def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-untyped-def]
+    n, d = kind.shape
+    for i in range(n):
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        if far:
+            out, back = (-tx[0], -tx[1], -tx[2]), (-rx[0], -rx[1], -rx[2])
+        elif used > 0:
+            out, back = _heading(tx, vertices[i, 0]), _heading(rx, vertices[i, used - 1])
+        else:
+            out, back = _heading(tx, rx), _heading(rx, tx)
+        for c in range(3):
+            away[i, c], look[i, c] = out[c], back[c]
 
 
 @njit(cache=True, nogil=True)

@@ -47,17 +47,7 @@ class History:
             facet[rows] = np.where(self._kind[here] == kind, self._facet[here], -1)
             at[rows] = self._before[here]
 
-    def tables(self, last: Ints, count: Ints) -> tuple[Floats, Floats, Ints, NDArray[np.int8]]:
-        """Return vertices and normals (n, d, 3), facets and kinds (n, d), oldest first, of ways of `count` (n,)
-        vertices that end in the rows `last` (n,)."""
-        n, d = len(last), self.slots
-        place, normal = np.zeros((n, d, 3)), np.zeros((n, d, 3))
-        facet, kind = np.full((n, d), -1, np.int32), np.zeros((n, d), np.int8)
-        at = last.copy()
-        for back in range(1, int(count.max(initial=0)) + 1):
-            rows = np.flatnonzero(count >= back)
-            slot, here = count[rows] - back, at[rows]
-            place[rows, slot], normal[rows, slot] = self._place[here], self._normal[here]
-            facet[rows, slot], kind[rows, slot] = self._facet[here], self._kind[here]
-            at[rows] = self._before[here]
-        return place, normal, facet, kind
+    @property
+    def rows(self) -> tuple[Floats, Floats, Ints, NDArray[np.int8], Ints]:
+        """Places and normals (h, 3), facets, kinds and the rows before (h,) of all vertices, for kernels."""
+        return self._place, self._normal, self._facet, self._kind, self._before

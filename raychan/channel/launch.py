@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,11 +33,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+_BATCH = 1 << 17  # tubes launched at once: few scenes have more on one leg
 GAPS = 1  # cuts of a hidden tube in search of a part that is seen
 
 
-def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, more: bool) -> Tubes:
-    """Return the tubes of first bounces seen over `leg`, fine enough for a return over `out`.
+def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, more: bool) -> Iterator[Tubes]:
+    """Yield the tubes of first bounces seen over `leg`, fine enough for a return over `out`, in batches.
 
     Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do; found what was so far;
     more whether the tubes will bounce again.
@@ -49,33 +51,47 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
     facet = seeds(surface, leg, allowed)
     if out != leg:
         facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
-    if not len(facet):
-        return stand(surface, leg, facet, np.zeros((0, 3, 3)), rule.slots)
-    facet, bary = _cut_for_phase(facet, shape, ways, rule, not more)
-    facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
-    if out != leg:
-        facet, bary = lit_parts(facet, bary, *shape, surface.open_facet, *ways)
-    return _cut_for_sight(surface, leg, out, stand(surface, leg, facet, bary, rule.slots), found, more)
+    for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
+        part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways[:2], *ways[:2])
+        if out != leg:
+            part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways)
+        yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary, rule.slots), found, more)
 
 
-def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> tuple[Ints, Floats]:
-    """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts.
+def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> Iterator[tuple[Ints, Floats]]:
+    """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts; yield
+    facets and corners of the parts in batches, so that memory does not grow with their number.
 
     Args: across whether only an edge's length across the rays counts: tubes that bounce again are needed as short.
     """
-    bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
-    done, spent, level = [(facet[:0], bary[:0])], 0, 0
-    while len(facet):
+    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
+    left = [(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), 0)]
+    done: list[tuple[Ints, Floats]] = []
+    held, spent = 0, 0
+    while left:
+        facet, bary, level = left.pop()
+        if len(facet) > _BATCH:
+            half = len(facet) // 2
+            left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
+            continue
         spent += len(facet)
-        limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
         edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
         if spent > rule.max_tubes:
             edge[:] = -1
-        done.append((facet[edge < 0], bary[edge < 0]))
-        more = edge >= 0
-        facet, bary = halved(facet[more], bary[more], edge[more], rule.jitter, level)
-        level += 1
-    return np.concatenate([f for f, _ in done]), np.concatenate([b for _, b in done])
+        ready, more = edge < 0, edge >= 0
+        if held + np.count_nonzero(ready) > _BATCH:
+            yield _joined(done)
+            done, held = [], 0
+        done.append((facet[ready], bary[ready]))
+        held += len(done[-1][0])
+        if more.any():
+            left.append((*halved(facet[more], bary[more], edge[more], rule.jitter, level), level + 1))
+    if held:
+        yield _joined(done)
+
+
+def _joined(parts: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
+    return np.concatenate([f for f, _ in parts]), np.concatenate([b for _, b in parts])
 
 
 def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, more: bool) -> Tubes:

@@ -27,12 +27,18 @@ def profile(
 ) -> Profile:
     """Return the power-delay profile of a channel in the waveform's band.
 
-    The channel's response at the frequencies of one ramp, windowed and transformed, without motion and without noise
-    samples; scaled so that a lone path reads its received power. Ranges c tau/2 reach to n_samples range cells; later
-    paths fold as they do in the radar. Args: power [W] transmitted; noise_power [W] a sample, gives Profile.noise, the
-    noise a cell of a single ramp would hold. Peaks: local maxima over one range cell, 10 dB above that noise and within
-    60 dB of the strongest, that are no side lobes of stronger ones.
+    The channel's response to one ramp, transformed, without motion and without noise samples; scaled so that a lone
+    path reads its received power. Ranges c tau/2 reach to n_samples range cells; later paths fold as they do in the
+    radar. Args: power [W] transmitted; noise_power [W] a sample, gives Profile.noise, the noise a cell of a single ramp
+    would hold. Peaks: local maxima over one range cell, 10 dB above that noise and within 60 dB of the strongest, that
+    are no side lobes of stronger ones.
     """
+    return profile_of(response(paths, waveform, power, window), waveform, noise_power, window)
+
+
+def response(paths: Paths, waveform: Waveform, power: float = 1.0, window: str = "hann") -> NDArray[np.complex128]:
+    """Return the windowed response (n_samples,) [sqrt(W)] of a channel at the frequencies of one ramp; those of several
+    sets of paths add up. Args as for `profile`."""
     n = waveform.n_samples
     taper = windows.window(window, n)
     weight = np.sqrt(power) * paths.amplitude / taper.sum()
@@ -40,11 +46,17 @@ def profile(
     turns = paths.delay * waveform.bandwidth / n
     weight = weight * np.exp(-2j * np.pi * turns * (n // 2))
     at = 2.0 * np.pi * (turns - np.floor(turns + 0.5))
-    held = np.zeros(n, np.complex128)
-    if len(at):
-        held = finufft.nufft1d1(at, weight, n, eps=_EPS, isign=-1, nthreads=1)
+    if not len(at):
+        return np.zeros(n, np.complex128)
+    return np.asarray(finufft.nufft1d1(at, weight, n, eps=_EPS, isign=-1, nthreads=1) * taper)
+
+
+def profile_of(told: NDArray[np.complex128], waveform: Waveform, noise_power: float, window: str) -> Profile:
+    """Return the power-delay profile of a channel's response (see `response`); args as for `profile`."""
+    n = waveform.n_samples
+    taper = windows.window(window, n)
     length = _PAD * n
-    received = np.abs(scipy.fft.ifft(held * taper, length, norm="forward")) ** 2
+    received = np.abs(scipy.fft.ifft(told, length, norm="forward")) ** 2
     noise = noise_power / windows.processing_gain(taper)
     around = np.stack([np.roll(received, s) for s in range(-_PAD, _PAD + 1)])
     floor = max(noise * 10.0 ** (0.1 * _ABOVE_DB), received.max() * 10.0 ** (-0.1 * _SIDE_LOBES_DB))

@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.channel.edges import dot
@@ -15,6 +14,7 @@ from raychan.channel.legs import Leg
 from raychan.channel.screens import Screens
 from raychan.channel.surface import Surface
 from raychan.frames import sizes
+from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
@@ -54,8 +54,9 @@ def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
 
 
 def _screens(surface: Surface) -> Any:
-    if surface.screens is None:
-        surface.screens = Screens(surface)
+    with surface.making:
+        if surface.screens is None:
+            surface.screens = Screens(surface)
     return surface.screens
 
 

@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, starts_again, within
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
+from raychan.kernels.jit import njit
 from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
@@ -65,11 +65,12 @@ def shadows_of(surface: Surface, leg: Leg) -> Shadows:
     last = (leg.mirrors[-1].facet, leg.mirrors[-1].normal.tobytes()) if leg.mirrors else None
     key = np.asarray(leg.image, float).tobytes(), leg.far, last
     known: dict[Any, Shadows] = surface.shadows
-    if key not in known:
-        if len(known) >= _KEPT:
-            del known[next(iter(known))]
-        known[key] = Shadows(surface, leg)
-    return known[key]
+    with surface.making:
+        if key not in known:
+            if len(known) >= _KEPT:
+                del known[next(iter(known))]
+            known[key] = Shadows(surface, leg)
+        return known[key]
 
 
 @njit(cache=True, nogil=True)

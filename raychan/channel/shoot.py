@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.collect import routes_of
+from raychan.channel.collect import routes_of, same_way_back
 from raychan.channel.found import Found
 from raychan.channel.launch import launch
 from raychan.channel.legs import Leg
@@ -17,7 +17,7 @@ from raychan.channel.settle import settle
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce
 from raychan.channel.tubes import Refinement, Tubes, phases_of
-from raychan.tables import MIRROR, TRANSMIT, Routes
+from raychan.tables import MIRROR, Routes
 
 Floats = NDArray[np.float64]
 
@@ -35,14 +35,26 @@ def tube_routes(
 
     Args: so_far what launches over other legs have found.
     """
-    f = surface.facets
     direct = outs[0]
     # Where a wave still has to bounce it does not matter how the antenna looks at the place.
     blind = replace(direct, beam=None)
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
-    tubes = launch(surface, leg, direct, bodies, found, more)
     mirror_planes = _planes_in(surface, outs)
+    for tubes in launch(surface, leg, direct, bodies, found, more):
+        yield from _followed(surface, leg, blind, outs, tubes, mirror_planes, bounces, found)
+
+
+def _followed(
+    surface: Surface, leg: Leg, blind: Leg, outs: list[Leg], tubes: Tubes, mirror_planes: NDArray[np.bool_],
+    bounces: int, found: Found,
+) -> Iterator[Routes]:  # fmt: skip
+    """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out.
+
+    Args: blind the way back, without its antenna, by which tubes are weighed that bounce again; mirror_planes (p,)
+    which planes are mirrors of the legs.
+    """
+    f, rule = surface.facets, found.rule
     first = True
     while len(tubes):
         count, body = int(tubes.bounces[0]), f.body[tubes.facet]
@@ -63,7 +75,7 @@ def tube_routes(
                 continue
             some = tubes.take(rows)
             if first and out == leg:
-                corners, passed = _same_way_back(some, leg, rule)
+                corners, passed = same_way_back(some, len(leg.mirrors), rule.layers)
                 if not surface.convex_alone:
                     found.add(phases_of(surface, leg, out, some, first, rule))
             else:
@@ -85,14 +97,3 @@ def tube_routes(
 def _planes_in(surface: Surface, legs: list[Leg]) -> NDArray[np.bool_]:
     used = {int(surface.plane[m.facet]) for leg in legs for m in leg.mirrors}
     return np.isin(surface.plane, list(used))
-
-
-def _same_way_back(tubes: Tubes, leg: Leg, rule: Refinement) -> tuple[Floats, NDArray[np.int32]]:
-    """Return the way out of first-bounce tubes over the leg they came by, from their history."""
-    n, m = len(tubes), len(leg.mirrors)
-    vertices, _, facets, kinds = tubes.history.tables(tubes.last, tubes.slots)
-    passed = np.full((n, rule.layers), -1, np.int32)
-    for j in range(rule.layers):
-        slot = m + j
-        passed[:, j] = np.where(kinds[:, slot] == TRANSMIT, facets[:, slot], -1)
-    return vertices[:, :m], passed

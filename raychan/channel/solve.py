@@ -2,42 +2,28 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.advance import APART, corner_rates
 from raychan.channel.beam import beam_of
 from raychan.channel.diffract import diffracted_paths
-from raychan.channel.fields import departures, rates, transfer
 from raychan.channel.found import Found
 from raychan.channel.legs import Leg
 from raychan.channel.mirrors import legs_over, reachable
+from raychan.channel.paths import Radar, join, nothing, paths_of
 from raychan.channel.scatterers import point_routes
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import Refinement
-from raychan.tables import MIRROR, REFLECT, SCATTER, Facets, Paths, Points, Routes, take
+from raychan.tables import MIRROR, REFLECT, Facets, Paths, Points, Routes
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
-
-
-class Radar(Protocol):
-    """What the solver asks of a radar (see radar.sensor.Sensor)."""
-
-    @property
-    def position(self) -> Floats: ...
-    @property
-    def velocity(self) -> Floats: ...
-    def tx_field(self, direction_world: Floats) -> Any: ...
-    def rx_field(self, direction_world: Floats) -> Any: ...
 
 
 @dataclass
@@ -94,7 +80,26 @@ def solve(
     diffraction: bool = False,
     each: Callable[[Routes], None] | None = None,
 ) -> tuple[Paths, Stats]:
-    """Return the paths of a scene seen by a monostatic radar, and what they cost.
+    """Return the paths of a scene seen by a monostatic radar, and what they cost; args as for `solve_into`."""
+    parts: list[Paths] = []
+    stats = solve_into(parts.append, facets, points, radar, frequency, rule, bounces, progress, diffraction, each)
+    return join(parts), stats
+
+
+def solve_into(
+    gather: Callable[[Paths], None],
+    facets: Facets | Surface,
+    points: Points,
+    radar: Radar,
+    frequency: float,
+    rule: Refinement,
+    bounces: int,
+    progress: Progress | None = None,
+    diffraction: bool = False,
+    each: Callable[[Routes], None] | None = None,
+) -> Stats:
+    """Give the paths of a scene seen by a monostatic radar to `gather`, batch by batch, at least one; return what they
+    cost.
 
     Args: facets, or the surface made of them, which serves many solutions;
     frequency [Hz] of the carrier phase; rule how finely tubes are cut; bounces: the most interactions,
@@ -108,10 +113,10 @@ def solve(
     stats.add("build", since)
     legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, beam_of(radar))
     stats.legs = len(legs)
-    parts: list[Paths] = []
+    gather(nothing(facets, radar))
 
     def carry(routes: Routes) -> None:
-        parts.append(paths_of(routes, facets, radar, frequency))
+        gather(paths_of(routes, facets, radar, frequency))
         if each:
             each(routes)
 
@@ -120,7 +125,8 @@ def solve(
     if found is not None:
         carry(found)
     if diffraction:
-        parts += diffracted_paths(surface, points, radar, frequency, rule.slots, legs)
+        for paths in diffracted_paths(surface, points, radar, frequency, rule.slots, legs):
+            gather(paths)
     found = _foot_points(surface, legs, rule)
     if found is not None:
         carry(found)
@@ -144,7 +150,7 @@ def solve(
     stats.rays = surface.rays - before
     if progress:
         progress("trace", 1.0)
-    return join(parts or [nothing(facets, radar, rule.slots)]), stats
+    return stats
 
 
 def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes | None:
@@ -189,73 +195,3 @@ def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes 
         caustics=np.zeros(n, np.int8),
         sigma=np.zeros(n),
     )
-
-
-def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> Paths:
-    """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
-    a = transfer(
-        routes,
-        facets,
-        frequency,
-        lambda d: np.asarray(radar.tx_field(d))[:, None],
-        lambda d: np.asarray(radar.rx_field(d))[:, None],
-        corners=True,
-    )[:, 0, 0]
-    v = np.asarray(radar.velocity, float)
-    rate = rates(routes, facets, v, v)
-    away, look = departures(routes)
-    spans = routes.lengths[:, :3].max(axis=1) - routes.lengths[:, :3].min(axis=1)
-    long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
-    whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
-    index = np.concatenate([whole, np.repeat(rows, 3)])
-    amplitude = np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])
-    length = np.concatenate([routes.length[whole], routes.lengths[rows, :3].ravel()])
-    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
-    part = np.where(routes.facet >= 0, part, -1).astype(np.int16)
-    return Paths(
-        delay=length / C0,
-        amplitude=amplitude,
-        rate=np.concatenate([rate[whole], corner_rates(take(routes, rows), facets, v).ravel()]),
-        departure=away[index],
-        arrival=look[index],
-        body=routes.body[index],
-        part=part[index],
-        kind=routes.kind[index],
-        vertices=routes.vertices.astype(np.float32)[index],
-        body_names=facets.body_names,
-        part_names=facets.part_names,
-        tx=routes.tx,
-        rx=routes.rx,
-    )
-
-
-def nothing(facets: Facets, radar: Radar, slots: int) -> Paths:
-    """Return the empty record of a scene of which nothing is in view."""
-    end, none = np.asarray(radar.position, float), np.zeros((0, slots))
-    return Paths(
-        delay=np.zeros(0),
-        amplitude=np.zeros(0, complex),
-        rate=np.zeros(0),
-        departure=np.zeros((0, 3)),
-        arrival=np.zeros((0, 3)),
-        body=none.astype(np.int16),
-        part=none.astype(np.int16),
-        kind=none.astype(np.int8),
-        vertices=np.zeros((0, slots, 3), np.float32),
-        body_names=facets.body_names,
-        part_names=facets.part_names,
-        tx=end,
-        rx=end,
-    )
-
-
-def join(parts: list[Paths]) -> Paths:
-    """Return all paths of several sets as one record."""
-    if len(parts) == 1:
-        return parts[0]
-    rows: dict[str, Any] = {
-        f.name: np.concatenate([getattr(p, f.name) for p in parts])
-        for f in dataclasses.fields(Paths)
-        if f.metadata.get("axes", [""])[0] == "n"
-    }
-    return dataclasses.replace(parts[0], **rows)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from raychan.kernels.facets import bulges, ends, hulls
 from raychan.kernels.fresnel import coefficients_array
+from raychan.kernels.rows import once
 from raychan.tables import MIRROR, PEC, Facets
 from raychan.world.embree import Tracer
 from raychan.world.joints import Joints, joined, places
@@ -80,7 +80,7 @@ class Surface(Tracer):
         found: Floats = ends(self.facets.vertices, np.ascontiguousarray(half))
         return found
 
-    @cached_property
+    @once
     def _outlines(self) -> tuple[Floats, NDArray[np.int64], Ints]:
         outer = self._halves("outer")
         count = np.bincount(self.plane[outer // 3], minlength=len(self.plane))
@@ -107,7 +107,7 @@ class Surface(Tracer):
         """Facets (e,) to which the edges of `outline` belong."""
         return self._outlines[2]
 
-    @cached_property
+    @once
     def _silhouettes(self) -> tuple[Floats, Ints]:
         if self.convex_alone:
             # No shadow falls on a body that hides nothing of itself.
@@ -137,24 +137,24 @@ class Surface(Tracer):
         """Facets (e, 2) on both sides of `edge_ends`, -1 beyond a rim."""
         return self._silhouettes[1]
 
-    @cached_property
+    @once
     def wedge_facet(self) -> Ints:
         """Faces 0 and n (w, 2) of convex edges; the rims of open sheets are half planes."""
         rim = self._halves("rim") // 3
         return np.concatenate([self._halves("pair", "sharp") // 3, np.stack([rim, rim], axis=1)]).astype(np.int32)
 
-    @cached_property
+    @once
     def wedge(self) -> Floats:
         """Ends (w, 2, 3) [m] of the edges of `wedge_facet`."""
         return self.ends(np.concatenate([self._halves("pair", "sharp")[:, 0], self._halves("rim")]))
 
-    @cached_property
+    @once
     def wedge_n(self) -> Floats:
         """Exterior angle (w,) over pi of the edges of `wedge_facet`."""
         turns = [j.turn[j.sharp] for j, _ in self._joined]
         return 1.0 + np.concatenate([*turns, np.ones(len(self._halves("rim")))])
 
-    @cached_property
+    @once
     def clusters(self) -> Clusters:
         """The facets in clusters of neighbours, each of one body."""
         parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self._joined]
@@ -164,7 +164,7 @@ class Surface(Tracer):
         hull = hulls(order, first, f.vertices, f.normals, self.normal, self.bulge)
         return Clusters(order, first, *hull)
 
-    @cached_property
+    @once
     def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Centre (b, 3) [m] and radius (b,) [m] of a ball about each body, and which bodies (b,) have no facet."""
         low, high = np.moveaxis(self.extents, 1, 0)

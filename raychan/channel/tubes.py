@@ -51,7 +51,7 @@ class Refinement:
     levels: int = 12
     slots: int = 8
     layers: int = 2
-    max_tubes: int = 2_000_000
+    max_tubes: int = 100_000_000
     jitter: float = 0.0
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
+
+from raychan.kernels.jit import njit
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

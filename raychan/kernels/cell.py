@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
 
 from raychan.kernels.beat import wave
+from raychan.kernels.jit import njit
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -33,7 +33,41 @@ def periodic(table, n, fine, cells):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
+    """Return the range [m] at which an echo stands mid frame, and its phase there."""
+    carrier, slope, centre, swept, _, _, _, light = ramp
+    then = delay + 2.0 * rate * centre / light
+    cosine, sine = wave(carrier * (then - delay) + swept * then - 0.5 * slope * then**2)
+    return 0.5 * light * then, complex(cosine, sine)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
+    """Return the response of both windows to an echo that stands at a range [m] mid frame."""
+    _, slope, _, _, middle, repetition, resolution, light = ramp
+    samples, chirps, fine = sizes
+    tables, middles = along
+    off = rate - cell_rate
+    # Doppler is measured at the middle sample of the sweep.
+    apart = 2.0 * middle / light * off * chirps * repetition
+    # Each row of the map is freed of its own Doppler within the ramp, not of that of others.
+    away = (at_range - cell_range + off * middle / slope) / resolution
+    moved = rate * repetition / resolution
+    total = 0j
+    low, share, sign = _place(chirps, fine, apart)
+    for k in range(len(middles)):
+        # Within a piece the range response runs along a straight line.
+        at, part, turned = _place(samples, fine, away + moved * (middles[k] - 0.5 * (chirps - 1)))
+        held = tables[k, low, 0] + share * (tables[k, low + 1, 0] - tables[k, low, 0])
+        late = tables[k, low, 1] + share * (tables[k, low + 1, 1] - tables[k, low, 1])
+        level = across[at, 0] + part * (across[at + 1, 0] - across[at, 0])
+        lean = across[at, 1] + part * (across[at + 1, 1] - across[at, 1])
+        total += turned * (level * held + moved * lean * late)
+    return sign * total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
     """Return what echoes (n,) bring to a cell, and the ranges (n,) [m] at which they stand.
 
@@ -42,51 +76,62 @@ def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # typ
     range response and its slope by cells; along (pieces, ., 2) the rate response of each piece of the frame and that
     of its chirps' numbers, counted from its middle chirp, and these middles (pieces,).
     """
-    carrier, slope, centre, swept, middle, repetition, resolution, light = ramp
-    samples, chirps, fine = sizes
-    tables, middles = along
     waves, ranges = np.empty(delay.size, np.complex128), np.empty(delay.size)
-    for i in prange(delay.size):
-        then = delay[i] + 2.0 * rate[i] * centre / light
-        ranges[i] = 0.5 * light * then
-        cosine, sine = wave(carrier * (then - delay[i]) + swept * then - 0.5 * slope * then**2)
-        off = rate[i] - cell[1]
-        # Doppler is measured at the middle sample of the sweep.
-        apart = 2.0 * middle / light * off * chirps * repetition
-        # Each row of the map is freed of its own Doppler within the ramp, not of that of others.
-        away = (ranges[i] - cell[0] + off * middle / slope) / resolution
-        moved = rate[i] * repetition / resolution
-        total = 0j
-        low, share, sign = _place(chirps, fine, apart)
-        for k in range(len(middles)):
-            # Within a piece the range response runs along a straight line.
-            at, part, turned = _place(samples, fine, away + moved * (middles[k] - 0.5 * (chirps - 1)))
-            held = tables[k, low, 0] + share * (tables[k, low + 1, 0] - tables[k, low, 0])
-            late = tables[k, low, 1] + share * (tables[k, low + 1, 1] - tables[k, low, 1])
-            level = across[at, 0] + part * (across[at + 1, 0] - across[at, 0])
-            lean = across[at, 1] + part * (across[at + 1, 1] - across[at, 1])
-            total += turned * (level * held + moved * lean * late)
-        total *= sign
-        waves[i] = amplitude[i] * complex(cosine, sine) * total
+    for i in range(delay.size):
+        ranges[i], turn = _stands(delay[i], rate[i], ramp)
+        waves[i] = amplitude[i] * turn * _answer(ranges[i], rate[i], cell[0], cell[1], ramp, sizes, across, along)
     return waves, ranges
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type: ignore[no-untyped-def]
+    weight = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
+    total[c, g] += wave
+    size[c, 1, g] += weight
+    size[c, 2, g] += weight * at_range
+    size[c, 3, g] += weight * rate
+    if weight > most[c, g]:
+        strongest[c, g], most[c, g] = i, weight
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sums_in_cells(  # type: ignore[no-untyped-def]
+    group, amplitude, delay, rate, cells, least, most_of, total, size, strongest, ramp, sizes, across, along
+):
+    """Write the `cell_sums` (c, ...) of what echoes (n,) bring to each of several cells (c, 2).
+
+    Args: least (c,) of the response to an echo that counts; most_of (s,) the largest that the range response and its
+    slope are so many cells from the peak and farther; else as for `cell_waves` and `cell_sums`.
+    """
+    samples, chirps, _ = sizes
+    middle, resolution = ramp[4], ramp[6]
+    most = np.full(strongest.shape, -1.0)
+    total[:], size[:], strongest[:] = 0.0, 0.0, -1
+    for i in range(delay.size):
+        at_range, turn = _stands(delay[i], rate[i], ramp)
+        turn *= amplitude[i]
+        half = 0.5 * abs(rate[i]) * ramp[5] / resolution * chirps
+        for c in range(len(cells)):
+            size[c, 0, group[i]] += 1.0
+            away = abs(at_range - cells[c, 0] + (rate[i] - cells[c, 1]) * middle / ramp[1]) / resolution
+            away -= samples * math.floor(away / samples)
+            away = max(min(away, samples - away) - half, 0.0)
+            if most_of[int(away)] * (1.0 + half) < least[c]:
+                continue
+            wave = turn * _answer(at_range, rate[i], cells[c, 0], cells[c, 1], ramp, sizes, across, along)
+            _count(c, group[i], i, wave, at_range, rate[i], total, size, strongest, most)
 
 
 @njit(cache=True, nogil=True)
 def cell_sums(group, count, waves, ranges, rates):  # type: ignore[no-untyped-def]
-    """Return sums of waves (g,), sizes (4, g): how many, their |wave|, and that times range and rate, and which is the
-    strongest (g,) of each group, -1 if there is none.
+    """Return sums of waves (1, g), sizes (1, 4, g): how many, their |wave|, and that times range and rate, and which is
+    the strongest (1, g) of each group, -1 if there is none.
 
     Args: group (n,) of each echo, below `count`.
     """
-    total, size = np.zeros(count, np.complex128), np.zeros((4, count))
-    strongest, most = np.full(count, -1), np.full(count, -1.0)
+    total, size = np.zeros((1, count), np.complex128), np.zeros((1, 4, count))
+    strongest, most = np.full((1, count), -1), np.full((1, count), -1.0)
     for i in range(group.size):
-        g, weight = group[i], math.sqrt(waves[i].real ** 2 + waves[i].imag ** 2)
-        total[g] += waves[i]
-        size[0, g] += 1.0
-        size[1, g] += weight
-        size[2, g] += weight * ranges[i]
-        size[3, g] += weight * rates[i]
-        if weight > most[g]:
-            strongest[g], most[g] = i, weight
+        size[0, 0, group[i]] += 1.0
+        _count(0, group[i], i, waves[i], ranges[i], rates[i], total, size, strongest, most)
     return total, size, strongest

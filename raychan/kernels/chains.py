@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from raychan.kernels.beam import field_towards
+from raychan.kernels.jit import njit
 from raychan.kernels.patch import length_to
 
 

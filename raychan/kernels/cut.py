@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from raychan.kernels.jit import njit
 from raychan.kernels.patch import distance, largest
 
 _LEAST = 1e-14  # m^2: a part of no more area is none

@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _SHARP = 0.95  # cosine of corner normals across an edge above which it is round, not a wedge
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 
 @njit(cache=True, inline="always")
-def _element(v, b, w, out):  # type: ignore[no-untyped-def]
-    """Write the vector [m^2] normal to the true surface at w (3,): its area for a unit of the last two coordinates."""
+def surface_element(v, b, w, out):  # type: ignore[no-untyped-def]
+    """Write the vector [m^2] normal to the true surface at w (3,): its area for a unit of the last two coordinates.
+
+    Args: v (3, 3) [m] corners, b (3, 3) [m] bulges of the edges (Nagata 2005, eq. 10).
+    """
     for c in range(3):
         d, e = (c + 1) % 3, (c + 2) % 3
         along_d = v[1, d] - v[0, d] - (w[0] - w[1]) * b[0, d] - w[2] * (b[1, d] - b[2, d])
@@ -18,20 +22,6 @@ def _element(v, b, w, out):  # type: ignore[no-untyped-def]
         aside_d = v[2, d] - v[0, d] + w[1] * (b[0, d] - b[1, d]) - (w[0] - w[2]) * b[2, d]
         aside_e = v[2, e] - v[0, e] + w[1] * (b[0, e] - b[1, e]) - (w[0] - w[2]) * b[2, e]
         out[c] = along_d * aside_e - along_e * aside_d
-
-
-@njit(cache=True, nogil=True)
-def elements(facet, bary, v, b):  # type: ignore[no-untyped-def]
-    """Return vectors (n, m, 3) [m^2] normal to the true surface at barycentric coordinates (n, m, 3) of facets (n,):
-    its area for a unit of the last two of these.
-
-    Args: v (f, 3, 3) [m] corners, b (f, 3, 3) [m] bulges of the edges (Nagata 2005, eq. 10).
-    """
-    out = np.empty(bary.shape)
-    for i in range(len(facet)):
-        for q in range(bary.shape[1]):
-            _element(v[facet[i]], b[facet[i]], bary[i, q], out[i, q])
-    return out
 
 
 @njit(cache=True, inline="always")
@@ -42,50 +32,81 @@ def _mean_cosine(normal, k, back):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, nogil=True)
-def tapers(  # type: ignore[no-untyped-def]
-    points, k, length, normals, back_k, back, far, facet, bary, bent, facing, v, b
-):
-    """Return the mean obliquity times spreading at corners over that at the centre (n, 3), for areas of the flat
-    footprints; zero beyond the terminator.
+@njit(cache=True, inline="always")
+def _back(p, image, far, k):  # type: ignore[no-untyped-def]
+    """Write the unit direction in which a wave from the end travels at p (3,), and return its length [m]."""
+    if far:
+        along = 0.0
+        for c in range(3):
+            k[c] = -image[c]
+            along -= p[c] * image[c]
+        return along
+    size = 0.0
+    for c in range(3):
+        k[c] = p[c] - image[c]
+        size += k[c] * k[c]
+    size = math.sqrt(size)
+    for c in range(3):
+        k[c] /= size
+    return size
 
-    Args: of tubes (n, 4, ...) points, directions and lengths in and back, normals on the lit side; bent (n,) on a
-    curved facet still, whose plane has the normal `facing` (n, 3); bary, v, b as for `elements`.
+
+@njit(cache=True, nogil=True)
+def footprints(tubes, middle, half_way, bent, facets, image, far, out):  # type: ignore[no-untyped-def]
+    """Write how tubes stand on their footprints.
+
+    Args: tubes: points, k, normals (n, 4, 3), length (n, 4), facet (n,), bary (n, 3, 3); middle (n, 3, 3) [m] of the
+    edges and length there half_way (n, 3) [m]; bent, whether facets may still be curved; facets: normal (f, 3),
+    vertices and bulge (f, 3, 3), curved (f,); image of the way out's end, or the direction to it when far; out: points
+    (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): the mean obliquity times spreading
+    at corners over that at the centre, for areas of the flat footprints, zero beyond the terminator; area (n,) and
+    length (n,) of the way out.
     """
-    n = len(facet)
-    out = np.empty((n, 3))
+    points, k, normals, length, facet, bary = tubes
+    facing, vertices, bulge, curved = facets
+    six, lengths, whole, taper, area, way_out = out
     flat, element = np.empty(3), np.empty(3)
-    for i in range(n):
+    back_k, back = np.empty((4, 3)), np.empty(4)
+    for i in range(len(facet)):
+        for j in range(4):
+            back[j] = _back(points[i, j], image, far, back_k[j])
+        for j in range(3):
+            lengths[i, j] = length[i, j] + back[j]
+            lengths[i, 3 + j] = half_way[i, j] + _back(middle[i, j], image, far, element)
+            for c in range(3):
+                six[i, j, c], six[i, 3 + j, c] = points[i, j, c], middle[i, j, c]
+        whole[i], way_out[i] = length[i, 3] + back[3], back[3]
         p, q, r = points[i, 0], points[i, 1], points[i, 2]
         size = 0.0
         for c in range(3):
             d, e = (c + 1) % 3, (c + 2) % 3
             flat[c] = 0.5 * ((q[d] - p[d]) * (r[e] - p[e]) - (q[e] - p[e]) * (r[d] - p[d]))
             size += flat[c] * flat[c]
-        area = max(math.sqrt(size), 1e-300)
+        area[i] = math.sqrt(size)
+        least = max(area[i], 1e-300)
+        f = facet[i]
         w, side = bary[i], 0.0
         share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
         share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
         share += w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
         for c in range(3):
-            side += facing[i, c] * normals[i, 3, c]
-        centre = max(_mean_cosine(normals[i, 3], k[i, 3], back_k[i, 3]), 0.0)
+            side += facing[f, c] * normals[i, 3, c]
+        centre = max(_mean_cosine(normals[i, 3], k[i, 3], back_k[3]), 0.0)
         if not far:
-            centre /= length[i, 3] * back[i, 3]
+            centre /= length[i, 3] * back[3]
         for j in range(3):
-            if bent[i]:
-                _element(v[facet[i]], b[facet[i]], w[j], element)
-                strength = _mean_cosine(element, k[i, j], back_k[i, j]) * (0.5 * abs(share) / area)
+            if bent and curved[f]:
+                surface_element(vertices[f], bulge[f], w[j], element)
+                strength = _mean_cosine(element, k[i, j], back_k[j]) * (0.5 * abs(share) / least)
                 if side < 0.0:
                     strength = -strength
             else:
                 # Where the true surface turns away from the flat one there is more of it.
                 turned = 0.0
                 for c in range(3):
-                    turned += normals[i, j, c] * flat[c] / area
-                strength = _mean_cosine(normals[i, j], k[i, j], back_k[i, j]) / max(abs(turned), 0.5)
+                    turned += normals[i, j, c] * flat[c] / least
+                strength = _mean_cosine(normals[i, j], k[i, j], back_k[j]) / max(abs(turned), 0.5)
             strength = max(strength, 0.0)
             if not far:
-                strength /= length[i, j] * back[i, j]
-            out[i, j] = min(strength / centre, 4.0) if centre > 0.0 else 0.0
-    return out
+                strength /= length[i, j] * back[j]
+            taper[i, j] = min(strength / centre, 4.0) if centre > 0.0 else 0.0

@@ -10,7 +10,8 @@ import cmath
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 PEC, HALF_SPACE, LAYER = 0, 1, 2
 

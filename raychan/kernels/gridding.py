@@ -10,9 +10,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import i0
+
+from raychan.kernels.jit import njit
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from raychan.kernels.fresnel import coefficients
+from raychan.kernels.jit import njit
 from raychan.kernels.patch import length_to
 
 _DRAWN = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _ALIKE = 1.0 + 1e-9  # sizes nearer than this are one: rounding must not choose between them
 

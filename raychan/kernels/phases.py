@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from raychan.kernels.chains import weight
 from raychan.kernels.fresnel import coefficients
+from raychan.kernels.jit import njit
 from raychan.kernels.patch import distance, length_to, place_on
 
 

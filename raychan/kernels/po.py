@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 
 import numpy as np
-from numba import njit
 
+from raychan.kernels.beat import wave
+from raychan.kernels.jit import njit
 from raychan.kernels.polar import Vec, cross, dot, mirror, reflect
 
 
@@ -37,6 +37,16 @@ def huygens(
     forward = _radiated(e_in, k_in, to_rx, n, r_in[0], r_in[1], e_out)
     backward = _radiated(e_out, k_out, to_tx, n, r_out[0], r_out[1], e_in)
     return 0.5 * (forward + backward)
+
+
+_TURN = 0.5 / math.pi
+
+
+@njit(cache=True, inline="always")
+def _turned(phase: float) -> complex:
+    """Return exp(-j phase)."""
+    cosine, sine = wave(_TURN * phase)
+    return complex(cosine, sine)
 
 
 @njit(cache=True)
@@ -155,15 +165,15 @@ def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
         xa, xb = -turn / (wa * sa) + 8.0 * d / (sa * sa), -turn / (wb * sb) + 8.0 * d / (sb * sb)
         worst = max(abs(turn / (wa * sa)), abs(turn / (wb * sb))) + 8.0 * abs(d) / min(sa * sa, sb * sb)
         if 12.0 * worst * worst < _FINE * min(abs(sa * wa), abs(sb * wb)):
-            first = -1j * ga / sa * complex(1.0, -xa) * cmath.exp(-1j * pa)
-            last = 1j * gb / sb * complex(1.0, -xb) * cmath.exp(-1j * pb)
+            first = -1j * ga / sa * complex(1.0, -xa) * _turned(pa)
+            last = 1j * gb / sb * complex(1.0, -xb) * _turned(pb)
             return first, last, 2.0
     panels = 1 + int((abs(s) + 4.0 * abs(d)) / _PANEL)
     first, last = 0j, 0j
     for i in range(panels):
         for q in range(6):
             t = (i + _SIX[0, q]) / panels
-            g = _SIX[1, q] * _inner(wa + t * (wb - wa), c) * cmath.exp(-1j * (pa + t * s + 4.0 * d * t * (1.0 - t)))
+            g = _SIX[1, q] * _inner(wa + t * (wb - wa), c) * _turned(pa + t * s + 4.0 * d * t * (1.0 - t))
             first += (1.0 - t) * g
             last += t * g
     return first / panels, last / panels, 1.0
@@ -219,7 +229,7 @@ def _gauss(phases, d01, d12, d20, rule, panels, out) -> int:  # type: ignore[no-
                 for r in range(rule.shape[1]):
                     v = (1.0 - w) * (j + rule[0, r]) * h
                     phase = _quadratic(phases, d01, d12, d20, v, w)
-                    e = 2.0 * h * h * rule[1, q] * rule[1, r] * (1.0 - w) * cmath.exp(-1j * phase)
+                    e = 2.0 * h * h * rule[1, q] * rule[1, r] * (1.0 - w) * _turned(phase)
                     t0 += (1.0 - v - w) * e
                     t1 += v * e
                     t2 += w * e
@@ -232,18 +242,18 @@ def _pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped-de
     """Fill in the mean's parts by m^2 equal pieces, linear on each, with the mean bend of a piece put in its phase."""
     h = 1.0 / m
     # The mean of a piece's own bend: a third of the sum of its edges' bends, alike for all pieces.
-    shift = cmath.exp(-1j * (d01 + d12 + d20) * h * h / 3.0) * h * h
+    shift = _turned((d01 + d12 + d20) * h * h / 3.0) * h * h
     p, e = np.empty((2, m + 1)), np.empty((2, m + 1), np.complex128)
     total, s1, s2 = 0j, 0j, 0j
     # Along a row the phase is a parabola, so its exponential follows from two running factors.
     curve = -8.0 * d20 * h * h
-    turn = cmath.exp(-1j * curve)
+    turn = _turned(curve)
     for i in range(m + 1):
         row = i & 1
         v = i * h
         first = _quadratic(phases, d01, d12, d20, v, 0.0)
         step = _quadratic(phases, d01, d12, d20, v, h) - first
-        value, factor = cmath.exp(-1j * first), cmath.exp(-1j * step)
+        value, factor = _turned(first), _turned(step)
         for j in range(m - i + 1):
             p[row, j], e[row, j] = first, value
             first += step
@@ -283,9 +293,9 @@ def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untype
     d20 = phases[5] - 0.5 * (phases[2] + phases[0])
     bend = max(abs(d01), abs(d12), abs(d20))
     if bend <= linear:
-        e0, e1, e2 = cmath.exp(-1j * phases[0]), cmath.exp(-1j * phases[1]), cmath.exp(-1j * phases[2])
+        e0, e1, e2 = _turned(phases[0]), _turned(phases[1]), _turned(phases[2])
         t0, t1, t2 = _corner_terms(phases[0], phases[1], phases[2], e0, e1, e2)
-        shift = cmath.exp(-1j * (d01 + d12 + d20) / 3.0)
+        shift = _turned((d01 + d12 + d20) / 3.0)
         out[0], out[1], out[2] = shift * t0, shift * t1, shift * t2
         return 1
     span = max(phases[0], phases[1], phases[2]) - min(phases[0], phases[1], phases[2])

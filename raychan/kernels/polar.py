@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
+from raychan.kernels.jit import njit
 
 Vec = tuple[Any, Any, Any]
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _FAR = 32.0  # radii of the ball about all facets from which an origin is far off
 
 
 @njit(cache=True, inline="always")
-def _plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
+def plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
     """Return the distance from x + along d to the plane through v of normal n, along d."""
     slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
     if slope == 0.0:
@@ -31,7 +32,7 @@ def plane_distances(facet, origin, direction, first, normal):  # type: ignore[no
     out = np.empty(len(facet))
     for i in range(len(facet)):
         f = facet[i]
-        out[i] = _plane_distance(normal[f], first[f], origin[i], 0.0, direction[i])
+        out[i] = plane_distance(normal[f], first[f], origin[i], 0.0, direction[i])
     return out
 
 
@@ -118,15 +119,15 @@ def land(  # type: ignore[no-untyped-def]
             other = hit[3 * j + s]
             if other < 0 or other == h:
                 continue
-            old = np.inf if h < 0 else _plane_distance(normal[h], first[h], x, ahead[i], d)
-            new = _plane_distance(normal[other], first[other], x, ahead[i], d)
+            old = np.inf if h < 0 else plane_distance(normal[h], first[h], x, ahead[i], d)
+            new = plane_distance(normal[other], first[other], x, ahead[i], d)
             if 0.0 < new < old - pace[i] and _holds(
                 vertices[other], normal[other], x, ahead[i] + new, d, edge * pace[i]
             ):
                 h = other
         if h < 0:
             continue
-        t = _plane_distance(normal[h], first[h], x, 0.0, d)
+        t = plane_distance(normal[h], first[h], x, 0.0, d)
         if h != skip[i] and t > start[i] + nearest:
             facet[i], distance[i] = h, t
             continue

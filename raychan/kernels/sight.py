@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from raychan.kernels.jit import njit
 
 _DRAWN = 0.98  # of the way from the centre: corners lie on edges that other facets share
 

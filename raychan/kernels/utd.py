@@ -12,8 +12,8 @@ import cmath
 import math
 
 import numpy as np
-from numba import njit
 
+from raychan.kernels.jit import njit
 from raychan.kernels.polar import Vec, cross, dot
 
 ROOT_J = cmath.exp(0.25j * math.pi)

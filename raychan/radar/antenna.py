@@ -16,6 +16,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
+from raychan.kernels.patterns import cosine_power
 from raychan.radar.windows import window
 from raychan.units import undb
 
@@ -88,15 +89,11 @@ class CosinePattern:
 
     def shape(self, direction: Floats) -> Floats:
         """Return the power pattern (n,), 1 at its peak."""
-        x, y2, z2 = np.maximum(direction[:, 0], 0.0), direction[:, 1] ** 2, direction[:, 2] ** 2
-        exponents = [
+        exponents = (
             math.log(0.5) / math.log(math.cos(math.radians(0.5 * w))) for w in (self.hpbw_h_deg, self.hpbw_v_deg)
-        ]
-        off = y2 + z2
-        exponent = np.divide(
-            exponents[0] * y2 + exponents[1] * z2, off, out=np.full(len(x), exponents[0]), where=off > 0.0
         )
-        return np.asarray(x**exponent)
+        found: Floats = cosine_power(np.asarray(direction, float), *exponents)
+        return found
 
     @cached_property
     def peak_gain(self) -> float:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import rotation, theta_phi
+from raychan.frames import rotation
+from raychan.kernels.patterns import turned, vectors
 from raychan.radar.antenna import Antenna
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.waveform import Waveform
@@ -123,7 +124,6 @@ class Sensor:
         }
 
     def _vector(self, antenna: Antenna, direction_world: Floats) -> Complexes:
-        local = np.asarray(direction_world, float) @ self.axes
-        theta, phi = theta_phi(local)
-        field = antenna.field(local)
-        return np.asarray((field[:, :1] * theta + field[:, 1:] * phi) @ self.axes.T)
+        local = turned(np.asarray(direction_world, float), self.axes)
+        found: Complexes = vectors(antenna.field(local), local, self.axes)
+        return found

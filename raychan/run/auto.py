@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
-from raychan.run.pieces import heard
 from raychan.signal.cube import synthesize
-from raychan.tables import DIFFRACT, TRANSMIT, Paths
+from raychan.tables import DIFFRACT, TRANSMIT, Paths, take
 from raychan.units import db, undb
 
 
@@ -29,14 +28,20 @@ class Choice:
 
 def interactions(paths: Paths) -> NDArray[np.int64]:
     """Return the number of interactions (n,) of each path, thin layers passed not counted."""
-    return np.asarray(((paths.kind > 0) & (paths.kind != TRANSMIT)).sum(axis=1))
+    kind = paths.ways.kind
+    return np.asarray(((kind > 0) & (kind != TRANSMIT)).sum(axis=1))[paths.way]
+
+
+def layers(paths: Paths) -> NDArray[np.int64]:
+    """Return the number of thin layers (n,) that each path passes."""
+    return np.asarray((paths.ways.kind == TRANSMIT).sum(axis=1))[paths.way]
 
 
 def peak(paths: Paths, rows: NDArray[np.bool_], sensor: Sensor, settings: Any) -> float:
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
     if not rows.any():
         return 0.0
-    cube = synthesize(heard(paths, rows), dataclasses.replace(sensor, noise=False))
+    cube = synthesize(take(paths, rows), dataclasses.replace(sensor, noise=False))
     rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
     return float(rdmap.power.max())
 
@@ -54,7 +59,7 @@ def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_
     why, chosen = [], []
     for name, count, least in (
         ("interactions", interactions(paths), 1),
-        ("thin layers passed", (paths.kind == TRANSMIT).sum(axis=1), 0),
+        ("thin layers passed", layers(paths), 0),
     ):
         keep = least
         for n in range(least, int(count.max(initial=least)) + 1):
@@ -67,7 +72,7 @@ def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_
                     f"{n} {name}: strongest cell {db(level / limit):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
                 )
         chosen.append(keep)
-    level = peak(paths, (paths.kind == DIFFRACT).any(axis=1), sensor, settings)
+    level = peak(paths, (paths.ways.kind == DIFFRACT).any(axis=1)[paths.way], sensor, settings)
     say = "needed" if level > limit else "not needed"
     why.append(
         f"diffraction: strongest cell {db(max(level / limit, 1e-30)):+.0f} dB of what {tolerance_db:g} dB allow: {say}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,23 +11,27 @@ from typing import Any
 
 import numpy as np
 
-from raychan.channel.profile import profile
-from raychan.channel.solve import join, refinement, solve
+from raychan.channel.beam import beam_of
+from raychan.channel.profile import profile_of
+from raychan.channel.solve import Stats, refinement, solve_into
 from raychan.channel.surface import Surface, surface_of
+from raychan.channel.tubes import Refinement
 from raychan.frames import direction
+from raychan.kernels.rows import at_once
 from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
 from raychan.radar.windows import processing_gain, window
 from raychan.run.auto import Choice, choose
+from raychan.run.gather import Gather, Launched
 from raychan.run.ledger import ledger
 from raychan.run.microdoppler import needed, retraced
-from raychan.run.pieces import Retraced, Traced, heard
+from raychan.run.pieces import Retraced, Traced
 from raychan.run.provenance import provenance
 from raychan.run.result import Receiver, Result
 from raychan.run.spread import claimed, launch_share, motion, without
-from raychan.signal.cube import synthesize
-from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Paths, Points, RangeDoppler, Routes
+from raychan.signal.cube import noisy, synthesize
+from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler, Routes
 from raychan.units import C0
 from raychan.world.scene import Scene
 
@@ -63,9 +66,9 @@ class Channel:
 
     surface: Surface
     points: Points
-    paths: Paths
-    others: Paths
-    """Of the coarse launch, which tells how wrong the fine one may be."""
+    launched: Launched
+    others: Launched
+    """The coarse launch, which tells how wrong the fine one may be."""
     model: Any
     """The scene's, with what was asked for and what mode = "auto" chose."""
     chosen: Choice | None
@@ -104,35 +107,45 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     floor, cell = drowned(sensor, settings), C0 / sensor.waveform.bandwidth
     with clock.stage("geometry"):
         surface, points = surface_of(scene), scene.points(0.0)
-    # The coarse launch comes first: it tells what is needed, and later how wrong the fine one may be.
-    chosen = None
-    with clock.stage("check"):
-        rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
-        everything = model.diffraction or model.mode == "auto"
-        others, more = solve(surface, points, sensor, carrier, rule, model.max_bounces, diffraction=everything)
-        if model.mode == "auto":
-            noise = noise_of_cell(sensor, settings)
-            chosen = choose(others, sensor, settings, noise, model.tolerance_db)
-            model = _changed(
-                model,
-                {
-                    "max_bounces": chosen.bounces,
-                    "max_transmissions": chosen.transmissions,
-                    "diffraction": chosen.diffraction,
-                },
-            )
+        beam_of(sensor)
+    rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
+    bounces, chosen = model.max_bounces, None
+
+    def launch(rule: Refinement, bounces: int, diffraction: bool, **more: Any) -> tuple[Launched, Stats]:
+        gather = Gather(sensor, settings.range_window)
+        stats = solve_into(gather.add, surface, points, sensor, carrier, rule, bounces, diffraction=diffraction, **more)
+        return gather.done(), stats
+
+    def coarse(diffraction: bool) -> tuple[Launched, Stats]:
+        """Launch on another lattice: it tells how wrong the fine launch may be."""
+        return launch(rule, bounces, diffraction)
+
+    if model.mode == "auto":
+        # With all mechanisms, it first tells which are needed.
+        with clock.stage("check"):
+            others, more = coarse(True)
+            chosen = choose(others.paths, sensor, settings, noise_of_cell(sensor, settings), model.tolerance_db)
+            kept = {"max_bounces": chosen.bounces, "max_transmissions": chosen.transmissions}
+            model = _changed(model, kept | {"diffraction": chosen.diffraction})
     with clock.stage("trace"):
-        rule = refinement(carrier, model.tolerance_db, floor, model.max_transmissions, cell=cell)
-        rule = dataclasses.replace(rule, slots=others.kind.shape[1])
-        again = needed(scene, model.retrace, rule.max_edge)
+        finer = refinement(carrier, model.tolerance_db, floor, model.max_transmissions, cell=cell)
+        again = needed(scene, model.retrace, finer.max_edge)
         routes: list[Routes] = []
-        each = routes.append if again else None
-        way = (model.max_bounces, clock.tell, model.diffraction, each)
-        paths, stats = solve(surface, points, sensor, carrier, rule, *way)
+
+        def fine() -> tuple[Launched, Stats]:
+            more = {"progress": clock.tell, "each": routes.append if again else None}
+            return launch(finer, model.max_bounces, model.diffraction, **more)
+
+        if chosen:
+            launched, stats = fine()
+        else:
+            (launched, stats), (others, more) = at_once(fine, lambda: coarse(model.diffraction))
     turned = None
     if again:
         with clock.stage("retrace"):
-            turned = retraced(scene, rule, model, Traced(paths, tuple(routes)), partial(clock.tell, "retrace"))
+            turned = retraced(
+                scene, finer, model, Traced(launched.paths, tuple(routes)), partial(clock.tell, "retrace")
+            )
     cost = {
         "rays": stats.rays + more.rays + (turned.rays if turned else 0),
         "tubes": stats.tubes,
@@ -140,7 +153,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         "tracings": len(turned.times) if turned else 1,
         "tolerance_db": model.tolerance_db,
     }
-    return Channel(surface, points, paths, others, model, chosen, cost, turned)
+    return Channel(surface, points, launched, others, model, chosen, cost, turned)
 
 
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
@@ -148,20 +161,23 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     # Streams are numbered by stage, so that one more random stage leaves the others as they are.
     noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     sensor, settings = scene.sensor, scene.processing
-    facets, paths = channel.surface.facets, channel.paths
+    facets, paths, others = channel.surface.facets, channel.launched.paths, channel.others.paths
     with clock.stage("profile"):
         noise = sensor.noise_power if sensor.noise else 0.0
-        pdp = profile(paths, sensor.waveform, sensor.power, noise, settings.range_window)
+        pdp = profile_of(channel.launched.response, sensor.waveform, noise, settings.range_window)
     with clock.stage("receive"):
-        cube, rdmap, detections = receive(paths, sensor, settings, noise_rng, channel.turned)
-        turned, others = channel.turned, channel.others
+        turned = channel.turned
+        quiet = turned.cube if turned else channel.launched.quiet
+        cube = noisy(quiet, sensor, noise_rng)
+        rdmap, detections = received(cube, sensor, settings)
         below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(sensor, settings)
         if turned is None:
-            error = MapError(map_error(paths, others, sensor, settings).power + below)
+            error = MapError(map_error(quiet, channel.others.quiet, sensor, settings).power + below)
         else:
             brought, doubt = (quiet_map(x, sensor, settings) for x in (turned.turning, turned.error))
             share = launch_share(paths, others, turned.turns, sensor)
-            still = map_error(without(paths, turned.turns), without(others, turned.turns), sensor, settings)
+            rest, others_rest = (without(x, turned.turns) for x in (paths, others))
+            still = map_error(synthesize(rest, sensor), synthesize(others_rest, sensor), sensor, settings)
             error = MapError(still.power + doubt + share * brought + below)
     receiver = Receiver(
         sensor.waveform,
@@ -192,19 +208,15 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         timings=clock.timings,
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
         stats=channel.stats | {"reached_db": max((r.error_db for r in reasons), default=0.0)},
-        warnings=tuple(scene.warnings),
+        warnings=(*scene.warnings, *_told(channel.launched)),
         scene=scene.bare(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
 
 
-def receive(
-    paths: Paths, sensor: Sensor, settings: Any, rng: np.random.Generator, turned: Retraced | None = None
-) -> tuple[Cube, RangeDoppler, Detections]:
-    """Return what the receiver makes of the paths, or of the samples of a frame with turning bodies; it sees nothing
-    else of the scene."""
-    cube = turned.cube(sensor, rng) if turned else synthesize(paths, sensor, rng)
+def received(cube: Cube, sensor: Sensor, settings: Any) -> tuple[RangeDoppler, Detections]:
+    """Return what the receiver makes of its samples; it sees nothing else of the scene."""
     rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
     # The scene file names range before rate; a map's axes are rate, then range.
     sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
@@ -219,7 +231,7 @@ def receive(
         elements=np.asarray(sensor.elements),
         **sizes,
     )
-    return cube, rdmap, detections
+    return rdmap, detections
 
 
 def drowned(sensor: Sensor, settings: Any) -> float:
@@ -244,12 +256,9 @@ def noise_of_cell(sensor: Sensor, settings: Any) -> float:
     return float(sensor.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
 
 
-def map_error(paths: Paths, others: Paths, sensor: Sensor, settings: Any) -> MapError:
-    """Return the map of what two launches differ by: their difference sent through the same receiver, without noise."""
-    difference = join([heard(paths), heard(others.replace(amplitude=-others.amplitude))])
-    return MapError(
-        quiet_map(synthesize(difference, dataclasses.replace(sensor, noise=False)).samples, sensor, settings)
-    )
+def map_error(quiet: Cube, others: Cube, sensor: Sensor, settings: Any) -> MapError:
+    """Return the map of what two launches differ by: the samples of one less those of the other, without noise."""
+    return MapError(quiet_map(quiet.samples - others.samples, sensor, settings))
 
 
 def quiet_map(samples: Any, sensor: Sensor, settings: Any) -> Any:
@@ -263,6 +272,14 @@ def background(facets: Facets) -> tuple[str, ...]:
     """Return the names of bodies that are never targets: mirrors (the ground) and the radar's carrier 'ego...'."""
     names = zip(facets.body_names, facets.role, strict=True)
     return tuple(name for name, role in names if role == MIRROR or name.startswith("ego"))
+
+
+def _told(launched: Launched) -> list[str]:
+    """Return what to tell of a launch that had more paths than a result can hold."""
+    kept = len(launched.paths.delay)
+    if launched.whole:
+        return []
+    return [f"{launched.count:,} paths: all are in the samples, the {kept:,} strongest are kept to explain them"]
 
 
 def _changed(model: Any, changes: dict[str, Any]) -> Any:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from raychan.channel.diffract import diffracted_paths
 from raychan.channel.legs import Leg
-from raychan.channel.solve import join
+from raychan.channel.paths import join
 from raychan.channel.surface import Surface
 from raychan.kernels.fresnel import coefficients_array
 from raychan.radar.sensor import Sensor
-from raychan.run.auto import interactions, peak
-from raychan.tables import MIRROR, TRANSMIT, Facets, Paths, Points, take
+from raychan.run.auto import interactions, layers, peak
+from raychan.tables import MIRROR, Facets, Paths, Points
 from raychan.units import C0, db
 
 Floats = NDArray[np.float64]
@@ -78,7 +78,7 @@ def _further(paths: Paths, sensor: Sensor, settings: Any, bounces: int, weakest:
 
 
 def _transmission(paths: Paths, sensor: Sensor, settings: Any, weakest: float) -> Entry:
-    passes = (paths.kind == TRANSMIT).sum(axis=1)
+    passes = layers(paths)
     most = int(passes.max(initial=0))
     if most == 0:
         return Entry(NOTHING, "exact", "no path passes a thin layer")
@@ -200,17 +200,20 @@ def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:
     if not len(paths.delay):
         return Entry(NOTHING, "exact", "no path")
     size = np.abs(paths.amplitude)
-    paths = take(paths, np.flatnonzero(size > 1e-3 * size.max()))
-    used = paths.body >= 0
-    used &= facets.role[np.maximum(paths.body, 0)] != MIRROR
-    body = np.maximum(paths.body, 0)
+    strong = np.flatnonzero(size > 1e-3 * size.max())
+    nearest = np.full(len(paths.ways.kind), np.inf)
+    np.minimum.at(nearest, paths.way[strong], np.maximum(0.5 * C0 * paths.delay[strong], 0.5))
+    taken = np.flatnonzero(np.isfinite(nearest))
+    body, away = paths.ways.body[taken], paths.ways.departure[taken].astype(float)
+    used = body >= 0
+    body = np.maximum(body, 0)
+    used &= facets.role[body] != MIRROR
     relative = facets.velocity[body] - np.asarray(sensor.velocity)
-    along = np.einsum("ndi,ni->nd", relative, paths.departure)
+    along = np.einsum("ndi,ni->nd", relative, away)
     across = np.einsum("ndi,ndi->nd", relative, relative) - along**2
     turning = np.linalg.norm(facets.spin, axis=1)[body]
-    ranges = np.maximum(0.5 * C0 * paths.delay, 0.5)
     # Lever arm of turning bodies: at most a few metres of a vehicle.
-    bend = np.where(used, across / ranges[:, None] + turning**2 * 2.5, 0.0).max(axis=1)
+    bend = np.where(used, across / nearest[taken, None] + turning**2 * 2.5, 0.0).max(axis=1)
     phase = 2.0 * np.pi / sensor.waveform.wavelength * bend * frame**2 / 4.0
     worst = float(phase.max(initial=0.0))
     how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level against the return that has it"

@@ -169,7 +169,8 @@ class _Work:
             known = Traced(paths, tuple(found))
         parts = [take(r, self.touches(r.body, r.kind)) for r in known.routes]
         routes = tuple(r for r in parts if len(r.kind))
-        rest = ~self.touches(known.paths.body, known.paths.kind) | (known.paths.kind == DIFFRACT).any(axis=1)
+        ways = known.paths.ways
+        rest = ~self.touches(ways.body, ways.kind) | (ways.kind == DIFFRACT).any(axis=1)
         if self.progress:
             self.progress(len(self.times) / self.most)
         return Key(
@@ -177,7 +178,7 @@ class _Work:
             now,
             routes,
             tuple(strengths(r, facets, now.sensor, carrier) for r in routes),
-            take(known.paths, rest),
+            take(known.paths, rest[known.paths.way]),
         )
 
     def touches(self, body: NDArray[np.signedinteger], kind: NDArray[np.signedinteger]) -> NDArray[np.bool_]:

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.radar.sensor import Sensor
-from raychan.signal.cube import synthesize
 from raychan.tables import Cube, Paths, Routes
 from raychan.units import C0
 from raychan.world.scene import Scene
@@ -37,11 +35,10 @@ class Retraced:
     reached: bool
     """Whether the error came under the tolerance."""
 
-    def cube(self, sensor: Sensor, rng: np.random.Generator) -> Cube:
-        """Return the samples with thermal noise, if the sensor has any."""
-        none = np.zeros(0)
-        quiet = synthesize(echoes(none, none.astype(complex), none, np.zeros(3)), sensor, rng)
-        return Cube(samples=(quiet.samples + self.samples).astype(np.complex64), noise_power=quiet.noise_power)
+    @property
+    def cube(self) -> Cube:
+        """The samples of all receivers and chirps."""
+        return Cube(samples=self.samples.astype(np.complex64), noise_power=0.0)
 
     def level(self) -> float:
         """Return the power of the error over that of the samples."""
@@ -124,17 +121,8 @@ def echoes(delay: Floats, amplitude: Complexes, growth: Floats, place: Floats) -
     """Return paths without a history."""
     n = len(delay)
     none, look = np.full((n, 1), -1, np.int16), np.zeros((n, 3))
-    return Paths(
+    return Paths.of(
         delay=delay, amplitude=amplitude, rate=0.5 * C0 * growth, departure=look, arrival=look, body=none, part=none,
         kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32), body_names=(), part_names=(),
         tx=place, rx=place,
     )  # fmt: skip
-
-
-def heard(paths: Paths, rows: Any = slice(None)) -> Paths:
-    """Return rows of paths without their history: all that a receiver needs."""
-    kept: Paths = paths.replace(
-        **{f: getattr(paths, f)[rows] for f in ("delay", "amplitude", "rate", "departure", "arrival")},
-        **{f: getattr(paths, f)[rows, :0] for f in ("body", "part", "kind", "vertices")},
-    )
-    return kept

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.rcs import stated_error
 from raychan.kernels.cell import cell_sums
-from raychan.run.response import Response
+from raychan.run.response import Response, Sums
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver, Result
 from raychan.tables import KIND_LETTERS, TRANSMIT, Detections, Paths, RangeDoppler
 from raychan.units import C0
@@ -44,9 +44,10 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
     bodies: list[tuple[str, ...]] = []
     targets: list[int] = []
     known: dict[tuple[str, ...], int] = {}
+    ways = paths.ways
     first, index = _alike(paths)
     for row in first:
-        met = [link for link in zip(paths.body[row], paths.part[row], paths.kind[row], strict=True) if link[2]]
+        met = [link for link in zip(ways.body[row], ways.part[row], ways.kind[row], strict=True) if link[2]]
         names.append(tuple(_name(paths, b, p, k) for b, p, k in met))
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
         left = [b for b in bodies[-1] if b not in background]
@@ -73,7 +74,20 @@ def explain_cell(
     the same chain add as waves, chains as powers.
     """
     wave, at = waves_in(paths, response, range, rate)
-    summed, sizes, strongest = cell_sums(known.part, len(known.names), wave, at, paths.rate)
+    sums = cell_sums(known.part, len(known.names), wave, at, paths.rate)
+    return _explained(paths, known, sums, 0, receiver, (range, rate, power, error))
+
+
+def _explained(
+    paths: Paths,
+    known: Chains,
+    sums: Sums,
+    cell: int,
+    receiver: Receiver,
+    about: tuple[float, float | None, float, float],
+) -> Explanation:
+    summed, sizes, strongest = (x[cell] for x in sums)
+    range, rate, power, error = about
     whole = complex(summed.sum())
     predicted = abs(whole) ** 2 * receiver.power
     speed = (rate or 0.0) + receiver.ego_speed
@@ -124,12 +138,14 @@ def provenance(
 ) -> tuple[Explanation, ...]:
     """Return one explanation for each detection, of the cell where its peak stands, at the place that it reports."""
     known, response = chains(paths, receiver.background), response_of(receiver)
+    rows, columns = detections.cell.T
+    powers, errors = rdmap.power[rows, columns], error[rows, columns]
+    at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
+    sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.rate, at)
     found = []
-    for i, (row, column) in enumerate(detections.cell):
-        at, rate, power = rdmap.range[column], rdmap.rate[row], rdmap.power[row, column]
-        why = explain_cell(
-            paths, known, response, receiver, float(at), float(rate), float(power), float(error[row, column])
-        )
+    for i in range(len(at)):
+        about = (float(at[i, 0]), float(at[i, 1]), float(powers[i]), float(errors[i]))
+        why = _explained(paths, known, sums, i, receiver, about)
         found.append(
             replace(
                 why,
@@ -186,10 +202,11 @@ def _cells(rdmap: RangeDoppler, range: float, rate: float | None) -> tuple[Ints,
 
 
 def _alike(paths: Paths) -> tuple[Ints, Ints]:
-    """Return one row of each chain, and the chain of each path (n,); slot by slot, for speed."""
-    code, most = np.zeros(len(paths.delay), np.int64), 1
+    """Return one way of each chain that a path took, and the chain of each path (n,); slot by slot, for speed."""
+    ways = paths.ways
+    code, most = np.zeros(len(ways.kind), np.int64), 1
     width = (len(paths.body_names) + 1) * (len(paths.part_names) + 1) * len(KIND_LETTERS)
-    for body, part, kind in zip(paths.body.T, paths.part.T, paths.kind.T, strict=True):
+    for body, part, kind in zip(ways.body.T, ways.part.T, ways.kind.T, strict=True):
         if not kind.any():
             break
         if most > np.iinfo(np.int64).max // width:
@@ -197,8 +214,13 @@ def _alike(paths: Paths) -> tuple[Ints, Ints]:
             most = int(code.max(initial=0)) + 1
         slot = (body + 1) * np.int64(len(paths.part_names) + 1) + part + 1
         code, most = code * width + np.where(kind > 0, slot * len(KIND_LETTERS) + kind, 0), most * width
-    _, first, index = np.unique(code, return_index=True, return_inverse=True)
-    return first, index.astype(np.int64)
+    taken = np.zeros(len(code), bool)
+    taken[paths.way] = True
+    rows = np.flatnonzero(taken)
+    _, first, inverse = np.unique(code[rows], return_index=True, return_inverse=True)
+    chain = np.full(len(code), -1, np.int64)
+    chain[rows] = inverse
+    return rows[first], chain[paths.way]
 
 
 def _sums(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
@@ -223,7 +245,8 @@ def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver
     if len(targets) > 1:
         return MULTIPATH
     # Over the ground and one target: an echo of the target, or a ghost behind it if the way round is long.
-    index = [paths.body_names[b] in targets for b in paths.body[row]]
-    straight = np.linalg.norm(paths.vertices[row][index] - 0.5 * (paths.tx + paths.rx), axis=1).min()
+    way = paths.way[row]
+    index = [paths.body_names[b] in targets for b in paths.ways.body[way]]
+    straight = np.linalg.norm(paths.ways.vertices[way][index] - 0.5 * (paths.tx + paths.rx), axis=1).min()
     detour = 0.5 * C0 * paths.delay[row] - straight
     return DIRECT if detour < max(receiver.waveform.range_resolution, _DEPTH) else MULTIPATH

@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.kernels.cell import cell_waves, periodic
+from raychan.kernels.cell import cell_waves, periodic, sums_in_cells
+from raychan.kernels.rows import in_two
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
+Sums = tuple[Complexes, Floats, NDArray[np.int64]]
 
 _FINE = 64  # points of the tabulated window response per resolution cell
+_LEAST = 1e-4  # of a cell's amplitude: what all paths that are left out may bring to it
 _STEP = 0.25  # range cells that a path may move within one piece of the frame
 
 
@@ -35,6 +38,15 @@ class Response:
         table = _table(self._range / self._range.sum())
         return np.stack([table, np.gradient(table, 1.0 / _FINE)], axis=1)
 
+    @cached_property
+    def _beyond(self) -> Floats:
+        """The largest that the range response and its slope are (s,) cells from the peak and farther."""
+        n = len(self._range)
+        size = np.abs(self._range_tables).max(axis=1)
+        by_cell = np.maximum.reduceat(size, np.arange(0, n * _FINE, _FINE))
+        by_cell = np.maximum(by_cell, by_cell[::-1])[: n // 2 + 1]
+        return np.asarray(np.maximum.accumulate(by_cell[::-1])[::-1])
+
     def in_profile(self, delay: Floats, range: float) -> tuple[Complexes, Floats]:
         """Return the response (n,) of the range window to paths of delays (n,) [s] at a range [m], their phase at mid
         sweep of the frame's first ramp in, and the ranges (n,) [m] at which they stand."""
@@ -50,18 +62,41 @@ class Response:
 
         Args: amplitude, delay [s] at the frame's start and rate [m/s] of paths; range [m] and rate [m/s] of the cell.
         """
+        found: tuple[Complexes, Floats] = cell_waves(amplitude, delay, rate, (range, cell_rate), *self._tables(rate))
+        return found
+
+    def in_cells(
+        self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
+    ) -> Sums:
+        """Return the sums by groups of what paths (n,) bring to cells of the map: see kernels.cell.cell_sums.
+
+        Args: group (n,) of each path, below `count`; cells (c, 3), each range [m], rate [m/s] and amplitude: what all
+        paths together bring is known to 1e-4 of that at least; else as for `in_cell`.
+        """
+        shape = len(cells), count
+        total, size, strongest = np.empty(shape, complex), np.empty((shape[0], 4, count)), np.empty(shape, np.int64)
+        least = _LEAST * cells[:, 2] / max(float(np.abs(amplitude).sum()), 1e-300)
+        tables = self._tables(rate)
+
+        def some(at: slice) -> None:
+            sums_in_cells(
+                group, amplitude, delay, rate, cells[at], least[at], self._beyond, total[at], size[at], strongest[at],
+                *tables,
+            )  # fmt: skip
+
+        in_two(len(cells), some, least=2)
+        return total, size, strongest
+
+    def _tables(self, rate: Floats) -> tuple[Any, ...]:
+        """Return ramp, sizes and tables for `cell_waves`, in as many pieces of the frame as the fastest path needs."""
         wave, count = self.waveform, len(self._rate)
-        middle = wave.carrier + self._swept
         moved = float(np.abs(rate).max(initial=0.0)) * wave.repetition / wave.range_resolution * count
         pieces = max(1, min(count, int(np.ceil(moved / _STEP))))
         if pieces not in self._pieces:
             self._pieces[pieces] = self._rate_tables(pieces)
+        middle = wave.carrier + self._swept
         ramp = (wave.carrier, wave.slope, wave.centre, self._swept, middle, wave.repetition, wave.range_resolution, C0)
-        sizes = (len(self._range), count, _FINE)
-        found: tuple[Complexes, Floats] = cell_waves(
-            amplitude, delay, rate, (range, cell_rate), ramp, sizes, self._range_tables, self._pieces[pieces]
-        )
-        return found
+        return ramp, (len(self._range), count, _FINE), self._range_tables, self._pieces[pieces]
 
     @property
     def _swept(self) -> float:

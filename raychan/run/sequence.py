@@ -18,7 +18,6 @@ from raychan.run.chain import Channel, Clock, Progress, result_of, trace
 from raychan.run.files import StoreError, staging
 from raychan.run.result import Result
 from raychan.run.store import COLUMNS, rows, save_result
-from raychan.tables import Paths
 from raychan.world.scene import Scene
 
 HEAD = ("frame", "time_s", *COLUMNS)
@@ -98,20 +97,14 @@ def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
     """Return the channel of a scene that has moved as one."""
     shift = time * np.asarray(scene.sensor.velocity, float)
 
-    def moved(paths: Paths) -> Paths:
-        there: Paths = paths.replace(
-            vertices=(paths.vertices + shift).astype(np.float32), tx=paths.tx + shift, rx=paths.rx + shift
-        )
-        return there
-
     points = scene.points()
     stats = channel.stats | {"rays": 0, "tubes": 0}
     return replace(
         channel,
         surface=surface_of(scene),
         points=points,
-        paths=moved(channel.paths),
-        others=moved(channel.others),
+        launched=channel.launched.moved(shift),
+        others=channel.others.moved(shift),
         stats=stats,
     )
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from raychan.channel.rcs import stated_error
 from raychan.radar.sensor import Sensor
 from raychan.run.ledger import Entry
-from raychan.run.pieces import Retraced, heard
+from raychan.run.pieces import Retraced
 from raychan.run.provenance import chains, label_of
 from raychan.run.result import Contribution, Explanation, Receiver
 from raychan.signal.cube import synthesize
@@ -23,7 +23,8 @@ _UNEXPLAINED = 0.1  # a cell to which turning bodies bring less than this share 
 
 def meets(paths: Paths, turns: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which paths (n,) meet one of the bodies `turns` (b,)."""
-    return np.asarray((turns[np.maximum(paths.body, 0)] & (paths.kind > 0)).any(axis=1))
+    body, kind = paths.ways.body, paths.ways.kind
+    return np.asarray((turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))[paths.way]
 
 
 def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
@@ -35,7 +36,7 @@ def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
 def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], sensor: Sensor) -> float:
     """Return by which share of their power two launches differ in what turning bodies bring to the first ramp."""
     one = replace(sensor, noise=False, waveform=replace(sensor.waveform, n_chirps=1))
-    a, b = (synthesize(heard(p, meets(p, turns)), one).samples for p in (paths, others))
+    a, b = (synthesize(take(p, meets(p, turns)), one).samples for p in (paths, others))
     power = float((np.abs(a) ** 2).sum())
     return float((np.abs(a - b) ** 2).sum()) / power if power > 0.0 else 0.0
 

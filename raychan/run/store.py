@@ -20,7 +20,7 @@ import numpy as np
 from raychan.radar.waveform import Waveform
 from raychan.run.files import StoreError
 from raychan.run.result import Contribution, Explanation, Receiver, Result
-from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
+from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler, Ways
 from raychan.units import dbm
 
 FORMAT = 1
@@ -181,10 +181,11 @@ def _dataset(record: Any) -> Any:
 
     variables: dict[str, Any] = {}
     attrs: dict[str, Any] = {}
-    for f in dataclasses.fields(record):
+    for f in _columns(type(record)):
         value = getattr(record, f.name)
         if "axes" in f.metadata:
-            dims = [f"xyz_{a}" if a.isdigit() else a for a in f.metadata["axes"]]
+            axes = ["n" if a == "w" else a for a in f.metadata["axes"]]
+            dims = [f"xyz_{a}" if a.isdigit() else a for a in axes]
             about = {"units": f.metadata["unit"], "long_name": f.metadata["doc"] or f.name}
             if np.iscomplexobj(value):
                 variables[f"{f.name}_re"] = (dims, value.real, about)
@@ -205,7 +206,7 @@ def _read_record(file: Path, group: str, kind: Any) -> Any:
 
     with xr.open_dataset(file, engine="h5netcdf", group=group, decode_cf=False) as data:
         values: dict[str, Any] = {}
-        for f in dataclasses.fields(kind):
+        for f in _columns(kind):
             if "axes" not in f.metadata:
                 held = data.attrs[f.name]
                 values[f.name] = tuple(json.loads(held)) if isinstance(held, str) else float(held)
@@ -216,7 +217,14 @@ def _read_record(file: Path, group: str, kind: Any) -> Any:
                 values[f.name] = value
             else:
                 values[f.name] = data[f.name].values
-    return kind(**values)
+    return Paths.of(**values) if kind is Paths else kind(**values)
+
+
+def _columns(kind: Any) -> list[dataclasses.Field[Any]]:
+    """Return the columns of a record; in a file paths have all of them a row a path."""
+    if kind is not Paths:
+        return list(dataclasses.fields(kind))
+    return [f for f in dataclasses.fields(Paths) if f.name not in ("way", "ways")] + list(dataclasses.fields(Ways))
 
 
 def _plain(value: Any) -> Any:

@@ -60,13 +60,22 @@ def synthesize(
                 layer[...] = _direct(turned, paths.delay + later, growth, wave)
         else:
             _fast(samples, [(grid, grid.prepared(part)) for grid, part in grids], elements)
-    noisy = rng is not None and sensor.noise
-    if rng is not None and noisy:
-        scale = np.float32(np.sqrt(0.5 * sensor.noise_power))
-        samples += scale * rng.standard_normal((*samples.shape, 2), np.float32).view(np.complex64)[..., 0]
     if not wave.complex_sampling:
         samples.imag = 0.0
-    return Cube(samples=samples, noise_power=sensor.noise_power if noisy else 0.0)
+    quiet = Cube(samples=samples, noise_power=0.0)
+    return quiet if rng is None else noisy(quiet, sensor, rng)
+
+
+def noisy(quiet: Cube, sensor: Sensor, rng: np.random.Generator) -> Cube:
+    """Return the samples with thermal noise, if the sensor has any."""
+    if not sensor.noise:
+        return quiet
+    scale = np.float32(np.sqrt(0.5 * sensor.noise_power))
+    samples = scale * rng.standard_normal((*quiet.samples.shape, 2), np.float32).view(np.complex64)[..., 0]
+    samples += quiet.samples
+    if not sensor.waveform.complex_sampling:
+        samples.imag = 0.0
+    return Cube(samples=samples, noise_power=sensor.noise_power)
 
 
 def _direct(amplitude: Complexes, delay: Floats, growth: Floats, wave: Waveform) -> Complexes:

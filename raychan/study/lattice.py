@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from raychan.channel.legs import Leg
 from raychan.kernels.fresnel import coefficients
+from raychan.kernels.jit import njit
 from raychan.kernels.po import huygens
 from raychan.kernels.polar import reflect
 from raychan.tables import MIRROR, SCATTERER

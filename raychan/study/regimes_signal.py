@@ -32,7 +32,7 @@ def _echoes(ranges: Any, rates: Any = 0.0, amplitudes: Any = 1.0) -> Paths:
     n = len(r)
     look = np.broadcast_to([1.0, 0.0, 0.0], (n, 3))
     none = np.full((n, 1), -1, np.int16)
-    return Paths(
+    return Paths.of(
         delay=2.0 * r / C0, amplitude=a.astype(complex), rate=v.astype(float), departure=look, arrival=look,
         body=none, part=none, kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32),
         body_names=(), part_names=(), tx=np.zeros(3), rx=np.zeros(3),

@@ -70,7 +70,7 @@ class Road:
         columns = {f.name: np.concatenate([getattr(e, f.name) for e in parts]) for f in dataclasses.fields(Echo)}
         keep = columns["amplitude"] != 0.0
         n, none = int(keep.sum()), np.full((int(keep.sum()), 1), -1, np.int16)
-        return Paths(
+        return Paths.of(
             delay=columns["length"][keep] / C0,
             amplitude=wave * columns["amplitude"][keep],
             rate=columns["rate"][keep],

@@ -10,7 +10,7 @@ import numpy as np
 from raychan.channel.diffract import diffracted_paths
 from raychan.channel.legs import Leg
 from raychan.channel.occlusion import Occlusion, occlusion
-from raychan.channel.solve import join
+from raychan.channel.paths import join
 from raychan.channel.surface import Surface
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
@@ -115,7 +115,11 @@ def ways_of(result: Result, known: Chains, target: str) -> np.ndarray[Any, np.dt
     strongest = order[np.searchsorted(known.part[order], np.arange(len(known.names)))]
     for g, (row, bodies) in enumerate(zip(strongest, known.bodies, strict=True)):
         if target in bodies:
-            way = DIFFRACTED if (paths.kind[row] == DIFFRACT).any() else label_of(paths, row, bodies, result.receiver)
+            way = (
+                DIFFRACTED
+                if (paths.ways.kind[paths.way[row]] == DIFFRACT).any()
+                else label_of(paths, row, bodies, result.receiver)
+            )
             kind[g] = WAYS.index(way)
     return kind[known.part]
 

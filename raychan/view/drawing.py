@@ -185,8 +185,9 @@ def rays_in(result: Result, cell: Explanation) -> tuple[Ray, ...]:
 
 
 def _ray(paths: Paths, row: int, chain: tuple[str, ...], watts: float, label: str) -> Ray:
-    used = int((paths.kind[row] > 0).sum())
-    points = np.concatenate([paths.tx[None], paths.vertices[row, :used].astype(float), paths.rx[None]])
+    way = paths.way[row]
+    used = int((paths.ways.kind[way] > 0).sum())
+    points = np.concatenate([paths.tx[None], paths.ways.vertices[way, :used].astype(float), paths.rx[None]])
     return Ray(" > ".join(chain) or "line of sight", points, float(dbm(watts)), label)
 
 

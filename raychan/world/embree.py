@@ -7,6 +7,7 @@ facets before it is cast to float32, so a scene far from the origin gives the an
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ _NEAREST = 1e-6  # a hit closer than this is the surface the ray leaves
 
 
 class Tracer:
-    """A scene of facets that answers rays; holds counts of the rays it cast."""
+    """A scene of facets that answers rays, and counts them by thread."""
 
     def __init__(self, facets: Facets) -> None:
         self.facets = facets
@@ -40,13 +41,15 @@ class Tracer:
         self.normal, self.area = planes_of(v)
         self.extents = extents(v, facets.body, len(facets.role))
         self.is_layer = facets.materials.kind[facets.material] == LAYER if len(v) else np.zeros(0, bool)
-        self.rays = 0
+        self._counts = threading.local()
         # Which facets are one surface; each for itself until someone knows better.
         self.plane = self.smooth = np.arange(len(v), dtype=np.int32)
         self._any_layer = bool(self.is_layer.any())
         # Whether facets never hide each other from a point that looks at their lit sides.
         self.hides_nothing = False
         self._scene: Any = None
+        # Held while something is made that serves all threads.
+        self.making = threading.RLock()
         self.extent, self._size, self.touch, self._nearest = 0.0, 1.0, _TOUCH, _NEAREST
         if len(v):
             low, high = self.extents[:, 0].min(axis=0), self.extents[:, 1].max(axis=0)
@@ -57,17 +60,26 @@ class Tracer:
             blur = 8.0 * float(np.spacing(np.maximum(-low, high).max()))
             self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
 
+    @property
+    def rays(self) -> int:
+        """Rays cast so far by this thread."""
+        return int(getattr(self._counts, "rays", 0))
+
+    def _count(self, rays: int) -> None:
+        self._counts.rays = self.rays + rays
+
     def _built(self) -> Any:
         """Return Embree's scene, made for the first ray."""
-        if self._scene is None:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
+        with self.making:
+            if self._scene is None:
+                from embreex.mesh_construction import TriangleMesh
+                from embreex.rtcore_scene import EmbreeScene
 
-            scene = EmbreeScene(robust=True)
-            self._mesh = TriangleMesh(scene, np.ascontiguousarray(self.facets.vertices - self._centre, np.float32))
-            scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-            self._scene = scene
-        return self._scene
+                scene = EmbreeScene(robust=True)
+                self._mesh = TriangleMesh(scene, np.ascontiguousarray(self.facets.vertices - self._centre, np.float32))
+                scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+                self._scene = scene
+            return self._scene
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
         """Return the float64 distance [m] along each ray to the plane of its facet (inf when parallel)."""
@@ -94,7 +106,7 @@ class Tracer:
 
         in_two(n, some, _MANY)
         # A ray and its two companions count as one.
-        self.rays += sum(casts)
+        self._count(sum(casts))
         return facet, distance
 
     def _cast(
@@ -143,7 +155,7 @@ class Tracer:
             towards = np.einsum("ij,ij->i", direction, self.normal[target]) < 0.0
             reached = towards & (target >= 0) & (skip < 0)
             todo = np.flatnonzero(~reached)
-            self.rays += n - len(todo)
+            self._count(n - len(todo))
         shape = self.plane, self.smooth, self.facets.vertices, self.normal, _EDGE * _SLACK * self._size
         ways = limit, slack, target, self.touch, *shape
         bodies = (self.facets.body, np.zeros(0, np.int64) if inside is None else inside.astype(np.int64))

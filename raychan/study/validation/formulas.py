@@ -35,7 +35,7 @@ def _echo(bench: Bench, run: str, at: float, rate: float, window: str, pad: tupl
     wave = dataclasses.replace(given.waveform, complex_sampling=iq)
     look, none = np.array([[1.0, 0.0, 0.0]]), np.full((1, 1), -1)
     here = np.asarray(given.position)
-    path = Paths(
+    path = Paths.of(
         delay=np.array([2.0 * at / C0]),
         amplitude=np.ones(1, complex),
         rate=np.array([rate]),

@@ -1,0 +1,125 @@
+"""Paths of routes: what each carries for a radar, and its delay and rate; footprints long in range give a path a
+corner."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.advance import APART, corner_rates
+from raychan.channel.fields import departures, rates, transfer
+from raychan.tables import SCATTER, Facets, Paths, Routes, Ways
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+
+
+class Radar(Protocol):
+    """What the solver asks of a radar (see radar.sensor.Sensor)."""
+
+    @property
+    def position(self) -> Floats: ...
+    @property
+    def velocity(self) -> Floats: ...
+    def tx_field(self, direction_world: Floats) -> Any: ...
+    def rx_field(self, direction_world: Floats) -> Any: ...
+
+
+def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> Paths:
+    """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
+    a = transfer(
+        routes,
+        facets,
+        frequency,
+        lambda d: np.asarray(radar.tx_field(d))[:, None],
+        lambda d: np.asarray(radar.rx_field(d))[:, None],
+        corners=True,
+    )[:, 0, 0]
+    away, look = departures(routes)
+    v = np.asarray(radar.velocity, float)
+    rate = rates(routes, facets, v, v)
+    corner = routes.lengths[:, :3]
+    spans = np.maximum(np.maximum(corner[:, 0], corner[:, 1]), corner[:, 2])
+    spans -= np.minimum(np.minimum(corner[:, 0], corner[:, 1]), corner[:, 2])
+    long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
+    whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
+    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
+    return Paths(
+        delay=np.concatenate([routes.length[whole], corner[rows].ravel()]) / C0,
+        amplitude=np.concatenate([a[whole].sum(axis=1), a[rows].ravel()]),
+        rate=np.concatenate([rate[whole], corner_rates(routes, rows, facets, v).ravel()]),
+        way=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
+        ways=Ways(
+            departure=away.astype(np.float32),
+            arrival=look,
+            body=routes.body,
+            part=np.where(routes.facet >= 0, part, -1).astype(np.int16),
+            kind=routes.kind,
+            vertices=routes.vertices.astype(np.float32),
+        ),
+        body_names=facets.body_names,
+        part_names=facets.part_names,
+        tx=routes.tx,
+        rx=routes.rx,
+    )
+
+
+def nothing(facets: Facets, radar: Radar) -> Paths:
+    """Return the empty record of a scene of which nothing is in view."""
+    end, none = np.asarray(radar.position, float), np.zeros((0, 1), np.int8)
+    return Paths.of(
+        delay=np.zeros(0),
+        amplitude=np.zeros(0, complex),
+        rate=np.zeros(0),
+        departure=np.zeros((0, 3)),
+        arrival=np.zeros((0, 3)),
+        body=none,
+        part=none,
+        kind=none,
+        vertices=np.zeros((0, 1, 3)),
+        body_names=facets.body_names,
+        part_names=facets.part_names,
+        tx=end,
+        rx=end,
+    )
+
+
+def join(parts: list[Paths]) -> Paths:
+    """Return all paths of several sets as one record, chains as long as the longest."""
+    if len(parts) == 1:
+        return parts[0]
+    begin = np.cumsum([0] + [len(p.ways.kind) for p in parts[:-1]])
+    slots = max(p.ways.kind.shape[1] for p in parts)
+    empty = {"body": -1, "part": -1, "kind": 0, "vertices": parts[0].rx}
+    ways: dict[str, Any] = {}
+    for f in dataclasses.fields(Ways):
+        held = [getattr(p.ways, f.name) for p in parts]
+        if f.name in empty:
+            out = np.empty((sum(map(len, held)), slots, *held[0].shape[2:]), held[0].dtype)
+            for first, some in zip(begin, held, strict=True):
+                out[first : first + len(some), : some.shape[1]] = some
+                out[first : first + len(some), some.shape[1] :] = empty[f.name]
+            ways[f.name] = out
+        else:
+            ways[f.name] = np.concatenate(held)
+    rows: dict[str, Any] = {
+        name: np.concatenate([getattr(p, name) for p in parts]) for name in ("delay", "amplitude", "rate")
+    }
+    way = np.concatenate([p.way + np.int32(first) for p, first in zip(parts, begin, strict=True)])
+    return dataclasses.replace(parts[0], **rows, way=way, ways=Ways(**ways))
+
+
+def strongest(paths: Paths, most: int) -> Paths:
+    """Return the paths of the ways, `most` at most, that carry most power; in their order."""
+    power = np.bincount(paths.way, np.abs(paths.amplitude) ** 2, len(paths.ways.kind))
+    if len(power) <= most:
+        return paths
+    keep = np.zeros(len(power), bool)
+    keep[np.argsort(-power, kind="stable")[:most]] = True
+    rows, number = keep[paths.way], np.cumsum(keep, dtype=np.int32) - 1
+    ways = Ways(**{f.name: getattr(paths.ways, f.name)[keep] for f in dataclasses.fields(Ways)})
+    columns = {name: getattr(paths, name)[rows] for name in ("delay", "amplitude", "rate")}
+    return dataclasses.replace(paths, **columns, way=number[paths.way[rows]], ways=ways)

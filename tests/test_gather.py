@@ -1,0 +1,55 @@
+"""Launches too large to keep: samples, profile and stated error are those of all paths; the strongest explain them."""
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.run import gather
+
+RADAR = {"waveform": {"bandwidth_mhz": 500.0, "chirp_us": 30.0, "chirps": 32, "samples": 64}}
+
+
+def scene():
+    bodies = [
+        rc.Body("wall", shape="plate", params={"width": 3.0, "height": 2.0}, position=(8, 0, 0), yaw_deg=180.0),
+        rc.Body("box", shape="box", params={"length": 1.0}, position=(12, 4, 0), velocity=(3, 0, 0)),
+    ]
+    return rc.Scene(bodies=bodies, radar=RADAR, model={"max_bounces": 2})
+
+
+@pytest.fixture
+def both(monkeypatch):
+    every = rc.simulate(scene())
+    monkeypatch.setattr(gather, "_MOST", 100)
+    monkeypatch.setattr(gather, "_KEPT", 40)
+    return every, rc.simulate(scene())
+
+
+def test_samples_profile_and_error_are_those_of_all_paths(both):
+    every, some = both
+    size = float(np.abs(every.cube.samples).max())
+    assert some.cube.samples == pytest.approx(every.cube.samples, abs=1e-5 * size)
+    assert some.profile.power == pytest.approx(every.profile.power, abs=1e-6 * every.profile.power.max())
+    assert some.detections.range == pytest.approx(every.detections.range, abs=1e-6)
+    strong = every.rdmap.power > 1e-3 * every.rdmap.power.max()
+    assert 10 * np.log10(some.error.power[strong]) == pytest.approx(10 * np.log10(every.error.power[strong]), abs=0.5)
+
+
+def test_the_strongest_paths_are_kept_and_it_is_told(both):
+    every, some = both
+    assert 0 < len(some.paths.delay) < len(every.paths.delay)
+    assert len(some.paths.ways.kind) <= 40
+    assert np.abs(some.paths.amplitude).max() == pytest.approx(np.abs(every.paths.amplitude).max())
+    assert every.warnings == () and f"{len(every.paths.delay):,} paths" in some.warnings[0]
+    for a, b in zip(every.provenance, some.provenance, strict=True):
+        assert (a.label, a.contributions[0].chain) == (b.label, b.contributions[0].chain)
+
+
+def test_all_corners_of_the_ways_that_carry_most_are_kept():
+    paths = rc.simulate(scene()).paths
+    kept = gather.strongest(paths, 20)
+    power = np.bincount(paths.way, np.abs(paths.amplitude) ** 2)
+    least = np.sort(power)[-20]
+    rows = power[paths.way] >= least
+    assert kept.delay == pytest.approx(paths.delay[rows])
+    assert kept.vertices == pytest.approx(paths.vertices[rows])
