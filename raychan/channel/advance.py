@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from raychan.channel.fields import transfer
@@ -92,11 +91,16 @@ def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float)
     """
     shape = (len(poses.radar), len(routes.kind), 3)
     lengths, amplitudes = np.empty(shape), np.empty(shape, np.complex128)
-    _carry(
-        routes.tx, routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points,
-        routes.lengths, routes.length, routes.taper, strength, poses.origin, poses.turn, poses.place, poses.radar,
-        2.0 * np.pi * frequency / C0, lengths, amplitudes,
+    columns = (
+        routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points, routes.lengths,
+        routes.length, routes.taper, strength,
     )  # fmt: skip
+    when = poses.origin, poses.turn, poses.place, poses.radar, 2.0 * np.pi * frequency / C0
+
+    def some(rows: slice) -> None:
+        _carry(*(routes.tx, *(c[rows] for c in columns), *when, lengths[:, rows], amplitudes[:, rows]))
+
+    in_two(shape[1], some)
     return lengths, amplitudes
 
 
@@ -174,7 +178,7 @@ def _corner_rates(  # type: ignore[no-untyped-def]
 APART = 3e-4  # m of path: footprints longer than this in range give each corner its own delay
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _carry(  # type: ignore[no-untyped-def]
     tx, vertices, normals, kind, body, scatter, points, lengths, length, taper, strength, origin, turn, place, radar,
     k, out_lengths, out,
@@ -183,8 +187,8 @@ def _carry(  # type: ignore[no-untyped-def]
     still = np.zeros((origin.shape[0], 3, 3))
     for b in range(origin.shape[0]):
         still[b, 0, 0] = still[b, 1, 1] = still[b, 2, 2] = 1.0
-    for i in prange(n):
-        now, then, phases, terms = np.empty(7), np.empty(7), np.empty(6), np.empty(3, np.complex128)
+    now, then, phases, terms = np.empty(7), np.empty(7), np.empty(6), np.empty(3, np.complex128)
+    for i in range(n):
         used = 0
         while used < d and kind[i, used] > 0:
             used += 1

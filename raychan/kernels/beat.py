@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from raychan.kernels.jit import njit
+from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
 def beat_sum(
     amplitude: Complexes,
     delay: Floats,
@@ -32,16 +31,25 @@ def beat_sum(
     carrier [Hz]; slope [Hz/s]; repetition and sample step [s].
     """
     out = np.zeros((chirps, samples), np.complex128)
-    for m in prange(chirps):
+
+    def some(rows: slice) -> None:
+        _beat_sum(amplitude, delay, growth, carrier, slope, repetition, step, rows.start, out[rows])
+
+    in_two(chirps, some, 2)
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _beat_sum(amplitude, delay, growth, carrier, slope, repetition, step, first, out):  # type: ignore[no-untyped-def]
+    for m in range(first, first + len(out)):
         for p in range(delay.size):
-            for s in range(samples):
+            for s in range(out.shape[1]):
                 t = s * step
                 grown = growth[p] * (m * repetition + t)
                 tau = delay[p] + grown
                 turn = carrier * grown + slope * tau * (t - 0.5 * tau)
                 angle = -2.0 * math.pi * (turn - math.floor(turn))
-                out[m, s] += amplitude[p] * complex(math.cos(angle), math.sin(angle))
-    return out
+                out[m - first, s] += amplitude[p] * complex(math.cos(angle), math.sin(angle))
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -156,7 +164,6 @@ _ABREAST = 8  # echoes whose recurrences run side by side, so that a core's vect
 _PIECE = 128  # samples after which a recurrence starts anew from the exact phase
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
 def ramp_sums(
     amplitude: Complexes,
     delay: Floats,
@@ -171,9 +178,19 @@ def ramp_sums(
     Args as for `beat_sum`, amplitude and delay at the start of each ramp. Along a ramp the phase is quadratic in the
     sample number, so that each sample follows from the one before by two complex products.
     """
-    ramps, count = delay.shape
-    out = np.zeros((ramps, samples), np.complex128)
-    for m in prange(ramps):
+    out = np.zeros((len(delay), samples), np.complex128)
+
+    def some(rows: slice) -> None:
+        _ramp_sums(amplitude[rows], delay[rows], growth[rows], carrier, slope, step, out[rows])
+
+    in_two(len(delay), some, 2)
+    return out
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _ramp_sums(amplitude, delay, growth, carrier, slope, step, out):  # type: ignore[no-untyped-def]
+    (ramps, count), samples = delay.shape, out.shape[1]
+    for m in range(ramps):
         re, im = np.zeros(samples), np.zeros(samples)
         z, w, q = np.empty((2, _ABREAST)), np.empty((2, _ABREAST)), np.empty((2, _ABREAST))
         turn = np.empty(3)
@@ -209,4 +226,3 @@ def ramp_sums(
                     im[s] += sum_im
         for s in range(samples):
             out[m, s] = complex(re[s], im[s])
-    return out
