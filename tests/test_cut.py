@@ -12,10 +12,15 @@ from raychan.channel.cut import divide, halves
 from raychan.channel.history import History
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
-from raychan.channel.tubes import Tubes, vector_area
+from raychan.channel.tubes import Tubes
 from raychan.kernels.landing import put_down
 
 N = 300
+
+
+def vector_area(points):
+    """Half the cross product of two edges of triangles (n, 3 or 4, 3)."""
+    return 0.5 * np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
 
 
 def tubes_from(source, corners):
@@ -27,7 +32,7 @@ def tubes_from(source, corners):
     byte, whole, one = np.zeros(n, np.int8), np.zeros(n, np.int32), np.ones(n)
     k = (points - source) / length[..., None]
     flat, none = np.ones(n, bool), np.empty((n, 0, 3))
-    return Tubes(points, k, length, normals, whole, one, one, flat, none, byte, byte, byte, whole - 1, History(3))
+    return Tubes(points, k, length, normals, whole, one, one, flat, none, byte, byte, byte, whole - 1, History())
 
 
 def triangles(rng, size, about=1.0, height=0.0):

@@ -40,7 +40,7 @@ def street(floor, least):
 def small_tubes(surface, leg, rng, n=600):
     facet = rng.choice(np.flatnonzero(surface.facets.body == 1), n).astype(np.int32)
     centre = rng.dirichlet(np.ones(3), (n, 1))
-    return stand(surface, leg, facet, 0.9 * centre + 0.1 * rng.dirichlet(np.ones(3), (n, 3)), RULE.slots)
+    return stand(surface, leg, facet, 0.9 * centre + 0.1 * rng.dirichlet(np.ones(3), (n, 3)))
 
 
 def test_tubes_behind_a_rectangle_are_seen_as_its_shadow_says():

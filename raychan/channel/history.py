@@ -14,8 +14,7 @@ _FIRST = 1000  # rows; they double when full
 class History:
     """Rows of vertices shared by tubes that were cut from each other, so that cutting copies none of them."""
 
-    def __init__(self, slots: int) -> None:
-        self.slots = slots
+    def __init__(self) -> None:
         self._used = 0
         self._place = np.empty((_FIRST, 3))
         self._normal = np.empty((_FIRST, 3))

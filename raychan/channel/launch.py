@@ -54,7 +54,7 @@ def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, mo
         facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
     for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
         part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways, out != leg)
-        yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary, rule.slots), found, more)
+        yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary), found, more)
 
 
 def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> Iterator[tuple[Ints, Floats]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,23 +35,20 @@ def tube_routes(
     Args: so_far what launches over other legs have found.
     """
     direct = outs[0]
-    # Where a wave still has to bounce it does not matter how the antenna looks at the place.
-    blind = replace(direct, beam=None)
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
     mirror_planes = _planes_in(surface, outs)
     for tubes in launch(surface, leg, direct, bodies, found, more):
-        yield from _followed(surface, leg, blind, outs, tubes, mirror_planes, bounces, found)
+        yield from _followed(surface, leg, outs, tubes, mirror_planes, bounces, found)
 
 
 def _followed(
-    surface: Surface, leg: Leg, blind: Leg, outs: list[Leg], tubes: Tubes, mirror_planes: NDArray[np.bool_],
+    surface: Surface, leg: Leg, outs: list[Leg], tubes: Tubes, mirror_planes: NDArray[np.bool_],
     bounces: int, found: Found,
 ) -> Iterator[Routes]:  # fmt: skip
     """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out.
 
-    Args: blind the way back, without its antenna, by which tubes are weighed that bounce again; mirror_planes (p,)
-    which planes are mirrors of the legs.
+    Args: mirror_planes (p,) which planes are mirrors of the legs.
     """
     f, rule = surface.facets, found.rule
     first = True
@@ -85,7 +81,7 @@ def _followed(
         if count >= bounces or surface.convex_alone:
             return
         last = count + 1 >= bounces
-        tubes = bounce(surface, leg, blind, tubes, first, last, found)
+        tubes = bounce(surface, leg, outs[0], tubes, first, last, found)
         if first and len(tubes):
             # From a plane mirror to another body: the legs over mirrors have these.
             previous = tubes.came_from()

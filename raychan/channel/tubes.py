@@ -122,7 +122,7 @@ class Tubes:
 _ROWS = tuple(f.name for f in fields(Tubes) if f.name != "history")
 
 
-def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> Tubes:
+def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> Tubes:
     """Return first-bounce tubes on the true surface at barycentric corners (n, 3, 3), seen from the end of `leg`."""
     n = len(facet)
     points, k, length, normals = first_rays(surface, leg, facet, bary)
@@ -140,7 +140,7 @@ def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats, slots: int) -> 
         bounces=np.full(n, len(leg.mirrors) + 1, np.int8),
         caustics=np.zeros(n, np.int8),
         last=np.full(n, -1, np.int32),
-        history=History(slots),
+        history=History(),
     )
 
 
@@ -149,11 +149,6 @@ def first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[F
     centres."""
     f = surface.facets
     return rays_on(facet, bary, f.vertices, f.normals, surface.bulge, surface.open_facet, leg.image, leg.far)
-
-
-def vector_area(points: Floats) -> Floats:
-    """Return half the cross product of two edges of triangles (n, 3 or 4, 3) [m^2]."""
-    return 0.5 * np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
 
 
 def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:

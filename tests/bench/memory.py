@@ -36,7 +36,8 @@ tubes = rc.simulate(scene, tolerance_db={tolerance!r}).stats["tubes"]
 _TUBES = """
 import dataclasses
 import raychan as rc
-from raychan.channel.solve import refinement, solve
+from raychan.channel.solve import refinement, solve_into
+from raychan.run.gather import Gather
 scene = rc.Scene(
     bodies=[rc.Body("wall", shape="plate", params=dict(width=10.0, height=10.0), position=(8, 0, 0), yaw_deg=180.0)],
     radar=dict(position=[0.0, 0.0, 0.0], waveform=dict(bandwidth_mhz=500.0, chirp_us=30.0, chirps=64, samples=128)),
@@ -44,7 +45,9 @@ scene = rc.Scene(
 start = time.perf_counter()
 rule = refinement(77e9, 0.5)
 rule = dataclasses.replace(rule, max_edge=10.0 * ({tubes} / 2.0) ** -0.5, max_tubes=10 * {tubes})
-tubes = solve(scene.facets(), scene.points(), scene.sensor, 77e9, rule, 1)[1].tubes
+gather = Gather(scene.sensor, "hann")
+tubes = solve_into(gather.add, scene.facets(), scene.points(), scene.sensor, 77e9, rule, 1).tubes
+gather.done().quiet
 """
 
 
