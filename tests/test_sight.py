@@ -108,7 +108,8 @@ def test_parts_that_are_lit_are_where_points_face_both_ends(back):
     xy, yz, zx = (np.roll(w, -i, axis=2)[..., :1] * np.roll(w, -i - 1, axis=2)[..., :1] for i in range(3))
     b = surface.bulge[:, None]
     p = w @ f.vertices - xy * b[:, :, 0] - yz * b[:, :, 1] - zx * b[:, :, 2]
-    normal = surface.normal_at(facet, w)
+    normal = w @ f.normals
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     cosine = np.min([((e - p) * normal).sum(axis=2) / np.linalg.norm(e - p, axis=2) for e in ends], axis=0)
     within = np.zeros(cosine.shape, bool)
     for row, part in zip(rows, bary, strict=True):
