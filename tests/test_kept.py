@@ -7,6 +7,8 @@ import dataclasses
 import gc
 import pickle
 import weakref
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +24,7 @@ from raychan.channel.surface import Surface, surface_of
 from raychan.run.sequence import frames
 from raychan.world.embree import Tracer
 
+SCENES = Path(__file__).parents[1] / "scenes"
 RADAR = {
     "position": [0.0, 0.0, 1.0],
     "waveform": {"bandwidth_mhz": 500.0, "chirp_us": 30.0, "chirps": 16, "samples": 64},
@@ -209,3 +212,14 @@ def test_where_the_antenna_sends_nothing_nothing_is_launched(scene):
     look = surface.facets.vertices[left].reshape(-1, 3)
     assert not leg.weight(look).any()
     assert len(np.intersect1d(found, every)) == len(found)
+
+
+def test_two_threads_may_simulate_one_scene_at_once():
+    scene = rc.Scene.load(SCENES / "occluded_pedestrian.toml")
+    with ThreadPoolExecutor(2) as pool:
+        jobs = [pool.submit(rc.simulate, scene, tolerance_db=3.0) for _ in range(2)]
+        one, other = (job.result() for job in jobs)
+    alone = rc.simulate(rc.Scene.load(SCENES / "occluded_pedestrian.toml"), tolerance_db=3.0)
+    for result in (one, other):
+        assert result.stats["rays"] == alone.stats["rays"]
+        np.testing.assert_array_equal(result.cube.samples, alone.cube.samples)
