@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,20 +70,11 @@ def refinement(
     )
 
 
-def solve(
-    facets: Facets | Surface,
-    points: Points,
-    radar: Radar,
-    frequency: float,
-    rule: Refinement,
-    bounces: int,
-    progress: Progress | None = None,
-    diffraction: bool = False,
-    each: Callable[[Routes], None] | None = None,
-) -> tuple[Paths, Stats]:
-    """Return the paths of a scene seen by a monostatic radar, and what they cost; args as for `solve_into`."""
+def solve(facets: Facets | Surface, *args: Any, **options: Any) -> tuple[Paths, Stats]:
+    """Return the paths of a scene seen by a monostatic radar, and what they cost; args as for `solve_into` from
+    `facets` on."""
     parts: list[Paths] = []
-    stats = solve_into(parts.append, facets, points, radar, frequency, rule, bounces, progress, diffraction, each)
+    stats = solve_into(parts.append, facets, *args, **options)
     return join(parts), stats
 
 
