@@ -14,7 +14,7 @@ from raychan.radar.sensor import Sensor
 from raychan.radar.waveform import Waveform
 from raychan.signal.cube import synthesize
 from raychan.study.regimes_base import FREQUENCY, LAMBDA, K, Outcome, Regime, Row, at_most
-from raychan.tables import Paths, RangeDoppler
+from raychan.tables import Paths, RangeDoppler, take
 from raychan.units import C0
 
 _WAVE = Waveform(FREQUENCY, 1e9, 25.6e-6, 40e-6, 128, 512)
@@ -76,20 +76,14 @@ def path_counts(quick: bool) -> Outcome:
 
 
 def _copies(paths: Paths, times: int) -> Paths:
-    n = len(paths.delay) * times
-    none = np.full((n, 1), -1, np.int16)
-    look = np.broadcast_to([1.0, 0.0, 0.0], (n, 3))
     made: Paths = paths.replace(
         delay=np.tile(paths.delay, times), amplitude=np.tile(paths.amplitude, times), rate=np.tile(paths.rate, times),
-        departure=look, arrival=look, body=none, part=none, kind=np.broadcast_to(np.int8(0), (n, 1)),
-        vertices=np.broadcast_to(np.float32(0), (n, 1, 3)),
+        way=np.tile(paths.way, times),
     )  # fmt: skip
     return made
 
 
 def _first(paths: Paths, n: int) -> Paths:
-    from raychan.tables import take
-
     made: Paths = take(paths, slice(0, n))
     return made
 
