@@ -152,6 +152,20 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [scene.name]
 
 
+_STOPPED_IN_LOOP = """
+import raychan.run.chain, raychan.cli
+def result_of(*a):
+    raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+raychan.run.chain.result_of = result_of
+raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
+"""
+
+
+def test_ctrl_c_that_a_compiled_loop_hands_on_as_a_fault_ends_with_130(scene, tmp_path):
+    done = python(_STOPPED_IN_LOOP.format(scene=str(scene), out=str(tmp_path / "out")))
+    assert (done.returncode, done.stderr) == (130, "raychan: interrupted; nothing was written\n")
+
+
 _STOPPED_IN_C = (
     _BESIDE
     + """

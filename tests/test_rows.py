@@ -86,7 +86,9 @@ def test_what_the_second_raises_is_raised():
 
 def test_a_ctrl_c_that_compiled_code_handed_on_as_a_fault_is_one():
     def here() -> None:
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+        inner = SystemError("returned a result with an exception set")
+        inner.__cause__ = KeyboardInterrupt()
+        raise SystemError("returned a result with an exception set") from inner
 
     with pytest.raises(KeyboardInterrupt):
         at_once(here, lambda: None)

@@ -59,6 +59,16 @@ def in_two(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
         other.result()
 
 
+def was_interrupted(failure: BaseException | None) -> bool:
+    """Tell whether a fault of compiled code is a Ctrl-C: one that reaches it while it waits for the interpreter becomes
+    a SystemError, since it gives back a result all the same."""
+    if not isinstance(failure, SystemError):
+        return False
+    while failure is not None and not isinstance(failure, KeyboardInterrupt):
+        failure = failure.__cause__ or failure.__context__
+    return failure is not None
+
+
 def at_once(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
     """Return what two works return, one done by this thread and one by another; neither may call this again.
 
@@ -91,8 +101,7 @@ def at_once(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
         ended.set()
         if other.is_alive():
             other.join()
-        # Compiled code that a Ctrl-C reaches while it waits for the interpreter gives back a result all the same.
-        if isinstance(failure, SystemError) and isinstance(failure.__cause__, KeyboardInterrupt):
+        if was_interrupted(failure):
             raise KeyboardInterrupt from failure
         raise
     finally:
