@@ -18,17 +18,23 @@ def dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
+def _normal(a, b, image, k, far):  # type: ignore[no-untyped-def]
+    """Return a vector normal to the plane through segment ab and the image."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    if far:
+        wx, wy, wz = k[0], k[1], k[2]
+    else:
+        wx, wy, wz = image[0] - a[0], image[1] - a[1], image[2] - a[2]
+    return dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
+
+
+@njit(cache=True, inline="always")
 def pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
     """Write the normals of the planes through the image and a tube's sides, one over the centre's height long, inward;
     return how far the centre lies ahead along k [m]."""
     for e in range(3):
         p, q = corners[e], corners[(e + 1) % 3]
-        sx, sy, sz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        if far:
-            wx, wy, wz = k[0], k[1], k[2]
-        else:
-            wx, wy, wz = image[0] - p[0], image[1] - p[1], image[2] - p[2]
-        x, y, z = sy * wz - sz * wy, sz * wx - sx * wz, sx * wy - sy * wx
+        x, y, z = _normal(p, q, image, k, far)
         whole = (corners[3, 0] - p[0]) * x + (corners[3, 1] - p[1]) * y + (corners[3, 2] - p[2]) * z
         # A tube without width has no inside.
         over = 1.0 / whole if whole != 0.0 else np.nan
@@ -68,12 +74,7 @@ def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped
 def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
     """Write into side (3,) the corners' distances from the plane through the image and segment ab; return whether that
     parts them."""
-    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    if far:
-        wx, wy, wz = k[0], k[1], k[2]
-    else:
-        wx, wy, wz = image[0] - a[0], image[1] - a[1], image[2] - a[2]
-    x, y, z = dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
+    x, y, z = _normal(a, b, image, k, far)
     size = math.sqrt(x * x + y * y + z * z)
     if size == 0.0:
         return False

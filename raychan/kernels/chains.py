@@ -15,6 +15,17 @@ from raychan.kernels.jit import njit
 from raychan.kernels.patch import length_to
 
 
+@njit(cache=True, inline="always", error_model="numpy")
+def _onto(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
+    """Return where the way from a place to an image meets the mirror's plane; the place itself if it never does."""
+    dx, dy, dz = image[0] - x, image[1] - y, image[2] - z
+    over = (at[0] - x) * normal[0] + (at[1] - y) * normal[1] + (at[2] - z) * normal[2]
+    t = over / (dx * normal[0] + dy * normal[1] + dz * normal[2])
+    if not math.isfinite(t):
+        t = 0.0
+    return x + t * dx, y + t * dy, z + t * dz
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _possible(point, size, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
     """Tell whether a ball could be met: in front of the last mirror, and by way of each mirror's circle."""
@@ -28,12 +39,7 @@ def _possible(point, size, images, at, normal, centre, radius):  # type: ignore[
         return False
     x, y, z = point[0], point[1], point[2]
     for i in range(m - 1, -1, -1):
-        dx, dy, dz = images[i + 1, 0] - x, images[i + 1, 1] - y, images[i + 1, 2] - z
-        over = (at[i, 0] - x) * normal[i, 0] + (at[i, 1] - y) * normal[i, 1] + (at[i, 2] - z) * normal[i, 2]
-        t = over / (dx * normal[i, 0] + dy * normal[i, 1] + dz * normal[i, 2])
-        if not math.isfinite(t):
-            t = 0.0
-        x, y, z = x + t * dx, y + t * dy, z + t * dz
+        x, y, z = _onto(x, y, z, images[i + 1], at[i], normal[i])
         # A ray to the ball's rim meets a mirror nearer to the ray to its centre than the ball's radius.
         off = math.sqrt((x - centre[i, 0]) ** 2 + (y - centre[i, 1]) ** 2 + (z - centre[i, 2]) ** 2)
         if not off < radius[i] + size:
@@ -79,12 +85,7 @@ def bounces(points, images, at, normal):  # type: ignore[no-untyped-def]
     for j in range(len(points)):
         x, y, z = points[j, 0], points[j, 1], points[j, 2]
         for i in range(len(at) - 1, -1, -1):
-            dx, dy, dz = images[i + 1, 0] - x, images[i + 1, 1] - y, images[i + 1, 2] - z
-            over = (at[i, 0] - x) * normal[i, 0] + (at[i, 1] - y) * normal[i, 1] + (at[i, 2] - z) * normal[i, 2]
-            t = over / (dx * normal[i, 0] + dy * normal[i, 1] + dz * normal[i, 2])
-            if not math.isfinite(t):
-                t = 0.0
-            x, y, z = x + t * dx, y + t * dy, z + t * dz
+            x, y, z = _onto(x, y, z, images[i + 1], at[i], normal[i])
             out[j, i, 0], out[j, i, 1], out[j, i, 2] = x, y, z
     return out
 

@@ -30,7 +30,7 @@ class Launched:
     window: str
     """Along range, for the profile."""
     told: tuple[Any, Any] | None = None
-    """Samples and response of all paths, where `paths` are not all."""
+    """Samples and response of all paths, where they are known already: always if `paths` are not all."""
 
     @cached_property
     def quiet(self) -> Cube:

@@ -49,13 +49,13 @@ def synthesize(
     elements = sensor.elements_world
     samples = np.zeros((len(elements), wave.n_chirps, wave.n_samples), np.complex64)
     if len(growth):
-        scaled = np.sqrt(sensor.power) * paths.amplitude
-        echoes = Echoes(paths.delay + growth * middle(wave)[0], growth, scaled, paths.arrival)
+        scaled, arrival = np.sqrt(sensor.power) * paths.amplitude, paths.arrival
+        echoes = Echoes(paths.delay + growth * middle(wave)[0], growth, scaled, arrival)
         grids = keystones(echoes, wave, tolerance, float(np.linalg.norm(elements, axis=1).max()) / C0)
         cells = sum(grid.cells for grid, _ in grids) / (wave.n_chirps * wave.n_samples)
         if method == "direct" or (method == "auto" and len(growth) <= _FEW * cells):
             for layer, element in zip(samples, elements, strict=True):
-                later = -(paths.arrival @ element) / C0
+                later = -(arrival @ element) / C0
                 turned = scaled * np.exp(-2j * np.pi * wave.carrier * later)
                 layer[...] = _direct(turned, paths.delay + later, growth, wave)
         else:
