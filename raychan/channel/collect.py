@@ -46,7 +46,7 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
         )  # fmt: skip
         footprints(
             tuple(getattr(tubes, x)[at] for x in ("points", "k", "normals", "length", "facet", "bary")), middle[at],
-            half_way[at], first, shape, out.image, out.far,
+            half_way[at], shape, out.image, out.far,
             tuple(x[at] for x in (points, lengths, length, taper, area, way_out)),
         )  # fmt: skip
 

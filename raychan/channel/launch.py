@@ -102,7 +102,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
         kept.append(tubes.take(ready))
         _write_leg(surface, kept[-1], leg, view.corners[ready], view.passed[ready], rule)
 
-    ph = phases_of(surface, leg, out, tubes, True, rule)
+    ph = phases_of(surface, leg, out, tubes, rule)
     # What returns little by itself may still carry the next bounces.
     rows = found.that_count(ph.area if more else ph.bound, ph.length)
     if len(rows) < len(tubes):
@@ -123,7 +123,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
         keep(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)
         tubes, _ = divide(surface, leg, tubes, rows, s.side, True, rule.jitter)
-        ph = phases_of(surface, leg, out, tubes, True, rule)
+        ph = phases_of(surface, leg, out, tubes, rule)
         known, matters = None, ph.bound > found.doubt(ph.length)
     return Tubes.join(kept)
 

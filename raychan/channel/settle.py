@@ -28,7 +28,7 @@ def settle(
     kept: list[tuple[Tubes, View, Phases]] = []
     rule = found.rule
     for level in range(rule.levels + 1):
-        ph = phases_of(surface, leg, out, tubes, first, rule)
+        ph = phases_of(surface, leg, out, tubes, rule)
         matters = ph.bound > found.doubt(ph.length)
         view = sight(surface, out, tubes, matters, first, rule, level < GAPS)
         cut = matters if level < rule.levels else np.zeros_like(matters)

@@ -73,7 +73,7 @@ def _followed(
             if first and out == leg:
                 corners, passed = same_way_back(some, len(leg.mirrors), rule.layers)
                 if not surface.convex_alone:
-                    found.add(phases_of(surface, leg, out, some, first, rule))
+                    found.add(phases_of(surface, leg, out, some, rule))
             else:
                 some, corners, passed = settle(surface, leg, out, some, found, first)
             if len(some):

@@ -157,7 +157,7 @@ def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floa
         points, _, length, _ = first_rays(
             surface, leg, tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1))
         )
-        return points[:, :3], length[:, :3]
+        return points[:, :3].copy(), length[:, :3].copy()
     p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
     d = np.roll(p, -1, axis=1) - p
     bend = np.einsum("nij,nij->ni", k - np.roll(k, -1, axis=1), d)
@@ -189,7 +189,7 @@ class Phases:
         return Phases(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Phases)})
 
 
-def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, rule: Refinement) -> Phases:
+def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
     """Return the phases of tubes over the way out, and what each can scatter back at most."""
     n, f = len(tubes), surface.facets
     six, bend, (bound, area, rough, way) = np.empty((n, 6)), np.empty((n, 3)), np.empty((4, n))
@@ -200,7 +200,7 @@ def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, r
 
     def some(rows: slice) -> None:
         here, of, to = ([x[rows] for x in arrays] for arrays in (rays, held, written))
-        phases(*(*here, first, *shape, *of, (rule.phase, rule.turn, MOST_BEND), surface.dull, *surface.matter, *to))
+        phases(*(*here, *shape, *of, (rule.phase, rule.turn, MOST_BEND), surface.dull, *surface.matter, *to))
 
     in_two(n, some, _MANY)
     return Phases(six, bend, bound, area, rough, way)

@@ -51,12 +51,21 @@ def _back(p, image, far, k):  # type: ignore[no-untyped-def]
     return size
 
 
+@njit(cache=True, inline="always")
+def _share(w):  # type: ignore[no-untyped-def]
+    """Return the share of its facet that a patch of corners w (3, 3) takes, below 0 where it runs the other way."""
+    share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
+    share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
+    return share + w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
+
+
 @njit(cache=True, nogil=True)
-def footprints(tubes, middle, half_way, bent, facets, image, far, out):  # type: ignore[no-untyped-def]
+def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignore[no-untyped-def]
     """Write how tubes stand on their footprints.
 
-    Args: tubes: points, k, normals (n, 4, 3), length (n, 4), facet (n,), bary (n, 3, 3); middle (n, 3, 3) [m] of the
-    edges and length there half_way (n, 3) [m]; bent, whether facets may still be curved; facets: normal (f, 3),
+    Args: tubes: points, k, normals (n, 4, 3), length (n, 4), facet (n,), bary (n, 3, 3),
+    or (n, 0, 3) once they left their first facet and all are flat; middle (n, 3, 3) [m] of the
+    edges and length there half_way (n, 3) [m]; facets: normal (f, 3),
     vertices and bulge (f, 3, 3), curved (f,); image of the way out's end, or the direction to it when far; out: points
     (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): the mean obliquity times spreading
     at corners over that at the centre, for areas of the flat footprints, zero beyond the terminator; area (n,) and
@@ -65,6 +74,7 @@ def footprints(tubes, middle, half_way, bent, facets, image, far, out):  # type:
     points, k, normals, length, facet, bary = tubes
     facing, vertices, bulge, curved = facets
     six, lengths, whole, taper, area, way_out = out
+    bent = bary.shape[1] == 3
     flat, element = np.empty(3), np.empty(3)
     back_k, back = np.empty((4, 3)), np.empty(4)
     for i in range(len(facet)):
@@ -85,10 +95,7 @@ def footprints(tubes, middle, half_way, bent, facets, image, far, out):  # type:
         area[i] = math.sqrt(size)
         least = max(area[i], 1e-300)
         f = facet[i]
-        w, side = bary[i], 0.0
-        share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
-        share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
-        share += w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
+        side, share = 0.0, _share(bary[i]) if bent else 0.0
         for c in range(3):
             side += facing[f, c] * normals[i, 3, c]
         centre = max(_mean_cosine(normals[i, 3], k[i, 3], back_k[3]), 0.0)
@@ -96,7 +103,7 @@ def footprints(tubes, middle, half_way, bent, facets, image, far, out):  # type:
             centre /= length[i, 3] * back[3]
         for j in range(3):
             if bent and curved[f]:
-                element_of(vertices[f], bulge[f], w[j], element)
+                element_of(vertices[f], bulge[f], bary[i, j], element)
                 strength = _mean_cosine(element, k[i, j], back_k[j]) * (0.5 * abs(share) / least)
                 if side < 0.0:
                     strength = -strength

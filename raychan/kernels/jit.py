@@ -2,7 +2,7 @@
 
 Numba keeps compiled code by the text of the file in which a function stands. What that function calls from other files,
 and the constants it takes from them, are compiled into it all the same: left to itself, numba would go on using them
-as they were.
+as they were. What is kept, and how processes share it, stands in `kernels.kept`.
 """
 
 from __future__ import annotations
@@ -13,22 +13,67 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core.registry import CPUDispatcher
+
+from raychan.kernels.kept import Kept
 
 _CONSTANTS = int, float, complex, str, tuple
+
+KERNELS: list[Kernel] = []  # all that are kept on disk, as their modules are imported
+
+
+class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
+    """A compiled function. Called from Python, it takes frozen arrays as if they could be written to: numba would
+    compile it once more for every mixture of both.
+
+    With bounds checked (NUMBA_BOUNDSCHECK=1) frozen arrays stay frozen, and a kernel that writes to one does not
+    compile.
+    """
+
+    stamp: bytes
+
+    def __call__(self, *args: Any) -> Any:
+        return super().__call__(*args) if numba.config.BOUNDSCHECK else super().__call__(*map(_open, args))
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return numba's `njit` with these options; with `cache`, code is kept as long as no file has changed of the
     compiled functions within reach of this one, nor a constant it may have taken from elsewhere."""
+    keep = options.pop("cache", False)
 
     def compiled(function: Callable[..., Any]) -> Any:
-        made = numba.njit(**options)(function)
-        if options.get("cache"):
-            kept = made._cache._cache_file
-            kept._source_stamp = made.stamp = hashlib.sha256(_within_reach(function, kept._source_stamp)).digest()
+        made: Any = numba.njit(**options)(function)
+        if keep and isinstance(made, CPUDispatcher):  # with NUMBA_DISABLE_JIT it is the function itself
+            made.__class__ = Kernel
+            made._cache = Kept(function)
+            made.stamp = made._cache.stamped(hashlib.sha256(_within_reach(function, made._cache.source)).digest())
+            KERNELS.append(made)
         return made
 
     return compiled
+
+
+def _open(value: Any) -> Any:
+    """Return an argument whose arrays, in tuples or alone, can all be written to, on the same memory."""
+    if type(value) is tuple:
+        return tuple(map(_open, value))
+    if type(value) is not np.ndarray or value.flags.writeable:
+        return value
+    seen = value.view()
+    try:
+        seen.flags.writeable = True
+    except ValueError:  # the memory's owner is frozen itself
+        return np.asarray(_Memory(value))
+    return seen
+
+
+class _Memory:
+    """The memory of an array, without its note that it is frozen."""
+
+    def __init__(self, held: np.ndarray[Any, Any]) -> None:
+        self.held = held
+        how = held.__array_interface__
+        self.__array_interface__ = how | {"data": (how["data"][0], False)}
 
 
 def _within_reach(function: Callable[..., Any], own: Any) -> bytes:

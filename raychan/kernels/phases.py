@@ -14,14 +14,14 @@ from raychan.kernels.patch import distance, length_to, place_on
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def phases(  # type: ignore[no-untyped-def]
-    points, k, length, normals, facet, bary, first, v, b, image, far, antenna, wavenumber, strength, spread, limits,
+    points, k, length, normals, facet, bary, v, b, image, far, antenna, wavenumber, strength, spread, limits,
     dull, material, materials, six, bend, bound, area, rough, way,
 ):  # fmt: skip
     """Write the two-way phases of tubes at corners and mid-edges, and what each tube may scatter.
 
-    Args: first: mid-edges lie on the true surface and are reached straight; else on the chord, with the length by the
-    cubic Hermite rule; antenna of the way out (see `chains.weight`); limits (phase, turn, most_bend) as for
-    `edge_to_cut`; dull (m,) facets whose material (m,), a row of `materials` (kind, eps, thickness, roughness),
+    Args: bary (n, 3, 3): mid-edges lie on the true surface and are reached straight; (n, 0, 3): on the chord, with the
+    length by the cubic Hermite rule; antenna of the way out (see `chains.weight`); limits (phase, turn, most_bend) as
+    for `edge_to_cut`; dull (m,) facets whose material (m,), a row of `materials` (kind, eps, thickness, roughness),
     reflects in part. Written: six (n, 6) [rad], bend (n, 3) [rad], bound and area (n,) [1/m], rough (n,): above 1 where
     phase or normal bend more than a quadratic follows; way (n,) [m] the two-way length.
     """
@@ -29,6 +29,7 @@ def phases(  # type: ignore[no-untyped-def]
     out_image = images[len(mirrors)]
     phase, turn, most_bend = limits
     kind, eps, thickness, roughness = materials
+    first = bary.shape[1] == 3
     middle, look = np.empty(3), np.empty(3)
     for i in range(len(facet)):
         f = facet[i]

@@ -156,7 +156,9 @@ class Tracer:
         facet, distance = np.full(n, _MISS, np.int32), np.full(n, np.inf)
         if not len(self.first) or n == 0:
             return facet, distance
-        begin = np.zeros(n) if start is None else np.asarray(start, float)
+        # Rows that lie apart, as those of one ray in four, would be compiled for by themselves.
+        origin, direction = np.ascontiguousarray(origin), np.ascontiguousarray(direction)
+        begin = np.zeros(n) if start is None else np.ascontiguousarray(start, float)
         casts = []
         for group in self._groups:
             _ = group.mesh.scene

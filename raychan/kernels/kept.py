@@ -1,0 +1,102 @@
+"""Kept: compiled code on disk, which any number of processes write and read at once.
+
+Numba keeps an index beside its data files and picks a data file's name by what the index holds: two processes that
+compile at once leave an index of one with code of the other. Here there is no index. A file's name is made of all that
+its code depends on, it appears whole or not at all, and it says itself what it holds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import pickle
+import platform
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+from numba.core.caching import FunctionCache
+from numba.core.serialize import dumps
+
+# What else compiled code depends on: versions, and numba's switches that change what is generated.
+_SWITCHES = ("BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "LLVM_REFPRUNE_PASS")
+_DIGEST = 32
+
+unkept: list[str] = []  # why compiled code could not be written; empty when all was
+
+
+def _digest(*parts: object) -> bytes:
+    return hashlib.sha256("\n".join(map(repr, parts)).encode()).digest()
+
+
+class Kept(FunctionCache):  # type: ignore[no-any-unimported]
+    """The compiled code of one function, a file a signature."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self.source: Any = self._impl.locator.get_source_stamp()
+        self.folder = Path(self._cache_path)
+        switches = [(name, getattr(numba.config, name, None)) for name in _SWITCHES]
+        how = _digest(numba.__version__, llvmlite.__version__, platform.python_version(), switches)
+        self._base = f"{self._impl.filename_base}.{how.hex()[:8]}"
+        self.stamped(_digest(self.source))
+
+    def stamped(self, stamp: bytes) -> bytes:
+        """Set what the code is made of, and return it; code made of anything else is not used, and cleared."""
+        self._stamp = stamp
+        self._prefix = f"{self._base}.{stamp.hex()[:16]}"
+        return stamp
+
+    def is_there(self) -> bool:
+        """Tell whether code for any signature is kept."""
+        return next(self.folder.glob(f"{self._prefix}.*.code"), None) is not None
+
+    def _file(self, key: object) -> Path:
+        return self.folder / f"{self._prefix}.{_digest(key).hex()[:16]}.code"
+
+    def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        key = self._index_key(sig, target_context.codegen())
+        try:
+            content = self._file(key).read_bytes()
+        except OSError:
+            return None
+        if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
+            return None
+        stamp, of, data = pickle.loads(content[_DIGEST:])
+        return self._impl.rebuild(target_context, data) if (stamp, of) == (self._stamp, key) else None
+
+    def _save_overload(self, sig: Any, data: Any) -> None:
+        if not self._impl.check_cachable(data):
+            return
+        key = self._index_key(sig, data.codegen)
+        content = dumps((self._stamp, key, self._impl.reduce(data)))
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._clear()
+            _write(self._file(key), hashlib.sha256(content).digest() + content)
+        except OSError as reason:
+            # The code runs all the same, and is compiled again the next time.
+            unkept.append(str(reason))
+
+    def _clear(self) -> None:
+        """Remove code that was made of what has changed since."""
+        for file in self.folder.glob(f"{self._base}.*.code"):
+            if not file.name.startswith(f"{self._prefix}."):
+                with contextlib.suppress(OSError):
+                    file.unlink()
+
+
+def _write(file: Path, content: bytes) -> None:
+    """Write a file that appears whole or not at all, whoever else writes it."""
+    stage = file.with_name(f"{file.name}.{uuid.uuid4().hex[:16]}")
+    try:
+        stage.write_bytes(content)
+        os.replace(stage, file)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            stage.unlink()
+        raise
