@@ -18,6 +18,7 @@ from raychan.channel.tubes import Refinement
 from raychan.frames import direction, theta_phi
 from raychan.tables import Facets
 from raychan.units import C0
+from raychan.world.limits import BOUNCES, FREQUENCY, LENGTH, TOLERANCE_DB
 from raychan.world.material import Material, resolve
 from raychan.world.mesh import Mesh
 from raychan.world.meshfile import from_trimesh, load
@@ -238,13 +239,10 @@ def _basis(look: Floats) -> Complexes:
 
 
 def _check(frequency: float, polarization: str, distance: float, tolerance_db: float, bounces: int) -> None:
-    if not (np.isfinite(frequency) and frequency > 0.0):
-        raise ValueError(f"frequency = {frequency!r} Hz: must be above 0")
+    FREQUENCY.check("frequency", frequency)
     if polarization.upper() not in _POLARIZATIONS:
         raise ValueError(f"polarization = {polarization!r}: must be one of {', '.join(_POLARIZATIONS)}")
-    if not distance > 0.0:
-        raise ValueError(f"distance = {distance!r} m: must be above 0, or inf")
-    if not tolerance_db > 0.0:
-        raise ValueError(f"tolerance_db = {tolerance_db!r}: must be above 0")
-    if bounces < 1:
-        raise ValueError(f"max_bounces = {bounces!r}: must be at least 1")
+    if distance != np.inf:
+        LENGTH.check("distance", distance)
+    TOLERANCE_DB.check("tolerance_db", tolerance_db)
+    BOUNCES.check("max_bounces", bounces, whole=True)

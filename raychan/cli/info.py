@@ -85,7 +85,7 @@ def _mesh(mesh: Any, source: Path) -> None:
 
 def _scene(scene: Any) -> None:
     screen = show.console()
-    screen.print(f"[bold]{scene.title}[/]", markup=True)
+    screen.print(scene.title, style="bold", markup=False)
     for made in (_bodies(scene), _parts(scene), *_radar(scene.sensor), *_antennas(scene)):
         screen.print(made)
     show.warn(scene.warnings)

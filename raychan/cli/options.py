@@ -4,19 +4,54 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from raychan.world import limits
+from raychan.world.limits import Limit
+
+
+def within(limit: Limit, whole: bool = False) -> Callable[[Any], Any]:
+    """Return the check of an option's figure; one that is not given, or a command's own, passes."""
+
+    def check(value: Any) -> Any:
+        if value is not None and (problem := limit.problem(value, whole)):
+            raise typer.BadParameter(problem)
+        return value
+
+    return check
+
+
+def meant(limit: Limit, option: str, value: Any, whole: bool = False) -> None:
+    """Raise typer.BadParameter where an option's figure cannot be meant."""
+    try:
+        limit.check(option, value, whole)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
 # typer takes [m] for a style of its own and swallows it: in help, units are words.
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
-Seed = Annotated[int, typer.Option(help="Seed of the noise; equal seeds give equal detections.", min=0)]
+Seed = Annotated[
+    int,
+    typer.Option(help="Seed of the noise; equal seeds give equal detections.", callback=within(limits.SEED, True)),
+]
 Tolerance = Annotated[
     float | None,
-    typer.Option(help="Error in dB to refine the tubes to; the scene's own if not given.", metavar="DB", min=1e-3),
+    typer.Option(
+        help="Error in dB to refine the tubes to; the scene's own if not given.",
+        metavar="DB",
+        callback=within(limits.TOLERANCE_DB),
+    ),
 ]
 MaxBounces = Annotated[
-    int | None, typer.Option(help="Interactions along a path; the scene's own if not given.", metavar="N", min=1)
+    int | None,
+    typer.Option(
+        help="Interactions along a path; the scene's own if not given.",
+        metavar="N",
+        callback=within(limits.BOUNCES, True),
+    ),
 ]
 Changes = Annotated[
     list[str] | None,

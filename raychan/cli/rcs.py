@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
+from raychan.cli.options import meant, within
+from raychan.world import limits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +35,9 @@ def rcs(
     shape: Annotated[
         str | None, typer.Option(help="Built-in shape instead of a mesh: plate, sphere, trihedral, car...")
     ] = None,
-    frequency_ghz: Annotated[float, typer.Option(help="Frequency in GHz.", metavar="GHZ")] = 77.0,
+    frequency_ghz: Annotated[
+        float, typer.Option(help="Frequency in GHz.", metavar="GHZ", callback=within(limits.CARRIER_GHZ))
+    ] = 77.0,
     azimuth: Annotated[
         str,
         typer.Option(help="Azimuth in degrees from target to radar: one, or first:last:step.", metavar="A[:B:STEP]"),
@@ -44,13 +48,19 @@ def rcs(
         str, typer.Option(help="Radar's distance from the target's origin in metres, or inf.", metavar="M")
     ] = "inf",
     material: Annotated[str, typer.Option(help="What all of it is made of, such as pec or glass.")] = "pec",
-    tolerance: Annotated[float, typer.Option(help="Error in dB to refine to.", metavar="DB")] = 0.25,
-    max_bounces: Annotated[int, typer.Option(help="Bounces along a path.", metavar="N")] = 3,
+    tolerance: Annotated[
+        float, typer.Option(help="Error in dB to refine to.", metavar="DB", callback=within(limits.TOLERANCE_DB))
+    ] = 0.25,
+    max_bounces: Annotated[
+        int, typer.Option(help="Bounces along a path.", metavar="N", callback=within(limits.BOUNCES, True))
+    ] = 3,
     unit: Annotated[str, typer.Option(help="Unit of the mesh file: m, cm, mm, inch, ft.")] = "m",
     up: Annotated[
         str | None, typer.Option(help="The file's axis that points up; y for GLB and z else if not given.")
     ] = None,
-    scale: Annotated[float, typer.Option(help="Further factor on the mesh's size.")] = 1.0,
+    scale: Annotated[
+        float, typer.Option(help="Further factor on the mesh's size.", callback=within(limits.SCALE))
+    ] = 1.0,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Write a table to this file.", metavar="FILE.csv")
     ] = None,
@@ -73,6 +83,8 @@ def rcs(
         far = float(distance)
     except ValueError:
         raise typer.BadParameter(f"--distance: '{distance}' is not a number of metres, nor inf") from None
+    if not np.isinf(far):
+        meant(limits.LENGTH, "--distance", far)
     settings: dict[str, Any] = {
         "polarization": polarization,
         "distance": far,
@@ -113,6 +125,8 @@ def angles(text: str, option: str) -> Any:
         numbers = []
     if len(numbers) not in (1, 3) or not np.isfinite(numbers).all():
         raise typer.BadParameter(f"{option}: '{text}' is neither a number of degrees nor first:last:step, as -30:30:1")
+    for number in numbers:
+        meant(limits.ANGLE, option, number)
     if len(numbers) == 1:
         return np.array(numbers)
     first, last, step = numbers

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, within
+from raychan.world import limits
 
 if TYPE_CHECKING:
     from raychan.run.result import Result
@@ -31,12 +32,18 @@ def run(
     frames: Annotated[
         int | None,
         typer.Option(
-            help="Simulate a sequence of N frames: poses advance by velocities and turn rates.", metavar="N", min=1
+            help="Simulate a sequence of N frames: poses advance by velocities and turn rates.",
+            metavar="N",
+            callback=within(limits.FRAMES, True),
         ),
     ] = None,
     frame_interval: Annotated[
         float | None,
-        typer.Option(help="Seconds from frame to frame; without pause if not given.", metavar="S", min=1e-9),
+        typer.Option(
+            help="Seconds from frame to frame; without pause if not given.",
+            metavar="S",
+            callback=within(limits.INTERVAL),
+        ),
     ] = None,
 ) -> None:
     """Simulate a scene: paths, power-delay profile, I/Q cube, range-Doppler map, detections.

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
+from raychan.cli.options import within
+from raychan.world import limits
 
 if TYPE_CHECKING:
     from raychan.study.validation.validate import Validation
@@ -27,7 +29,13 @@ def validate(
         ),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option("--tolerance", help="Error of the launches to aim at, in dB.", metavar="DB")
+        float,
+        typer.Option(
+            "--tolerance",
+            help="Error of the launches to aim at, in dB.",
+            metavar="DB",
+            callback=within(limits.TOLERANCE_DB),
+        ),
     ] = 1.0,
     data: Annotated[
         Path | None,

@@ -23,13 +23,16 @@ def window(name: str, n: int) -> Floats:
     Args: name one of NAMES; taylor and chebyshev take a side-lobe level in dB: "taylor(40)".
     Raises: ValueError on an unknown name. Source: Harris 1978.
     """
-    match = re.fullmatch(r"(\w+)(?:\(([\d.]+)\))?", name)
+    match = re.fullmatch(r"([a-z]+)(?:\((\d+(?:\.\d*)?)\))?", name)
     kind = match[1] if match else ""
-    if kind not in NAMES or (match and match[2] and kind not in _SIDE_LOBE):
-        raise ValueError(f"window {name!r}: must be one of {', '.join(NAMES)}; taylor and chebyshev may name their dB")
+    level = float(match[2]) if match and match[2] else _SIDE_LOBE.get(kind, 0.0)
+    if kind not in NAMES or (match and match[2] and not (kind in _SIDE_LOBE and 10.0 <= level <= 200.0)):
+        raise ValueError(
+            f"window {name!r}: must be one of {', '.join(NAMES)}; taylor and chebyshev may name their side lobes, as "
+            "taylor(40), from 10 to 200 dB"
+        )
     if n == 1 or kind == "rect":
         return np.ones(n)
-    level = float(match[2]) if match and match[2] else _SIDE_LOBE.get(kind, 0.0)
     made: Any
     if kind == "taylor":
         made = scipy_windows.taylor(n, _TAYLOR_NBAR, level)

@@ -59,6 +59,8 @@ def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_
     weakest = noise * undb(settings.min_snr_db) if noise > 0.0 else peak(paths, everything, sensor, settings) * 1e-8
     limit = float(weakest) * (10.0 ** (tolerance_db / 20.0) - 1.0) ** 2
     why, chosen = [], []
+    if limit == 0.0:
+        return Choice(1, 0, False, ("nothing returns, and no noise is there to measure it by: nothing is needed",))
     for name, count, least in (
         ("interactions", interactions(paths), 1),
         ("thin layers passed", layers(paths), 0),

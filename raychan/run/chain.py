@@ -33,6 +33,7 @@ from raychan.run.spread import claimed, launch_share, motion, without
 from raychan.signal.cube import noisy, synthesize
 from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler, Routes
 from raychan.units import C0
+from raychan.world.limits import BOUNCES, SEED, TOLERANCE_DB
 from raychan.world.scene import Scene
 
 Progress = Callable[[str, float], None]
@@ -90,16 +91,17 @@ def simulate(
     max_bounces override the scene's; progress is told how far each stage is.
     Returns: Result. Raises: ValueError on a tolerance or a number of bounces out of range.
     """
+    SEED.check("seed", seed, whole=True)
     clock = Clock(progress)
     return result_of(scene, trace(scene, tolerance_db, max_bounces, clock), seed, clock)
 
 
 def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clock: Clock) -> Channel:
     """Return the channel of a scene; arguments and errors as those of `simulate`."""
-    if tolerance_db is not None and not tolerance_db > 0.0:
-        raise ValueError(f"tolerance_db = {tolerance_db:g}: must be positive")
-    if max_bounces is not None and max_bounces < 1:
-        raise ValueError(f"max_bounces = {max_bounces}: must be at least 1")
+    if tolerance_db is not None:
+        TOLERANCE_DB.check("tolerance_db", tolerance_db)
+    if max_bounces is not None:
+        BOUNCES.check("max_bounces", max_bounces, whole=True)
     sensor, settings = scene.sensor, scene.processing
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
     model = _changed(scene.model, changes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 import shutil
 from collections.abc import Callable, Iterator
@@ -18,6 +17,7 @@ from raychan.run.chain import Channel, Clock, Progress, result_of, trace
 from raychan.run.files import StoreError, staging
 from raychan.run.result import Result
 from raychan.run.store import COLUMNS, rows, save_result
+from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
 
 HEAD = ("frame", "time_s", *COLUMNS)
@@ -52,11 +52,10 @@ def frames(
     as for `simulate`. A scene in which nothing moves relative to the radar is traced once.
     Raises: ValueError on a count, an interval or an override out of range; SceneError where the radar runs into a body.
     """
-    if count < 1:
-        raise ValueError(f"count = {count}: must be at least 1")
+    FRAMES.check("count", count, whole=True)
+    SEED.check("seed", seed, whole=True)
     step = scene.sensor.waveform.frame_duration if interval is None else interval
-    if not (math.isfinite(step) and step > 0.0):
-        raise ValueError(f"interval = {step:g} s: must be positive and finite")
+    INTERVAL.check("interval", step)
     for k in range(count):
         scene.at(k * step)  # a radar that would run into a body is told before the first frame is computed
     return _frames(scene, count, step, seed, tolerance_db, max_bounces, progress)

@@ -13,8 +13,9 @@ import numpy as np
 
 from raychan.tables import BLOCKER, MIRROR, SCATTERER
 from raychan.units import undb
-from raychan.world import shapes
-from raychan.world.errors import SceneError, nearest
+from raychan.world import limits, shapes
+from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
 from raychan.world.meshfile import from_trimesh, load
@@ -78,16 +79,24 @@ class Body:
     @cached_property
     def motion(self) -> Motion:
         """Pose at time 0 and rates."""
-        x, y, z = map(float, self.position)
-        u, v, w = map(float, self.velocity)
-        angles = np.radians([self.yaw_deg, self.pitch_deg, self.roll_deg, self.turn_rate_dps, *self.spin_dps])
-        values = [x, y, z, u, v, w, *angles]
-        if not np.isfinite(values).all():
-            raise SceneError(
-                "pose or motion holds NaN or infinity", key=self.name, value=values, allowed="finite numbers"
-            )
-        yaw, pitch, roll, turn, *spin = map(float, angles)
+        x, y, z = self._numbers("position", limits.PLACE, 3)
+        u, v, w = self._numbers("velocity", limits.SPEED, 3)
+        angles = [self._numbers(name, limits.ANGLE)[0] for name in ("yaw_deg", "pitch_deg", "roll_deg")]
+        turns = *self._numbers("turn_rate_dps", limits.TURN), *self._numbers("spin_dps", limits.TURN, 3)
+        yaw, pitch, roll, turn, *spin = map(float, np.radians([*angles, *turns]))
         return Motion((x, y, z), yaw, pitch, roll, (u, v, w), turn, (spin[0], spin[1], spin[2]))
+
+    def _numbers(self, name: str, limit: Limit, count: int = 1) -> list[float]:
+        """Return a field as so many numbers; SceneError where they are not, or cannot be meant."""
+        value = getattr(self, name)
+        try:
+            found = [float(x) for x in np.atleast_1d(np.asarray(value, float)).ravel()]
+        except (TypeError, ValueError):
+            found = []
+        if len(found) != count or not all(map(limit.allows, found)):
+            allowed = limit.allowed if count == 1 else f"{count} numbers, each {limit.allowed}"
+            raise SceneError(f"{shown(value)} is not possible", key=f"{self.name}.{name}", value=value, allowed=allowed)
+        return found
 
     @property
     def moves(self) -> bool:

@@ -25,6 +25,10 @@ def parsed(text: str, file: Any = None) -> dict[str, Any]:
         found = re.search(r"line (\d+)", str(e))
         line = int(found[1]) if found else len(text.splitlines())
         raise SceneError(f"not valid TOML: {e}", file=file, line=line, allowed="TOML 1.0") from None
+    except ValueError as e:  # a number of too many digits, a date that is none
+        raise SceneError(f"not valid TOML: {e}", file=file, allowed="TOML 1.0") from None
+    except RecursionError:
+        raise SceneError("tables or lists nested too deep", file=file, allowed="a few levels") from None
 
 
 def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -> dict[str, Any]:
@@ -76,5 +80,5 @@ def _value(text: str) -> Any:
     """Return a TOML value; what is none is text."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text

@@ -43,3 +43,12 @@ def nearest(word: str, known: Iterable[str]) -> str:
     names = sorted(map(str, known))
     close = get_close_matches(word, names, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'?" if close else "one of " + ", ".join(names)
+
+
+def shown(value: Any) -> str:
+    """Return a value as messages show it, cut where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes no whole number of more than 4300 digits
+        return "a number of thousands of digits"
+    return text if len(text) <= 80 else f"{text[:60]}... ({len(text)} characters)"

@@ -15,6 +15,9 @@ from raychan.tables import HALF_SPACE, LAYER, Materials
 from raychan.tables import PEC as KIND_PEC
 from raychan.units import EPS0
 from raychan.world.errors import SceneError, nearest
+from raychan.world.limits import EPS_R, ROUGHNESS_MM, SIGMA, THICKNESS_MM
+
+_ROUGHNESS, _THICKNESS = ROUGHNESS_MM.times(1e-3, "m"), THICKNESS_MM.times(1e-3, "m")
 
 
 @dataclass(frozen=True)
@@ -35,22 +38,10 @@ class Material:
     source: str = ""
 
     def __post_init__(self) -> None:
-        for key, value, least in (
-            ("eps_r", self.eps_r, 1.0),
-            ("sigma", self.sigma, 0.0),
-            ("roughness", self.roughness, 0.0),
-        ):
-            if not (np.isfinite(value) and value >= least):
-                raise SceneError(
-                    f"{value!r} is not possible", key=key, value=value, allowed=f"a number from {least:g} up"
-                )
-        if self.thickness is not None and not (np.isfinite(self.thickness) and self.thickness > 0.0):
-            raise SceneError(
-                f"{self.thickness!r} is not possible",
-                key="thickness",
-                value=self.thickness,
-                allowed="above 0 m, or none",
-            )
+        for key, limit in (("eps_r", EPS_R), ("sigma", SIGMA), ("roughness", _ROUGHNESS), ("thickness", _THICKNESS)):
+            value = getattr(self, key)
+            if not (limit.allows(value) if value is not None else key == "thickness"):
+                raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=limit.allowed)
 
     @property
     def kind(self) -> int:

@@ -10,8 +10,9 @@ import numpy as np
 
 from raychan.units import watt
 from raychan.world import edit
+from raychan.world.checked import checked
 from raychan.world.errors import SceneError, nearest
-from raychan.world.schema import AntennaTable, RadarTable, checked
+from raychan.world.schema import AntennaTable, RadarTable
 
 
 def sensor_of(table: RadarTable, folder: Path, file: Any = None) -> Any:

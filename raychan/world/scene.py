@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 from raychan.tables import LAYER, MIRROR, Facets, Points
 from raychan.world import check, edit
 from raychan.world.body import Body
+from raychan.world.checked import checked
 from raychan.world.errors import SceneError, nearest
 from raychan.world.joints import Joints
+from raychan.world.limits import FREQUENCY
 from raychan.world.made import body_of, material_of
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.mount import sensor_of
 from raychan.world.placed import placed, stack
-from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile, checked
+from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile
 from raychan.world.still import Still
 
 __all__ = ["Body", "Scene", "SceneError"]
@@ -58,8 +60,10 @@ class Scene:
         self.model: Model = checked(Model, model or Model(), path)
         carrier = self.radar.waveform.carrier_ghz * 1e9 if self.radar else 77e9
         self.frequency = carrier if frequency is None else float(frequency)
-        if not (np.isfinite(self.frequency) and self.frequency > 0.0):
-            raise SceneError(f"{frequency!r} is not possible", key="frequency", value=frequency, allowed="above 0 Hz")
+        if not FREQUENCY.allows(self.frequency):
+            raise SceneError(
+                f"{frequency!r} is not possible", key="frequency", value=frequency, allowed=FREQUENCY.allowed
+            )
         self.materials = dict(materials or {})
         self._data: dict[str, Any] | None = None
         self._tables: Sequence[BodyTable] = ()

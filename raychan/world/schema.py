@@ -4,17 +4,47 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from raychan.world.errors import SceneError, nearest
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
-Count = Annotated[int, Field(strict=True, ge=1)]
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Pair = Annotated[tuple[Number, Number], Field(strict=False)]
-CountPair = tuple[Annotated[int, Field(strict=True, ge=0)], Annotated[int, Field(strict=True, ge=0)]]
+from raychan.world.figures import (
+    Angle,
+    Bandwidth,
+    Beam,
+    Bearing,
+    Bounces,
+    Carrier,
+    CellPair,
+    Chirps,
+    Conductivity,
+    Crease,
+    Gain,
+    Layers,
+    Level,
+    Loss,
+    Noise,
+    Offset,
+    Pad,
+    Permittivity,
+    Pfa,
+    Place,
+    Power,
+    Ramp,
+    Rcs,
+    Roughness,
+    Row,
+    Samples,
+    Scale,
+    Snr,
+    Spacing,
+    Speed,
+    Spin,
+    Thickness,
+    Tolerance,
+    Tracings,
+    Turn,
+    Window,
+)
+from raychan.world.limits import ROW_WAVELENGTHS
 
 
 class Table(BaseModel):
@@ -27,18 +57,18 @@ class Header(Table):
     """[scene]"""
 
     title: str = ""
-    frequency_ghz: Positive | None = None
+    frequency_ghz: Carrier | None = None
     """Frequency of the materials; default the radar's carrier, or 77 GHz without a radar."""
 
 
 class PublishedTable(Table):
     """[published] of an antenna: what its source prints of it; `raychan info` sets it beside the computed figures."""
 
-    gain_dbi: Number | None = None
-    hpbw_h_deg: Number | None = None
-    hpbw_v_deg: Number | None = None
-    sll_h_db: Number | None = None
-    sll_v_db: Number | None = None
+    gain_dbi: Gain | None = None
+    hpbw_h_deg: Beam | None = None
+    hpbw_v_deg: Beam | None = None
+    sll_h_db: Level | None = None
+    sll_v_db: Level | None = None
 
 
 class AntennaTable(Table):
@@ -47,19 +77,19 @@ class AntennaTable(Table):
     kind: Literal["isotropic", "cosine", "array", "measured"]
     source: str = ""
     published: PublishedTable | None = None
-    gain_dbi: Number | None = None
+    gain_dbi: Gain | None = None
     """At boresight; the loss follows."""
-    loss_db: Number | None = None
+    loss_db: Loss | None = None
     """Default 0 dB."""
-    hpbw_h_deg: Positive | None = None
-    hpbw_v_deg: Positive | None = None
-    ny: Count = 1
-    nz: Count = 1
-    spacing_y: Positive = 0.5
+    hpbw_h_deg: Beam | None = None
+    hpbw_v_deg: Beam | None = None
+    ny: Row = 1
+    nz: Row = 1
+    spacing_y: Spacing = 0.5
     """Wavelengths."""
-    spacing_z: Positive = 0.5
-    taper_y: str = "rect"
-    taper_z: str = "rect"
+    spacing_z: Spacing = 0.5
+    taper_y: Window = "rect"
+    taper_z: Window = "rect"
     element: AntennaTable | None = None
     """Default: isotropic ahead."""
     front: bool = False
@@ -77,6 +107,8 @@ class AntennaTable(Table):
             raise ValueError("hpbw_h_deg and hpbw_v_deg for kind = 'cosine'")
         if self.kind == "measured" and self.file is None:
             raise ValueError("file for kind = 'measured'")
+        if max(self.ny * self.spacing_y, self.nz * self.spacing_z) > ROW_WAVELENGTHS:
+            raise ValueError(f"elements times spacing at most {ROW_WAVELENGTHS:g} wavelengths, along y and z")
         return self
 
 
@@ -92,42 +124,44 @@ _OF_ANY = {"kind", "source", "published", "gain_dbi", "loss_db"}
 class WaveformTable(Table):
     """[radar.waveform]"""
 
-    carrier_ghz: Positive = 77.0
+    carrier_ghz: Carrier = 77.0
     """At the start of the sampled ramp."""
-    bandwidth_mhz: Positive
+    bandwidth_mhz: Bandwidth
     """Swept while sampling."""
-    chirp_us: Positive
+    chirp_us: Ramp
     """Sampled time of a ramp."""
-    repetition_us: Positive | None = None
+    repetition_us: Ramp | None = None
     """From ramp to ramp; default chirp_us."""
-    chirps: Count = 128
-    samples: Count = 256
+    chirps: Chirps = 128
+    samples: Samples = 256
     iq: bool = True
 
     @model_validator(mode="after")
     def _fits(self) -> WaveformTable:
         if self.repetition_us is not None and self.repetition_us < self.chirp_us * (1.0 - 1e-9):
             raise ValueError("repetition_us not shorter than chirp_us")
+        if self.bandwidth_mhz >= 1e3 * self.carrier_ghz:
+            raise ValueError(f"bandwidth_mhz below the carrier of {self.carrier_ghz:g} GHz")
         return self
 
 
 class RadarTable(Table):
     """[radar]"""
 
-    position: Vector = [0.0, 0.0, 0.5]
-    yaw_deg: Number = 0.0
-    pitch_deg: Number = 0.0
-    roll_deg: Number = 0.0
-    velocity_mps: Vector = [0.0, 0.0, 0.0]
-    power_dbm: Number = 12.0
-    noise_figure_db: NotNegative = 15.0
+    position: Place = [0.0, 0.0, 0.5]
+    yaw_deg: Angle = 0.0
+    pitch_deg: Angle = 0.0
+    roll_deg: Angle = 0.0
+    velocity_mps: Speed = [0.0, 0.0, 0.0]
+    power_dbm: Power = 12.0
+    noise_figure_db: Noise = 15.0
     noise: bool = True
     antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
     """Of transmitter and receiver; a text names an antenna file, relative to the scene's."""
     tx_antenna: str | AntennaTable | None = None
     rx_antenna: str | AntennaTable | None = None
     polarization: Literal["V", "H"] = "V"
-    elements_mm: Annotated[list[Vector], Field(min_length=1)] = [[0.0, 0.0, 0.0]]
+    elements_mm: Annotated[list[Offset], Field(min_length=1, max_length=4096)] = [[0.0, 0.0, 0.0]]
     """Receiver phase centres in the antenna's frame."""
     waveform: WaveformTable
 
@@ -135,16 +169,16 @@ class RadarTable(Table):
 class Processing(Table):
     """[processing]: what the receiver does."""
 
-    range_window: str = "hann"
-    rate_window: str = "hann"
-    pad: CountPair = (2, 2)
+    range_window: Window = "hann"
+    rate_window: Window = "hann"
+    pad: tuple[Pad, Pad] = (2, 2)
     """Zero padding along range and range rate, as a multiple of the samples."""
     cfar: Literal["ca", "os"] = "os"
-    pfa: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] = 1e-7
-    min_snr_db: Number = 20.0
-    guard: CountPair | None = None
+    pfa: Pfa = 1e-7
+    min_snr_db: Snr = 20.0
+    guard: CellPair | None = None
     """Cells along range and range rate; none: the detector's own choice."""
-    train: CountPair | None = None
+    train: CellPair | None = None
 
 
 class Model(Table):
@@ -152,10 +186,10 @@ class Model(Table):
 
     mode: Literal["physical", "auto"] = "physical"
     """physical: all that max_bounces and max_transmissions allow; auto: of these only what tolerance_db needs."""
-    max_bounces: Annotated[int, Field(strict=True, ge=1, le=12)] = 3
-    tolerance_db: Positive = 0.5
-    max_transmissions: Annotated[int, Field(strict=True, ge=0, le=16)] = 4
-    retrace: Literal["auto"] | Count = "auto"
+    max_bounces: Bounces = 3
+    tolerance_db: Tolerance = 0.5
+    max_transmissions: Layers = 4
+    retrace: Literal["auto"] | Tracings = "auto"
     """How often a frame is traced; auto: if bodies turn, as often as tolerance_db needs; 1: once, and paths keep the
     rates of the frame's start; more: so often, and all that moves is carried on in between."""
     diffraction: bool = False
@@ -165,11 +199,11 @@ class Model(Table):
 class MaterialTable(Table):
     """[materials.NAME]"""
 
-    eps_r: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1.0)] = 1.0
-    sigma: NotNegative = 0.0
+    eps_r: Permittivity = 1.0
+    sigma: Conductivity = 0.0
     """S/m."""
-    thickness_mm: Positive | None = None
-    roughness_mm: NotNegative = 0.0
+    thickness_mm: Thickness | None = None
+    roughness_mm: Roughness = 0.0
     pec: bool = False
     source: str = ""
 
@@ -177,7 +211,7 @@ class MaterialTable(Table):
 class BodyTable(Table):
     """[[bodies]]"""
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[^.\s]+$")]
+    name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^.\s\p{C}]+$")]
     shape: str | None = None
     params: dict[str, Any] = {}
     """Parameters of the shape [m]."""
@@ -185,22 +219,22 @@ class BodyTable(Table):
     unit: str = "m"
     up: str | None = None
     forward: str | None = None
-    scale: Positive = 1.0
-    crease_deg: Annotated[float, Field(strict=True, ge=0.0, le=180.0)] = 20.0
+    scale: Scale = 1.0
+    crease_deg: Crease = 20.0
     material: str | None = None
     materials: dict[str, str] = {}
     """By part; names may hold * and ?."""
-    position: Vector = [0.0, 0.0, 0.0]
-    yaw_deg: Number = 0.0
-    pitch_deg: Number = 0.0
-    roll_deg: Number = 0.0
-    velocity_mps: Vector = [0.0, 0.0, 0.0]
-    turn_rate_dps: Number = 0.0
-    spin_dps: Vector = [0.0, 0.0, 0.0]
+    position: Place = [0.0, 0.0, 0.0]
+    yaw_deg: Angle = 0.0
+    pitch_deg: Angle = 0.0
+    roll_deg: Angle = 0.0
+    velocity_mps: Speed = [0.0, 0.0, 0.0]
+    turn_rate_dps: Turn = 0.0
+    spin_dps: Spin = [0.0, 0.0, 0.0]
     """About the body's own axes, as of a wheel: about its origin."""
-    rcs_dbsm: Number | Annotated[list[Pair], Field(min_length=2)] | None = None
+    rcs_dbsm: Rcs | Annotated[list[Bearing], Field(min_length=2)] | None = None
     """Makes the body a point target: a figure, or [azimuth_deg, dBsm] pairs seen from its heading."""
-    rcs_point: Vector | None = None
+    rcs_point: Place | None = None
     """Where it stands, body frame; default the middle of the body."""
     role: Literal["scatterer", "mirror", "blocker"] | None = None
 
@@ -220,64 +254,3 @@ class SceneFile(Table):
     model: Model = Model()
     materials: dict[str, MaterialTable] = {}
     bodies: list[BodyTable] = []
-
-
-def checked(kind: type[Any], data: Any, file: Any = None) -> Any:
-    """Return `data` checked as a table of `kind`; SceneError for the first thing that is wrong."""
-    try:
-        return kind.model_validate(data)
-    except ValidationError as e:
-        raise _explained(kind, data, e, file) from None
-
-
-def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: Any) -> SceneError:
-    # Unknown keys first: a misspelt key also makes its right spelling missing.
-    found = sorted(error.errors(), key=_weight)[0]
-    loc, value = found["loc"], found.get("input")
-    key = _dotted(loc, data, found["type"] in ("missing", "extra_forbidden"))
-    if found["type"] == "extra_forbidden":
-        known = _table_at(kind, loc[:-1]).model_fields
-        return SceneError(
-            f"unknown key '{loc[-1]}'", file=file, key=key, value=value, allowed=nearest(str(loc[-1]), known)
-        )
-    message = found["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    if found["type"] == "missing":
-        return SceneError("key is missing", file=file, key=key, allowed="a value")
-    if found["type"] == "value_error":
-        return SceneError("keys do not fit together", file=file, key=key, value=value, allowed=message)
-    return SceneError(f"{value!r} is not possible", file=file, key=key, value=value, allowed=message)
-
-
-def _weight(found: Any) -> tuple[bool, bool, int]:
-    # Of a union's branches, the one of the right type says more than that the other is of the wrong one.
-    return found["type"] != "extra_forbidden", found["type"].endswith("_type"), -len(found["loc"])
-
-
-def _table_at(kind: type[BaseModel], loc: tuple[Any, ...]) -> type[BaseModel]:
-    at: type[BaseModel] = kind
-    for step in loc:
-        # Steps that are no field (indices, names of materials, branches of a union) stay in or lead to the table.
-        if isinstance(step, str) and step in at.model_fields:
-            inner = _tables_in(at.model_fields[step].annotation)
-            at = inner[0] if inner else at
-    return at
-
-
-def _tables_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [t for part in getattr(annotation, "__args__", ()) for t in _tables_in(part)]
-
-
-def _dotted(loc: tuple[Any, ...], data: Any, whole: bool) -> str:
-    """Return the key as people write it: bodies by name, no branches of unions; `whole` if its end may be absent."""
-    words: list[str] = []
-    for step in loc:
-        if isinstance(data, list) and isinstance(step, int) and step < len(data):
-            data = data[step]
-            name = data.get("name") if isinstance(data, dict) else None
-            words.append(str(name if isinstance(name, str) else step))
-        elif isinstance(data, dict) and (step in data or (whole and step == loc[-1])):
-            data = data.get(step)
-            words.append(str(step))
-    return ".".join(words)

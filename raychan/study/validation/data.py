@@ -13,8 +13,9 @@ from pydantic import Field
 
 import raychan
 from raychan.world import edit
+from raychan.world.checked import checked
 from raychan.world.errors import SceneError
-from raychan.world.schema import Table, checked
+from raychan.world.schema import Table
 
 HERE = Path(raychan.__file__).parents[1] / "validation"
 """Where the data stand in a checkout."""

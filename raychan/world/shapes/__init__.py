@@ -6,7 +6,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from raychan.world.errors import SceneError, nearest
+from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.limits import HOOPS, LENGTH, SAG
 from raychan.world.mesh import Mesh
 from raychan.world.shapes.basic import box, cylinder, dihedral, ground, plate, sphere, trihedral
 from raychan.world.shapes.pedestrian import pedestrian
@@ -38,17 +39,20 @@ def build(name: str, params: dict[str, Any] | None = None) -> Mesh:
         number = (isinstance(default, (int, float)) and not isinstance(default, bool)) or default is None
         if number and (isinstance(value, bool) or not isinstance(value, (int, float))):
             raise SceneError(f"{value!r} is not a number", key=key, value=value, allowed="a number [m]")
-        if number and not 0.0 <= value < float("inf"):
-            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a positive number [m]")
-        if number and value == 0.0 and default != 0.0 and key not in ("arm",):
-            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a positive number [m]")
+        may_be_none = value == 0.0 and (default == 0.0 or key == "arm")
+        limit = SAG if key == "max_sag" else HOOPS if key == "hoops" else LENGTH
+        if number and not may_be_none and not limit.allows(value):
+            allowed = f"a positive number, {limit.allowed}"
+            raise SceneError(f"{shown(value)} is not possible", key=key, value=value, allowed=allowed)
+        if isinstance(default, int) and not isinstance(default, bool) and not isinstance(value, int):
+            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a whole number")
         if not number and not isinstance(value, type(default)):
             raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=type(default).__name__)
     try:
         return make(**given)
     except SceneError:
         raise
-    except (ValueError, ArithmeticError, IndexError, StopIteration) as e:
+    except (ValueError, TypeError, ArithmeticError, IndexError, StopIteration) as e:
         raise SceneError(f"'{name}' cannot be built with these sizes ({e})", key="shape", value=given) from e
 
 

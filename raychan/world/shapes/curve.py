@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
+
+_MOST = 2048  # chords of an arc: a ball of so many has four million facets
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,9 @@ def steps(radius: float, angle: float, sag: float) -> int:
     if radius <= 0.0 or angle == 0.0:
         return 1
     half = np.arccos(max(1.0 - sag / radius, np.cos(np.pi / 12)))
+    if abs(angle) > 2.0 * half * _MOST:
+        problem = f"an arc of radius {radius:g} m would need more than {_MOST} chords to keep to {sag:g} m"
+        raise SceneError(problem, key="max_sag", value=sag, allowed="a larger max_sag, or a smaller body")
     return max(1, int(np.ceil(abs(angle) / (2.0 * half) - 1e-9)))
 
 

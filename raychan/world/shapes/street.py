@@ -45,6 +45,8 @@ def guard_rail(length: float = 8.0, height: float = 0.75, material: str = "metal
     front = Curve(np.stack([y + 0.5 * deep, height - tall + tall * u], axis=1), normal)
     back = Curve(front.points[::-1] + np.array([sheet, 0.0]), -normal[::-1])
     made.add("beam", material, _extruded(front, back, length))
+    if length > 10_000.0:
+        raise ValueError("a rail of more than 10 km has too many posts")
     posts = np.linspace(-0.5 * length + 0.3, 0.5 * length - 0.3, max(2, int(length // 2.0)))
     for x in posts:
         made.add("posts", material, block((x - 0.05, deep - 0.01, 0.0), (x + 0.05, deep + 0.1, height)))

@@ -1,0 +1,70 @@
+"""Tables checked by their schema: what pydantic found, said in the words of a scene file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from raychan.world.errors import SceneError, nearest, shown
+
+
+def checked(kind: type[Any], data: Any, file: Any = None) -> Any:
+    """Return `data` checked as a table of `kind`; SceneError for the first thing that is wrong."""
+    try:
+        return kind.model_validate(data)
+    except ValidationError as e:
+        raise _explained(kind, data, e, file) from None
+
+
+def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: Any) -> SceneError:
+    # Unknown keys first: a misspelt key also makes its right spelling missing.
+    found = sorted(error.errors(), key=_weight)[0]
+    loc, value = found["loc"], found.get("input")
+    key = _dotted(loc, data, found["type"] in ("missing", "extra_forbidden"))
+    if found["type"] == "extra_forbidden":
+        known = _table_at(kind, loc[:-1]).model_fields
+        return SceneError(
+            f"unknown key '{loc[-1]}'", file=file, key=key, value=value, allowed=nearest(str(loc[-1]), known)
+        )
+    message = found["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    if found["type"] == "missing":
+        return SceneError("key is missing", file=file, key=key, allowed="a value")
+    if found["type"] == "value_error":
+        return SceneError("keys do not fit together", file=file, key=key, value=value, allowed=message)
+    return SceneError(f"{shown(value)} is not possible", file=file, key=key, value=value, allowed=message)
+
+
+def _weight(found: Any) -> tuple[bool, bool, int]:
+    # Of a union's branches, the one of the right type says more than that the other is of the wrong one.
+    return found["type"] != "extra_forbidden", found["type"].endswith("_type"), -len(found["loc"])
+
+
+def _table_at(kind: type[BaseModel], loc: tuple[Any, ...]) -> type[BaseModel]:
+    at: type[BaseModel] = kind
+    for step in loc:
+        # Steps that are no field (indices, names of materials, branches of a union) stay in or lead to the table.
+        if isinstance(step, str) and step in at.model_fields:
+            inner = _tables_in(at.model_fields[step].annotation)
+            at = inner[0] if inner else at
+    return at
+
+
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [t for part in getattr(annotation, "__args__", ()) for t in _tables_in(part)]
+
+
+def _dotted(loc: tuple[Any, ...], data: Any, whole: bool) -> str:
+    """Return the key as people write it: bodies by name, no branches of unions; `whole` if its end may be absent."""
+    words: list[str] = []
+    for step in loc:
+        if isinstance(data, list) and isinstance(step, int) and step < len(data):
+            data = data[step]
+            name = data.get("name") if isinstance(data, dict) else None
+            words.append(str(name if isinstance(name, str) else step))
+        elif isinstance(data, dict) and (step in data or (whole and step == loc[-1])):
+            data = data.get(step)
+            words.append(str(step))
+    return ".".join(words)
