@@ -27,7 +27,7 @@ _HOME = {
     "PEC": "raychan.world.material",
     "simulate": "raychan.run.chain",
     "Result": "raychan.run.result",
-    "explain": "raychan.run.provenance",
+    "explain": "raychan.run.explain",
     "load_result": "raychan.run.store",
     "rcs": "raychan.channel.rcs",
     "specular_paths": "raychan.channel.specular",

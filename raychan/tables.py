@@ -26,6 +26,7 @@ Ints = NDArray[np.signedinteger[Any]]
 NONE, REFLECT, TRANSMIT, SCATTER, POINT, DIFFRACT = 0, 1, 2, 3, 4, 5
 KIND_LETTERS = ("", "R", "T", "S", "P", "D")
 """Reflect at a mirror, transmit a thin layer, scatter by physical optics, point target of given RCS, diffract."""
+KIND_WORDS = ("", "reflect", "pass", "scatter", "point", "diffract")
 
 # What a material is to a wave.
 PEC, HALF_SPACE, LAYER = 0, 1, 2

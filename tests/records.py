@@ -6,7 +6,7 @@ import numpy as np
 
 from raychan.radar.waveform import Waveform
 from raychan.run.provenance import provenance
-from raychan.run.result import Receiver, Result
+from raychan.run.result import ExplainedDetections, Receiver, Result
 from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
 from raychan.units import C0
 
@@ -71,7 +71,7 @@ def result(p: Paths, where, text: str = "") -> Result:
     cube = Cube(samples=np.zeros((1, 64, 128), np.complex64), noise_power=1e-12)
     why = provenance(p, rdmap, found, receiver(), 0.01 * power)
     return Result(
-        p, profile, cube, rdmap, found, why, receiver(), seed=3, timings={"trace": 0.5},
+        p, profile, cube, rdmap, ExplainedDetections.of(found, why), why, receiver(), seed=3, timings={"trace": 0.5},
         error=MapError(power=0.01 * power), ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text,
         path="street.toml" if text else "",
     )  # fmt: skip

@@ -12,7 +12,7 @@ from records import paths, result
 from texts import ISOTROPIC, upright, walker
 
 from raychan.cli import invoke
-from raychan.run.provenance import explain
+from raychan.run.explain import explain
 from raychan.run.store import load_result
 from raychan.tables import POINT, REFLECT, SCATTER
 from raychan.units import dbm

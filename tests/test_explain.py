@@ -12,7 +12,8 @@ from raychan.channel.rcs import stated_error
 from raychan.process.spectrum import range_doppler
 from raychan.radar.antenna import Isotropic
 from raychan.radar.sensor import Sensor
-from raychan.run.provenance import chains, explain, explain_cell, response_of
+from raychan.run.explain import explain
+from raychan.run.provenance import chains, explain_cell, response_of
 from raychan.signal.cube import synthesize
 from raychan.tables import REFLECT, SCATTER, TRANSMIT, take
 from raychan.units import C0

@@ -1,46 +1,152 @@
-"""raychan explain: where a cell of a map came from."""
+"""raychan explain: where a detection, or a cell of a map, came from."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from raychan.cli import show
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from raychan.run.explain import CellExplanation, CellPaths
+
+_OTHERS = 5  # detections beside the one taken that are named
 
 
 def explain(
     directory: Annotated[
         Path, typer.Argument(help="Directory that `raychan run` wrote.", metavar="DIR", show_default=False)
     ],
-    range: Annotated[float, typer.Option("--range", help="Range of the cell in m.", metavar="M", show_default=False)],
-    speed: Annotated[
+    range: Annotated[
         float | None,
         typer.Option(
-            help="Speed in m/s as the detections print it; the strongest at that range if not given.", metavar="M/S"
+            "--range", help="Range in m: the nearest detection within a resolution cell of it.", metavar="M",
+            show_default=False,
         ),
     ] = None,
-) -> None:
-    """Say which paths, over which bodies, made a cell of the map, and what share of its power each brought."""
+    speed: Annotated[
+        float | None,
+        typer.Option(help="Speed in m/s as the detections print it; any if not given.", metavar="M/S"),
+    ] = None,
+    detection: Annotated[
+        int | None,
+        typer.Option(
+            help="The detection of this number instead: 1 is the first that `raychan run` lists, and the first row of "
+            "detections.csv.",
+            metavar="N",
+        ),
+    ] = None,
+    cell: Annotated[
+        bool,
+        typer.Option(
+            "--cell", help="The very map cell at --range and --speed (without --speed the strongest), no detection."
+        ),
+    ] = False,
+    paths: Annotated[
+        int, typer.Option(help="Paths to list, the one that brings most first.", metavar="N", min=0)
+    ] = 10,
+) -> None:  # fmt: skip
+    """Say which paths, over which bodies, made a detection or a cell of the map, and what each brought.
+
+    A path's own power and phase (that of its amplitude, at the frame's start) stand beside what it brings to the cell,
+    where all paths add up as waves. Angles are azimuth and elevation in world axes.
+    """
+    from raychan.run.explain import explain as explain_result
     from raychan.run.files import StoreError
-    from raychan.run.provenance import explain as explain_result
-    from raychan.units import dbm
 
     try:
-        why = explain_result(directory, range, speed)
+        why = explain_result(directory, range, speed, detection=detection, cell=cell)
     except StoreError:
         raise
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     screen = show.console()
-    screen.print(
-        f"{why.range:.2f} m, range rate {why.rate:+.2f} m/s, speed {why.speed:+.2f} m/s: "
-        f"{dbm(why.power):.1f} dBm, {why.label}"
-    )
+    for line in _head(why, range is not None and not cell):
+        screen.print(line, soft_wrap=True, markup=False)
     if not why.contributions:
         screen.print("no path explains this cell: noise")
         return
+    for line in _chains(why):
+        screen.print(line, soft_wrap=True, markup=False)
+    if why.paths is not None and paths:
+        screen.print(_listed(why.paths, paths))
+    screen.print(_sum(why), soft_wrap=True)
+
+
+def _head(why: CellExplanation, searched: bool) -> list[str]:
+    from raychan.units import dbm
+
+    taken = f"detection {why.detection}" if why.detection else "map cell"
+    if searched and not why.detection:
+        taken = "no detection within a cell of it; the map cell itself"
+    others = ", ".join(map(str, why.others[:_OTHERS])) + (" ..." if len(why.others) > _OTHERS else "")
+    also = f" (detection {others} within a cell too)" if others else ""
+    lines = [
+        f"{taken}{also}: {why.range:.2f} m, range rate {why.rate:+.2f} m/s, speed {why.speed:+.2f} m/s: "
+        f"{dbm(why.power):.1f} dBm, {why.label}"
+    ]
+    if why.folded:
+        rate = "" if math.isnan(why.true_rate) else f", {why.true_rate:+.2f} m/s"
+        lines.append(f"folded: truly at {why.true_range:.2f} m{rate}, beyond what the waveform tells apart")
+    return lines
+
+
+def _chains(why: CellExplanation) -> list[str]:
+    """Return a line for each chain, with the power and phase of what it brings to the cell."""
+    import numpy as np
+
+    from raychan.units import dbm
+
+    lines = []
     for part in why.contributions:
-        screen.print(f"  {part.text()}", soft_wrap=True, markup=False)
-    screen.print(f"the paths alone give {dbm(why.predicted):.1f} dBm, within {why.error_db:.2f} dB by their refinement")
+        brings = ""
+        if why.paths is not None and part.chain in why.paths.chains:
+            wave = why.paths.wave[why.paths.chain == why.paths.chains.index(part.chain)].sum()
+            brings = f", {dbm(abs(wave) ** 2):.1f} dBm at {np.degrees(np.angle(wave)):+.0f} deg"
+        lines.append(f"  {part.text()}{brings}")
+    return lines
+
+
+def _listed(paths: CellPaths, most: int) -> Table:
+    import numpy as np
+
+    from raychan.units import dbm
+
+    count = min(most, len(paths.row))
+    heads = (
+        "in cell dBm",
+        "deg",
+        "path dBm",
+        "deg",
+        "range m",
+        "rate m/s",
+        "departs deg",
+        "arrives deg",
+        "interactions",
+    )
+    rows = []
+    for i in np.arange(count):
+        wave, power = paths.wave[i], paths.power[i]
+        ends = (f"{az:+.1f}, {el:+.1f}" for az, el in np.degrees([paths.departure[i], paths.arrival[i]]))
+        rows.append([
+            f"{dbm(abs(wave) ** 2):.1f}", f"{np.degrees(np.angle(wave)):+.1f}", f"{dbm(power):.1f}",
+            f"{np.degrees(paths.phase[i]):+.1f}", f"{paths.range[i]:.3f}", f"{paths.rate[i]:+.3f}", *ends,
+            f"{paths.interactions[i]}: {', '.join(paths.met[paths.chain[i]]) or 'none'}",
+        ])  # fmt: skip
+    rest = len(paths.row) - count
+    left = paths.wave[count:].sum()
+    others = f"; {rest} weaker ones add up to {dbm(abs(left) ** 2):.1f} dBm in the cell" if rest else ""
+    return show.table(f"{count} of {len(paths.row)} paths{others}", heads, rows, left=(8,))
+
+
+def _sum(why: CellExplanation) -> str:
+    from raychan.units import dbm
+
+    within = f"within {why.error_db:.2f} dB" if why.converged else "not converged: error unknown"
+    tail = " by their refinement" if why.converged else ""
+    return f"the paths alone give {dbm(why.predicted):.1f} dBm, {within}{tail}"

@@ -70,6 +70,7 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
     from raychan.run.chain import simulate
     from raychan.run.files import staging
     from raychan.run.store import save_result
+    from raychan.run.tell import notes as result_notes
 
     with staging(out) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
@@ -77,9 +78,13 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
         warnings = list(result.warnings)
         if pictures:
             warnings += _pictures(result, stage, tell)
-    show.warn(warnings)
+    notes = result_notes(result)
+    show.warn(w for w in warnings if w not in notes)
     screen = show.console()
-    screen.print(show.detections(result))
+    for made in show.detections(result):
+        screen.print(made)
+    for line in notes:
+        screen.print(line, soft_wrap=True)
     took = sum(result.timings.values())
     screen.print(f"{len(result.paths.delay)} paths in {took:.1f} s; seed {result.seed}")
     if pictures:
@@ -91,6 +96,7 @@ def _sequence(
     scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
 ) -> None:
     from raychan.run.sequence import Store, frames
+    from raychan.run.tell import findings, marks
 
     store, told, screen = Store(out), set(), show.console()
     start = perf_counter()
@@ -100,13 +106,16 @@ def _sequence(
                 drawn: list[str] = []
                 store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
                 # A sequence says each warning once.
-                new = [w for w in dict.fromkeys([*frame.result.warnings, *drawn]) if w not in told]
+                # What it tells of detections differs from frame to frame, which the line of a frame counts.
+                said = [] if frame.number == 0 else findings(frame.result)
+                new = [w for w in dict.fromkeys([*frame.result.warnings, *drawn]) if w not in told and w not in said]
                 told.update(new)
                 show.warn(new)
                 found = len(frame.result.detections.range)
                 took = sum(frame.result.timings.values())
                 plural = "" if found == 1 else "s"
-                screen.print(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}  in {took:.2f} s")
+                marked = marks(frame.result.detections)
+                screen.print(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}{marked}  in {took:.2f} s")
     except KeyboardInterrupt:
         done = f"{store.count} of {count} frames are in {out}" if store.count else "nothing was written"
         raise show.Interrupted(f"interrupted; {done}") from None

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from rich.text import Text
 if TYPE_CHECKING:
     from raychan.run.result import Result
 
+_SOME = ("azimuth deg", "error dB", "folded: true m", "true m/s")  # columns of a table where a row has them
 _WIDE = 150  # columns where the output is no terminal, so that no line is cut
 
 
@@ -44,25 +46,51 @@ def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], left:
     return made
 
 
-def detections(result: Result) -> Table:
-    """Return the detections of a result as a table."""
-    import numpy as np
+def detections(result: Result) -> list[Table]:
+    """Return the detections of a result as a table, and those that are not converged as another; numbered together,
+    from 1."""
+    found = result.detections
+    apart = [i for i, converged in enumerate(found.converged) if not converged]
+    rest = [i for i in range(len(found.range)) if i not in apart]
+    made = []
+    if rest or not apart:
+        made.append(_detections(result, rest, f"{len(found.range)} detection{_s(found.range)}"))
+    if apart:
+        title = f"{len(apart)} of {len(found.range)} detection{_s(found.range)}: not converged, error unknown"
+        made.append(_detections(result, apart, title))
+    return made
 
+
+def _s(things: Sized) -> str:
+    return "" if len(things) == 1 else "s"
+
+
+def _detections(result: Result, rows: Sequence[int], title: str) -> Table:
+    """Return some detections as a table; columns that say nothing of them are left out."""
     from raychan.units import dbm
 
     d = result.detections
-    azimuths = bool(np.isfinite(d.azimuth).any())
-    heads = ["range m", "range rate m/s", "speed m/s", *(["azimuth deg"] if azimuths else []), "SNR dB", "power dBm"]
-    heads.append("error dB")
-    rows = []
-    for i, why in enumerate(result.provenance):
-        cells = [f"{d.range[i]:.2f}", f"{d.rate[i]:+.2f}", f"{d.speed[i]:+.2f}"]
-        if azimuths:
-            cells.append("" if np.isnan(d.azimuth[i]) else f"{np.degrees(d.azimuth[i]):.1f}")
-        rows.append([*cells, f"{d.snr[i]:.1f}", f"{dbm(d.power[i]):.1f}", f"{why.error_db:.2f}", why.label, why.bodies])
-    n = len(heads)
-    title = f"{len(rows)} detection{'' if len(rows) == 1 else 's'}"
-    return table(title, [*heads, "label", "bodies"], rows, left=(n, n + 1))
+    columns = {
+        "#": [str(i + 1) for i in rows],
+        "range m": [f"{d.range[i]:.2f}" for i in rows],
+        "range rate m/s": [f"{d.rate[i]:+.2f}" for i in rows],
+        "speed m/s": [f"{d.speed[i]:+.2f}" for i in rows],
+        "azimuth deg": [_known(math.degrees(d.azimuth[i]), ".1f") for i in rows],
+        "SNR dB": [f"{d.snr[i]:.1f}" for i in rows],
+        "power dBm": [f"{dbm(d.power[i]):.1f}" for i in rows],
+        "error dB": [_known(d.error_db[i], ".2f") for i in rows],
+        "folded: true m": [_known(d.true_range[i], ".2f") if d.folded[i] else "" for i in rows],
+        "true m/s": [_known(d.true_rate[i], "+.2f") if d.folded[i] else "" for i in rows],
+    }
+    shown = {head: cells for head, cells in columns.items() if head not in _SOME or any(cells)}
+    reasons = [result.provenance[i] for i in rows]
+    words = {"label": [why.label for why in reasons], "bodies": [why.bodies for why in reasons]}
+    n = len(shown)
+    return table(title, [*shown, *words], zip(*shown.values(), *words.values(), strict=True), left=(n, n + 1))
+
+
+def _known(value: float, digits: str) -> str:
+    return "" if math.isnan(value) else f"{value:{digits}}"
 
 
 @contextmanager

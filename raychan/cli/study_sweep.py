@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -96,7 +97,8 @@ def _cells(step: Step) -> list[str]:
     seen, hidden = step.seen, step.found.occlusion
     told = ["no", "", "", "", ""]
     if seen is not None:
-        told = [seen.label, f"{seen.range:.2f}", f"{seen.speed:+.2f}", f"{seen.snr_db:.1f}", f"{seen.error_db:.2f}"]
+        told = [seen.label, f"{seen.range:.2f}", f"{seen.speed:+.2f}", f"{seen.snr_db:.1f}"]
+        told.append("unknown" if math.isnan(seen.error_db) else f"{seen.error_db:.2f}")
     share = "" if hidden.blocked is None else f"{100.0 * hidden.blocked:.1f}"
     return [*told, share, ", ".join(name for name, _ in hidden.by), *map(_margin, step.found.levels.values())]
 

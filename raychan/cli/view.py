@@ -25,20 +25,23 @@ def view(
     ] = None,
     range: Annotated[
         float | None,
-        typer.Option("--range", help="Show only the rays that make the cell at this range in metres.", metavar="M"),
+        typer.Option(
+            "--range", help="Show only the rays of the detection nearest to this range in metres.", metavar="M"
+        ),
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option(help="Speed of that cell in m/s; the strongest at that range if not given.", metavar="M/S"),
+        typer.Option(help="Speed of that detection in m/s; any if not given.", metavar="M/S"),
     ] = None,
 ) -> None:
     """Show a scene, and the rays of a result coloured by the power they bring.
 
     Without --screenshot or --html a window opens, where a click on a ray prints its chain of bodies. With --range only
-    the rays behind one cell of the map are shown, and bodies that they do not meet are seen through.
+    the rays behind one detection are shown (behind the map cell where none is within a cell), and bodies that they do
+    not meet are seen through.
     """
+    from raychan.run.explain import explain
     from raychan.run.files import StoreError
-    from raychan.run.provenance import explain
     from raychan.run.store import load_result
     from raychan.view.scene import drawing_of, scene_picture
     from raychan.world.scene import Scene

@@ -64,7 +64,7 @@ def detect(
     cells, power, snr, place = cells[strong], power[strong], snr[strong], (cells + shift)[strong]
 
     steps = map.rate_resolution / grid.pad[0], map.range_resolution / grid.pad[1]
-    rate = map.rate[0] + place[:, 0] * steps[0]
+    rate = _within(map.rate[0] + place[:, 0] * steps[0], map.unambiguous_rate)
     duration = waveform.frame_duration if waveform else 0.0
     kept = _own(place / np.array(grid.pad), power, np.abs(rate) * duration / map.range_resolution, grid, windows)
     cells, power, snr, place, rate = cells[kept], power[kept], snr[kept], place[kept], rate[kept]
@@ -80,6 +80,11 @@ def detect(
         power=power,
         cell=cells.astype(np.int32),
     )
+
+
+def _within(rate: Floats, limit: float) -> Floats:
+    """Return rates as the one of their aliases that is not ambiguous: from -limit up to limit [m/s]."""
+    return np.where(np.abs(rate) <= limit, rate, (rate + limit) % (2.0 * limit) - limit)
 
 
 def _maxima(power: Floats, least: float) -> Ints:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -40,13 +41,7 @@ def rdmap_picture(result: Result, path: str | Path) -> Path:
         axes.set_xlim(r[0], r[-1])
         axes.set_ylim(*_rates(result))
         made.colorbar(image, ax=axes, label="received power [dBm]", pad=0.01, aspect=30)
-        for label, (mark, colour) in MARKS.items():
-            rows = [i for i, e in enumerate(result.provenance) if e.label == label]
-            if rows:
-                axes.plot(
-                    d.range[rows], d.rate[rows], mark, ms=7, mfc="none", mec=colour, mew=1.4, ls="none",
-                    label=f"{label} ({len(rows)})", path_effects=outlined(2.6),
-                )  # fmt: skip
+        _mark_detections(result, axes)
         if len(d.range):
             legend = axes.legend(
                 loc="upper right", labelcolor="white", frameon=True, facecolor="#222222", framealpha=0.7
@@ -106,6 +101,26 @@ def _rates(result: Result) -> tuple[float, float]:
     return max(float(m.rate[0]), float(seen.min()) - room), min(float(m.rate[-1]), float(seen.max()) + room)
 
 
+def _mark_detections(result: Result, axes: Any) -> None:
+    """Mark detections by their labels: full, but hollow where not converged; a square round those that are folded."""
+    d = result.detections
+    for label, (mark, colour) in MARKS.items():
+        mine = np.array([why.label == label for why in result.provenance], bool)
+        for rows, inside, words in ((mine & d.converged, colour, ""), (mine & ~d.converged, "none", ", not converged")):
+            if rows.any():
+                edge = "black" if inside == colour else colour
+                axes.plot(
+                    d.range[rows], d.rate[rows], mark, ms=7, mfc=inside, mec=edge, mew=0.8 if edge == "black" else 1.4,
+                    ls="none", label=f"{label}{words} ({int(rows.sum())})",
+                    path_effects=None if edge == "black" else outlined(2.6),
+                )  # fmt: skip
+    if d.folded.any():
+        axes.plot(
+            d.range[d.folded], d.rate[d.folded], "s", ms=13, mfc="none", mec="white", mew=1.2, ls="none",
+            label=f"folded, truly elsewhere ({int(d.folded.sum())})", path_effects=outlined(2.4),
+        )  # fmt: skip
+
+
 def _name_detections(result: Result, axes: Any) -> None:
     d = result.detections
     placer = Placer(axes)
@@ -118,7 +133,7 @@ def _name_detections(result: Result, axes: Any) -> None:
         if near or len(named) >= _LABELS:
             continue
         named.append((name, float(d.range[i]), float(d.rate[i])))
-        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB"
+        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB{_truly(why)}"
         look: dict[str, Any] = {
             "color": MARKS[why.label][1],
             "fontsize": 7,
@@ -147,7 +162,15 @@ def _name_peaks(result: Result, axes: Any, power: Floats, far: float) -> None:
             continue
         named.add(name)
         axes.plot(at, height, "o", ms=3.5, color="#225588")
-        placer.label(at, height, f"{name}\n{at:.2f} m", fontsize=7, color="#222222", above=True)
+        placer.label(at, height, f"{name}\n{at:.2f} m{_truly(why)}", fontsize=7, color="#222222", above=True)
+
+
+def _truly(why: Explanation) -> str:
+    """Return where a folded echo is, as a line more of its label."""
+    if not why.folded:
+        return ""
+    rate = "" if math.isnan(why.true_rate) else f", {why.true_rate:+.1f} m/s"
+    return f"\nfolded from {why.true_range:.1f} m{rate}"
 
 
 def _short(why: Explanation) -> str:

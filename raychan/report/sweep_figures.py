@@ -69,6 +69,12 @@ def _levels(axes: Any, done: Sweep, x: Floats, order: NDArray[np.int64]) -> None
             snr = np.array([done.steps[i].seen.snr_db for i in rows])  # type: ignore[union-attr]
             error = np.array([done.steps[i].seen.error_db for i in rows])  # type: ignore[union-attr]
             axes.errorbar(x[rows], snr, error, ls="none", color=colour, lw=4.0, alpha=0.35)
+            unknown = np.isnan(error)
+            if unknown.any():
+                axes.plot(
+                    x[rows][unknown], snr[unknown], "_", ms=14, color=colour, ls="none",
+                    label=f"{label}: not converged,\nerror unknown",
+                )  # fmt: skip
             axes.plot(
                 x[rows], snr, mark, ms=7, mfc="white", mec=colour, mew=1.6, ls="none",
                 label=f"detected, {label}\n(bar: stated error)",

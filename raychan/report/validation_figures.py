@@ -139,7 +139,8 @@ def _ghost(done: Validation, path: Path) -> Path:
             d = result.detections
             for i, why in enumerate(result.provenance):
                 if why.contributions and any(link.startswith("pedestrian") for link in why.contributions[0].chain):
-                    axes.plot(d.range[i], d.snr[i], "v", color=PALETTE[7], ms=6)
+                    inside = PALETTE[7] if why.converged else "none"
+                    axes.plot(d.range[i], d.snr[i], "v", mec=PALETTE[7], mfc=inside, ms=6)
             title = "as printed" if run == _GHOST_RUNS[0] else done.study.runs[run].title
             axes.annotate(title, (0.995, 0.93), xycoords="axes fraction", ha="right", va="top", fontsize=9)
             axes.set(ylim=(0.0, 45.0), xlim=(near, far))
@@ -148,7 +149,7 @@ def _ghost(done: Validation, path: Path) -> Path:
             panels[0].annotate(
                 name, (at, 1.02), xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=8
             )
-        panels[-1].set(xlabel="range [m]   (red: detections over the pedestrian)")
+        panels[-1].set(xlabel="range [m]   (red: detections over the pedestrian, hollow where not converged)")
         made.supylabel("SNR of the strongest cell [dB]", fontsize=9)
         return save(made, path, flat=True)
 

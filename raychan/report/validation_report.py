@@ -261,8 +261,9 @@ def _runs(done: Validation) -> list[str]:
     for name, result in done.bench.results.items():
         given = done.study.runs[name]
         how = "; ".join([*given.changes, *([f"max_bounces={given.max_bounces}"] if given.max_bounces else [])])
-        worst = max((w.error_db for w in result.provenance), default=0.0)
-        figures = f"{result.stats['rays']:,}", str(len(result.detections.range)), f"{worst:.1f}"
+        d = result.detections
+        worst = d.error_db[d.converged].max(initial=0.0)
+        figures = f"{result.stats['rays']:,}", str(len(d.range)), f"{worst:.1f}", str(int((~d.converged).sum()))
         rows.append((given.title, f"{given.scene}.toml", how, *figures, f"{sum(result.timings.values()):.0f}"))
-    heads = ("run", "scene", "changed", "rays", "detections", "greatest stated error dB", "s")
+    heads = ("run", "scene", "changed", "rays", "detections", "greatest stated error dB", "not converged", "s")
     return ["## Runs", "", *table(heads, rows)]

@@ -28,8 +28,9 @@ from raychan.run.ledger import ledger
 from raychan.run.microdoppler import needed, retraced
 from raychan.run.pieces import Retraced, Traced
 from raychan.run.provenance import provenance
-from raychan.run.result import Receiver, Result
+from raychan.run.result import ExplainedDetections, Receiver, Result
 from raychan.run.spread import claimed, launch_share, motion, without
+from raychan.run.tell import counts, told
 from raychan.signal.cube import noisy, synthesize
 from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler, Routes
 from raychan.units import C0
@@ -201,20 +202,22 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         if turned:
             left_out["intra-frame motion"] = motion(turned)
             reasons = claimed(reasons, paths, turned.turns, brought, error.power, detections, receiver)
+    known = ExplainedDetections.of(detections, reasons)
+    tolerance = channel.model.tolerance_db
     return Result(
         paths=paths,
         profile=pdp,
         cube=cube,
         rdmap=rdmap,
-        detections=detections,
+        detections=known,
         provenance=reasons,
         receiver=receiver,
         error=error,
         seed=seed,
         timings=clock.timings,
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
-        stats=channel.stats | {"reached_db": max((r.error_db for r in reasons), default=0.0)},
-        warnings=(*scene.warnings, *_told(channel.launched)),
+        stats=channel.stats | counts(known, tolerance),
+        warnings=(*scene.warnings, *_told(channel.launched), *told(known, tolerance, sensor.waveform, left_out)),
         scene=scene.bare(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.rcs import stated_error
 from raychan.kernels.cell import cell_sums
-from raychan.run.response import Response, Sums
-from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver, Result
+from raychan.run.converged import figure
+from raychan.run.folding import Shown, truth
+from raychan.run.response import Response
+from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver
 from raychan.tables import KIND_LETTERS, TRANSMIT, Detections, Paths, RangeDoppler
 from raychan.units import C0
 
@@ -75,26 +75,32 @@ def explain_cell(
     """
     wave, at = waves_in(paths, response, range, rate)
     sums = cell_sums(known.part, len(known.names), wave, at, paths.rate)
-    return _explained(paths, known, sums, 0, receiver, (range, rate, power, error))
+    cell = _Cell(Shown(range, rate, range, rate or 0.0), power, error)
+    return _explained(paths, known, response, tuple(x[0] for x in sums), cell, receiver)
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """A cell to explain: the power that it shows and that by which two launches differ there, both [W]."""
+
+    shown: Shown
+    power: float
+    error: float
 
 
 def _explained(
-    paths: Paths,
-    known: Chains,
-    sums: Sums,
-    cell: int,
-    receiver: Receiver,
-    about: tuple[float, float | None, float, float],
+    paths: Paths, known: Chains, response: Response, sums: Any, cell: _Cell, receiver: Receiver
 ) -> Explanation:
-    summed, sizes, strongest = (x[cell] for x in sums)
-    range, rate, power, error = about
+    """Return the explanation of a cell by the sums over chains that it has of `Sums`, reported at its place."""
+    summed, sizes, strongest = sums
     whole = complex(summed.sum())
     predicted = abs(whole) ** 2 * receiver.power
-    speed = (rate or 0.0) + receiver.ego_speed
-    error_db = stated_error(whole, float(np.sqrt(error / receiver.power)))
+    range, rate = cell.shown.at_range, cell.shown.at_rate
+    place = range, rate, rate + receiver.ego_speed
     shares = np.abs(summed) ** 2
-    if predicted < _UNEXPLAINED * power or not shares.sum() > 0.0:
-        return Explanation(range, rate or 0.0, speed, power, predicted, error_db, CLUTTER, ())
+    if predicted < _UNEXPLAINED * cell.power or not shares.sum() > 0.0:
+        error_db = figure(cell.power, cell.error)  # of noise: what launches differ by against what is seen
+        return Explanation(*place, cell.power, predicted, error_db, CLUTTER, ())
     shares /= shares.sum()
     # The ground beside a target adds to its return, so what leads is the target over all its ways.
     leading = np.argmax(np.abs(_sums(known.targets, summed, int(known.targets.max()) + 1)))
@@ -115,8 +121,11 @@ def _explained(
         for g in order
         if (shares[g] >= _LEAST_SHARE or g == first) and size[g] > 0.0
     )
-    label = label_of(paths, int(strongest[first]), known.bodies[first], receiver)
-    return Explanation(range, rate or 0.0, speed, power, predicted, error_db, label, parts)
+    leader = int(strongest[first])
+    label = label_of(paths, leader, known.bodies[first], receiver)
+    true = truth(paths, np.flatnonzero(known.part == first), leader, response, cell.shown)
+    error_db = figure(predicted, cell.error)
+    return Explanation(*place, cell.power, predicted, error_db, label, parts, true.folded, true.range, true.rate)
 
 
 def waves_in(
@@ -144,61 +153,16 @@ def provenance(
     sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.rate, at)
     found = []
     for i in range(len(at)):
-        about = (float(at[i, 0]), float(at[i, 1]), float(powers[i]), float(errors[i]))
-        why = _explained(paths, known, sums, i, receiver, about)
-        found.append(
-            replace(
-                why,
-                range=float(detections.range[i]),
-                rate=float(detections.rate[i]),
-                speed=float(detections.speed[i]),
-                power=float(detections.power[i]),
-            )
-        )
+        shown = Shown(*map(float, (at[i, 0], at[i, 1], detections.range[i], detections.rate[i])))
+        cell = _Cell(shown, float(powers[i]), float(errors[i]))
+        why = _explained(paths, known, response, tuple(x[i] for x in sums), cell, receiver)
+        found.append(replace(why, speed=float(detections.speed[i]), power=float(detections.power[i])))
     return tuple(found)
-
-
-def explain(result: Result | str | Path, range: float, speed: float | None = None) -> Explanation:
-    """Return which paths over which bodies made the cell of a map.
-
-    Args: result a Result, or the directory or file of one; range [m]; speed [m/s] with the ego speed taken out, as
-    the detections print it; None takes the strongest speed at that range.
-    Raises: ValueError outside the map.
-    """
-    if not isinstance(result, Result):
-        from raychan.run.store import load_result
-
-        result = load_result(result)
-    rows, column = _cells(result.rdmap, range, None if speed is None else speed - result.receiver.ego_speed)
-    row = int(rows[np.argmax(result.rdmap.power[rows, column])])
-    cell = (row, column)
-    return explain_cell(
-        result.paths,
-        chains(result.paths, result.receiver.background),
-        response_of(result.receiver),
-        result.receiver,
-        float(result.rdmap.range[column]),
-        float(result.rdmap.rate[row]),
-        float(result.rdmap.power[cell]),
-        float(result.error.power[cell]),
-    )
 
 
 def response_of(receiver: Receiver) -> Response:
     """Return the response of a receiver's processor."""
     return Response(receiver.waveform, receiver.range_window, receiver.rate_window)
-
-
-def _cells(rdmap: RangeDoppler, range: float, rate: float | None) -> tuple[Ints, int]:
-    if not rdmap.range[0] <= range <= rdmap.range[-1]:
-        raise ValueError(f"range {range:g} m lies outside the map, {rdmap.range[0]:.1f} to {rdmap.range[-1]:.1f} m")
-    column = int(np.argmin(np.abs(rdmap.range - range)))
-    if rate is None:
-        return np.arange(len(rdmap.rate)), column
-    low, high = rdmap.rate[0] - rdmap.rate_resolution, rdmap.rate[-1] + rdmap.rate_resolution
-    if not low <= rate <= high:
-        raise ValueError(f"range rate {rate:g} m/s lies outside the map, {low:.1f} to {high:.1f} m/s")
-    return np.array([np.argmin(np.abs(rdmap.rate - rate))]), column
 
 
 def _alike(paths: Paths) -> tuple[Ints, Ints]:

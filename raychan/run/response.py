@@ -24,7 +24,11 @@ _STEP = 0.25  # range cells that a path may move within one piece of the frame
 
 
 class Response:
-    """Response of both windows, side lobes and aliases included, 1 at the peak; migration by pieces of the frame."""
+    """Response of both windows, side lobes and aliases included, 1 at the peak; migration by pieces of the frame.
+
+    With real sampling each echo has a mirror image, its conjugate at minus its range and minus its rate, which shows
+    where the range is folded.
+    """
 
     def __init__(self, waveform: Waveform, range_window: str, rate_window: str) -> None:
         self.waveform = waveform
@@ -53,6 +57,16 @@ class Response:
 
         Args: amplitude, delay [s] at the frame's start and rate [m/s] of paths; range [m] and rate [m/s] of the cell.
         """
+        wave, at = self.image_in_cell(amplitude, delay, rate, range, cell_rate)
+        if self.mirrors:
+            wave = wave + self.image_in_cell(amplitude, delay, rate, -range, -cell_rate)[0].conj()
+        return wave, at
+
+    def image_in_cell(
+        self, amplitude: Complexes, delay: Floats, rate: Floats, range: float, cell_rate: float
+    ) -> tuple[Complexes, Floats]:
+        """Return what `in_cell` does, of the paths without their mirror images; the mirror images bring to a cell the
+        conjugate of what the paths bring to the cell at minus its range and minus its rate."""
         found: tuple[Complexes, Floats] = cell_waves(amplitude, delay, rate, (range, cell_rate), *self._tables(rate))
         return found
 
@@ -64,6 +78,17 @@ class Response:
         Args: group (n,) of each path, below `count`; cells (c, 3), each range [m], rate [m/s] and amplitude: what all
         paths together bring is known to 1e-3 of that at least; else as for `in_cell`.
         """
+        found = self._images_in_cells(group, count, amplitude, delay, rate, cells)
+        if not self.mirrors:
+            return found
+        mirrored = self._images_in_cells(group, count, amplitude, delay, rate, cells * (-1.0, -1.0, 1.0))
+        strongest = np.where(mirrored[1][:, 1] > found[1][:, 1], mirrored[2], found[2])
+        size = found[1] + mirrored[1] * [[0.0], [1.0], [1.0], [1.0]]  # each path is counted once
+        return found[0] + mirrored[0].conj(), size, strongest
+
+    def _images_in_cells(
+        self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
+    ) -> Sums:
         shape = len(cells), count
         total, size, strongest = np.empty(shape, complex), np.empty((shape[0], 4, count)), np.empty(shape, np.int64)
         least = _LEAST * cells[:, 2] / max(len(rate), 1)
@@ -90,6 +115,32 @@ class Response:
         middle = wave.carrier + self._swept
         ramp = (wave.carrier, wave.slope, wave.centre, self._swept, middle, wave.repetition, wave.range_resolution, C0)
         return ramp, (len(self._range), count, _FINE), self._range_tables, self._pieces[pieces]
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether echoes have mirror images."""
+        return not self.waveform.complex_sampling
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Ranges [m] and rates [m/s] after which the map repeats; with real sampling it shows half of the former."""
+        wave = self.waveform
+        middle = wave.carrier + self._swept
+        return wave.range_resolution * wave.n_samples, 0.5 * C0 / (middle * wave.repetition)
+
+    @property
+    def resolutions(self) -> tuple[float, float]:
+        """Resolution cells of range [m] and rate [m/s]."""
+        return self.waveform.range_resolution, self.periods[1] / self.waveform.n_chirps
+
+    @property
+    def drift(self) -> float:
+        """Range by which a path shows too far for each m/s that it recedes faster than its cell [s]."""
+        return (self.waveform.carrier + self._swept) / self.waveform.slope
+
+    def stands(self, delay: Floats, rate: Floats, mid_frame: bool) -> tuple[Floats, Floats]:
+        """Return the ranges (n,) [m] at which paths stand, mid frame or at its start, and their rates (n,) [m/s]."""
+        return 0.5 * C0 * delay + (rate * self.waveform.centre if mid_frame else 0.0), rate
 
     @property
     def _swept(self) -> float:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from raychan.radar.waveform import Waveform
-from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
+from raychan.tables import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler, column
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
 
@@ -58,14 +63,50 @@ class Explanation:
     predicted: float
     """What the paths alone give; the rest is noise."""
     error_db: float
-    """How far the power may be off, as two launches of tubes differ [dB]."""
+    """How far the power may be off, as two launches of tubes differ [dB]; NaN where they differ by so much that it is
+    no figure."""
     label: str
     contributions: tuple[Contribution, ...]
+    folded: bool = False
+    """Whether the leading chain is ambiguities away from where the map shows it, or mirrored by real sampling."""
+    true_range: float = math.nan
+    """Range of the leading chain [m], mid frame; NaN where unknown."""
+    true_rate: float = math.nan
+    """Its range rate [m/s]; NaN where unknown."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the error is a figure."""
+        return not math.isnan(self.error_db)
 
     @property
     def bodies(self) -> str:
         """Chain of the leading contribution; 'noise' if no path explains the cell."""
         return " > ".join(self.contributions[0].chain) if self.contributions else "noise"
+
+
+@dataclass(frozen=True)
+class ExplainedDetections(Detections):
+    """What the receiver reports, and beside it what only a simulator knows; a row a detection, strongest first."""
+
+    error_db: Floats = column("n", unit="dB", doc="stated error of the power; NaN where not converged", finite=False)
+    converged: NDArray[np.bool_] = column("n", np.bool_, doc="whether the error is a figure")
+    folded: NDArray[np.bool_] = column("n", np.bool_, doc="whether the echo is not where the map shows it")
+    true_range: Floats = column("n", unit="m", doc="range of the leading chain; NaN where unknown", finite=False)
+    true_rate: Floats = column("n", unit="m/s", doc="range rate of the leading chain; NaN where unknown", finite=False)
+
+    @classmethod
+    def of(cls, found: Detections, reasons: Sequence[Explanation]) -> ExplainedDetections:
+        """Return a receiver's detections with what is known of each."""
+        known = {f.name: getattr(found, f.name) for f in fields(Detections)}
+        return cls(
+            **known,
+            error_db=np.array([why.error_db for why in reasons], float),
+            converged=np.array([why.converged for why in reasons], bool),
+            folded=np.array([why.folded for why in reasons], bool),
+            true_range=np.array([why.true_range for why in reasons], float),
+            true_rate=np.array([why.true_rate for why in reasons], float),
+        )
 
 
 @dataclass(frozen=True)
@@ -76,7 +117,7 @@ class Result:
     profile: Profile
     cube: Cube
     rdmap: RangeDoppler
-    detections: Detections
+    detections: ExplainedDetections
     provenance: tuple[Explanation, ...]
     receiver: Receiver
     error: MapError

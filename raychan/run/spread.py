@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.rcs import stated_error
 from raychan.radar.sensor import Sensor
+from raychan.run.converged import figure
+from raychan.run.folding import aliased
 from raychan.run.ledger import Entry
 from raychan.run.pieces import Retraced
-from raychan.run.provenance import chains, label_of
+from raychan.run.provenance import Chains, chains, label_of, response_of
 from raychan.run.result import Contribution, Explanation, Receiver
 from raychan.signal.cube import synthesize
 from raychan.tables import Detections, Paths, take
@@ -63,25 +64,33 @@ def claimed(
     if not len(rows):
         return reasons
     known = chains(paths, receiver.background)
-    strength = np.abs(paths.amplitude[rows]) ** 2
     found = []
     for i, why in enumerate(reasons):
         brought = float(power[tuple(detections.cell[i])])
         if brought < _UNEXPLAINED * why.power:
             found.append(why)
             continue
-        off = stated_error(complex(np.sqrt(brought)), float(np.sqrt(error[tuple(detections.cell[i])])))
+        off = figure(brought, float(error[tuple(detections.cell[i])]))
         why = replace(why, predicted=brought, error_db=off)
         if not why.contributions:
-            away = np.abs(0.5 * C0 * paths.delay[rows] - why.range)
-            near = away <= away.min() + receiver.waveform.range_resolution
-            chain = known.part[rows]
-            leading = int(np.argmax(np.bincount(chain, strength * near, len(known.names))))
-            mine = rows[(chain == leading) & near]
-            strongest = int(mine[np.argmax(np.abs(paths.amplitude[mine]))])
-            label = label_of(paths, strongest, known.bodies[leading], receiver)
-            names, met = known.names[leading], len(known.bodies[leading])
-            part = Contribution(names, met, why.range, why.rate, 1.0, len(mine))
-            why = replace(why, label=label, contributions=(part,))
+            why = _given(why, paths, rows, known, receiver)
         found.append(why)
     return tuple(found)
+
+
+def _given(why: Explanation, paths: Paths, rows: NDArray[np.int64], known: Chains, receiver: Receiver) -> Explanation:
+    """Return the explanation of a cell given to the chain, among `rows` of paths over turning bodies, that is strongest
+    at the cell's range; at which rate it turns there is not known."""
+    at = 0.5 * C0 * paths.delay[rows]
+    away, folded = aliased(at, why.range, response_of(receiver))
+    near = away <= away.min() + receiver.waveform.range_resolution
+    chain, strength = known.part[rows], np.abs(paths.amplitude[rows]) ** 2
+    leading = int(np.argmax(np.bincount(chain, strength * near, len(known.names))))
+    mine = np.flatnonzero((chain == leading) & near)
+    strongest = int(mine[np.argmax(strength[mine])])
+    label = label_of(paths, int(rows[strongest]), known.bodies[leading], receiver)
+    names, met = known.names[leading], len(known.bodies[leading])
+    part = Contribution(names, met, why.range, why.rate, 1.0, len(mine))
+    same = mine[folded[mine] == folded[strongest]]
+    true = float(np.average(at[same], weights=strength[same]))
+    return replace(why, label=label, contributions=(part,), folded=bool(folded[strongest]), true_range=true)

@@ -19,11 +19,11 @@ import numpy as np
 
 from raychan.radar.waveform import Waveform
 from raychan.run.files import StoreError
-from raychan.run.result import Contribution, Explanation, Receiver, Result
-from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler, Ways
+from raychan.run.result import Contribution, ExplainedDetections, Explanation, Receiver, Result
+from raychan.tables import Cube, MapError, Paths, Profile, RangeDoppler, Ways
 from raychan.units import dbm
 
-FORMAT = 1
+FORMAT = 2
 _CHANGED = "# changed: "  # how a scene notes overridden keys below its text
 COLUMNS = (
     "range_m",
@@ -33,6 +33,10 @@ COLUMNS = (
     "snr_db",
     "power_dbm",
     "error_db",
+    "converged",
+    "folded",
+    "true_range_m",
+    "true_range_rate_mps",
     "label",
     "bodies",
 )
@@ -42,7 +46,7 @@ _GROUPS: dict[str, Any] = {
     "cube": Cube,
     "rdmap": RangeDoppler,
     "error": MapError,
-    "detections": Detections,
+    "detections": ExplainedDetections,
 }
 _JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
 _UNITS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_resolution": "m/s"} | {
@@ -109,22 +113,35 @@ def load_result(path: str | Path) -> Result:
 
 
 def rows(result: Result) -> list[tuple[str, ...]]:
-    """Return the detections as text, a tuple of COLUMNS each; an azimuth that no array gives is empty."""
+    """Return the detections as text, a tuple of COLUMNS each; what is unknown is empty: an azimuth that no array gives,
+    the error of a detection that is not converged, the true place of noise."""
     d = result.detections
     return [
         (
             f"{d.range[i]:.4f}",
             f"{d.rate[i]:.4f}",
             f"{d.speed[i]:.4f}",
-            "" if math.isnan(d.azimuth[i]) else f"{math.degrees(d.azimuth[i]):.3f}",
+            _known(math.degrees(d.azimuth[i]), 3),
             f"{d.snr[i]:.2f}",
             f"{dbm(d.power[i]):.2f}",
-            f"{why.error_db:.2f}",
+            _known(d.error_db[i], 2),
+            _word(d.converged[i]),
+            _word(d.folded[i]),
+            _known(d.true_range[i], 4),
+            _known(d.true_rate[i], 4),
             why.label,
             why.bodies,
         )
         for i, why in enumerate(result.provenance)
     ]
+
+
+def _known(value: float, digits: int) -> str:
+    return "" if math.isnan(value) else f"{value:.{digits}f}"
+
+
+def _word(value: bool) -> str:
+    return "true" if value else "false"
 
 
 def summary(result: Result) -> dict[str, Any]:
@@ -215,6 +232,8 @@ def _read_record(file: Path, group: str, kind: Any) -> Any:
                 value = np.empty(real.shape, f.metadata["dtype"])
                 value.real, value.imag = real, data[f"{f.name}_im"].values
                 values[f.name] = value
+            elif f.metadata["dtype"].kind == "b":  # a file holds them as bytes
+                values[f.name] = data[f.name].values.astype(bool)
             else:
                 values[f.name] = data[f.name].values
     return Paths.of(**values) if kind is Paths else kind(**values)
@@ -244,7 +263,8 @@ def _plain(value: Any) -> Any:
 
 def _explanation(held: dict[str, Any]) -> Explanation:
     parts = tuple(Contribution(**(c | {"chain": tuple(c["chain"])})) for c in held["contributions"])
-    return Explanation(**(held | {"contributions": parts}))
+    numbers = {name: math.nan for name, value in held.items() if value is None}  # as JSON has it
+    return Explanation(**(held | numbers | {"contributions": parts}))
 
 
 def _scene(text: str, where: str) -> Any:

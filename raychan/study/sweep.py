@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -95,6 +96,7 @@ class Seen:
     speed: float
     snr_db: float
     error_db: float
+    """Stated error; NaN where not converged."""
     label: str
     bodies: str
 
@@ -207,8 +209,8 @@ def cells(step: Step) -> list[str]:
     """Return a step as text, in COLUMNS; what is unknown or not there is empty."""
     seen, hidden, levels = step.seen, step.found.occlusion, step.found.levels
     told = [""] * 6 if seen is None else [
-        f"{seen.range:.4f}", f"{seen.rate:.4f}", f"{seen.speed:.4f}", f"{seen.snr_db:.2f}", f"{seen.error_db:.2f}",
-        seen.bodies,
+        f"{seen.range:.4f}", f"{seen.rate:.4f}", f"{seen.speed:.4f}", f"{seen.snr_db:.2f}",
+        "" if math.isnan(seen.error_db) else f"{seen.error_db:.2f}", seen.bodies,
     ]  # fmt: skip
     return [
         "no" if seen is None else "yes",

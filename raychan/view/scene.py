@@ -22,6 +22,8 @@ def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | Non
     sensor, title = scene.sensor, scene.title
     if cell is not None:
         where = f"{cell.range:.2f} m, {cell.speed:+.2f} m/s, {cell.label}"
+        where += f", folded from {cell.true_range:.2f} m" if cell.folded else ""
+        where += "" if cell.converged else ", not converged"
         title = f"{title}: {where}" if title else where
     return draw(title, scene.facets(0.0), scene.points(0.0), sensor.position, sensor.boresight, result, cell)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,7 @@ class Echo:
     snr: float | None
     """Of the detection, or without noise of the paths alone [dB]; None without a path."""
     error: float | None
-    """Stated error of the detection [dB]."""
+    """Stated error of the detection [dB]; NaN where not converged."""
 
     def text(self) -> str:
         """Return '22.49 m, 21.2 dB ± 0.1', 'not detected, 13.0 dB', or 'no path'."""
@@ -35,7 +36,8 @@ class Echo:
             return "no path"
         if self.range is None:
             return f"not detected, {self.snr:.1f} dB"
-        return f"{self.range:.2f} m, {self.snr:.1f} dB ± {self.error:.1f}"
+        error = "?" if self.error is None or math.isnan(self.error) else f"{self.error:.1f}"
+        return f"{self.range:.2f} m, {self.snr:.1f} dB ± {error}"
 
 
 @dataclass(frozen=True)

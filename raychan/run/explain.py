@@ -1,0 +1,175 @@
+"""Explain: which detection or cell of a map is meant, and every path that feeds it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.frames import angles
+from raychan.run.provenance import Chains, chains, explain_cell, response_of, waves_in
+from raychan.run.result import Explanation, Result
+from raychan.tables import KIND_WORDS, NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler, Record, column
+
+_SAME = 0.1  # cells: places that are so alike are the same to who typed one of them
+
+
+@dataclass(frozen=True)
+class CellPaths(Record):
+    """The paths that feed a cell of the map, the one that brings most first; a row a path, all of them."""
+
+    row: Ints = column("n", np.int32, doc="row of the result's `paths`")
+    power: Floats = column("n", unit="W", doc="received power of the path alone")
+    phase: Floats = column("n", unit="rad", doc="argument of the path's amplitude, at the frame's start")
+    wave: Complexes = column("n", np.complex128, unit="sqrt(W)", doc="what it brings to the cell; they add up")
+    range: Floats = column("n", unit="m", doc="true range, mid frame")
+    rate: Floats = column("n", unit="m/s", doc="true range rate, positive = receding")
+    departure: Floats = column("n 2", unit="rad", doc="azimuth and elevation of departure, world axes")
+    arrival: Floats = column("n 2", unit="rad", doc="azimuth and elevation towards which the receiver looks")
+    interactions: Ints = column("n", np.int16, doc="over both legs, thin layers passed not counted")
+    chain: Ints = column("n", np.int64, doc="row of `chains`")
+    chains: tuple[tuple[str, ...], ...]
+    """Names 'body.part' met by each chain, as Contribution.chain has them."""
+    met: tuple[tuple[str, ...], ...]
+    """What happened to each chain, as 'reflect truck.tail'."""
+
+
+@dataclass(frozen=True)
+class CellExplanation(Explanation):
+    """An explanation with its paths, and which detection it is of."""
+
+    paths: CellPaths | None = None
+    detection: int = 0
+    """Number of the detection, from 1 as tables and detections.csv list them; 0 for a cell of the map itself."""
+    others: tuple[int, ...] = ()
+    """Numbers of other detections as near to the place asked for as a resolution cell."""
+
+
+def explain(
+    result: Result | str | Path,
+    range: float | None = None,
+    speed: float | None = None,
+    *,
+    detection: int | None = None,
+    cell: bool = False,
+) -> CellExplanation:
+    """Return which paths over which bodies made a detection, or a cell of the map.
+
+    Args: result a Result, or the directory or file of one; range [m] and speed [m/s] with the ego speed taken out, as
+    the detections print it: the nearest detection within a resolution cell of them is taken, of equally near ones the
+    strongest; detection its number instead, from 1; cell the very map cell at range and speed (without speed the
+    strongest there), which is also taken where no detection is near.
+    Raises: ValueError outside the map, on a number that no detection has, or if nothing or both are asked for.
+    """
+    if (range is None) == (detection is None):
+        raise ValueError("either a range or the number of a detection is wanted")
+    if detection is not None and (speed is not None or cell):
+        raise ValueError("the number of a detection stands alone, without a speed or the cell")
+    if not isinstance(result, Result):
+        from raychan.run.store import load_result
+
+        result = load_result(result)
+    near: list[int] = []
+    if detection is not None:
+        near = [_checked(result, detection)]
+    elif range is not None:
+        place = _place(result, range, speed)
+        near = [] if cell else _nearest(result, range, speed)
+    return _of_detection(result, near) if near else _of_cell(result, place)
+
+
+def _of_detection(result: Result, near: list[int]) -> CellExplanation:
+    row, column = map(int, result.detections.cell[near[0]])
+    held = _held(result.provenance[near[0]])
+    paths = _paths_in(result, row, column)
+    return CellExplanation(**held, paths=paths, detection=near[0] + 1, others=tuple(i + 1 for i in near[1:]))
+
+
+def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
+    row, column = place
+    known = chains(result.paths, result.receiver.background)
+    at = float(result.rdmap.range[column]), float(result.rdmap.rate[row])
+    seen, error = float(result.rdmap.power[place]), float(result.error.power[place])
+    response = response_of(result.receiver)
+    why = explain_cell(result.paths, known, response, result.receiver, *at, seen, error)
+    return CellExplanation(**_held(why), paths=_paths_in(result, row, column, known))
+
+
+def _held(why: Explanation) -> dict[str, Any]:
+    return {f.name: getattr(why, f.name) for f in fields(Explanation)}
+
+
+def _paths_in(result: Result, row: int, column: int, known: Chains | None = None) -> CellPaths:
+    paths, receiver = result.paths, result.receiver
+    known = known or chains(paths, receiver.background)
+    place = float(result.rdmap.range[column]), float(result.rdmap.rate[row])
+    wave, at = waves_in(paths, response_of(receiver), *place)
+    order = np.argsort(-np.abs(wave), kind="stable")
+    amplitude, way = paths.amplitude[order], paths.way[order]
+    kind = paths.ways.kind
+    return CellPaths(
+        row=order.astype(np.int32),
+        power=np.abs(amplitude) ** 2 * receiver.power,
+        phase=np.asarray(np.angle(amplitude), float),
+        wave=wave[order] * np.sqrt(receiver.power),
+        range=at[order],
+        rate=paths.rate[order],
+        departure=np.stack(angles(paths.ways.departure), axis=1)[way],
+        arrival=np.stack(angles(paths.ways.arrival), axis=1)[way],
+        interactions=((kind != NONE) & (kind != TRANSMIT)).sum(axis=1)[way],
+        chain=known.part[order],
+        chains=known.names,
+        met=_met(paths, known),
+    )
+
+
+def _met(paths: Paths, known: Chains) -> tuple[tuple[str, ...], ...]:
+    """Return what happened to the waves of each chain, in order."""
+    first = np.zeros(len(known.names), np.int64)
+    first[known.part[::-1]] = paths.way[::-1]
+    return tuple(
+        tuple(f"{KIND_WORDS[k]} {name.strip('()')}" for k, name in zip(paths.ways.kind[way], names, strict=False))
+        for way, names in zip(first, known.names, strict=True)
+    )
+
+
+def _checked(result: Result, number: int) -> int:
+    count = len(result.detections.range)
+    if not 1 <= number <= count:
+        allowed = f"they are numbered from 1 to {count}" if count else "there is none"
+        raise ValueError(f"no detection has the number {number}: {allowed}")
+    return number - 1
+
+
+def _nearest(result: Result, range: float, speed: float | None) -> list[int]:
+    """Return the detections within a resolution cell of a place, the nearest first; of equally near ones the strongest
+    is."""
+    d, m = result.detections, result.rdmap
+    away = np.abs(d.range - range) / m.range_resolution
+    if speed is not None:
+        period = 2.0 * m.unambiguous_rate
+        off = np.abs(d.speed - speed)
+        away = np.maximum(away, np.minimum(off, np.abs(period - off)) / m.rate_resolution)
+    order = np.lexsort((-d.power, np.floor(away / _SAME)))
+    return [int(i) for i in order if away[i] <= 1.0]
+
+
+def _place(result: Result, range: float, speed: float | None) -> tuple[int, int]:
+    """Return the map cell (rate, range) at a place; without speed the strongest at that range."""
+    rows, column = _cells(result.rdmap, range, None if speed is None else speed - result.receiver.ego_speed)
+    return int(rows[np.argmax(result.rdmap.power[rows, column])]), column
+
+
+def _cells(rdmap: RangeDoppler, range: float, rate: float | None) -> tuple[NDArray[np.int64], int]:
+    if not rdmap.range[0] <= range <= rdmap.range[-1]:
+        raise ValueError(f"range {range:g} m lies outside the map, {rdmap.range[0]:.1f} to {rdmap.range[-1]:.1f} m")
+    column = int(np.argmin(np.abs(rdmap.range - range)))
+    if rate is None:
+        return np.arange(len(rdmap.rate)), column
+    low, high = rdmap.rate[0] - rdmap.rate_resolution, rdmap.rate[-1] + rdmap.rate_resolution
+    if not low <= rate <= high:
+        raise ValueError(f"range rate {rate:g} m/s lies outside the map, {low:.1f} to {high:.1f} m/s")
+    return np.array([np.argmin(np.abs(rdmap.rate - rate))]), column

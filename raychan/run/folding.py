@@ -1,0 +1,112 @@
+"""Folding: whether a cell shows its echo where it is, or a whole number of ambiguities away, or mirrored."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.run.response import Response
+from raychan.tables import Complexes, Paths
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_NEAR = 4.0  # resolution cells: beyond the main lobe of any window, whose side lobes do not tell what feeds a cell
+_EQUAL = 1.0 + 1e-6
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Where the paths behind a cell are: range [m] mid frame and range rate [m/s]; NaN where unknown."""
+
+    range: float = math.nan
+    rate: float = math.nan
+    folded: bool = False
+    """Whether that is another place than the one shown: ambiguities away, or the mirror image of real sampling."""
+
+
+UNKNOWN = Truth()
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A cell of the map, range [m] and rate [m/s] (None for one of the profile), and the place reported for it."""
+
+    range: float
+    rate: float | None
+    at_range: float
+    at_rate: float
+
+
+def truth(paths: Paths, rows: Ints, strongest: int, response: Response, shown: Shown) -> Truth:
+    """Return where the paths of one chain that feed a cell are.
+
+    Args: rows of the chain's paths; strongest the row of the one that brings most to the cell.
+    Of all places that alias to the cell it is the one that brings most power; range and rate are the power-weighted
+    means of the paths there.
+    """
+    found: list[tuple[float, Truth]] = []
+    for mirrored in (False, True) if response.mirrors and shown.rate is not None else (False,):
+        folds, near = _folds(paths, rows, response, shown, mirrored)
+        taken = rows[near]
+        if not near.any():  # a side lobe: the strongest path says whose
+            taken = np.array([strongest])
+            folds, near = _folds(paths, taken, response, shown, mirrored)[0], np.ones(1, bool)
+        power = _powers(paths, taken, response, shown, mirrored)
+        at, rate = response.stands(paths.delay[taken], paths.rate[taken], shown.rate is not None)
+        places, place = np.unique(folds[near], axis=0, return_inverse=True)
+        for i, whole in enumerate(places):
+            weight = power * (place.ravel() == i)
+            total = float(weight.sum())
+            if total > 0.0:
+                folded = mirrored or bool(whole.any())
+                found.append((total, Truth(float(weight @ at) / total, float(weight @ rate) / total, folded)))
+    # Of equal ones (a target at range 0 is its own mirror image) the place as shown.
+    return max(found, key=lambda one: one[0] * (1.0 if one[1].folded else _EQUAL), default=(0.0, UNKNOWN))[1]
+
+
+def aliased(at: Floats, shown: float, response: Response) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return how far (n,) [m] the nearest alias of echoes at ranges `at` (n,) [m] is from a range shown [m], and
+    whether that alias is another place than theirs."""
+    period = response.periods[0]
+    signs = np.array([[1.0], [-1.0]] if response.mirrors else [[1.0]])
+    off = signs * at - shown
+    whole = np.rint(off / period)
+    away = np.abs(off - whole * period)
+    near, row = np.argmin(away, axis=0), np.arange(len(at))
+    return away[near, row], (whole[near, row] != 0.0) | (near > 0)
+
+
+def _folds(
+    paths: Paths, rows: Ints, response: Response, shown: Shown, mirrored: bool
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """Return the ambiguities (n, 2) of range and rate between paths and the place shown, and whether the paths stand
+    on the main lobe about it when these are taken out."""
+    at, rate = response.stands(paths.delay[rows], paths.rate[rows], shown.rate is not None)
+    sign = -1.0 if mirrored else 1.0
+    away, smear = np.zeros((len(rows), 2)), np.zeros(len(rows))
+    away[:, 0] = sign * at - shown.at_range
+    if shown.rate is not None:
+        # Each row of the map is freed of its own Doppler within the ramp, not of that of others.
+        away[:, 0] += (sign * rate - shown.rate) * response.drift
+        away[:, 1] = sign * rate - shown.at_rate
+        # A mover that migrates over cells of range spreads over as many of rate.
+        smear = 0.5 * np.abs(rate) * response.waveform.frame_duration / response.resolutions[0]
+    whole = np.rint(away / response.periods)
+    rest = np.abs(away - whole * response.periods) / response.resolutions
+    return whole.astype(np.int64), np.asarray((rest <= _NEAR + smear[:, None]).all(axis=1))
+
+
+def _powers(paths: Paths, rows: Ints, response: Response, shown: Shown, mirrored: bool) -> Floats:
+    """Return what paths, or their mirror images, bring to the cell shown, as powers (n,)."""
+    delay = paths.delay[rows]
+    if shown.rate is None:
+        wave: Complexes = paths.amplitude[rows] * response.in_profile(delay, shown.range)[0]
+    else:
+        sign = -1.0 if mirrored else 1.0
+        cell = sign * shown.range, sign * shown.rate
+        wave = response.image_in_cell(paths.amplitude[rows], delay, paths.rate[rows], *cell)[0]
+    return np.abs(wave) ** 2
