@@ -12,6 +12,8 @@ import numpy as np
 from raychan.kernels.jit import njit
 
 _FAR = 32.0  # radii of the ball about all facets from which an origin is far off
+_BESIDE = 1e-3  # of a facet's length along a ray: what a grazing ray's hit may lie beside it
+_PACES = 64.0  # the same in paces of the ray, of which a small facet is no more
 
 
 @njit(cache=True, inline="always")
@@ -96,9 +98,9 @@ def set_out(origin, direction, skip, start, centre, radius, slack, size):  # typ
 
 
 @njit(cache=True, nogil=True)
-def companions(todo, origin, direction, ahead, pace, centre):  # type: ignore[no-untyped-def]
+def companions(todo, origin, direction, ahead, pace, centre, turn):  # type: ignore[no-untyped-def]
     """Return float32 origins and directions (3 m, 3) of the rays `todo` (m,), each with two companions, a pace to
-    either side."""
+    either side, or a quarter turn from there if `turn`: no plane through the ray holds both pairs."""
     m = len(todo)
     o, d = np.empty((3 * m, 3), np.float32), np.empty((3 * m, 3), np.float32)
     side = np.empty(3)
@@ -109,6 +111,9 @@ def companions(todo, origin, direction, ahead, pace, centre):  # type: ignore[no
         side[0] = y * (y - 0.7) - z * (x + 0.3)
         side[1] = z * z - x * (y - 0.7)
         side[2] = x * (x + 0.3) - y * z
+        if turn:
+            a, b, c = side
+            side[0], side[1], side[2] = y * c - z * b, z * a - x * c, x * b - y * a
         for c in range(3):
             at, way = origin[i, c] + ahead[i] * direction[i, c], pace[i] * side[c]
             o[3 * j, c], d[3 * j, c] = at - centre[c], direction[i, c]
@@ -117,11 +122,47 @@ def companions(todo, origin, direction, ahead, pace, centre):  # type: ignore[no
     return o, d
 
 
+@njit(cache=True, inline="always")
+def _met(v, x, d, t, pace):  # type: ignore[no-untyped-def]
+    """Tell whether the distance t [m] along a ray to a facet's plane is one to the facet: not before it nor beyond.
+
+    A facet seen edge-on, which float32 meets, has no such distance in float64, or any: the ray runs along its plane.
+    """
+    if not math.isfinite(t):
+        return False
+    low, high = np.inf, -np.inf
+    for q in range(3):
+        along = 0.0
+        for c in range(3):
+            along += (v[q, c] - x[c]) * d[c]
+        low, high = min(low, along), max(high, along)
+    room = _BESIDE * (high - low) + _PACES * pace
+    return low - room < t < high + room
+
+
+@njit(cache=True, inline="always")
+def _beside(j, hit, x, d, ahead, pace, vertices, first, normal):  # type: ignore[no-untyped-def]
+    """Return what stands for a facet that a ray runs along: the nearest that its companions meet, -1 if nothing; -2 if
+    they run along one too."""
+    h, old = -1, np.inf
+    for s in range(1, 3):
+        other = hit[3 * j + s]
+        if other < 0:
+            continue
+        new = plane_distance(normal[other], first[other], x, 0.0, d)
+        if other == hit[3 * j] or not _met(vertices[other], x, d, new, pace):
+            return -2
+        if ahead < new < old:
+            h, old = other, new
+    return h
+
+
 @njit(cache=True, nogil=True)
 def land(  # type: ignore[no-untyped-def]
     todo, hit, origin, direction, skip, start, ahead, pace, edge, nearest, vertices, first, normal, facet, distance
 ):
-    """Write facets and distances of the rays `todo` (m,); return those to be cast again from farther on.
+    """Write facets and distances of the rays `todo` (m,); return those to be cast again, from farther on or with
+    companions farther aside.
 
     Args: hit (3 m,) what each ray and its companions met. Of rays aimed at corners Embree lets one in some hundreds
     through, of those aimed at edges one in a million: what a companion met nearer counts, where the ray meets it too,
@@ -133,6 +174,13 @@ def land(  # type: ignore[no-untyped-def]
         i = todo[j]
         x, d = origin[i], direction[i]
         h = hit[3 * j]
+        if h >= 0 and not _met(vertices[h], x, d, plane_distance(normal[h], first[h], x, 0.0, d), pace[i]):
+            h = _beside(j, hit, x, d, ahead[i], pace[i], vertices, first, normal)
+            if h == -2:
+                pace[i] *= 2.0
+                again[count] = i
+                count += 1
+                continue
         for s in range(1, 3):
             other = hit[3 * j + s]
             if other < 0 or other == h:
@@ -149,7 +197,7 @@ def land(  # type: ignore[no-untyped-def]
         if h != skip[i] and t > start[i] + nearest:
             facet[i], distance[i] = h, t
             continue
-        ahead[i] = max(t if np.isfinite(t) else 0.0, ahead[i]) + 2.0 * pace[i]
+        ahead[i] = max(t, ahead[i]) + 2.0 * pace[i]
         pace[i] *= 2.0
         again[count] = i
         count += 1

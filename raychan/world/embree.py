@@ -197,8 +197,8 @@ class Tracer:
         near = group.own(origin, direction)
         todo, count = np.arange(len(origin)), 0
         shape = self.facets.vertices, self.first, self.normal
-        for _ in range(8):
-            hit = group.run(*companions(todo, *near, ahead, pace, group.mesh.centre))
+        for turn in range(8):
+            hit = group.run(*companions(todo, *near, ahead, pace, group.mesh.centre, turn % 2 == 1))
             count += len(todo)
             ways = origin, direction, skip, begin, ahead, pace, _EDGE, self._nearest
             todo = land(todo, hit, *ways, *shape, facet, distance)
