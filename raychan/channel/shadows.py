@@ -180,7 +180,7 @@ def _across(  # type: ignore[no-untyped-def]
         best = 0.0
         for ci in range(i0, i1):
             start = ci * shape[1]
-            for at in range(first[start + j0], first[start + max(j1, j0)]):
+            for at in range(first[start + j0], first[start + j1]):
                 e = index[at]
                 if tried[e] == i:
                     continue
@@ -205,4 +205,6 @@ def _across(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _cells(low_end, high_end, low, cell, count):  # type: ignore[no-untyped-def]
-    return max(int((low_end - low) / cell), 0), min(int((high_end - low) / cell) + 1, count)
+    # A tube may lie wholly beside the grid.
+    begin = min(max(int((low_end - low) / cell), 0), count)
+    return begin, max(min(int((high_end - low) / cell) + 1, count), begin)
