@@ -70,6 +70,45 @@ def test_near_field_polarisation_and_material_are_passed_on(plate, tmp_path, cap
     assert "HH, radar at 2 m" in capsys.readouterr().out
 
 
+def drawn(monkeypatch, dbsm, error, polar=False, azimuth=None, elevation=(0.0,)):
+    """The axes of a picture of RCS against angle."""
+    from raychan.report import rcs_figure
+
+    made = []
+    monkeypatch.setattr(rcs_figure, "drawn_as", lambda figure, suffix: made.append(figure) or memoryview(b""))
+    azimuth = np.arange(float(np.shape(dbsm)[1])) if azimuth is None else np.array(azimuth)
+    rcs_figure.rcs_picture(azimuth, np.array(elevation), np.array(dbsm), np.array(error), "title", polar=polar)
+    return made[0].axes[0]
+
+
+@pytest.mark.parametrize("polar", [False, True])
+def test_the_plot_clips_nothing_and_leaves_gaps_where_nothing_returns(polar, monkeypatch):
+    dbsm = np.array([[-137.0, -np.inf, 3.0, 41.0, -350.0]])
+    axes = drawn(monkeypatch, dbsm, [[0.5, 60.0, 0.1, 60.0, 0.2]], polar)
+    low, high = axes.get_ylim()
+    assert low < -137.5 and high > 41.0
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), [-137.0, np.nan, 3.0, 41.0, np.nan])
+    assert axes.lines[2].get_ydata()[1] == 41.0, "a cross where the error is unknown"
+    note = axes.get_legend().get_title().get_text()
+    assert "0.1 to 0.5 dB" in note and "error unknown (2 of 5" in note and "no return (2 of 5" in note
+    assert axes.name == ("polar" if polar else "rectilinear")
+
+
+def test_a_polar_plot_turns_as_the_target_does_from_above(monkeypatch):
+    axes = drawn(monkeypatch, [[0.0, 1.0, 2.0]], [[0.1, 0.1, 0.1]], True, azimuth=[0.0, 90.0, 180.0])
+    np.testing.assert_allclose(axes.lines[0].get_xdata(), [0.0, np.pi / 2, np.pi])
+    assert axes.get_theta_offset() == pytest.approx(np.pi / 2) and axes.get_theta_direction() == 1.0
+
+
+def test_one_angle_is_written_as_a_figure(monkeypatch):
+    axes = drawn(monkeypatch, [[10.0]], [[0.25]], azimuth=[30.0])
+    said = " ".join(t.get_text() for t in axes.texts)
+    assert "10.00 dBsm" in said and "0.25 dB" in said and "10 m²" in said and "azimuth 30 deg" in said
+    assert not axes.lines and not axes.axison
+    said = " ".join(t.get_text() for t in drawn(monkeypatch, [[-np.inf]], [[60.0]]).texts)
+    assert "no return" in said and "error unknown" in said
+
+
 def test_many_elevations_are_drawn_as_a_map(plate, tmp_path):
     png = tmp_path / "map.png"
     assert invoke(["rcs", str(plate), "--azimuth=-5:5:1", "--elevation=-5:5:1", "--plot", str(png)]) == 0
@@ -103,6 +142,8 @@ def test_many_elevations_are_drawn_as_a_map(plate, tmp_path):
         (["--shape", "plate", "--out", "no/such/place.csv"], "no directory"),
         (["--shape", "plate", "--out", "table.txt"], ".csv"),
         (["--shape", "plate", "--plot", "picture.tiff"], ".png"),
+        (["--shape", "plate", "--polar"], "--plot"),
+        (["--shape", "plate", "--polar", "--plot", "a.png", "--azimuth=0:9:1", "--elevation=0:8:1"], "at most 8"),
     ],
 )
 def test_wrong_input_ends_with_2_and_says_what_is_allowed(argv, says, capsys):

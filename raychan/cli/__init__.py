@@ -100,7 +100,8 @@ def invoke(argv: list[str]) -> int:
     """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C."""
     try:
         code = typer.main.get_command(app).main(args=argv, prog_name="raychan", standalone_mode=False)
-        sys.stdout.flush()
+        if (trouble := _unprinted()) is not None:
+            return trouble
         # typer turns Ctrl-C into an exit code of its own, silently.
         return _fail(_STOPPED, 130) if code == 130 else int(code or 0)
     except (KeyboardInterrupt, typer.Abort):
@@ -108,9 +109,7 @@ def invoke(argv: list[str]) -> int:
     except Interrupted as stop:
         return _fail(str(stop), 130)
     except BrokenPipeError:
-        # The reader of a pipe went away, as `head` does; Python would complain again when it flushes at the end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return _unprinted() or 0
     except MemoryError:
         return _fail("out of memory; ask for a coarser --tolerance or fewer --max-bounces")
     except Exception as error:
@@ -123,9 +122,25 @@ def invoke(argv: list[str]) -> int:
         if was_interrupted(error):
             return _fail(_STOPPED, 130)
 
+        _unprinted()
+        if isinstance(error, OSError) and error.errno and not error.filename:
+            return _fail(f"standard output: {error.strerror}")  # files are told of by their names
         if isinstance(error, SceneError | OSError):
             return _fail(str(error))
         raise
+
+
+def _unprinted() -> int | None:
+    """Print what waits to be printed; return the exit code where standard output does not take it."""
+    try:
+        sys.stdout.flush()
+        return None
+    except OSError as error:
+        # Python would complain again when it flushes at the end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            return 0  # the reader of a pipe went away, as `head` does
+        return _fail(f"standard output: {error.strerror or error}")
 
 
 def _fail(text: str, code: int = 2) -> int:

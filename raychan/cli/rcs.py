@@ -65,6 +65,7 @@ def rcs(
         Path | None, typer.Option("--out", "-o", help="Write a table to this file.", metavar="FILE.csv")
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw RCS against angle to this file.", metavar="FILE.png")] = None,
+    polar: Annotated[bool, typer.Option("--polar", help="Draw the angle round a circle.")] = False,
 ) -> None:
     """Compute the radar cross-section of a mesh or a built-in shape against angle, and how wrong it may be.
 
@@ -77,6 +78,8 @@ def rcs(
     az, el = angles(azimuth, "--azimuth"), angles(elevation, "--elevation")
     if len(az) * len(el) > _MOST_ANGLES:
         raise typer.BadParameter(f"{len(az) * len(el)} angles wanted; at most {_MOST_ANGLES} can be")
+    if polar:
+        _can_be_polar(plot, len(az), len(el))
     mesh, name = _target(source or [], shape, unit, up, scale)
     grid = np.meshgrid(az, el)
     try:
@@ -98,16 +101,18 @@ def rcs(
     title = f"{name}, {frequency_ghz:g} GHz, {polarization.upper()}, " + (
         "far field" if np.isinf(far) else f"radar at {far:g} m"
     )
-    files = {}
+    files: dict[Path, bytes | memoryview] = {}
     if out is not None:
         files[out] = _csv(rows).encode()
     if plot is not None:
-        dbsm = np.array([r[3] for r in rows]).reshape(grid[0].shape)
-        files[plot] = _drawn(az, el, dbsm, found.error_db.reshape(grid[0].shape), title, plot.suffix)
-    from raychan.run.files import write_whole
+        from raychan.report.rcs_figure import rcs_picture
 
-    for file, content in files.items():
-        write_whole(file, content)
+        dbsm = np.array([r[3] for r in rows]).reshape(grid[0].shape)
+        error = found.error_db.reshape(grid[0].shape)
+        files[plot] = rcs_picture(az, el, dbsm, error, title, plot.suffix, polar)
+    from raychan.run.files import write_together
+
+    write_together(files)
     screen = show.console()
     screen.print(_table(title, rows))
     _warn(found, tolerance)
@@ -147,6 +152,15 @@ def _writable(file: Path | None, endings: tuple[str, ...]) -> None:
         raise typer.BadParameter(f"{file}: there is no directory {file.parent}")
     if not os.access(file.parent, os.W_OK):
         raise typer.BadParameter(f"{file}: the directory {file.parent} cannot be written to")
+
+
+def _can_be_polar(plot: Path | None, azimuths: int, elevations: int) -> None:
+    from raychan.report.rcs_figure import MOST_CUTS
+
+    if plot is None:
+        raise typer.BadParameter("it needs --plot", param_hint="--polar")
+    if azimuths > 1 and elevations > MOST_CUTS:
+        raise typer.BadParameter(f"{elevations} cuts wanted; at most {MOST_CUTS} can be", param_hint="--polar")
 
 
 def _target(source: list[str], shape: str | None, unit: str, up: str | None, scale: float) -> tuple[Mesh, str]:
@@ -228,12 +242,3 @@ def _warn(found: Rcs, tolerance: float) -> None:
         count, worst = found.error_db.size, float(found.error_db.max())
         most = "unknown" if worst >= _UNSURE_DB else f"{worst:.2f} dB"
         show.warn([f"{over} of {count} angles miss the tolerance of {tolerance:g} dB; largest stated error: {most}"])
-
-
-def _drawn(az: Any, el: Any, dbsm: Any, error: Any, title: str, suffix: str) -> bytes:
-    import tempfile
-
-    from raychan.report.rcs_figure import rcs_picture
-
-    with tempfile.TemporaryDirectory() as stage:
-        return rcs_picture(az, el, dbsm, error, title, Path(stage) / f"rcs{suffix}").read_bytes()

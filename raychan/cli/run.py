@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from raychan.run.result import Result
     from raychan.world.scene import Scene
 
-PICTURES = ("scene.png", "profile.png", "rdmap.png")
-
 
 def run(
     scene: SceneFile,
@@ -49,7 +47,7 @@ def run(
     """Simulate a scene: paths, power-delay profile, I/Q cube, range-Doppler map, detections.
 
     Writes result.nc (netCDF-4: all of it), detections.csv, summary.json (timings, error reached, what was left out) and
-    three pictures. The directory changes only when everything is ready.
+    three pictures. When all is ready they take the place of an earlier run's at once; other files in DIR stay.
 
     With --frames, DIR holds frame_0000, frame_0001, ..., each such a directory and written as soon as it is ready, and
     detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 is what a run without --frames gives.
@@ -69,10 +67,10 @@ def run(
 def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:
     from raychan.run.chain import simulate
     from raychan.run.files import staging
-    from raychan.run.store import save_result
+    from raychan.run.store import CONTENTS, PICTURES, save_result
     from raychan.run.tell import notes as result_notes
 
-    with staging(out) as stage, show.progress() as tell:
+    with staging(out, CONTENTS) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
         save_result(result, stage)
         warnings = list(result.warnings)

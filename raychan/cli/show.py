@@ -24,9 +24,15 @@ class Interrupted(Exception):
     """Ctrl-C in a command that keeps what is ready; the message says what that is."""
 
 
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Leave it to the command line, where rich would end the process with 1."""
+        raise BrokenPipeError
+
+
 def console() -> Console:
     """Return the console of standard output."""
-    return Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
+    return _Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
 
 
 def warn(warnings: Iterable[str]) -> None:

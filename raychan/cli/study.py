@@ -49,7 +49,7 @@ def tradeoff(
     Writes tradeoff.csv, tradeoff_CASE.png for each case and tradeoff.png with the settings that none beats.
     """
     from raychan.report.tradeoff_figures import case_picture, summary_picture
-    from raychan.run.files import staging
+    from raychan.run.files import Contents, staging
     from raychan.study.tradeoff import read_csv, tradeoff, write_csv
     from raychan.study.verdicts import verdicts
 
@@ -57,7 +57,8 @@ def tradeoff(
         earlier = read_csv(beside) if beside else []
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--beside") from None
-    with staging(out) as stage, show.progress() as tell:
+    contents = Contents(("tradeoff.csv", "tradeoff.png", "tradeoff_*.png"), signs=("tradeoff.csv",))
+    with staging(out, contents) as stage, show.progress() as tell:
         try:
             rows = tradeoff(case or (), quick=quick, progress=tell)
         except ValueError as error:

@@ -25,12 +25,13 @@ def stability(
 
     Writes stability.md, stability.csv and figures. What fails is told as failing; the exit code is 0 all the same.
     """
-    from raychan.report.stability_figures import pictures
-    from raychan.run.files import staging
+    from raychan.report.stability_figures import FIGURES, pictures
+    from raychan.run.files import Contents, staging
     from raychan.study.stability import cells, summary, write_csv, write_markdown
     from raychan.study.stability import stability as study
 
-    with staging(out) as stage, show.progress() as tell:
+    contents = Contents(("stability.csv", "stability.md", *FIGURES), signs=("stability.csv",))
+    with staging(out, contents) as stage, show.progress() as tell:
         try:
             done = study(quick, only or (), tell)
         except ValueError as error:

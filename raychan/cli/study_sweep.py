@@ -49,13 +49,14 @@ def sweep(
     return of the body stand against the weakest that the radar reports. Writes sweep.csv and sweep.png.
     """
     from raychan.report.sweep_figures import sweep_picture
-    from raychan.run.files import staging
+    from raychan.run.files import Contents, staging
     from raychan.study import sweep as study
     from raychan.world.errors import SceneError
     from raychan.world.scene import Scene
 
     loaded = Scene.load(scene).override(set_ or [])
-    with staging(out) as stage, show.progress() as tell:
+    contents = Contents(("sweep.csv", "sweep.png"), signs=("sweep.csv",))
+    with staging(out, contents) as stage, show.progress() as tell:
         try:
             axes = [study.Axis.of(text) for text in vary or ()]
             axes += [study.Axis.time(times)] if times else []

@@ -54,11 +54,12 @@ def validate(
     """
     from raychan.report.validation_page import page
     from raychan.report.validation_report import markdown
-    from raychan.run.files import staging
+    from raychan.run.files import Contents, staging, write_whole
     from raychan.study.validation.sections import ablations, budgets, ghosts, turns
     from raychan.study.validation.validate import validate as run
 
-    with staging(out) as stage, show.progress() as tell:
+    contents = Contents(("report.md", "report.html", "report-*.png"), signs=("report.html",))
+    with staging(out, contents) as stage, show.progress() as tell:
         done = run(data, only or (), tolerance, tell)
         sections, figures = None, {}
         if done.whole:
@@ -68,8 +69,8 @@ def validate(
             sections = (ablations(done.bench), ghosts(done.bench), people, by_azimuth)
             figures = {name: path.name for name, path in pictures(done, people, by_azimuth, stage).items()}
         text = markdown(done, sections, figures)
-        (stage / "report.md").write_text(text, encoding="utf-8")
-        (stage / "report.html").write_text(page(text, stage, "raychan: validation"), encoding="utf-8")
+        write_whole(stage / "report.md", text.encode())
+        write_whole(stage / "report.html", page(text, stage, "raychan: validation").encode())
     _say(done, out)
     if done.problems:
         show.warn(done.problems)

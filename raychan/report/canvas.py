@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from raychan.run.files import write_whole
 
 Floats = NDArray[np.float64]
 
@@ -60,15 +63,21 @@ def style() -> Any:
 
 def save(made: Any, path: str | Path, flat: bool = False) -> Path:
     """Write a figure at 200 dots an inch and return its path; a `flat` PNG, of lines and marks, with 256 colours."""
-    path = Path(path)
-    made.savefig(path, dpi=200)
+    return write_whole(path, drawn_as(made, Path(path).suffix, flat))
+
+
+def drawn_as(made: Any, suffix: str, flat: bool = False) -> memoryview:
+    """Return a figure as the bytes of a file of a suffix such as '.png'; see `save`."""
+    drawn = io.BytesIO()
+    made.savefig(drawn, dpi=200, format=suffix[1:].lower() or "png")
     if flat:  # a third of the size
         from PIL import Image
 
-        with Image.open(path) as picture:
+        with Image.open(drawn) as picture:
             few = picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-        few.save(path, optimize=True)
-    return path
+        drawn = io.BytesIO()
+        few.save(drawn, "PNG", optimize=True)
+    return drawn.getbuffer()
 
 
 def outlined(width: float = 2.0, colour: str = "black") -> list[Any]:

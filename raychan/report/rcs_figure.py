@@ -2,80 +2,128 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import PALETTE, figure, save, style
+from raychan.report.canvas import PALETTE, drawn_as, figure, style
 
 Floats = NDArray[np.float64]
 
-_RANGE_DB = 80.0
-_LINES = 8
+UNSURE_DB = 60.0  # the error that raychan.rcs states where it knows nothing
+_ROUNDING_DB = 20.0 * np.log10(np.finfo(float).eps)  # so far below its peak a pattern is but rounding: no return
+MOST_CUTS = 8
+"""Cuts that are drawn as lines; more become a map."""
 
 
 def rcs_picture(
-    azimuth: Floats, elevation: Floats, dbsm: Floats, error_db: Floats, title: str, path: str | Path
-) -> Path:
-    """Draw RCS against angle; many elevations and azimuths at once become a map.
+    azimuth: Floats,
+    elevation: Floats,
+    dbsm: Floats,
+    error_db: Floats,
+    title: str,
+    suffix: str = ".png",
+    polar: bool = False,
+) -> memoryview:
+    """Draw RCS against angle and return the file's bytes; many elevations and azimuths at once become a map.
 
-    Args: azimuth (a,) and elevation (e,) [deg], dbsm and error_db (e, a) [dBsm, dB]; title a line; path of the picture.
+    Args: azimuth (a,) and elevation (e,) [deg], dbsm and error_db (e, a) [dBsm, dB]; title a line; suffix of the file;
+    polar: angle round a circle, which at most MOST_CUTS cuts can be. One angle is written as a figure.
     """
-    low, high = _limits(dbsm, error_db)
+    error_db = np.where(error_db < UNSURE_DB, error_db, np.nan)
+    dbsm = np.where(dbsm > dbsm.max() + _ROUNDING_DB, dbsm, -np.inf)
     with style():
-        made = figure(7.6, 4.2)
-        axes = made.add_subplot()
-        axes.set_title(title)
-        if len(azimuth) > 1 and len(elevation) > _LINES:
-            _map(made, axes, azimuth, elevation, np.clip(dbsm, low, high), error_db)
+        made = figure(6.4, 6.0) if polar and dbsm.size > 1 else figure(7.6, 4.2)
+        if dbsm.size == 1:
+            _figure(made, azimuth[0], elevation[0], dbsm.item(), error_db.item(), title)
+        elif len(azimuth) > 1 and len(elevation) > MOST_CUTS and not polar:
+            _map(made, azimuth, elevation, dbsm, error_db, title)
         else:
-            across = len(azimuth) > 1 or len(elevation) == 1
-            angle, other, names = azimuth, elevation, ("azimuth", "elevation")
-            if not across:
-                angle, other, names, dbsm, error_db = elevation, azimuth, names[::-1], dbsm.T, error_db.T
-            for i, fixed in enumerate(other):
-                label = f"{names[1]} {fixed:g} deg" if len(other) > 1 else "RCS"
-                _line(axes, angle, np.clip(dbsm[i], low, high), error_db[i], PALETTE[i % len(PALETTE)], label)
-            if len(angle) > 1:
-                axes.set_xlim(angle.min(), angle.max())
-            axes.set(xlabel=f"{names[0]} [deg]", ylabel="RCS [dBsm]")
-            axes.set_ylim(low, high)
-            axes.grid(alpha=0.25, lw=0.5)
-            mark = "band" if len(angle) > 1 else "bar"
-            least, most = (f"{x:.2g}" for x in (error_db.min(), error_db.max()))
-            note = (
-                f"{mark}: stated error, {least} to {most} dB" if least != most else f"{mark}: stated error, {most} dB"
-            )
-            axes.legend(loc="best", ncols=2 if len(other) > 4 else 1, title=note, title_fontsize=8, alignment="left")
-        return save(made, path)
+            _cuts(made, azimuth, elevation, dbsm, error_db, title, polar)
+        return drawn_as(made, suffix)
 
 
-def _limits(dbsm: Floats, error_db: Floats) -> tuple[float, float]:
-    """Return the span of RCS worth drawing [dBsm]."""
+def _figure(made: Any, azimuth: float, elevation: float, dbsm: float, error: float, title: str) -> None:
+    """Write the cross-section at one angle."""
+    axes = made.add_subplot()
+    axes.set_axis_off()
+    axes.set_title(title)
+    sure = "error unknown" if np.isnan(error) else f"± {error:.2g} dB"
+    large = f"{dbsm:.2f} dBsm" if np.isfinite(dbsm) else "no return"
+    small = f"{sure}\n{10.0 ** (0.1 * dbsm):.4g} m²\nazimuth {azimuth:g} deg, elevation {elevation:g} deg"
+    axes.text(0.5, 0.62, large, ha="center", va="center", fontsize=34, transform=axes.transAxes)
+    axes.text(0.5, 0.28, small, ha="center", va="center", fontsize=12, linespacing=1.6, transform=axes.transAxes)
+
+
+def _cuts(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Floats, title: str, polar: bool) -> None:
+    """Draw a line for each elevation against azimuth, or, of one azimuth, a line against elevation."""
+    angle, other, names = azimuth, elevation, ("azimuth", "elevation")
+    if len(azimuth) == 1:
+        angle, other, names, dbsm, error = elevation, azimuth, names[::-1], dbsm.T, error.T
+    axes = made.add_subplot(projection="polar" if polar else None)
+    axes.set_title(title)
+    low, high = _limits(dbsm, error)
+    for i, fixed in enumerate(other):
+        label = f"{names[1]} {fixed:g} deg" if len(other) > 1 else "RCS"
+        _line(axes, np.radians(angle) if polar else angle, dbsm[i], error[i], PALETTE[i % len(PALETTE)], label)
+    axes.set_ylim(low, high)
+    axes.grid(alpha=0.25, lw=0.5)
+    if polar:
+        axes.set_theta_zero_location("N" if names[0] == "azimuth" else "E")
+        axes.set_rlabel_position(112.5)
+        axes.set_xlabel(f"{names[0]} [deg], RCS [dBsm]")
+    else:
+        axes.set(xlabel=f"{names[0]} [deg]", ylabel="RCS [dBsm]", xlim=(angle.min(), angle.max()))
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1)} if polar else {"loc": "best"}
+    axes.legend(ncols=2 if len(other) > 4 else 1, title=_note(dbsm, error), title_fontsize=8, alignment="left", **place)
+
+
+def _note(dbsm: Floats, error: Floats) -> str:
+    """Return what the band shows, and what can be neither line nor band."""
+    known = error[np.isfinite(error)]
+    parts = []
+    if known.size:
+        least, most = f"{known.min():.2g}", f"{known.max():.2g}"
+        parts.append("band: stated error, " + (f"{least} to {most} dB" if least != most else f"{most} dB"))
+    if unsure := error.size - known.size:
+        parts.append(f"x: error unknown ({unsure} of {error.size} angles)")
+    if silent := int((~np.isfinite(dbsm)).sum()):
+        parts.append(f"gap: no return ({silent} of {dbsm.size} angles)")
+    return "\n".join(parts)
+
+
+def _limits(dbsm: Floats, error: Floats) -> tuple[float, float]:
+    """Return the span that holds every value and its band [dBsm]."""
     real = np.isfinite(dbsm)
     if not real.any():
         return -100.0, -90.0
-    top, least = float(dbsm[real].max()), float(dbsm[real].min())
-    room = max(3.0, min(6.0, float(error_db[real & (dbsm == top)].max(initial=0.0))))
-    return max(least, top - _RANGE_DB) - room, top + room
+    band = np.where(np.isfinite(error), error, 0.0)[real]
+    low, high = float((dbsm[real] - band).min()), float((dbsm[real] + band).max())
+    room = max(1.0, 0.05 * (high - low))
+    return low - room, high + room
 
 
 def _line(axes: Any, angle: Floats, dbsm: Floats, error: Floats, colour: str, label: str) -> None:
-    """Draw one cut: a line, or a point where there is one angle, over its band of error."""
-    if len(angle) == 1:
-        axes.errorbar(angle, dbsm, yerr=error, fmt="o", color=colour, capsize=4, label=label)
-        return
+    """Draw one cut over its band of error; crosses where the error is not known."""
+    dbsm = np.where(np.isfinite(dbsm), dbsm, np.nan)
     axes.fill_between(angle, dbsm - error, dbsm + error, color=colour, alpha=0.3, lw=0)
     axes.plot(angle, dbsm, color=colour, lw=1.1, label=label)
+    alone = np.isfinite(dbsm) & ~np.isfinite(np.r_[np.nan, dbsm[:-1]]) & ~np.isfinite(np.r_[dbsm[1:], np.nan])
+    axes.plot(angle[alone], dbsm[alone], ".", ms=4, color=colour)
+    unsure = np.isnan(error)
+    axes.plot(angle[unsure], dbsm[unsure], "x", ms=5, mew=1.0, color=colour)
 
 
-def _map(made: Any, axes: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Floats) -> None:
-    """Draw RCS over both angles, and contours where the stated error passes 1 dB."""
-    image = axes.pcolormesh(azimuth, elevation, dbsm, cmap="viridis", shading="nearest", rasterized=True)
+def _map(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Floats, title: str) -> None:
+    """Draw RCS over both angles, and contours where the stated error passes 1 dB; what returns nothing stays white."""
+    axes = made.add_subplot()
+    axes.set_title(title)
+    shown = np.where(np.isfinite(dbsm), dbsm, np.nan)
+    image = axes.pcolormesh(azimuth, elevation, shown, cmap="viridis", shading="nearest", rasterized=True)
     made.colorbar(image, ax=axes, label="RCS [dBsm]", pad=0.01, aspect=30)
-    if error.min() < 1.0 < error.max():
-        axes.contour(azimuth, elevation, error, levels=[1.0], colors="white", linewidths=0.8)
-        axes.annotate("white: stated error 1 dB", (0.0, -0.16), xycoords="axes fraction", fontsize=8)
+    wide = np.where(np.isnan(error), UNSURE_DB, error)
+    if wide.min() < 1.0 < wide.max():
+        axes.contour(azimuth, elevation, wide, levels=[1.0], colors="white", linewidths=0.8)
+        axes.annotate("white line: stated error 1 dB", (0.0, -0.16), xycoords="axes fraction", fontsize=8)
     axes.set(xlabel="azimuth [deg]", ylabel="elevation [deg]")

@@ -14,23 +14,36 @@ from raychan.study.stability import Tried
 _GOOD, _BAD = "#228833", "#cc3311"
 _MOST = 1e4  # tolerances beyond which a failure is drawn at the edge
 
+_OVERVIEW = "overview.png"
+_FILES = {
+    "grazing": "grazing.png",
+    "facet_sizes": "facet-sizes.png",
+    "leaks": "leaks.png",
+    "parallel": "parallel-mirrors.png",
+    "layers": "layers.png",
+    "paths": "path-count.png",
+    "dynamic": "dynamic-range.png",
+    "near_array": "near-array.png",
+}
+FIGURES = (_OVERVIEW, *_FILES.values())
+
 
 def pictures(done: Sequence[Tried], folder: Path) -> list[Path]:
     """Draw what the regimes tried give to draw, and return the files."""
     curves = {t.regime.key: t.outcome.curves for t in done if t.outcome.curves}
-    draw: dict[str, tuple[str, Callable[[dict[str, Any], Path], Path]]] = {
-        "grazing": ("grazing.png", _grazing),
-        "facet_sizes": ("facet-sizes.png", _sizes),
-        "leaks": ("leaks.png", _leaks),
-        "parallel": ("parallel-mirrors.png", _bounces),
-        "layers": ("layers.png", _layers),
-        "paths": ("path-count.png", _paths),
-        "dynamic": ("dynamic-range.png", _dynamic),
-        "near_array": ("near-array.png", _array),
+    draw: dict[str, Callable[[dict[str, Any], Path], Path]] = {
+        "grazing": _grazing,
+        "facet_sizes": _sizes,
+        "leaks": _leaks,
+        "parallel": _bounces,
+        "layers": _layers,
+        "paths": _paths,
+        "dynamic": _dynamic,
+        "near_array": _array,
     }
-    made = [_overview(done, folder / "overview.png")]
+    made = [_overview(done, folder / _OVERVIEW)]
     with style():
-        return made + [make(curves[key], folder / name) for key, (name, make) in draw.items() if key in curves]
+        return made + [make(curves[key], folder / _FILES[key]) for key, make in draw.items() if key in curves]
 
 
 def _overview(done: Sequence[Tried], path: Path) -> Path:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import re
+import math
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -14,9 +12,9 @@ import numpy as np
 
 from raychan.channel.surface import surface_of
 from raychan.run.chain import Channel, Clock, Progress, result_of, trace
-from raychan.run.files import StoreError, staging
+from raychan.run.files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
-from raychan.run.store import COLUMNS, rows, save_result
+from raychan.run.store import COLUMNS, CONTENTS, rows, save_result
 from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
 
@@ -111,8 +109,8 @@ def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
 class Store:
     """A directory of frames: frame_0000, frame_0001, ..., each as `raychan run` writes it, and detections.csv of all.
 
-    A frame is there whole or not at all, and detections.csv tells of those that are there. Frames that an earlier
-    sequence left go away. Raises: StoreError where the disk refuses.
+    The first frame takes the place of what an earlier run left, all at once. From then on a frame is there whole or
+    not at all, and detections.csv tells of those that are there. Raises: StoreError where the disk refuses.
     """
 
     def __init__(self, directory: str | Path) -> None:
@@ -121,36 +119,41 @@ class Store:
 
     def add(self, frame: Frame, draw: Callable[[Result, Path], None] | None = None) -> None:
         """Write a frame; `draw(result, directory)` adds pictures to it."""
-        place = self.directory / frame.name
+        lines = csv_bytes((frame.number, f"{frame.time:.6f}", *row) for row in rows(frame.result))
         if self.count == 0:
-            self._clear()
-        with staging(place) as stage:
-            save_result(frame.result, stage)
-            if draw is not None:
-                draw(frame.result, stage)
-        self._append(frame)
+            with staging(self.directory, CONTENTS) as stage:
+                place = stage / frame.name
+                place.mkdir()
+                _fill(place, frame, draw)
+                (stage / "detections.csv").write_bytes(csv_bytes([HEAD]) + lines)
+        else:
+            place = self.directory / frame.name
+            with staging(place, CONTENTS) as stage:
+                _fill(stage, frame, draw)
+            try:
+                self._append(lines)
+            except StoreError:
+                shutil.rmtree(place, ignore_errors=True)
+                raise
         self.count += 1
 
-    def _clear(self) -> None:
-        """Remove what an earlier sequence left."""
-        try:
-            if self.directory.is_dir():
-                for old in self.directory.iterdir():
-                    if re.fullmatch(r"frame_\d{4,}", old.name) and (old / "result.nc").is_file():
-                        shutil.rmtree(old)
-                (self.directory / "detections.csv").unlink(missing_ok=True)
-        except OSError as error:
-            raise StoreError(f"{self.directory}: cannot be cleared: {error.strerror or error}") from error
-
-    def _append(self, frame: Frame) -> None:
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        if self.count == 0:
-            writer.writerow(HEAD)
-        writer.writerows((frame.number, f"{frame.time:.6f}", *row) for row in rows(frame.result))
+    def _append(self, lines: bytes) -> None:
+        """Add lines to the list of detections, or leave it as it was."""
         path = self.directory / "detections.csv"
         try:
-            with open(path, "ab") as file:
-                file.write(text.getvalue().encode())
+            with open(path, "ab", buffering=0) as file:
+                end = file.tell()
+                try:
+                    while lines:
+                        lines = lines[file.write(lines) :]
+                except BaseException:
+                    file.truncate(end)
+                    raise
         except OSError as error:
             raise StoreError(f"{path}: cannot write: {error.strerror or error}") from error
+
+
+def _fill(place: Path, frame: Frame, draw: Callable[[Result, Path], None] | None) -> None:
+    save_result(frame.result, place)
+    if draw is not None:
+        draw(frame.result, place)

@@ -1,12 +1,7 @@
-"""Results on disk: result.nc (netCDF-4), detections.csv, summary.json.
-
-In result.nc each record is a group, each column a variable with its unit; a complex column is two real ones, `_re` and
-`_im`, so that xarray, MATLAB's h5read and any HDF5 reader open it alike.
-"""
+"""Results on disk: result.nc (netCDF-4), detections.csv, summary.json."""
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import json
 import math
@@ -18,12 +13,18 @@ from typing import Any
 import numpy as np
 
 from raychan.radar.waveform import Waveform
-from raychan.run.files import StoreError
-from raychan.run.result import Contribution, ExplainedDetections, Explanation, Receiver, Result
-from raychan.tables import Cube, MapError, Paths, Profile, RangeDoppler, Ways
+from raychan.run.files import Contents, StoreError, csv_bytes
+from raychan.run.netcdf import GROUPS, as_netcdf, read_record
+from raychan.run.result import Contribution, Explanation, Receiver, Result
 from raychan.units import dbm
 
 FORMAT = 2
+PICTURES = ("scene.png", "profile.png", "rdmap.png")
+CONTENTS = Contents(
+    names=("result.nc", "detections.csv", "summary.json", *PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
+    signs=("result.nc", "summary.json", "frame_[0-9][0-9][0-9][0-9]*/result.nc"),
+)
+"""What `raychan run` writes into its folder; a sequence has a folder of the same for each frame."""
 _CHANGED = "# changed: "  # how a scene notes overridden keys below its text
 COLUMNS = (
     "range_m",
@@ -40,19 +41,7 @@ COLUMNS = (
     "label",
     "bodies",
 )
-_GROUPS: dict[str, Any] = {
-    "paths": Paths,
-    "profile": Profile,
-    "cube": Cube,
-    "rdmap": RangeDoppler,
-    "error": MapError,
-    "detections": ExplainedDetections,
-}
 _JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
-_UNITS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_resolution": "m/s"} | {
-    "unambiguous_range": "m",
-    "unambiguous_rate": "m/s",
-}
 
 
 def save_result(result: Result, directory: str | Path) -> None:
@@ -62,14 +51,11 @@ def save_result(result: Result, directory: str | Path) -> None:
     """
     directory = Path(directory)
     try:
-        _write_netcdf(result, directory / "result.nc")
-        with open(directory / "detections.csv", "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows(rows(result))
+        (directory / "result.nc").write_bytes(as_netcdf(result, _attrs(result)))
+        (directory / "detections.csv").write_bytes(csv_bytes([COLUMNS, *rows(result)]))
         (directory / "summary.json").write_text(json.dumps(summary(result), indent=2) + "\n", encoding="utf-8")
-    except (OSError, RuntimeError) as error:  # h5py tells of a full disk by either
-        raise StoreError(f"{directory}: cannot write the result: {error}") from error
+    except OSError as error:
+        raise StoreError(f"{directory}: cannot write the result: {error.strerror or error}") from error
 
 
 def load_result(path: str | Path) -> Result:
@@ -88,7 +74,7 @@ def load_result(path: str | Path) -> Result:
             attrs = dict(root.attrs)
         if int(attrs.get("format", 0)) != FORMAT:
             raise StoreError(f"{file}: not a result of this version of raychan")
-        records = {name: _read_record(file, name, kind) for name, kind in _GROUPS.items()}
+        records = {name: read_record(file, name, kind) for name, kind in GROUPS.items()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, StoreError):
             raise
@@ -171,79 +157,18 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _write_netcdf(result: Result, file: Path) -> None:
-    import xarray as xr
-
+def _attrs(result: Result) -> dict[str, Any]:
+    """Return what goes beside the records: the scene, how it was run and what was told."""
     attrs = {
-        "title": "raychan result",
         "format": FORMAT,
-        "conventions": "SI; x forward, y left, z up; exp(+jwt); range rate positive = receding; NAME_re + j NAME_im",
+        "source": f"raychan {versions()['raychan']}, ray-traced radar channel simulation",
+        "comment": "SI; x forward, y left, z up; exp(+jwt); range rate positive = receding; NAME_re + j NAME_im",
         "seed": result.seed,
         "scene": result.text,
         "scene_path": result.path,
         "versions": json.dumps(versions()),
     }
-    attrs |= {name: json.dumps(_plain(getattr(result, name))) for name in _JSON}
-    xr.Dataset(attrs=attrs).to_netcdf(file, engine="h5netcdf")
-    for name in _GROUPS:
-        data = _dataset(getattr(result, name))
-        # Unused slots of chains make up most of the paths, and shrink to nothing; samples are noise and do not.
-        packed = {"zlib": True, "complevel": 1, "shuffle": True}
-        encoding = {column: packed for column in data} if name == "paths" and len(result.paths.delay) else {}
-        data.to_netcdf(file, engine="h5netcdf", group=name, mode="a", encoding=encoding)
-
-
-def _dataset(record: Any) -> Any:
-    import xarray as xr
-
-    variables: dict[str, Any] = {}
-    attrs: dict[str, Any] = {}
-    for f in _columns(type(record)):
-        value = getattr(record, f.name)
-        if "axes" in f.metadata:
-            axes = ["n" if a == "w" else a for a in f.metadata["axes"]]
-            dims = [f"xyz_{a}" if a.isdigit() else a for a in axes]
-            about = {"units": f.metadata["unit"], "long_name": f.metadata["doc"] or f.name}
-            if np.iscomplexobj(value):
-                variables[f"{f.name}_re"] = (dims, value.real, about)
-                variables[f"{f.name}_im"] = (dims, value.imag, about)
-            else:
-                variables[f.name] = (dims, value, about)
-        elif isinstance(value, tuple):
-            attrs[f.name] = json.dumps(value)
-        else:
-            attrs[f.name] = value
-            if f.name in _UNITS:
-                attrs[f"{f.name}_units"] = _UNITS[f.name]
-    return xr.Dataset(variables, attrs=attrs)
-
-
-def _read_record(file: Path, group: str, kind: Any) -> Any:
-    import xarray as xr
-
-    with xr.open_dataset(file, engine="h5netcdf", group=group, decode_cf=False) as data:
-        values: dict[str, Any] = {}
-        for f in _columns(kind):
-            if "axes" not in f.metadata:
-                held = data.attrs[f.name]
-                values[f.name] = tuple(json.loads(held)) if isinstance(held, str) else float(held)
-            elif f.metadata["dtype"].kind == "c":
-                real = data[f"{f.name}_re"].values
-                value = np.empty(real.shape, f.metadata["dtype"])
-                value.real, value.imag = real, data[f"{f.name}_im"].values
-                values[f.name] = value
-            elif f.metadata["dtype"].kind == "b":  # a file holds them as bytes
-                values[f.name] = data[f.name].values.astype(bool)
-            else:
-                values[f.name] = data[f.name].values
-    return Paths.of(**values) if kind is Paths else kind(**values)
-
-
-def _columns(kind: Any) -> list[dataclasses.Field[Any]]:
-    """Return the columns of a record; in a file paths have all of them a row a path."""
-    if kind is not Paths:
-        return list(dataclasses.fields(kind))
-    return [f for f in dataclasses.fields(Paths) if f.name not in ("way", "ways")] + list(dataclasses.fields(Ways))
+    return attrs | {name: json.dumps(_plain(getattr(result, name))) for name in _JSON}
 
 
 def _plain(value: Any) -> Any:

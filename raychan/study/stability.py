@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
+from raychan.run.files import csv_bytes, write_whole
 from raychan.study import regimes_angle, regimes_leaks, regimes_material, regimes_mesh, regimes_rays, regimes_signal
 from raychan.study.regimes_base import Outcome, Regime, Row
 
@@ -85,13 +84,7 @@ def summary(done: Iterable[Tried]) -> list[tuple[str, ...]]:
 
 def write_csv(done: Sequence[Tried], path: Path) -> Path:
     """Write all rows as CSV and return the path."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(HEADS)
-    for t in done:
-        writer.writerows(cells(t, r) for r in t.outcome.rows)
-    path.write_text(text.getvalue(), encoding="utf-8")
-    return path
+    return write_whole(path, csv_bytes([HEADS, *(cells(t, r) for t in done for r in t.outcome.rows)]))
 
 
 def write_markdown(done: Sequence[Tried], path: Path, figures: Sequence[str] = ()) -> Path:
@@ -110,8 +103,7 @@ def write_markdown(done: Sequence[Tried], path: Path, figures: Sequence[str] = (
     for t in done:
         text += ["", f"## {t.regime.title}", "", (t.regime.run.__doc__ or "").strip(), ""]
         text += _table(HEADS[1:], [cells(t, r)[1:] for r in t.outcome.rows])
-    path.write_text("\n".join(text) + "\n", encoding="utf-8")
-    return path
+    return write_whole(path, ("\n".join(text) + "\n").encode())
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:

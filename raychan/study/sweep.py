@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from raychan.run.chain import STAGES, simulate
+from raychan.run.files import csv_bytes, write_whole
 from raychan.run.result import Result
 from raychan.study.visibility import WAYS, Visibility, check_target, visibility
 from raychan.world.errors import SceneError
@@ -197,12 +197,9 @@ def write_csv(done: Sweep, path: Path) -> Path:
     Columns WAY_db [dB] are levels over the weakest that is reported: -inf where no path is, empty where the way is
     not modelled or the scene has no noise. Shares are of the solid angle of the outline.
     """
-    with path.open("w", newline="", encoding="utf-8") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow([*(a.key if a.changes else "time_s" for a in done.axes), *COLUMNS])
-        for step in done.steps:
-            out.writerow([*(f"{v:.10g}" for v in step.values), *cells(step)])
-    return path
+    heads = [*(a.key if a.changes else "time_s" for a in done.axes), *COLUMNS]
+    lines = [[*(f"{v:.10g}" for v in step.values), *cells(step)] for step in done.steps]
+    return write_whole(path, csv_bytes([heads, *lines]))
 
 
 def cells(step: Step) -> list[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from raychan.run.files import csv_bytes, write_whole
 from raychan.study import cases, methods, street
 from raychan.study.cases import TARGETS, Street, Target
 
@@ -171,12 +172,9 @@ def beaten_by(rows: Sequence[Row], row: Row, key: str = "seconds") -> list[Row]:
 
 def write_csv(rows: Sequence[Row], path: Path) -> Path:
     """Write the rows as CSV (rays, seconds [s], error_db [dB] rms over views or cells) and return the path."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        out = csv.writer(file)
-        out.writerow(f.name for f in fields(Row))
-        for row in rows:
-            out.writerow(f"{v:.6g}" if isinstance(v, float) else v for v in astuple(row))
-    return path
+    heads = [f.name for f in fields(Row)]
+    lines = [[f"{v:.6g}" if isinstance(v, float) else v for v in astuple(row)] for row in rows]
+    return write_whole(path, csv_bytes([heads, *lines]))
 
 
 def read_csv(path: Path) -> list[Row]:

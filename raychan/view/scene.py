@@ -15,6 +15,7 @@ from raychan.view import plain
 from raychan.view.drawing import Drawing, draw
 
 _PATIENCE_S = 180.0
+_PNG_END = b"IEND\xaeB`\x82"  # without it the disk was full
 
 
 def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | None = None) -> Drawing:
@@ -43,6 +44,17 @@ def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:
 def _rendered(drawing: Drawing, path: Path) -> str | None:
     if os.environ.get("RAYCHAN_NO_OPENGL"):
         return "RAYCHAN_NO_OPENGL is set"
+    try:
+        picture, trouble = _in_a_process_of_its_own(drawing)
+    except OSError as error:
+        return f"no room for the drawing in {tempfile.gettempdir()}: {error.strerror or error}"
+    if trouble is None:
+        write_whole(path, picture)
+    return trouble
+
+
+def _in_a_process_of_its_own(drawing: Drawing) -> tuple[bytes, str | None]:
+    """Return the rendered PNG, or why there is none."""
     with tempfile.TemporaryDirectory() as room:
         held, made = Path(room) / "drawing.npz", Path(room) / "scene.png"
         drawing.save(held)
@@ -50,11 +62,11 @@ def _rendered(drawing: Drawing, path: Path) -> str | None:
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE_S, check=False)
         except subprocess.TimeoutExpired:
-            return f"no picture within {_PATIENCE_S:.0f} s"
+            return b"", f"no picture within {_PATIENCE_S:.0f} s"
         if done.returncode < 0:
-            return f"the renderer died of signal {-done.returncode}"
-        if done.returncode or not made.is_file():
+            return b"", f"the renderer died of signal {-done.returncode}"
+        picture = made.read_bytes() if made.is_file() else b""
+        if done.returncode or not picture.endswith(_PNG_END):
             lines = done.stderr.strip().splitlines()
-            return lines[-1] if lines else f"the renderer ended with code {done.returncode}"
-        write_whole(path, made.read_bytes())
-    return None
+            return b"", lines[-1] if lines else f"the renderer ended with code {done.returncode}"
+        return picture, None

@@ -1,0 +1,203 @@
+"""The records of a result as netCDF-4 by the CF conventions, and back.
+
+Each record is a group, each column a variable with its unit; range and range rate are coordinates. A complex column is
+two real ones, `_re` and `_im`, so that xarray, MATLAB's h5read and any HDF5 reader open it alike. What is told of each
+detection (label, bodies, error) stands beside its columns.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.run.result import ExplainedDetections, Result
+from raychan.tables import Cube, MapError, Paths, Profile, RangeDoppler, Ways
+from raychan.units import dbm
+
+CONVENTIONS = "CF-1.11"
+GROUPS: dict[str, Any] = {
+    "paths": Paths,
+    "profile": Profile,
+    "cube": Cube,
+    "rdmap": RangeDoppler,
+    "error": MapError,
+    "detections": ExplainedDetections,
+}
+_AXES = {"a": "antenna", "c": "chirp", "s": "sample", "v": "range_rate", "r": "range", "p": "peak", "d": "vertex"}
+_ROWS = {"paths": "path", "detections": "detection"}
+_CALLED = {"rate": "range_rate", "true_rate": "true_range_rate"}
+"""Columns that have another name in a file than in their record."""
+_UNITS = {"sqrt(W)": "V"}
+"""As UDUNITS writes them: waves at 1 ohm. It has no decibel, which is written dB."""
+_TITLES = {
+    "rate": "range rate, receding positive",
+    "speed": "speed over ground",
+    "power": "received power",
+    "snr": "signal-to-noise ratio in dB",
+    "error_db": "stated error in dB",
+    "amplitude": "complex gain of the path",
+    "samples": "dechirped voltage wave at 1 ohm",
+    "spectrum": "range-Doppler spectrum, voltage wave at 1 ohm",
+    "tx": "position of the transmitter",
+    "rx": "position of the receiver",
+}
+_STANDARD = {"rate": "radial_velocity_of_scatterers_away_from_instrument"}
+_SCALARS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_resolution": "m s-1"} | {
+    "unambiguous_range": "m",
+    "unambiguous_rate": "m s-1",
+}
+_TOLD = ("label", "bodies", "error_db", "converged", "folded")
+
+
+def as_netcdf(result: Result, attrs: dict[str, Any]) -> memoryview:
+    """Return a result as the bytes of a netCDF-4 file, made in memory; `attrs` go beside those of the conventions.
+
+    HDF5 must not meet a full disk: it crashes when it cannot close what it could not write.
+    """
+    import h5netcdf
+    import h5py
+
+    made = io.BytesIO()
+    with h5py.File(made, "w") as held, h5netcdf.File(held, "w") as file:
+        file.attrs.update({"Conventions": CONVENTIONS, "title": "raychan result"} | attrs)
+        for name in GROUPS:
+            # Unused slots of chains make up most of the paths, and shrink to nothing; samples are noise and do not.
+            packed = name == "paths" and len(result.paths.delay) > 0
+            _write(file.create_group(name), name, result, {"compression": 1, "shuffle": True} if packed else {})
+    return made.getbuffer()
+
+
+def read_record(file: Path, group: str, kind: Any) -> Any:
+    """Return the record of a group of a file. Raises: OSError, KeyError, ValueError for a file that is another's."""
+    import xarray as xr
+
+    with xr.open_dataset(file, engine="h5netcdf", group=group, decode_cf=False) as data:
+        values: dict[str, Any] = {}
+        for f in columns(kind):
+            name = _CALLED.get(f.name, f.name)
+            if "axes" not in f.metadata:
+                told = data.attrs[f.name]
+                values[f.name] = tuple(json.loads(told)) if isinstance(told, str) else float(told)
+            elif f.metadata["dtype"].kind == "c":
+                real = data[f"{name}_re"].values
+                value = np.empty(real.shape, f.metadata["dtype"])
+                value.real, value.imag = real, data[f"{name}_im"].values
+                values[f.name] = value
+            else:
+                values[f.name] = data[name].values.astype(f.metadata["dtype"], copy=False)
+    return Paths.of(**values) if kind is Paths else kind(**values)
+
+
+def columns(kind: Any) -> list[dataclasses.Field[Any]]:
+    """Return the columns of a record; in a file paths have all of them a row a path."""
+    if kind is not Paths:
+        return list(dataclasses.fields(kind))
+    return [f for f in dataclasses.fields(Paths) if f.name not in ("way", "ways")] + list(dataclasses.fields(Ways))
+
+
+def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> None:
+    """Write one record, its coordinates and what goes with it."""
+    record = getattr(result, name)
+    wave = result.receiver.waveform
+    for f in columns(type(record)):
+        value = getattr(record, f.name)
+        if "axes" in f.metadata:
+            _column(group, name, f, value, packed)
+        else:
+            group.attrs[f.name] = json.dumps(value) if isinstance(value, tuple) else value
+            if f.name in _SCALARS:
+                group.attrs[f"{f.name}_units"] = _SCALARS[f.name]
+    if name == "error":
+        for f in columns(RangeDoppler):
+            if f.name in ("range", "rate"):
+                _column(group, name, f, getattr(result.rdmap, f.name), {})
+    if name == "cube":
+        times = (
+            ("chirp", wave.repetition, "start of the ramp"),
+            ("sample", 1.0 / wave.sample_rate, "time in the ramp"),
+        )
+        for axis, step, title in times:
+            time = step * np.arange(len(group.dimensions[axis]))
+            _variable(group, f"{axis}_time", (axis,), time, {"units": "s", "long_name": title}, {})
+        for part in ("re", "im"):
+            group.variables[f"samples_{part}"].attrs["coordinates"] = "chirp_time sample_time"
+    if name in ("profile", "rdmap", "detections"):
+        _decibels(group, record)
+    if name == "detections":
+        _told(group, result)
+
+
+def _column(group: Any, name: str, f: dataclasses.Field[Any], value: Any, packed: dict[str, Any]) -> None:
+    """Write a column of a record: the two parts of a complex one, truths as 0 and 1."""
+    axes = [_ROWS[name] if a in "nw" else _AXES.get(a) or _fixed(f.name, a) for a in f.metadata["axes"]]
+    title = _TITLES.get(f.name, f.name.replace("_", " "))
+    unit = f.metadata["unit"]
+    about = {"units": _UNITS.get(unit, unit.replace("/", " ").replace("m s", "m s-1")), "long_name": title}
+    if f.metadata["doc"]:
+        about["comment"] = f.metadata["doc"]
+    if f.name in _STANDARD:
+        about["standard_name"] = _STANDARD[f.name]
+    if not f.metadata["finite"]:
+        about["_FillValue"] = np.asarray(value).dtype.type(np.nan)
+    if np.iscomplexobj(value):
+        for part, half in (("real", value.real), ("imag", value.imag)):
+            said = about | {"long_name": f"{title}, {part}{'inary' if part == 'imag' else ''} part"}
+            _variable(group, f"{f.name}_{part[:2]}", axes, half, said, packed)
+    else:
+        _variable(group, _CALLED.get(f.name, f.name), axes, value, about, packed)
+
+
+def _fixed(column: str, size: str) -> str:
+    """Return the name of an axis of a given length."""
+    return "xyz" if size == "3" else f"{column}_axis"
+
+
+def _decibels(group: Any, record: Any) -> None:
+    """Write the power once more in dBm, for pictures; nothing at all is NaN."""
+    level = np.full(record.power.shape, np.nan, np.float32)
+    some = record.power > 0.0
+    level[some] = dbm(record.power[some])
+    about = {"units": "dBm", "long_name": "received power", "_FillValue": np.float32(np.nan)}
+    _variable(group, "power_dbm", group.variables["power"].dimensions, level, about, {})
+
+
+def _told(group: Any, result: Result) -> None:
+    """Write what is told of each detection, unless the record has it as a column."""
+    for name in (n for n in _TOLD if n not in group.variables):
+        if all(hasattr(why, name) for why in result.provenance):
+            values = np.array([getattr(why, name) for why in result.provenance])
+            about: dict[str, Any] = {"long_name": _TITLES.get(name, name)}
+            if name in ("label", "bodies"):
+                values = values.astype(object)
+            else:
+                values = values.astype(bool if name in ("converged", "folded") else float)
+            if name == "error_db":
+                about |= {"units": "dB", "_FillValue": np.nan}
+            _variable(group, name, ("detection",), values, about, {})
+
+
+def _variable(
+    group: Any, name: str, axes: Any, value: NDArray[Any], about: dict[str, Any], packed: dict[str, Any]
+) -> None:
+    import h5py
+
+    value = np.asarray(value)
+    for axis, size in zip(axes, value.shape, strict=True):
+        if axis not in group.dimensions:
+            group.dimensions[axis] = size
+    dtype: Any = value.dtype
+    if dtype.kind == "b":
+        about = {k: v for k, v in about.items() if k != "units"} | {"dtype": "bool"}
+        about |= {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "no yes"}
+        value, dtype = value.astype(np.int8), np.dtype(np.int8)
+    elif dtype.kind == "O":
+        dtype, packed = h5py.string_dtype(), {}
+    fill = about.pop("_FillValue", None)
+    made = group.create_variable(name, tuple(axes), dtype=dtype, data=value, fillvalue=fill, **packed)
+    made.attrs.update(about)
