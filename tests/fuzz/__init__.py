@@ -1,0 +1,1 @@
+"""Random input for the commands: broken and odd scene files, meshes and flags. `python -m fuzz --help`."""
