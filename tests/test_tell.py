@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 from PIL import Image
-from records import paths, receiver, result
+from records import paths, result
 from texts import ISOTROPIC, walker
 
 from raychan.channel.rcs import stated_error
@@ -90,7 +90,7 @@ def test_counts_are_of_those_that_are_figures(half):
 
 
 def test_what_is_not_converged_is_warned_of_with_what_would_help(half):
-    (line,) = warned(half.detections, 0.5, receiver().waveform)
+    (line,) = warned(half.detections, 0.5, half.rdmap)
     assert line.startswith("1 of 2 detections is not converged (number 2)")
     assert "a smaller tolerance than 0.5 dB (--tolerance, model.tolerance_db)" in line
 
@@ -122,7 +122,7 @@ def test_only_what_the_ledger_puts_above_the_weakest_detection_is_listed(half):
 def test_the_table_lists_apart_what_is_not_converged_and_numbers_all(half, capsys):
     first, second = show.detections(half)
     assert first.title == "2 detections" and second.title == "1 of 2 detections: not converged, error unknown"
-    assert [list(t.columns[0].cells)[0].plain for t in (first, second)] == ["1", "2"]
+    assert [next(iter(t.columns[0].cells)).plain for t in (first, second)] == ["1", "2"]
     assert [c.header for c in first.columns].count("error dB") == 1
     assert [c.header for c in second.columns].count("error dB") == 0
 
