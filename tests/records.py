@@ -46,8 +46,9 @@ def receiver(window: str = "hann") -> Receiver:
     return Receiver(WAVE, window, window, power=1.0, ego_speed=7.0, background=("ground",))
 
 
-def result(p: Paths, where, text: str = "") -> Result:
-    """A result whose map is empty but for its detections at `where`, rows of (range, rate, power)."""
+def result(p: Paths, where, text: str = "", differ=0.01) -> Result:
+    """A result whose map is empty but for its detections at `where`, rows of (range, rate, power); two launches differ
+    by the share `differ` of the power, one or one a detection."""
     where = np.asarray(where, float).reshape(-1, 3)
     ranges = np.arange(128) * WAVE.range_resolution
     rates = (np.arange(64) - 32) * WAVE.rate_resolution
@@ -69,9 +70,12 @@ def result(p: Paths, where, text: str = "") -> Result:
         range=ranges, power=power.max(axis=0), noise=1e-15, peaks=np.unique([c[1] for c in cells]).astype(int)
     )
     cube = Cube(samples=np.zeros((1, 64, 128), np.complex64), noise_power=1e-12)
-    why = provenance(p, rdmap, found, receiver(), 0.01 * power)
+    error = 0.01 * power
+    for cell, share in zip(cells, np.broadcast_to(differ, n), strict=True):
+        error[cell] = share * power[cell]
+    why = provenance(p, rdmap, found, receiver(), error)
     return Result(
         p, profile, cube, rdmap, ExplainedDetections.of(found, why), why, receiver(), seed=3, timings={"trace": 0.5},
-        error=MapError(power=0.01 * power), ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text,
+        error=MapError(power=error), ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text,
         path="street.toml" if text else "",
     )  # fmt: skip

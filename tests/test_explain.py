@@ -32,10 +32,11 @@ def cell(p, r, v, power=1.0, name="hann"):
 @pytest.mark.parametrize("name", ["rect", "hann"])
 @pytest.mark.parametrize("speed", [0.0, 20.0, -60.0], ids=["at rest", "fast", "folded"])
 @pytest.mark.parametrize("bandwidth", [0.5e9, 4e9])
-def test_prediction_is_the_map_itself(name, speed, bandwidth):
+@pytest.mark.parametrize(("iq", "share"), [(True, 0.4), (False, 0.4), (False, 1.55)], ids=["I/Q", "real", "mirrored"])
+def test_prediction_is_the_map_itself(name, speed, bandwidth, iq, share):
     rng = np.random.default_rng(1)
-    wave = dataclasses.replace(WAVE, bandwidth=bandwidth)
-    middle = 0.4 * wave.unambiguous_range
+    wave = dataclasses.replace(WAVE, bandwidth=bandwidth, complex_sampling=iq)
+    middle = share * wave.unambiguous_range
     r = middle + rng.uniform(-2, 2, 8) * wave.range_resolution
     v = speed + rng.uniform(-2, 2, 8) * wave.rate_resolution
     p = paths(r, v, rng.normal(size=8) + 1j * rng.normal(size=8), [DIRECT_SUV] * 8)

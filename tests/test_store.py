@@ -124,8 +124,12 @@ def test_a_long_scene_text_is_kept_whole(made, tmp_path):
 def test_csv_and_summary_say_what_the_record_holds(made, tmp_path):
     save_result(made, tmp_path)
     head, first, _ = (tmp_path / "detections.csv").read_text().splitlines()
-    assert head == "range_m,range_rate_mps,speed_mps,azimuth_deg,snr_db,power_dbm,error_db,label,bodies"
+    assert head == (
+        "range_m,range_rate_mps,speed_mps,azimuth_deg,snr_db,power_dbm,error_db,converged,folded,true_range_m,"
+        "true_range_rate_mps,label,bodies"
+    )
     assert first.startswith("9.0000,-7.0000,0.0000,,30.00,-63.01,")
+    assert ",true,false,8.99" in first  # mid frame it has come nearer
     assert first.endswith(",multipath,truck.tail > walker > truck.tail")
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["labels"] == {"direct": 1, "multipath": 1, "clutter": 0}

@@ -107,6 +107,11 @@ class Placer:
         half = 0.5 * size * self.axes.figure.dpi / 72.0
         self.taken = np.concatenate([self.taken, np.hstack([at - half, at + half])])
 
+    def spare(self, artist: Any) -> None:
+        """Keep labels and their lines off something drawn, as a legend."""
+        box = artist.get_window_extent(self.axes.figure.canvas.get_renderer()).extents
+        self.taken = np.concatenate([self.taken, np.asarray(box, float)[None]])
+
     def label(self, x: float, y: float, text: str, above: bool = False, **style: Any) -> bool:
         """Write `text` at the nearest free place round (or above) data (x, y), with a line to it; False if none is."""
         from matplotlib.text import Text

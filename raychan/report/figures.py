@@ -126,6 +126,9 @@ def _name_detections(result: Result, axes: Any) -> None:
     placer = Placer(axes)
     placer.settle()
     placer.avoid(d.range, d.rate, 9.0)
+    placer.avoid(d.range[d.folded], d.rate[d.folded], 15.0)
+    if (legend := axes.get_legend()) is not None:
+        placer.spare(legend)
     named: list[tuple[str, float, float]] = []
     for i, why in enumerate(result.provenance):
         name = _short(why)

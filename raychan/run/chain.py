@@ -217,7 +217,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         timings=clock.timings,
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
         stats=channel.stats | counts(known, tolerance),
-        warnings=(*scene.warnings, *_told(channel.launched), *told(known, tolerance, sensor.waveform, left_out)),
+        warnings=(*scene.warnings, *_told(channel.launched), *told(known, tolerance, rdmap, left_out)),
         scene=scene.bare(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",

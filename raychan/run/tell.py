@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from raychan.radar.waveform import Waveform
 from raychan.run.ledger import Entry
 from raychan.run.result import ExplainedDetections, Result
+from raychan.tables import RangeDoppler
 
 _NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: what a whole number of dB shows as more than 0
@@ -27,7 +27,7 @@ def counts(found: ExplainedDetections, tolerance_db: float) -> dict[str, Any]:
     }
 
 
-def warned(found: ExplainedDetections, tolerance_db: float, waveform: Waveform) -> list[str]:
+def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler) -> list[str]:
     """Return a line if detections are not converged, and one if some are folded."""
     said = []
     if (~found.converged).any():
@@ -45,7 +45,7 @@ def warned(found: ExplainedDetections, tolerance_db: float, waveform: Waveform) 
         )
         said.append(
             f"{_of(found.folded)} {_verb(found.folded)} folded ({_numbers(found.folded)}): beyond "
-            f"{waveform.unambiguous_range:.4g} m or {waveform.unambiguous_rate:.4g} m/s an echo shows elsewhere; "
+            f"{rdmap.unambiguous_range:.4g} m or {rdmap.unambiguous_rate:.4g} m/s an echo shows elsewhere; "
             f"number {first + 1} is at {true}, shown at {shown}"
         )
     return said
@@ -67,9 +67,9 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: dict[str, Any
     return said
 
 
-def told(found: ExplainedDetections, tolerance_db: float, waveform: Waveform, ledger: dict[str, Any]) -> list[str]:
+def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: dict[str, Any]) -> list[str]:
     """Return all lines on detections."""
-    return [*warned(found, tolerance_db, waveform), *noted(found, tolerance_db, ledger)]
+    return [*warned(found, tolerance_db, rdmap), *noted(found, tolerance_db, ledger)]
 
 
 def notes(result: Result) -> list[str]:
@@ -80,7 +80,7 @@ def notes(result: Result) -> list[str]:
 def findings(result: Result) -> list[str]:
     """Return all lines that are told of a result's detections."""
     tolerance = float(result.stats.get("tolerance_db", math.inf))
-    return told(result.detections, tolerance, result.receiver.waveform, result.ledger)
+    return told(result.detections, tolerance, result.rdmap, result.ledger)
 
 
 def marks(found: ExplainedDetections) -> str:
