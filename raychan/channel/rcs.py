@@ -18,6 +18,7 @@ from raychan.channel.tubes import Refinement
 from raychan.frames import direction, theta_phi
 from raychan.tables import Facets
 from raychan.units import C0
+from raychan.world.inside import refuse_within
 from raychan.world.limits import BOUNCES, FREQUENCY, LENGTH, TOLERANCE_DB
 from raychan.world.material import Material, resolve
 from raychan.world.mesh import Mesh
@@ -91,6 +92,9 @@ def rcs(
     for i, (az, el, raz, rel) in enumerate(zip(*(a.ravel() for a in angles), strict=True)):
         leg = _leg(direction(az, el), distance)
         back = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
+        for end in (leg, back):
+            if not end.far:
+                refuse_within(surface.facets.vertices, end.end, "radar")
         out[:, i] = _refined(surface, leg, back, frequency, max_bounces, tolerance_db, max_rays, row, col)
     shape = angles[0].shape
     sigma, error, rays, bounces = (o.reshape(shape) for o in out)

@@ -14,6 +14,7 @@ from raychan.channel.legs import Leg, Mirror
 from raychan.channel.surface import Surface
 from raychan.frames import theta_phi
 from raychan.tables import KIND_LETTERS, REFLECT, TRANSMIT, Facets, Routes
+from raychan.world.inside import Place, place_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,7 +52,9 @@ def _planes(surface: Surface) -> Ints:
 def _every_chain(surface: Surface, planes: Ints, tx: Floats, bounces: int) -> list[Chain]:
     """Return all chains whose images lie in front of the planes that mirror them; level by level."""
     normal, point = surface.normal[planes], surface.first[planes]
-    closed = surface.closed[surface.facets.body[planes]]
+    # A body about the transmitter is met from within.
+    around = [place_of(surface.facets.vertices[surface.facets.body == b], tx) for b in range(len(surface.closed))]
+    closed = (surface.closed & (np.array(around) != Place.INSIDE))[surface.facets.body[planes]]
     images, last = tx[None], np.full(1, -1)
     chains: list[Chain] = [()]
     out: list[Chain] = []
@@ -137,8 +140,6 @@ def _exact(surface: Surface, tx: Floats, rx: Floats, chains: list[Chain], slots:
 
 def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # type: ignore[no-untyped-def]
     """Return (length, vertices, normals, facets, kinds) of one chain, or None if it is not real."""
-    if any((rx - m.point) @ m.normal <= 0.0 for m in leg.mirrors[-1:]):
-        return None
     if np.linalg.norm(rx - leg.image) == 0.0 or not leg.may_reach(rx[None], np.zeros(1))[0]:
         return None
     stops = [leg.end, *leg.bounces(rx[None])[0], rx]
@@ -153,8 +154,9 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
             return None
         d = (b - a)[None] / gap
         last = i == len(leg.mirrors)
-        mirror = None if last else leg.mirrors[i]
-        if mirror is not None and (a - mirror.point) @ mirror.normal <= 0.0:
+        before, mirror = leg.mirrors[i - 1] if i else None, None if last else leg.mirrors[i]
+        # Both ends of a stretch lie on the lit sides of its mirrors: else an image is met beyond its mirror, or before.
+        if any((p - m.point) @ m.normal <= 0.0 for p, m in ((b, before), (a, mirror)) if m is not None):
             return None
         near = np.array([max(gap * 1e-7, 1e-6)])
         aim = np.array([-1], np.int32)
@@ -169,15 +171,14 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
             kinds.append(TRANSMIT)
         if mirror is None:
             break
-        step = min(1e-3, 0.5 * gap)
-        hit, _ = surface.cast((b - step * d[0])[None], d, np.array([-1], np.int32))
-        if hit[0] < 0 or surface.plane[hit[0]] != surface.plane[mirror.facet]:
+        hit = _there(surface, b, d[0], gap, mirror)
+        if hit < 0:
             return None
         vertices.append(b)
         normals.append(mirror.normal)
-        facets.append(int(hit[0]))
+        facets.append(hit)
         kinds.append(REFLECT)
-        skip = hit.astype(np.int32)
+        skip = np.array([hit], np.int32)
     free = slots - len(kinds)
     return (
         float(np.linalg.norm(rx - leg.image)),
@@ -186,6 +187,23 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
         np.array(facets + [-1] * free),
         np.array(kinds + [0] * free),
     )
+
+
+def _there(surface: Surface, at: Floats, way: Floats, gap: float, mirror: Mirror) -> int:
+    """Return the facet of a mirror that a ray, `gap` [m] long along `way`, meets at its end, or -1: none, or one that
+    coincides with another that counts."""
+    step = min(1e-3, 0.5 * gap)
+    hit, t = surface.cast((at - step * way)[None], way[None], np.array([-1], np.int32))
+    if hit[0] >= 0 and surface.plane[hit[0]] == surface.plane[mirror.facet]:
+        return int(hit[0])
+    if hit[0] >= 0 and abs(t[0] - step) < surface.touch:
+        return -1
+    # A layer just before the mirror was met, or float32 let the ray through an edge.
+    rows = np.flatnonzero(surface.plane == surface.plane[mirror.facet])
+    v = surface.facets.vertices[rows]
+    inward = np.cross(surface.normal[rows, None], np.roll(v, -1, axis=1) - v)
+    held = (np.einsum("fqc,fqc->fq", at - v, inward) >= 0.0).all(axis=1)
+    return int(rows[np.argmax(held)]) if held.any() else -1
 
 
 def _passes(kinds: list[int]) -> int:
@@ -237,7 +255,8 @@ def specular_paths(
     """Return the exact specular paths between two points of a scene, line of sight included, isotropic ends.
 
     Args: scene Scene; tx, rx (3,) [m]; max_bounces the most reflections; velocities (3,) [m/s] of the ends.
-    Gains hold lambda/4 pi L and the carrier phase exp(-jkL); V, H are theta-hat, phi-hat of the direction of travel.
+    Gains hold lambda/4 pi L and the carrier phase exp(-jkL), V, H are theta-hat, phi-hat of the direction of travel;
+    paths of gain 0 are left out.
     Raises: ValueError for points that are not three finite numbers. Source: image method, McKown, Hamilton 1991.
     """
     ends = [np.asarray(x, float) for x in (tx, rx, tx_velocity, rx_velocity)]
@@ -247,18 +266,19 @@ def specular_paths(
         raise ValueError(f"max_bounces = {max_bounces}: must be 0 or more")
     facets = scene.facets(0.0)
     routes = specular_routes(Surface(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)
+    gain = jones(routes, facets, scene.frequency)
     order = np.argsort(routes.length, kind="stable")
+    order = order[np.abs(gain[order]).max(axis=(1, 2), initial=0.0) > 0.0]
     used = routes.kind > 0
-    deep = int(used.sum(axis=1).max(initial=0))
+    deep = int(used[order].sum(axis=1).max(initial=0))
     names = np.array([*facets.body_names, ""])
     n = len(order)
-    chain = np.concatenate([np.broadcast_to(ends[0], (n, 1, 3)), routes.vertices[:, :deep]], axis=1)
-    vertices = np.concatenate([chain, np.broadcast_to(ends[1], (n, 1, 3))], axis=1)
+    start, stop = (np.broadcast_to(x, (n, 1, 3)) for x in ends[:2])
     return SpecularPaths(
         length=routes.length[order],
-        gain=jones(routes, facets, scene.frequency)[order],
+        gain=gain[order],
         rate=2.0 * rates(routes, facets, ends[2], ends[3])[order],
         bodies=names[np.where(used, routes.body, -1)][order, :deep],
         kind=np.array(KIND_LETTERS)[routes.kind][order, :deep],
-        vertices=vertices[order],
+        vertices=np.concatenate([start, routes.vertices[order, :deep], stop], axis=1),
     )

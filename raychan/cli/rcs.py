@@ -115,6 +115,7 @@ def rcs(
     write_together(files)
     screen = show.console()
     screen.print(_table(title, rows))
+    show.warn(mesh.report.warnings() if shape is None else [])
     _warn(found, tolerance)
     if files:
         screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)

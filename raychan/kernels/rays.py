@@ -112,8 +112,8 @@ def companions(todo, origin, direction, ahead, pace, centre, turn):  # type: ign
         side[1] = z * z - x * (y - 0.7)
         side[2] = x * (x + 0.3) - y * z
         if turn:
-            a, b, c = side
-            side[0], side[1], side[2] = y * c - z * b, z * a - x * c, x * b - y * a
+            u, v, w = side
+            side[0], side[1], side[2] = y * w - z * v, z * u - x * w, x * v - y * u
         for c in range(3):
             at, way = origin[i, c] + ahead[i] * direction[i, c], pace[i] * side[c]
             o[3 * j, c], d[3 * j, c] = at - centre[c], direction[i, c]

@@ -10,12 +10,13 @@ from raychan.radar.waveform import Waveform
 from raychan.tables import MIRROR
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
+from raychan.world.inside import Place, in_plane_of, place_of
 from raychan.world.mesh import Floats
 from raychan.world.schema import RadarTable
 
 
 def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
-    """Raise SceneError where the radar is inside a body or below a mirror."""
+    """Raise SceneError where the radar is inside a body, on its surface, or below a mirror."""
     if radar is None:
         return
     at = np.array(radar.position)
@@ -30,10 +31,25 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
                     f"radar is behind '{body.name}'", key="radar.position", value=at.tolist(), allowed=where
                 )
             continue
-        low, high = mesh.bounds
-        if (local >= low).all() and (local <= high).all() and mesh.winding(local) > 0.5:
-            where = "a place outside all bodies"
-            raise SceneError(f"radar is inside '{body.name}'", key="radar.position", value=at.tolist(), allowed=where)
+        place = place_of(mesh.corners, local)
+        if place != Place.OUTSIDE:
+            where = "inside" if place == Place.INSIDE else "on the surface of"
+            raise SceneError(
+                f"radar is {where} '{body.name}'",
+                key="radar.position",
+                value=at.tolist(),
+                allowed="a place outside all bodies",
+            )
+
+
+def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:
+    """Return a warning for each body that has facets in whose plane the radar lies."""
+    said = []
+    for body in bodies:
+        count = in_plane_of(body.geometry.corners, body.motion.to_body(np.array(radar.position)))
+        if count:
+            said.append(f"radar lies in the plane of {count} facets of '{body.name}': edge-on, they return nothing")
+    return said
 
 
 def nearest_point(body: Body, at: Floats) -> Floats:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from raychan.world import raw
 from raychan.world.cores import closed_pieces, cores_of
 from raychan.world.errors import SceneError
 from raychan.world.flatten import merge_flat
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
 
 CREASE_DEG = 20.0
-_WELD = 1e-9  # of the mesh's size
+_CANCELLED = 1e-9  # of their sum of sizes: weighted normals that leave no direction
 
 
 @dataclass(frozen=True)
@@ -131,15 +132,14 @@ def make_mesh(
 
     Args: vertices (v, 3) [m]; faces (f, 3); part (f,), normals (f, 3, 3) exact corner normals, or None to smooth over
     edges that bend less than crease_deg (the faces' winding is then made consistent too).
-    Raises: SceneError for a mesh that is empty or holds NaN.
+    Raises: SceneError for a mesh that is empty, holds NaN or faces of vertices that are not there, or is of no size
+    that radar can see.
     """
     v, f = np.asarray(vertices, float).reshape(-1, 3), np.asarray(faces, np.int64).reshape(-1, 3)
-    if not np.isfinite(v).all():
-        bad = int((~np.isfinite(v)).any(axis=1).sum())
-        raise SceneError(f"{bad} vertices hold NaN or infinity", value=bad, allowed="finite coordinates")
+    v, f = raw.used(v, f)
     kind = np.zeros(len(f), np.int32) if part is None else np.asarray(part, np.int32)
-    v, f = _weld(v, f)
-    keep, zero, twins = _alive(v, f)
+    v, f = raw.weld(v, f)
+    keep, zero, twins = raw.alive(v, f)
     if not keep.any():
         raise SceneError("mesh is empty: no face with an area", value=len(f), allowed="at least one triangle")
     f, kind = f[keep], kind[keep]
@@ -178,34 +178,15 @@ def smooth_normals(vertices: Floats, faces: Ints, crease_deg: float = CREASE_DEG
     squares = np.einsum("nij,nij->ni", to_next, to_next) * np.einsum("nij,nij->ni", to_last, to_last)
     weighted = (np.cross(to_next, to_last) / squares[..., None]).reshape(-1, 3)
     total = np.stack([np.bincount(group, weighted[:, i]) for i in range(3)], axis=1)[group]
-    return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(n, 3, 3)
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    # About a point where a surface is folded on itself no normal is smooth: each facet keeps its own.
+    lost = size <= _CANCELLED * np.bincount(group, np.linalg.norm(weighted, axis=1))[group][:, None]
+    flat = np.repeat(unit, 3, axis=0)
+    return np.where(lost, flat, total / np.where(lost, 1.0, size)).reshape(n, 3, 3)
 
 
 def _cross(v: Floats, f: Ints) -> Floats:
     return np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
-
-
-def _weld(v: Floats, f: Ints) -> tuple[Floats, Ints]:
-    if not len(v):
-        return v, f
-    step = max(float(np.ptp(v, axis=0).max()), 1e-300) * _WELD
-    key = np.round((v - v.min(axis=0)) / step).astype(np.int64)
-    order = np.lexsort(key.T)
-    new = np.concatenate([[True], (np.diff(key[order], axis=0) != 0).any(axis=1)])
-    index = np.empty(len(v), np.int64)
-    index[order] = np.cumsum(new) - 1
-    return v[order[new]], index[f]
-
-
-def _alive(v: Floats, f: Ints) -> tuple[NDArray[np.bool_], int, int]:
-    """Return which faces have an area and are the first of their kind, and the counts of the others."""
-    c = v[f]
-    longest = np.linalg.norm(np.roll(c, -1, axis=1) - c, axis=2).max(axis=1, initial=0.0)
-    flat = np.linalg.norm(_cross(v, f), axis=1) <= 1e-12 * longest**2
-    _, first = np.unique(np.sort(f, axis=1), axis=0, return_index=True)
-    once = np.zeros(len(f), bool)
-    once[first] = True
-    return once & ~flat, int(flat.sum()), int((~once & ~flat).sum())
 
 
 def _edges(f: Ints) -> tuple[Ints, NDArray[np.bool_], Ints]:

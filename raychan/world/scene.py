@@ -211,7 +211,10 @@ class Scene:
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
         }
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
-        return said if self.radar is None else said + check.aliases(self.bodies, self.radar, self.sensor.waveform)
+        if self.radar is not None:
+            said += check.edge_on(self.bodies, self.radar)
+            said += check.aliases(self.bodies, self.radar, self.sensor.waveform)
+        return said
 
     def _chosen(self, body: Body) -> list[Material]:
         """Return the materials of a body's parts: the scene's own first, then the built-in ones."""

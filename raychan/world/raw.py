@@ -1,0 +1,61 @@
+"""Raw triangles: what of them can be a surface at all."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.world.errors import SceneError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.signedinteger[Any]]
+
+_WELD = 1e-9  # of the mesh's size
+_SIZES = (1e-6, 1e6)  # m: smaller than any wave's length, larger than any radar's range
+
+
+def used(v: Floats, f: Ints) -> tuple[Floats, Ints]:
+    """Return the vertices that faces name, and the faces. Raises: SceneError for vertices that are not finite, that are
+    named and not there, or that span no size a radar can see."""
+    if not np.isfinite(v).all():
+        bad = int((~np.isfinite(v)).any(axis=1).sum())
+        raise SceneError(f"{bad} vertices hold NaN or infinity", value=bad, allowed="finite coordinates")
+    lost = int(((f < 0) | (f >= len(v))).any(axis=1).sum())
+    if lost:
+        raise SceneError(f"{lost} faces name vertices that are not there", value=lost, allowed=f"0 to {len(v) - 1}")
+    if not len(f):
+        return v, f
+    named, f = np.unique(f, return_inverse=True)
+    v, f = v[named], f.reshape(-1, 3).astype(np.int64)
+    far, size = float(np.abs(v).max()), 2.0 * float(np.ptp(0.5 * v, axis=0).max())
+    if not max(far, size) <= _SIZES[1] or 0.0 < size < _SIZES[0]:
+        least, most = _SIZES
+        allowed = f"a size from {least:g} m, and coordinates up to {most:g} m: check unit and scale"
+        raise SceneError(f"mesh is {size:.3g} m across, {far:.3g} m from its origin", value=size, allowed=allowed)
+    return v, f
+
+
+def weld(v: Floats, f: Ints) -> tuple[Floats, Ints]:
+    """Return vertices of which no two are at one place, and the faces."""
+    if not len(v):
+        return v, f
+    step = max(float(np.ptp(v, axis=0).max()), 1e-300) * _WELD
+    key = np.round((v - v.min(axis=0)) / step).astype(np.int64)
+    order = np.lexsort(key.T)
+    new = np.concatenate([[True], (np.diff(key[order], axis=0) != 0).any(axis=1)])
+    index = np.empty(len(v), np.int64)
+    index[order] = np.cumsum(new) - 1
+    return v[order[new]], index[f]
+
+
+def alive(v: Floats, f: Ints) -> tuple[NDArray[np.bool_], int, int]:
+    """Return which faces have an area and are the first of their kind, and the counts of the others."""
+    c = v[f]
+    longest = np.linalg.norm(np.roll(c, -1, axis=1) - c, axis=2).max(axis=1, initial=0.0)
+    flat = np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1) <= 1e-12 * longest**2
+    _, first = np.unique(np.sort(f, axis=1), axis=0, return_index=True)
+    once = np.zeros(len(f), bool)
+    once[first] = True
+    return once & ~flat, int(flat.sum()), int((~once & ~flat).sum())
