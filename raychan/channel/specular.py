@@ -51,13 +51,13 @@ def _planes(surface: Surface) -> Ints:
 def _every_chain(surface: Surface, planes: Ints, tx: Floats, bounces: int) -> list[Chain]:
     """Return all chains whose images lie in front of the planes that mirror them; level by level."""
     normal, point = surface.normal[planes], surface.first[planes]
-    closed = surface.closed[surface.facets.body[planes]]
+    both = surface.both_sides[planes]
     images, last = tx[None], np.full(1, -1)
     chains: list[Chain] = [()]
     out: list[Chain] = []
     for _ in range(bounces):
         height = np.einsum("ij,nj->ni", normal, images) - np.einsum("ij,ij->i", normal, point)
-        usable = np.where(closed[None], height > 1e-9, np.abs(height) > 1e-9)
+        usable = np.where(both[None], np.abs(height) > 1e-9, height > 1e-9)
         usable &= np.arange(len(planes))[None] != last[:, None]
         rows, cols = np.nonzero(usable)
         images = images[rows] - 2.0 * height[rows, cols, None] * normal[cols]
