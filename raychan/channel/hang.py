@@ -28,9 +28,8 @@ def pieces(facets: Facets, joined: Sequence[tuple[Joints, int]], rim: Ints) -> I
     begin = np.cumsum([0, *(int(j.piece.max(initial=-1)) + 1 for j, _ in joined)])
     out = np.concatenate([np.zeros(0, np.int32), *(j.piece + b for (j, _), b in zip(joined, begin, strict=False))])
     f = facets
-    motion = np.column_stack(
-        [f.velocity, f.spin, np.where((f.spin != 0.0).any(axis=1, keepdims=True), f.origin, 0.0), f.role]
-    )
+    turning = (f.spin != 0.0).any(axis=1, keepdims=True)
+    motion = np.column_stack([f.velocity, f.spin, np.where(turning, f.origin, 0.0), f.role])
     frame = np.unique(motion, axis=0, return_inverse=True)[1].ravel()
     owner = f.body[rim // 3]
     rim = rim[f.role[owner] != MIRROR]
