@@ -98,7 +98,7 @@ def test_what_changes_a_surface_makes_a_new_one(scene, change):
 def test_joints_of_meshes_are_those_found_from_facets_alone(scene):
     turned = scene.override(["bodies.box.yaw_deg=33.0"])
     own, blind = Surface(turned.facets(), turned.joints), Surface(turned.facets())
-    for name in ("plane", "smooth", "closed", "open_facet", "first_edge", "outline"):
+    for name in ("plane", "smooth", "both_sides", "piece", "first_edge", "outline"):
         np.testing.assert_array_equal(getattr(own, name), getattr(blind, name), err_msg=name)
     for name in ("edge_ends", "wedge"):
         a, b = (np.sort(getattr(s, name).reshape(-1, 6), axis=0) for s in (own, blind))
@@ -153,7 +153,7 @@ def wanted(surface, leg, bodies):
     rows = np.flatnonzero(bodies[f.body])
     k, _ = leg.rays(f.vertices[rows])
     lit = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
-    return rows[lit | surface.open_facet[rows]]
+    return rows[lit | surface.both_sides[rows]]
 
 
 def ball(at, radius=0.5):

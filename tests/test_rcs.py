@@ -393,7 +393,7 @@ def test_the_true_error_lies_within_the_stated_one_and_not_far_within():
 def range_profile(surface, leg, distance, rule, bandwidth=4e9, cells=512):
     """Hann-windowed profile (n,) about a body at `distance` [m], a cell of c/2B each, of one launch seen VV."""
     field = np.zeros(cells, complex)
-    for routes in tube_routes(surface, leg, [leg], np.ones(1, bool), rule, 3):
+    for routes in tube_routes(surface, leg, [leg], np.ones(len(surface.piece_role), bool), rule, 3):
         a = transfer(routes, surface.facets, F, theta_phi_of, theta_phi_of, corners=True)[:, 0, 0]
         delay = 2.0 * np.pi * (routes.lengths[:, :3] - 2.0 * distance) / C0
         f = (np.arange(cells) / cells - 0.5) * bandwidth

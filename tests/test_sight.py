@@ -100,7 +100,7 @@ def test_parts_that_are_lit_are_where_points_face_both_ends(back):
     surface = Surface(facets([ball], smooth=True))
     f, ends = surface.facets, (np.zeros(3), np.array(back))
     facet = np.arange(len(f.body), dtype=np.int32)
-    shape = f.vertices, f.normals, surface.bulge, surface.open_facet
+    shape = f.vertices, f.normals, surface.bulge, surface.both_sides
     ways = ends[0], False, ends[1], False
     rows, bary = lit_parts(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), *shape, *ways, any(back))
     rng = np.random.default_rng(3)

@@ -252,7 +252,7 @@ def footprints(mesh, look, step=1, bounces=3):
     leg = Leg(end=look, far=True)
     rule = next(itertools.islice(refinements(surface, F), step, None))
     areas: dict[tuple[int, ...], float] = {}
-    for routes in tube_routes(surface, leg, [leg], np.ones(1, bool), rule, bounces):
+    for routes in tube_routes(surface, leg, [leg], np.ones(len(surface.piece_role), bool), rule, bounces):
         for facet, area in zip(routes.facet, routes.area, strict=True):
             chain = tuple(int(surface.plane[f]) for f in facet if f >= 0)
             areas[chain] = areas.get(chain, 0.0) + float(area)
@@ -285,7 +285,7 @@ def test_lit_half_of_a_sphere_projects_to_its_disc():
     leg = Leg(end=po.direction(0.3, 0.2), far=True)
     rule = next(itertools.islice(refinements(surface, F), 2, None))
     shadow = 0.0
-    for routes in tube_routes(surface, leg, [leg], np.ones(1, bool), rule, 1):
+    for routes in tube_routes(surface, leg, [leg], np.ones(len(surface.piece_role), bool), rule, 1):
         shadow += float(routes.area @ np.einsum("nj,j->n", routes.normals[:, 0], leg.end))
     assert shadow == pytest.approx(np.pi * 0.1**2, rel=2e-3)
 

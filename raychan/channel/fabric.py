@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.hang import pieces
 from raychan.kernels.outline import by_cluster
 from raychan.kernels.rows import once
 from raychan.tables import LAYER, MIRROR, Facets
+from raychan.world.cores import closed_pieces
 from raychan.world.joints import Joints
 
 Floats = NDArray[np.float64]
@@ -33,17 +35,21 @@ class Fabric:
         self.joined = list(zip(joints, np.cumsum([0, *(len(j.plane) for j in joints)]), strict=False))
         self.plane = _numbers([j.plane for j in joints], [j.planes for j in joints])
         self.smooth = _numbers([j.smooth for j in joints], [j.patches for j in joints])
-        self.closed = np.full(len(facets.role), n > 0)
-        self.closed[facets.body[self.halves("rim") // 3]] = False
-        one_sheet = n > 0 and not self.plane.any()
-        if one_sheet:
-            # Two sheets upon each other share every edge twice, yet have no inside.
-            self.closed[:] = False
-        self.open_facet = ~self.closed[facets.body]
-        self.convex_alone = n > 0 and len(facets.role) == 1 and (one_sheet or (len(joints) == 1 and joints[0].convex))
-        self.hides_nothing = self.convex_alone and bool(self.closed[0])
         self._mirror = (facets.role == MIRROR)[facets.body]
         self._layer = (facets.materials.kind == LAYER)[facets.material]
+        self.both_sides = self._entered()
+        # Over the borders of bodies too.
+        self.piece = pieces(facets, self.joined, self.halves("rim"))
+        lone = len(joints) == 1 and joints[0].convex and not self.both_sides.any()
+        self.convex_alone = n > 0 and len(facets.role) == 1 and (lone or not self.plane.any())
+        self.hides_nothing = self.convex_alone and lone
+
+    def _entered(self) -> Bools:
+        """Tell which facets (n,) can be met from either side: those of open pieces, and of pieces that let a wave in
+        somewhere."""
+        return ~np.concatenate(
+            [np.zeros(0, bool), *(closed_pieces(j, ~self._layer[i : i + len(j.plane)]) for j, i in self.joined)]
+        )
 
     def halves(self, name: str, rows: str = "") -> Ints:
         """Return half edges of all joints by their numbers in the scene, some rows of them if asked."""
@@ -77,15 +83,17 @@ class Fabric:
             return np.zeros(0, np.int32), np.zeros((0, 2), np.int32)
         # The ground ends where nobody looks, and its far rim would stretch every grid.
         solid = ~self._mirror
-        pair, rim = self.halves("pair", "bent"), self.halves("rim")
-        pair, frame = pair[solid[pair[:, 0] // 3]], rim[:0]
-        if self._layer.any():
-            layer = self._layer
-            pair = pair[layer[pair[:, 0] // 3] == layer[pair[:, 1] // 3]]
-            every = self.halves("pair")
-            a, b = every.T // 3
-            framed = (layer[a] != layer[b]) & solid[a]
-            frame = np.where(layer[a], every[:, 1], every[:, 0])[framed]
+        every, rim = self.halves("pair"), self.halves("rim")
+        ours, bent = solid[every[:, 0] // 3], np.concatenate([np.zeros(0, bool), *(j.bent for j, _ in self.joined)])
+        every = every[ours]
+        a, b = every.T // 3
+        # From inside, hollow edges stand out.
+        turns = bent[ours] | (self.borders[every[:, 0]] & self.both_sides[a])
+        # Where a pane ends, or bends, what passes it is another wave.
+        hard = np.zeros(len(self.borders), bool)
+        hard[self.halves("outer")] = True
+        framed = (self._layer[a] | self._layer[b]) & hard[every[:, 0]]
+        pair, frame = every[turns & ~framed], np.where(self._layer[a], every[:, 1], every[:, 0])[framed]
         rim = np.concatenate([rim[solid[rim // 3]], frame])
         faces = np.concatenate([pair // 3, np.stack([rim // 3, np.full(len(rim), -1)], axis=1)])
         return np.concatenate([pair[:, 0], rim]), faces.astype(np.int32)
@@ -96,6 +104,20 @@ class Fabric:
         parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self.joined]
         order, first = (np.concatenate(x) for x in zip(*parts, strict=True))
         return order, np.append(first, len(order))
+
+    @once
+    def cluster_piece(self) -> Ints:
+        """The piece (k,) that each cluster is of, -1 for one of several."""
+        order, first = self.clusters
+        own = self.piece[order]
+        least, most = np.minimum.reduceat(own, first[:-1]), np.maximum.reduceat(own, first[:-1])
+        return np.where(least == most, least, -1).astype(np.int32)
+
+    @once
+    def cluster_sides(self) -> Bools:
+        """Which clusters (k,) hold a facet that can be met from either side."""
+        order, first = self.clusters
+        return np.logical_or.reduceat(self.both_sides[order], first[:-1])
 
     @once
     def outlining(self) -> tuple[NDArray[Any], ...]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.tables import REFLECT, TRANSMIT
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -45,6 +47,18 @@ class History:
             here = at[rows]
             facet[rows] = np.where(self._kind[here] == kind, self._facet[here], -1)
             at[rows] = self._before[here]
+
+    def veiled(self, last: Ints) -> NDArray[np.bool_]:
+        """Tell of which rows `last` (n,) the vertex before the newest reflection is a layer passed."""
+        at = last.copy()
+        while True:
+            rows = np.flatnonzero(at >= 0)
+            rows = rows[self._kind[at[rows]] != REFLECT]
+            if not len(rows):
+                break
+            at[rows] = self._before[at[rows]]
+        before = np.where(at >= 0, self._before[at], -1)
+        return np.asarray((before >= 0) & (self._kind[before] == TRANSMIT))
 
     @property
     def rows(self) -> tuple[Floats, Floats, Ints, NDArray[np.int8], Ints]:

@@ -38,22 +38,22 @@ _BATCH = 1 << 17  # tubes launched at once: few scenes have more on one leg
 GAPS = 1  # cuts of a hidden tube in search of a part that is seen
 
 
-def launch(surface: Surface, leg: Leg, out: Leg, bodies: Bools, found: Found, more: bool) -> Iterator[Tubes]:
+def launch(surface: Surface, leg: Leg, out: Leg, pieces: Bools, found: Found, more: bool) -> Iterator[Tubes]:
     """Yield the tubes of first bounces seen over `leg`, fine enough for a return over `out`, in batches.
 
-    Args: bodies (b,) which bodies may carry a first bounce; the leg's own mirrors never do; found what was so far;
+    Args: pieces (p,) which may carry a first bounce; those of the leg's own mirrors never do; found what was so far;
     more whether the tubes will bounce again.
     """
     f, rule = surface.facets, found.rule
     shape = f.vertices, f.normals, surface.bulge
     ways = leg.image, leg.far, out.image, out.far
-    allowed = bodies & (f.role == SCATTERER)
-    allowed[list(leg.bodies)] = False
+    allowed = pieces & (surface.piece_role == SCATTERER)
+    allowed[leg.pieces(surface)] = False
     facet = seeds(surface, leg, allowed)
     if out != leg:
-        facet = facet[may_be_lit(facet, *shape, surface.open_facet, *ways)]
+        facet = facet[may_be_lit(facet, *shape, surface.both_sides, *ways)]
     for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
-        part, bary = lit_parts(part, bary, *shape, surface.open_facet, *ways, out != leg)
+        part, bary = lit_parts(part, bary, *shape, surface.both_sides, *ways, out != leg)
         yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary), found, more)
 
 

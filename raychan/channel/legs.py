@@ -87,10 +87,9 @@ class Leg:
         radius = np.array([m.radius for m in self.mirrors])
         object.__setattr__(self, "_chain", (np.array(images), *(s.reshape(-1, 3) for s in sheets), radius))
 
-    @property
-    def bodies(self) -> set[int]:
-        """Bodies of the mirrors."""
-        return {m.body for m in self.mirrors}
+    def pieces(self, surface: Surface) -> Ints:
+        """Return the pieces (m,) of the mirrors."""
+        return surface.piece[[m.facet for m in self.mirrors]]
 
     def rays(self, points: Floats) -> tuple[Floats, Floats]:
         """Return unit directions (..., 3) at the points, travelling from the end, and lengths [m]."""

@@ -39,7 +39,7 @@ def planes_that_mirror(surface: Surface, end: Floats) -> list[Mirror]:
         facet = int(largest[plane])
         body = int(f.body[facet])
         height = float((end - surface.first[facet]) @ surface.normal[facet])
-        if height < 0.0 and surface.closed[body]:
+        if height < 0.0 and not surface.both_sides[facet]:
             continue
         mirror = Mirror.of(surface, facet, 1.0 if height >= 0.0 else -1.0)
         view = area[plane] * abs(height) / np.linalg.norm(end - mirror.centre) ** 3
@@ -65,8 +65,8 @@ def legs_over(surface: Surface, end: Floats, bounces: int, beam: Beam | None = N
 
 
 def _both_sides(surface: Surface, mirrors: list[Mirror]) -> list[Mirror]:
-    """Add the back of each open sheet: a second mirror may be met from behind as seen from the end."""
-    backs = [m.turned() for m in mirrors if not surface.closed[m.body]]
+    """Add the back of what can be met from either side: a second mirror may be met from behind as seen from the end."""
+    backs = [m.turned() for m in mirrors if surface.both_sides[m.facet]]
     return mirrors + [m for m in backs if surface.facets.role[m.body] != MIRROR]
 
 
@@ -81,13 +81,12 @@ def _possible(end: Floats, chain: tuple[Mirror, ...]) -> bool:
 
 
 def reachable(surface: Surface, leg: Leg) -> Bools:
-    """Return which bodies (b,) can be met over a leg: in front of its last mirror and through its outline's sphere."""
+    """Return which pieces (p,) can be met over a leg: in front of its last mirror and through its outline's sphere."""
     known: WeakKeyDictionary[Leg, Bools] = surface.reach
     if leg not in known:
-        ok = np.ones(len(surface.facets.role), bool)
+        ok = np.ones(len(surface.piece_role), bool)
         if leg.mirrors:
-            centre, radius, empty = surface.balls
-            ok = ~empty & leg.may_reach(centre, radius)
-            ok[leg.mirrors[-1].body] = False
+            ok = leg.may_reach(*surface.piece_balls)
+            ok[leg.pieces(surface)[-1]] = False
         known[leg] = ok
     return known[leg]

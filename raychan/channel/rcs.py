@@ -167,9 +167,9 @@ def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: 
     Rows are the receiver's V, H and columns the transmitter's; V, H are theta-hat, phi-hat of the direction that each
     end looks to. Point ends are scaled to their distances from the origin.
     """
-    bodies = np.ones(len(surface.facets.role), bool)
+    every = np.ones(len(surface.piece_role), bool)
     total = np.zeros((bounces, 2, 2), complex)
-    for routes in tube_routes(surface, leg, [out], bodies, rule, bounces):
+    for routes in tube_routes(surface, leg, [out], every, rule, bounces):
         count = int((routes.kind[0] != 0).sum()) - int((routes.kind[0] == 2).sum())
         total[min(count, bounces) - 1] += transfer(routes, surface.facets, frequency, _basis, _basis).sum(axis=0)
     reach = 1.0 if leg.far else float(np.linalg.norm(leg.end))

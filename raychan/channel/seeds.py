@@ -25,10 +25,10 @@ _MANY = 1000  # clusters from which on a second thread pays
 _WIDE = 1e-6  # rad: rounding must not hide what grazes
 
 
-def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
-    """Return the facets of bodies (b,) that could be met over a leg, in order."""
+def seeds(surface: Surface, leg: Leg, pieces: Bools) -> Ints:
+    """Return the facets of pieces (p,) that could be met over a leg, in order."""
     f = surface.facets
-    if not len(f.body) or not bodies.any():
+    if not len(f.body) or not pieces.any():
         return np.zeros(0, np.int32)
     c, screens = surface.clusters, _screens(surface)
     walls, balls = screens.over(leg), screens.within(leg)
@@ -39,19 +39,23 @@ def seeds(surface: Surface, leg: Leg, bodies: Bools) -> Ints:
     image = np.asarray(leg.image, float)
     way = image, leg.far, bool(leg.mirrors) and not leg.far, *mirror
     lead = c.order[c.first[:-1]]
-    of, wanted = f.body[lead], bodies[f.body[lead]]
+    of, sides, piece = f.body[lead], surface.fabric.cluster_sides, surface.fabric.cluster_piece
+    # Of clusters of several pieces each facet is asked later.
+    wanted = pieces[piece] | (piece < 0)
     alive = np.zeros(len(lead), np.bool_)
 
     def some(rows: slice) -> None:
         hull = c.centre[rows], c.radius[rows], c.axis[rows], c.spread[rows]
-        about = wanted[rows], of[rows], surface.open_facet[lead[rows]], *hull
+        about = wanted[rows], of[rows], sides[rows], *hull
         _alive(*(*about, *way, *walls, *balls, alive[rows]))
 
     in_two(len(lead), some, _MANY)
     left = np.flatnonzero(alive)
     left = left[~leg.dark(c.centre[left], c.radius[left])]
-    shape = f.vertices, f.normals, surface.area, surface.open_facet
+    shape = f.vertices, f.normals, surface.area, surface.both_sides
     rows = np.sort(_lit(left, c.order, c.first, *shape, image, leg.far))
+    if not pieces.all():
+        rows = rows[pieces[surface.piece[rows]]]
     if leg.mirrors:
         v = f.vertices[rows]
         middle = v.mean(axis=1)

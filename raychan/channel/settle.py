@@ -18,12 +18,12 @@ Ints = NDArray[np.int32]
 
 
 def settle(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, first: bool = False
+    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, first: bool = False, veiled: bool = False
 ) -> tuple[Tubes, Floats, Ints]:
     """Cut tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
 
-    What is seen counts as found. Returns: the seen tubes, and mirror points (n, m, 3) and layers (n, l) of their way
-    out.
+    What is seen counts as found; if `veiled` only what is seen through a layer does, and is returned. Returns: the seen
+    tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
     """
     kept: list[tuple[Tubes, View, Phases]] = []
     rule = found.rule
@@ -32,6 +32,8 @@ def settle(
         matters = ph.bound > found.doubt(ph.length)
         view = sight(surface, out, tubes, matters, first, rule, level < GAPS)
         cut = matters if level < rule.levels else np.zeros_like(matters)
+        if veiled:
+            view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
         seen = view.centre.seen, view.some, view.mixed
         what = sort_out(tubes.points, tubes.normals, out.image, out.far, *seen, ph.rough, cut)
         ready, bent, shaded = (np.flatnonzero(what == w) for w in (READY, BENT, SHADED))

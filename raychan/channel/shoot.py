@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,78 +19,110 @@ from raychan.channel.trace import bounce
 from raychan.channel.tubes import Refinement, Tubes, phases_of
 from raychan.tables import MIRROR, Routes
 
-Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 def tube_routes(
     surface: Surface,
     leg: Leg,
     outs: list[Leg],
-    bodies: NDArray[np.bool_],
+    pieces: Bools,
     rule: Refinement,
     bounces: int,
     so_far: Found | None = None,
 ) -> Iterator[Routes]:
     """Yield the routes of tubes launched over `leg`, bounce by bounce and way out by way out.
 
-    Args: so_far what launches over other legs have found.
+    Args: pieces (p,) which may carry the first bounce; so_far what launches over other legs have found.
     """
     direct = outs[0]
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
-    mirror_planes = _planes_in(surface, outs)
-    for tubes in launch(surface, leg, direct, bodies, found, more):
-        yield from _followed(surface, leg, outs, tubes, mirror_planes, bounces, found)
+    images = _Images.of(surface, outs)
+    for tubes in launch(surface, leg, direct, pieces, found, more):
+        yield from _followed(surface, leg, outs, tubes, images, bounces, found)
 
 
 def _followed(
-    surface: Surface, leg: Leg, outs: list[Leg], tubes: Tubes, mirror_planes: NDArray[np.bool_],
-    bounces: int, found: Found,
-) -> Iterator[Routes]:  # fmt: skip
-    """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out.
-
-    Args: mirror_planes (p,) which planes are mirrors of the legs.
-    """
-    f, rule = surface.facets, found.rule
-    first = True
+    surface: Surface, leg: Leg, outs: list[Leg], tubes: Tubes, images: _Images, bounces: int, found: Found
+) -> Iterator[Routes]:
+    """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out."""
+    f, first = surface.facets, True
     while len(tubes):
-        count, body = int(tubes.bounces[0]), f.body[tubes.facet]
-        # Ground has no return of its own here; a plane mirror lit from another body returns by its image, not twice.
-        own = f.role[body] != MIRROR
-        if not first:
-            own &= ~(mirror_planes[tubes.facet] & (f.body[tubes.came_from()] != body))
-        present = np.bincount(body[own], minlength=len(f.role)) > 0
+        count = int(tubes.bounces[0])
+        # Ground has no return of its own here.
+        own = f.role[f.body[tubes.facet]] != MIRROR
+        by_image = images.returns(surface, leg, tubes, first)
         for out in outs:
-            may = reachable(surface, out) & present
-            may[list(out.bodies)] = False
-            if count + len(out.mirrors) > bounces or not may.any():
+            if count + len(out.mirrors) > bounces:
                 continue
-            rows = np.flatnonzero(own & may[body])
-            if out.mirrors or not first:
-                rows = rows[out.may_leave(tubes.points[rows], tubes.normals[rows])]
-            if not len(rows):
-                continue
-            some = tubes.take(rows)
-            if first and out == leg:
-                corners, passed = same_way_back(some, len(leg.mirrors), rule.layers)
-                if not surface.convex_alone:
-                    found.add(phases_of(surface, leg, out, some, rule))
-            else:
-                some, corners, passed = settle(surface, leg, out, some, found, first)
-            if len(some):
-                yield routes_of(surface, leg, out, some, first, corners, passed)
+            twice = by_image & (not first or images.over(surface, out))
+            yield from _returned(surface, leg, out, tubes, own & ~twice, first, False, found)
+            if surface.veils:
+                yield from _returned(surface, leg, out, tubes, own & twice, first, True, found)
         if count >= bounces or surface.convex_alone:
             return
         last = count + 1 >= bounces
         tubes = bounce(surface, leg, outs[0], tubes, first, last, found)
         if first and len(tubes):
-            # From a plane mirror to another body: the legs over mirrors have these.
-            previous = tubes.came_from()
-            moved = f.body[previous] != f.body[tubes.facet]
-            tubes = tubes.take(~(mirror_planes[previous] & moved))
+            tubes = tubes.take(~images.carry(surface, tubes))
         first = False
 
 
-def _planes_in(surface: Surface, legs: list[Leg]) -> NDArray[np.bool_]:
-    used = {int(surface.plane[m.facet]) for leg in legs for m in leg.mirrors}
-    return np.isin(surface.plane, list(used))
+def _returned(
+    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, own: Bools, first: bool, veiled: bool, found: Found
+) -> Iterator[Routes]:
+    """Yield the routes of those tubes, of `own` (n,), that are seen over a way out, or seen through a layer."""
+    rule, piece = found.rule, surface.piece[tubes.facet]
+    may = reachable(surface, out).copy()
+    may[out.pieces(surface)] = False
+    rows = np.flatnonzero(own & may[piece])
+    if out.mirrors or not first:
+        rows = rows[out.may_leave(tubes.points[rows], tubes.normals[rows])]
+    if not len(rows):
+        return
+    some = tubes.take(rows)
+    if first and out == leg and not veiled:
+        corners, passed = same_way_back(some, len(leg.mirrors), rule.layers)
+        if not surface.convex_alone:
+            found.add(phases_of(surface, leg, out, some, rule))
+    else:
+        some, corners, passed = settle(surface, leg, out, some, found, first, veiled)
+    if len(some):
+        yield routes_of(surface, leg, out, some, first, corners, passed)
+
+
+@dataclass(frozen=True)
+class _Images:
+    """What returns by its image in a mirror must not return by tubes too: `planes` (p,) that are mirrors of legs.
+
+    Over several such mirrors in a row a wave scatters at the last. No leg leads through a layer before its last
+    stretch, though: such ways are the tubes'.
+    """
+
+    planes: Bools
+
+    @staticmethod
+    def of(surface: Surface, legs: list[Leg]) -> _Images:
+        """Return the mirrors of legs."""
+        used = {int(surface.plane[m.facet]) for leg in legs for m in leg.mirrors}
+        return _Images(np.isin(np.arange(surface.plane.max(initial=-1) + 1), list(used)))
+
+    def over(self, surface: Surface, out: Leg) -> bool:
+        """Tell whether a way out leads over a mirror that may be the last to scatter."""
+        return any(surface.facets.role[m.body] != MIRROR for m in out.mirrors)
+
+    def returns(self, surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> Bools:
+        """Tell of tubes (n,) whether they stand on a mirror that has their returns by its image: on their first
+        surface those that leave over other mirrors, later all that came from another piece."""
+        mirror = self.planes[surface.plane[tubes.facet]]
+        if first:
+            return mirror & (tubes.slots == len(leg.mirrors))
+        return mirror & (surface.piece[tubes.came_from()] != surface.piece[tubes.facet])
+
+    def carry(self, surface: Surface, tubes: Tubes) -> Bools:
+        """Tell of tubes (n,) whether a leg over the mirror on which they stood first leads to the piece where they
+        landed."""
+        before = tubes.came_from()
+        moved = surface.piece[before] != surface.piece[tubes.facet]
+        return self.planes[surface.plane[before]] & moved & ~tubes.history.veiled(tubes.last)

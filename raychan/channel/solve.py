@@ -127,11 +127,11 @@ def solve_into(
     for i, leg in enumerate(legs):
         if progress:
             progress("trace", i / len(legs))
-        bodies = reachable(surface, leg)
-        if not bodies.any():
+        pieces = reachable(surface, leg)
+        if not pieces.any():
             continue
         since = perf_counter()
-        for routes in tube_routes(surface, leg, legs, bodies, rule, bounces, so_far):
+        for routes in tube_routes(surface, leg, legs, pieces, rule, bounces, so_far):
             stats.add("trace", since)
             since = perf_counter()
             stats.tubes += len(routes.kind)

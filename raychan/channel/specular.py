@@ -53,14 +53,15 @@ def _every_chain(surface: Surface, planes: Ints, tx: Floats, bounces: int) -> li
     """Return all chains whose images lie in front of the planes that mirror them; level by level."""
     normal, point = surface.normal[planes], surface.first[planes]
     # A body about the transmitter is met from within.
-    around = [place_of(surface.facets.vertices[surface.facets.body == b], tx) for b in range(len(surface.closed))]
-    closed = (surface.closed & (np.array(around) != Place.INSIDE))[surface.facets.body[planes]]
+    body = surface.facets.body
+    around = [place_of(surface.facets.vertices[body == b], tx) for b in range(len(surface.facets.role))]
+    both = surface.both_sides[planes] | (np.array(around) == Place.INSIDE)[body[planes]]
     images, last = tx[None], np.full(1, -1)
     chains: list[Chain] = [()]
     out: list[Chain] = []
     for _ in range(bounces):
         height = np.einsum("ij,nj->ni", normal, images) - np.einsum("ij,ij->i", normal, point)
-        usable = np.where(closed[None], height > 1e-9, np.abs(height) > 1e-9)
+        usable = np.where(both[None], np.abs(height) > 1e-9, height > 1e-9)
         usable &= np.arange(len(planes))[None] != last[:, None]
         rows, cols = np.nonzero(usable)
         images = images[rows] - 2.0 * height[rows, cols, None] * normal[cols]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.fabric import Fabric
-from raychan.kernels.facets import bulges, ends, hulls
+from raychan.kernels.facets import bulges, ends, extents, hulls
 from raychan.kernels.fresnel import coefficients_array
 from raychan.kernels.outline import turning
 from raychan.kernels.rows import once
@@ -59,7 +59,7 @@ class Surface(Tracer):
         self.reach: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
         self.fabric = lasting(still, "fabric", lambda: Fabric(facets, joints or ([self._joints()] if len(v) else [])))
         self.plane, self.smooth = self.fabric.plane, self.fabric.smooth
-        self.closed, self.open_facet = self.fabric.closed, self.fabric.open_facet
+        self.both_sides, self.piece = self.fabric.both_sides, self.fabric.piece
         self.convex_alone, self.hides_nothing = self.fabric.convex_alone, self.fabric.hides_nothing
 
     def _joints(self) -> Joints:
@@ -176,6 +176,25 @@ class Surface(Tracer):
         found = [cores_of(f.vertices[solid & (f.body == b)]) for b in range(len(f.role))]
         owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(r) for _, r in found])
         return np.concatenate([c for c, _ in found]), np.concatenate([r for _, r in found]), owner
+
+    @property
+    def veils(self) -> bool:
+        """Whether anything lets a wave through."""
+        return self._any_layer
+
+    @once
+    def piece_role(self) -> NDArray[np.int8]:
+        """Role (p,) of each piece's body."""
+        f = self.facets
+        out = np.zeros(int(self.piece.max(initial=-1)) + 1, f.role.dtype)
+        out[self.piece] = f.role[f.body]
+        return out
+
+    @once
+    def piece_balls(self) -> tuple[Floats, Floats]:
+        """Centre (p, 3) [m] and radius (p,) [m] of a ball about each piece."""
+        low, high = np.moveaxis(extents(self.facets.vertices, self.piece, len(self.piece_role)), 1, 0)
+        return 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
 
     @once
     def balls(self) -> tuple[Floats, Floats, NDArray[np.bool_]]:

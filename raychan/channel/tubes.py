@@ -148,7 +148,7 @@ def first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[F
     """Return points, directions, lengths and normals of the rays of a leg to barycentric corners (n, 3, 3) and their
     centres."""
     f = surface.facets
-    return rays_on(facet, bary, f.vertices, f.normals, surface.bulge, surface.open_facet, leg.image, leg.far)
+    return rays_on(facet, bary, f.vertices, f.normals, surface.bulge, surface.both_sides, leg.image, leg.far)
 
 
 def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:

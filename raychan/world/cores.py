@@ -24,11 +24,16 @@ _INNER = 0.999  # of the way to the nearest facet: rounding of a ray must not pa
 
 
 def closed_pieces(joints: Joints, opaque: Bools) -> Bools:
-    """Tell which facets (n,) are of pieces that hang together, close, and are opaque (n,) all over."""
-    open_piece = np.zeros(len(opaque), bool)
-    open_piece[joints.piece[~opaque]] = True
-    open_piece[joints.piece[joints.rim // 3]] = True
-    return np.asarray(~open_piece[joints.piece])
+    """Tell which facets (n,) are of pieces that hang together, close about an inside, and are opaque (n,) all over."""
+    piece = joints.piece
+    # Two sheets upon each other share every edge twice, yet have no inside.
+    closed = np.zeros(len(opaque), bool)
+    one_plane = np.empty(len(opaque), joints.plane.dtype)
+    one_plane[piece] = joints.plane
+    closed[piece[joints.plane != one_plane[piece]]] = True
+    closed[piece[~opaque]] = False
+    closed[piece[joints.rim // 3]] = False
+    return np.asarray(closed[piece])
 
 
 def cores_of(v: Floats) -> tuple[Floats, Floats]:
