@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from raychan.channel.settle import settle
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce
 from raychan.channel.tubes import Refinement, Tubes, phases_of
+from raychan.kernels.horizon import FACING, OBLIQUE
 from raychan.tables import MIRROR, Routes
 
 Floats = NDArray[np.float64]
@@ -29,26 +30,30 @@ def tube_routes(
     rule: Refinement,
     bounces: int,
     so_far: Found | None = None,
+    first: Callable[[Tubes, Found], None] | None = None,
 ) -> Iterator[Routes]:
     """Yield the routes of tubes launched over `leg`, bounce by bounce and way out by way out.
 
-    Args: so_far what launches over other legs have found.
+    Args: so_far what launches over other legs have found; first is given the tubes on their first surface, whose own
+    routes are then not among those yielded.
     """
     direct = outs[0]
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
     mirror_planes = _planes_in(surface, outs)
     for tubes in launch(surface, leg, direct, bodies, found, more):
-        yield from _followed(surface, leg, outs, tubes, mirror_planes, bounces, found)
+        if first is not None:
+            first(tubes, found)
+        yield from _followed(surface, leg, outs, tubes, mirror_planes, bounces, found, first is None)
 
 
 def _followed(
     surface: Surface, leg: Leg, outs: list[Leg], tubes: Tubes, mirror_planes: NDArray[np.bool_],
-    bounces: int, found: Found,
+    bounces: int, found: Found, single: bool,
 ) -> Iterator[Routes]:  # fmt: skip
     """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out.
 
-    Args: mirror_planes (p,) which planes are mirrors of the legs.
+    Args: mirror_planes (p,) which planes are mirrors of the legs; single whether those of the first surface count.
     """
     f, rule = surface.facets, found.rule
     first = True
@@ -59,14 +64,14 @@ def _followed(
         if not first:
             own &= ~(mirror_planes[tubes.facet] & (f.body[tubes.came_from()] != body))
         present = np.bincount(body[own], minlength=len(f.role)) > 0
-        for out in outs:
+        for out in outs if single or not first else []:
             may = reachable(surface, out) & present
             may[list(out.bodies)] = False
             if count + len(out.mirrors) > bounces or not may.any():
                 continue
             rows = np.flatnonzero(own & may[body])
-            if out.mirrors or not first:
-                rows = rows[out.may_leave(tubes.points[rows], tubes.normals[rows])]
+            if out.mirrors:
+                rows = rows[out.may_leave(tubes.points[rows])]
             if not len(rows):
                 continue
             some = tubes.take(rows)
@@ -75,7 +80,8 @@ def _followed(
                 if not surface.convex_alone:
                     found.add(phases_of(surface, leg, out, some, first, rule))
             else:
-                some, corners, passed = settle(surface, leg, out, some, found, first)
+                which = OBLIQUE if first else FACING
+                some, corners, passed = settle(surface, leg, out, some, found, first, which)
             if len(some):
                 yield routes_of(surface, leg, out, some, first, corners, passed)
         if count >= bounces or surface.convex_alone:
