@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.kernels.currents import reflected_wave, shadow_wave
 from raychan.kernels.fresnel import coefficients
 from raychan.kernels.jit import njit
 from raychan.kernels.po import huygens, triangle_terms
@@ -18,6 +19,9 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+HUYGENS, REFLECTED, SHADOW = 0, 1, 2
+"""Which currents radiate: the reflected wave's, the mean of both ways; the reflected wave's; the shadow's."""
+
 _LINEAR = 1e-4  # rad: how far the phase of a piece of the footprint may bend in the integral
 
 FieldOf = Callable[[Floats], Complexes]
@@ -32,12 +36,20 @@ def departures(routes: Routes) -> tuple[Floats, Floats]:
 
 
 def transfer(
-    routes: Routes, facets: Facets, frequency: float, tx_field: FieldOf, rx_field: FieldOf, corners: bool = False
+    routes: Routes,
+    facets: Facets,
+    frequency: float,
+    tx_field: FieldOf,
+    rx_field: FieldOf,
+    corners: bool = False,
+    wave: int = HUYGENS,
+    elements: Floats | None = None,
 ) -> Complexes:
     """Return what each route carries (n, q, p): received over transmitted wave, lambda/4 pi and carrier phase in.
 
     Args: tx_field, rx_field vector fields of p and q polarisations; corners: give (n, q, p, 3), the parts
-    belonging to the three footprint corners, whose sum is the whole.
+    belonging to the three footprint corners, whose sum is the whole; wave which currents radiate, and, unless HUYGENS,
+    the vector elements (n, 3, 3) [m^2] of their area at the corners, in place of taper and area.
     """
     away, look = departures(routes)
     e_tx = np.ascontiguousarray(tx_field(away), dtype=np.complex128)
@@ -48,13 +60,15 @@ def transfer(
     out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3 if corners else 1), np.complex128)
     columns = (
         routes.vertices, routes.normals, routes.kind, material, routes.scatter, routes.lengths, routes.length,
-        routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma, e_tx, e_rx, out,
+        routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma, e_tx, e_rx,
+        np.zeros((len(out), 0, 3)) if elements is None else elements, out,
     )  # fmt: skip
 
     def some(at: slice) -> None:
         _transfer(
-            routes.tx, routes.rx, routes.far, m.kind, m.eps, m.thickness, m.roughness, k, *(c[at] for c in columns)
-        )
+            routes.tx, routes.rx, routes.far, m.kind, m.eps, m.thickness, m.roughness, k, wave,
+            *(c[at] for c in columns),
+        )  # fmt: skip
 
     in_two(len(out), some)
     return out if corners else out[..., 0]
@@ -98,8 +112,8 @@ def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-unt
 
 @njit(cache=True, nogil=True)
 def _transfer(  # type: ignore[no-untyped-def]
-    tx, rx, far, m_kind, m_eps, m_thickness, m_rough, k, vertices, normals, kind, material, scatter, lengths, length,
-    taper, area, spread_in, spread_out, caustics, sigma, e_tx, e_rx, out,
+    tx, rx, far, m_kind, m_eps, m_thickness, m_rough, k, wave, vertices, normals, kind, material, scatter, lengths,
+    length, taper, area, spread_in, spread_out, caustics, sigma, e_tx, e_rx, elements, out,
 ):  # fmt: skip
     n, d = kind.shape
     ins, outs, apart = e_tx.shape[1], e_rx.shape[1], out.shape[3] == 3
@@ -152,18 +166,26 @@ def _transfer(  # type: ignore[no-untyped-def]
         mat = material[i, at]
         ci = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k)
         co = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k)
-        scale = wavelength_4pi * (-0.25j * k / np.pi) * area[i] * spread_in[i] * spread_out[i]
+        scale = wavelength_4pi * (-0.25j * k / np.pi) * spread_in[i] * spread_out[i]
         for _ in range(caustics[i]):
             scale *= 1j
         for c6 in range(6):
             phases[c6] = k * lengths[i, c6]
         triangle_terms(phases, _LINEAR, terms)
+        to, mean = (-k_out[0], -k_out[1], -k_out[2]), 0j
         for p in range(ins):
             for q in range(outs):
                 e, g = _vec(arriving[p]), _vec(leaving[q])
-                couple = huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
+                if wave == HUYGENS:
+                    mean = area[i] * huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
                 for c3 in range(3):
-                    out[i, q, p, c3 if apart else 0] += scale * couple * taper[i, c3] * terms[c3]
+                    if wave == HUYGENS:
+                        couple = mean * taper[i, c3]
+                    elif wave == REFLECTED:
+                        couple = reflected_wave(e, k_in, to, _vec(elements[i, c3]), ci[0], ci[1], g)
+                    else:
+                        couple = shadow_wave(e, k_in, to, _vec(elements[i, c3]), ci[2], ci[3], g)
+                    out[i, q, p, c3 if apart else 0] += scale * couple * terms[c3]
 
 
 @njit(cache=True)

@@ -57,10 +57,10 @@ class Found:
         if not np.isfinite(self.rule.cell):
             self._level = self._level[:1]
 
-    def that_count(self, bound: Floats, length: Floats) -> NDArray[np.intp]:
-        """Return the tubes to keep: of many, the weakest of each cell are let go while all these in phase stay under
-        0.3 of the doubt."""
-        if len(bound) < _MANY:
+    def that_count(self, bound: Floats, length: Floats, many: int = _MANY) -> NDArray[np.intp]:
+        """Return the tubes to keep: of `many` or more, the weakest of each cell are let go while all these in phase
+        stay under 0.3 of the doubt."""
+        if len(bound) < many:
             return np.arange(len(bound))
         share = bound / self.doubt(length)
         # The weakest few are enough: none that alone exceeds the sum is looked at.

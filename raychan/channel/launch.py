@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.beyond import outlets
 from raychan.channel.cut import divide
 from raychan.channel.edges import meeting_lines
 from raychan.channel.found import Found
@@ -25,7 +26,7 @@ from raychan.channel.tubes import (
     stand,
     unit,
 )
-from raychan.kernels.lit import lit_parts, may_be_lit
+from raychan.kernels.lit import lit_parts
 from raychan.kernels.patch import edge_to_cut, halved
 from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
 from raychan.tables import REFLECT, SCATTERER, TRANSMIT
@@ -50,10 +51,8 @@ def launch(surface: Surface, leg: Leg, out: Leg, pieces: Bools, found: Found, mo
     allowed = pieces & (surface.piece_role == SCATTERER)
     allowed[leg.pieces(surface)] = False
     facet = seeds(surface, leg, allowed)
-    if out != leg:
-        facet = facet[may_be_lit(facet, *shape, surface.both_sides, *ways)]
     for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
-        part, bary = lit_parts(part, bary, *shape, surface.both_sides, *ways, out != leg)
+        part, bary = lit_parts(part, bary, *shape, surface.both_sides, leg.image, leg.far)
         yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary), found, more)
 
 
@@ -156,22 +155,33 @@ def sight(
     rule: Refinement,
     gaps: bool = True,
     centre: View | None = None,
+    beyond: Bools | None = None,
 ) -> Sight:
     """Return how tubes are seen over a leg; by the centre ray alone where cutting would not matter.
 
     Args: first whether they stand on their first surface; gaps whether to look for one through which a tube is seen
-    that none of its rays is; centre how their centres are seen, cast if not given.
+    that none of its rays is; centre how their centres are seen, cast if not given; beyond (n,) tubes that face away,
+    which their own body does not hide.
     """
     n = len(tubes)
     points = on_facets(surface, tubes) if first else tubes.points
     where = tubes.facet, surface.first, surface.normal, leg.image, leg.far
     corners = np.zeros(n, bool) if surface.convex_alone else matters
     aim, target, near, slack = aims(points, tubes.points, *where, centre is None, corners)
+    if beyond is not None:
+        rows = np.concatenate([np.arange(n if centre is None else 0), np.repeat(np.flatnonzero(corners), 3)])
+        rows = np.flatnonzero(beyond[rows])
+        if not surface.hides_nothing:
+            aim[rows], target[rows] = outlets(surface, leg, aim[rows], target[rows])
     view = leg.visible(surface, aim, target, near, rule.layers)
+    if surface.hides_nothing and beyond is not None:
+        view.seen[rows] = True
     if centre is None:
         centre, view = view.take(slice(n)), view.take(slice(n, None))
     rays = view.seen, view.blocker, centre.seen, centre.blocker, corners
     some, mixed, look = read_rays(*rays, matters, gaps, surface.smooth)
+    if beyond is not None:
+        look &= ~beyond
     side = np.zeros((n, 3))
     rows, points, met, planes, source, back, own = partly_seen(
         look, points, tubes.facet, *rays, surface.plane, leg.image, leg.far

@@ -137,9 +137,9 @@ class Leg:
         ok: Bools = possible(points, size, *self._chain)
         return ok
 
-    def may_leave(self, points: Floats, normals: Floats) -> Bools:
-        """Tell which tubes (n, 4, 3), standing on surfaces of these normals, could send something to the end."""
-        ok: Bools = may_leave(points, normals, self.far, *self._chain)
+    def may_leave(self, points: Floats) -> Bools:
+        """Tell from which tubes (n, 4, 3) [m] something could come to the end by way of each mirror's circle."""
+        ok: Bools = may_leave(points, *self._chain)
         return ok
 
     def visible(

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.bistatic import first_surface
 from raychan.channel.fields import transfer
+from raychan.channel.found import Found
 from raychan.channel.legs import Leg
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
-from raychan.channel.tubes import Refinement
+from raychan.channel.tubes import Refinement, Tubes
 from raychan.frames import direction, theta_phi
 from raychan.tables import Facets
 from raychan.units import C0
@@ -169,7 +171,11 @@ def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: 
     """
     every = np.ones(len(surface.piece_role), bool)
     total = np.zeros((bounces, 2, 2), complex)
-    for routes in tube_routes(surface, leg, [out], every, rule, bounces):
+
+    def first(tubes: Tubes, found: Found) -> None:
+        total[0] += first_surface(surface, leg, out, tubes, found, frequency, _basis)
+
+    for routes in tube_routes(surface, leg, [out], every, rule, bounces, first=None if out == leg else first):
         count = int((routes.kind[0] != 0).sum()) - int((routes.kind[0] == 2).sum())
         total[min(count, bounces) - 1] += transfer(routes, surface.facets, frequency, _basis, _basis).sum(axis=0)
     reach = 1.0 if leg.far else float(np.linalg.norm(leg.end))

@@ -11,6 +11,8 @@ from raychan.channel.launch import GAPS, sight
 from raychan.channel.legs import Leg, View
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import Phases, Tubes, phases_of
+from raychan.frames import sizes
+from raychan.kernels.horizon import FACING, OBLIQUE, radiating
 from raychan.kernels.sight import BENT, READY, SHADED, sort_out
 
 Floats = NDArray[np.float64]
@@ -18,29 +20,48 @@ Ints = NDArray[np.int32]
 
 
 def settle(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, first: bool = False, veiled: bool = False
+    surface: Surface,
+    leg: Leg,
+    out: Leg,
+    tubes: Tubes,
+    found: Found,
+    first: bool = False,
+    veiled: bool = False,
+    which: int = FACING,
 ) -> tuple[Tubes, Floats, Ints]:
     """Cut tubes until their phase over `out` is linear enough and the receiver sees all or nothing of each.
 
-    What is seen counts as found; if `veiled` only what is seen through a layer does, and is returned. Returns: the seen
-    tubes, and mirror points (n, m, 3) and layers (n, l) of their way out.
+    What is seen counts as found. Args: first whether they stand on their first surface; veiled: only what is seen
+    through a layer counts, and is returned; which of them radiate (see `kernels.horizon`). Returns: the seen tubes, and
+    mirror points (n, m, 3) and layers (n, l) of their way out.
     """
     kept: list[tuple[Tubes, View, Phases]] = []
     rule = found.rule
     for level in range(rule.levels + 1):
+        share, facing = radiating(tubes.points, tubes.k, tubes.normals, out.image, out.far, which)
+        rows = np.flatnonzero(share > 0.0)
+        tubes, share, facing = tubes.take(rows), share[rows], facing[rows]
         ph = phases_of(surface, leg, out, tubes, rule)
+        if which == OBLIQUE and not facing.all():
+            # Beyond the horizon most is out of phase with its neighbours, and little of it counts.
+            weak = np.flatnonzero(~facing)
+            left = found.that_count(ph.bound[weak] * share[weak], ph.length[weak], 0)
+            rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
+            tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
         matters = ph.bound > found.doubt(ph.length)
-        view = sight(surface, out, tubes, matters, first, rule, level < GAPS)
+        view = sight(surface, out, tubes, matters, first, rule, level < GAPS, beyond=~facing)
         cut = matters if level < rule.levels else np.zeros_like(matters)
         if veiled:
             view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
-        seen = view.centre.seen, view.some, view.mixed
-        what = sort_out(tubes.points, tubes.normals, out.image, out.far, *seen, ph.rough, cut)
+        what = sort_out(facing, view.centre.seen, view.some, view.mixed, ph.rough, cut)
         ready, bent, shaded = (np.flatnonzero(what == w) for w in (READY, BENT, SHADED))
         kept.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
         if not len(bent) and not len(shaded):
             break
-        edge = np.argmax(np.abs(ph.bend[bent]), axis=1)
+        # Where phases run alike along all edges, the longest is cut.
+        lengths = sizes(tubes.points[bent, :3] - np.roll(tubes.points[bent, :3], -1, axis=1))
+        bend = np.abs(ph.bend[bent])
+        edge = np.argmax(np.where((ph.rough[bent] > 1.0)[:, None], bend, lengths), axis=1)
         halved = halves(surface, leg, tubes, bent, edge, first, rule.jitter)
         parted, _ = divide(surface, leg, tubes, shaded, view.side, first, rule.jitter)
         tubes = Tubes.join([halved, parted])

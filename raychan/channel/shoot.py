@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from raychan.channel.settle import settle
 from raychan.channel.surface import Surface
 from raychan.channel.trace import bounce
 from raychan.channel.tubes import Refinement, Tubes, phases_of
+from raychan.kernels.horizon import FACING, OBLIQUE
 from raychan.tables import MIRROR, Routes
 
 Bools = NDArray[np.bool_]
@@ -30,30 +31,35 @@ def tube_routes(
     rule: Refinement,
     bounces: int,
     so_far: Found | None = None,
+    first: Callable[[Tubes, Found], None] | None = None,
 ) -> Iterator[Routes]:
     """Yield the routes of tubes launched over `leg`, bounce by bounce and way out by way out.
 
-    Args: pieces (p,) which may carry the first bounce; so_far what launches over other legs have found.
+    Args: pieces (p,) which may carry the first bounce; so_far what launches over other legs have found; first is given
+    the tubes on their first surface, whose own routes are then not among those yielded.
     """
     direct = outs[0]
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
     images = _Images.of(surface, outs)
     for tubes in launch(surface, leg, direct, pieces, found, more):
-        yield from _followed(surface, leg, outs, tubes, images, bounces, found)
+        if first is not None:
+            first(tubes, found)
+        yield from _followed(surface, leg, outs, tubes, images, bounces, found, first is None)
 
 
 def _followed(
-    surface: Surface, leg: Leg, outs: list[Leg], tubes: Tubes, images: _Images, bounces: int, found: Found
+    surface: Surface, leg: Leg, outs: list[Leg], tubes: Tubes, images: _Images, bounces: int, found: Found, single: bool
 ) -> Iterator[Routes]:
-    """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out."""
+    """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out; `single`: those of the
+    first surface too."""
     f, first = surface.facets, True
     while len(tubes):
         count = int(tubes.bounces[0])
         # Ground has no return of its own here.
         own = f.role[f.body[tubes.facet]] != MIRROR
         by_image = images.returns(surface, leg, tubes, first)
-        for out in outs:
+        for out in outs if single or not first else []:
             if count + len(out.mirrors) > bounces:
                 continue
             twice = by_image & (not first or images.over(surface, out))
@@ -77,8 +83,8 @@ def _returned(
     may = reachable(surface, out).copy()
     may[out.pieces(surface)] = False
     rows = np.flatnonzero(own & may[piece])
-    if out.mirrors or not first:
-        rows = rows[out.may_leave(tubes.points[rows], tubes.normals[rows])]
+    if out.mirrors:
+        rows = rows[out.may_leave(tubes.points[rows])]
     if not len(rows):
         return
     some = tubes.take(rows)
@@ -87,7 +93,7 @@ def _returned(
         if not surface.convex_alone:
             found.add(phases_of(surface, leg, out, some, rule))
     else:
-        some, corners, passed = settle(surface, leg, out, some, found, first, veiled)
+        some, corners, passed = settle(surface, leg, out, some, found, first, veiled, OBLIQUE if first else FACING)
     if len(some):
         yield routes_of(surface, leg, out, some, first, corners, passed)
 

@@ -164,15 +164,19 @@ class Surface(Tracer):
         return out
 
     @once
+    def shell(self) -> NDArray[np.bool_]:
+        """Facets (n,) of pieces that close and let nothing through."""
+        opaque = ~self.is_layer
+        pieces = (closed_pieces(j, opaque[i : i + len(j.plane)]) for j, i in self.fabric.joined)
+        return np.concatenate([np.zeros(0, bool), *pieces])
+
+    @once
     def cores(self) -> Balls:
         """Centre (k, 3) [m], radius (k,) [m] and body (k,) of balls inside closed opaque bodies."""
         if self._cores is not None:
             return self._cores
         f = self.facets
-        opaque = ~self.is_layer & (f.role[f.body] != MIRROR)
-        solid = np.concatenate(
-            [np.zeros(0, bool), *(closed_pieces(j, opaque[i : i + len(j.plane)]) for j, i in self.fabric.joined)]
-        )
+        solid = self.shell & (f.role[f.body] != MIRROR)
         found = [cores_of(f.vertices[solid & (f.body == b)]) for b in range(len(f.role))]
         owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(r) for _, r in found])
         return np.concatenate([c for c, _ in found]), np.concatenate([r for _, r in found]), owner

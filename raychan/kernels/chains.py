@@ -57,24 +57,14 @@ def possible(points, size, images, at, normal, centre, radius):  # type: ignore[
 
 
 @njit(cache=True, nogil=True)
-def may_leave(points, normals, far, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
-    """Return which tubes of corners and centre (n, 4, 3) could send something to the end: turned to it, and possible.
-
-    Args: normals (n, 4, 3) of the surface they stand on.
-    """
+def may_leave(points, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
+    """Return over which tubes of corners and centre (n, 4, 3) [m] the way to the end is possible."""
     ok = np.empty(len(points), np.bool_)
-    image = images[len(at)]
     for i in range(len(points)):
-        p, n = points[i, 3], normals[i, 3]
-        towards = 0.0
-        for c in range(3):
-            towards += (-image[c] if far else p[c] - image[c]) * n[c]
-        ok[i] = towards < 0.0
-        if ok[i] and len(at):
-            size = 0.0
-            for q in range(3):
-                size = max(size, length_to(points[i, q], p, False))
-            ok[i] = _possible(p, size, images, at, normal, centre, radius)
+        size = 0.0
+        for q in range(3):
+            size = max(size, length_to(points[i, q], points[i, 3], False))
+        ok[i] = _possible(points[i, 3], size, images, at, normal, centre, radius)
     return ok
 
 

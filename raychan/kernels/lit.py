@@ -1,4 +1,4 @@
-"""Lit: which parts of patches face the ends of a way (numba loops); arguments as for `patch`."""
+"""Lit: which parts of patches face the source (numba loops); arguments as for `patch`."""
 
 from __future__ import annotations
 
@@ -28,23 +28,6 @@ def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _lit_whole(v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
-    """Return 1 if all of a facet faces the end of a way, -1 if nothing of it does, 0 if that is not sure."""
-    towards = _faces(v, n, b, way_image, way_far)
-    return towards * _faces(v, n, b, image, far) if is_open else towards
-
-
-@njit(cache=True, nogil=True)
-def may_be_lit(facet, v, n, b, is_open, image, far, way_image, way_far):  # type: ignore[no-untyped-def]
-    """Tell of which facets (n,) some part may face the end of a way (see `lit_parts`)."""
-    out = np.empty(len(facet), np.bool_)
-    for i in range(len(facet)):
-        f = facet[i]
-        out[i] = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, way_image, way_far) >= 0
-    return out
-
-
-@njit(cache=True, inline="always")
 def _towards(v, n, b, x, y, z, image, far):  # type: ignore[no-untyped-def]
     """Return the cosine of incidence at barycentric (x, y, z) of the true surface: above 0 where it faces the image."""
     xy, yz, zx = x * y, y * z, z * x
@@ -60,20 +43,19 @@ def _towards(v, n, b, x, y, z, image, far):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _parts_towards(v, n, b, is_open, w, image, far, way_image, way_far, side, p, out):  # type: ignore[no-untyped-def]
-    """Write the parts of a patch that face the end of a way into out (3, 3, 3); return how many.
+def _parts_towards(v, n, b, is_open, w, image, far, side, p, out):  # type: ignore[no-untyped-def]
+    """Write the parts of a patch that face the image into out (3, 3, 3), of an open sheet those of either side; return
+    how many.
 
     Args: side (3,), p (3, 3) for work.
     """
-    x, y, z = middle(w)
-    sign = -1.0 if is_open and _towards(v, n, b, x, y, z, image, far) < 0.0 else 1.0
     low, high, total = np.inf, -np.inf, 0.0
     for q in range(3):
-        side[q] = sign * _towards(v, n, b, w[q, 0], w[q, 1], w[q, 2], way_image, way_far)
+        side[q] = _towards(v, n, b, w[q, 0], w[q, 1], w[q, 2], image, far)
         low, high, total = min(low, side[q]), max(high, side[q]), total + side[q]
     if not (high > 1e-9 and low < -1e-9):
         out[0] = w
-        return 1 if total > 0.0 else 0
+        return 1 if is_open or total > 0.0 else 0
     for q in range(3):
         if side[q] == 0.0:
             side[q] = 1e-12
@@ -81,8 +63,7 @@ def _parts_towards(v, n, b, is_open, w, image, far, way_image, way_far, side, p,
     count = 0
     for j in range(3):
         x, y, z = middle(out[j])
-        sign = -1.0 if is_open and _towards(v, n, b, x, y, z, image, far) < 0.0 else 1.0
-        if sign * _towards(v, n, b, x, y, z, way_image, way_far) <= 0.0:
+        if not is_open and _towards(v, n, b, x, y, z, image, far) <= 0.0:
             continue
         for q in range(3):
             place_on(v, b, out[j, q, 0], out[j, q, 1], out[j, q, 2], p[q])
@@ -93,43 +74,33 @@ def _parts_towards(v, n, b, is_open, w, image, far, way_image, way_far, side, p,
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lit_parts(facet, bary, v, n, b, is_open, image, far, out_image, out_far, both):  # type: ignore[no-untyped-def]
-    """Return (facet, bary) of the parts of patches that face the source and the end of the way out, cut along the
-    terminators.
+def lit_parts(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyped-def]
+    """Return (facet, bary) of the parts of patches that face the source, cut along the terminator.
 
-    Args: is_open (m,) facets of open sheets, which face the source from either side; both whether the way out is
-    another one than the way in.
+    Args: is_open (m,) facets of open sheets, which face the source from either side.
     """
     m = len(facet)
     room = m + m // 4 + 9
     facets, barys = np.empty(room, facet.dtype), np.empty((room, 3, 3))
-    p, side, part, some = np.empty((3, 3)), np.empty(3), np.empty((3, 3, 3)), np.empty((3, 3, 3))
-    count, f, lit, back = 0, -1, 0, 1
+    p, side, part = np.empty((3, 3)), np.empty(3), np.empty((3, 3, 3))
+    count, f, lit = 0, -1, 0
     for i in range(m):
         if facet[i] != f:
             f = facet[i]
-            lit = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, image, far)
-            if both:
-                back = _lit_whole(v[f], n[f], b[f], is_open[f], image, far, out_image, out_far)
-        if lit < 0 or back < 0:
+            lit = _faces(v[f], n[f], b[f], image, far)
+            lit = lit * lit if is_open[f] else lit
+        if lit < 0:
             continue
-        if count + 9 + m - i > len(facets):
+        if count + 3 + m - i > len(facets):
             facets = np.append(facets, np.empty(m // 4 + 9, facet.dtype))
             barys = np.concatenate((barys, np.empty((m // 4 + 9, 3, 3))))
         found = 1
         part[0] = bary[i]
         if lit == 0:
-            found = _parts_towards(v[f], n[f], b[f], is_open[f], bary[i], image, far, image, far, side, p, part)
+            found = _parts_towards(v[f], n[f], b[f], is_open[f], bary[i], image, far, side, p, part)
         for j in range(found):
-            more = 1
-            some[0] = part[j]
-            if back == 0:
-                more = _parts_towards(
-                    v[f], n[f], b[f], is_open[f], part[j], image, far, out_image, out_far, side, p, some
-                )
-            for x in range(more):
-                facets[count], barys[count] = f, some[x]
-                count += 1
+            facets[count], barys[count] = f, part[j]
+            count += 1
     return facets[:count], barys[:count]
 
 

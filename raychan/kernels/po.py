@@ -13,7 +13,7 @@ from raychan.kernels.quadrature import mean_parts, points_for
 
 
 @njit(cache=True)
-def _radiated(e: Vec, k: Vec, s: Vec, n: Vec, r_s: complex, r_p: complex, g: Vec) -> complex:
+def radiated(e: Vec, k: Vec, s: Vec, n: Vec, r_s: complex, r_p: complex, g: Vec) -> complex:
     """Project on g what the currents of the reflected wave of (e, k) radiate towards s."""
     er = reflect(e, k, n, r_s, r_p)
     hr = cross(mirror(k, n), er)
@@ -35,8 +35,8 @@ def huygens(
     """
     to_rx = (-k_out[0], -k_out[1], -k_out[2])
     to_tx = (-k_in[0], -k_in[1], -k_in[2])
-    forward = _radiated(e_in, k_in, to_rx, n, r_in[0], r_in[1], e_out)
-    backward = _radiated(e_out, k_out, to_tx, n, r_out[0], r_out[1], e_in)
+    forward = radiated(e_in, k_in, to_rx, n, r_in[0], r_in[1], e_out)
+    backward = radiated(e_out, k_out, to_tx, n, r_out[0], r_out[1], e_in)
     return 0.5 * (forward + backward)
 
 

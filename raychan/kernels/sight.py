@@ -155,23 +155,21 @@ GONE, READY, BENT, SHADED = 0, 1, 2, 3
 
 
 @njit(cache=True, nogil=True)
-def sort_out(points, normals, image, far, seen, some, mixed, rough, matters):  # type: ignore[no-untyped-def]
+def sort_out(facing, seen, some, mixed, rough, matters):  # type: ignore[no-untyped-def]
     """Return what is to be done with each tube (n,): let go, keep, halve where its phase bends, or divide where only a
     part of it is seen.
 
-    Args: normals (n, 4, 3); seen (n,) by its centre ray, `some` (n,) by any, `mixed` (n,) in part; rough (n,) see
-    `phases`; matters (n,) whether it may be cut. What is turned away is let go.
+    Args: facing (n,) whether it faces the end; seen (n,) by its centre ray, `some` (n,) by any, `mixed` (n,) in part;
+    rough (n,) see `phases`; matters (n,) whether it may be cut.
     """
-    out = np.empty(len(points), np.int8)
-    for i in range(len(points)):
-        towards = 0.0
-        for c in range(3):
-            towards += (-image[c] if far else points[i, 3, c] - image[c]) * normals[i, 3, c]
-        out[i] = READY if towards < 0.0 and seen[i] else GONE
-        if towards < 0.0 and matters[i]:
+    out = np.empty(len(seen), np.int8)
+    for i in range(len(seen)):
+        out[i] = READY if seen[i] else GONE
+        if matters[i]:
             # Bends come first: they need an edge of their own.
             if some[i] and rough[i] > 1.0:
                 out[i] = BENT
             elif mixed[i]:
-                out[i] = SHADED
+                # Beyond the horizon no shadow's edge is known to cut along.
+                out[i] = SHADED if facing[i] else BENT
     return out
