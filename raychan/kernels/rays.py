@@ -14,7 +14,7 @@ from raychan.kernels.jit import njit
 _FAR = 32.0  # radii of the ball about all facets from which an origin is far off
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
     """Return the distance from x + along d to the plane through v of normal n, along d."""
     slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
@@ -36,7 +36,7 @@ def plane_distances(facet, origin, direction, first, normal):  # type: ignore[no
     return out
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _holds(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
     """Tell whether x + t d, a point of a facet's plane, lies on it, or at most `margin` [m] outside."""
     for a in range(3):
@@ -156,7 +156,7 @@ def land(  # type: ignore[no-untyped-def]
     return again[:count].copy()
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _clear(  # type: ignore[no-untyped-def]
     a, b, t, x, d, limit, slack, touch, plane, smooth, vertices, normal, margin
 ):
