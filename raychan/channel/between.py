@@ -189,34 +189,14 @@ def _crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _across(  # type: ignore[no-untyped-def]
-    rows,
-    points,
-    ks,
-    length,
-    far,
-    flat,
-    hit,
-    reach,
-    extent,
-    first_point,
-    normal,
-    edges,
-    sheets,
-    first,
-    index,
-    low,
-    cell,
-    shape,
-    crowd,
-    ball,
-    radius,
-    out,
-):
+    rows, points, ks, length, far, flat, hit, reach, extent, first_point, normal, edges, sheets, first, index, low,
+    cell, shape, crowd, ball, radius, out,
+):  # fmt: skip
     tried = np.full(len(edges), -1, np.int32)
     side, source, planes, section = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 3))
     begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
     # Not constants: for each of those the compiler would make `_layer` anew.
-    one_layer, many_layers = np.int64(1), np.int64(_BLOCK)
+    single, many = np.int64(1), np.int64(_BLOCK)
     for i in rows:
         centre, k = points[i, 3], ks[i, 3]
         lands = hit[i, 3] >= 0
@@ -247,14 +227,12 @@ def _across(  # type: ignore[no-untyped-def]
             at_layer = low_layer + s if k[axis] > 0.0 else high_layer - s
             if s % _BLOCK == 0:
                 block = at_layer if k[axis] > 0.0 else at_layer - _BLOCK + 1
-                _layer(
-                    points[i], ks[i], axis, block, many_layers, begin_at, end_at, low, cell, shape, begin_cell, end_cell
-                )
+                _layer(points[i], ks[i], axis, block, many, begin_at, end_at, low, cell, shape, begin_cell, end_cell)
                 if not _crowded(crowd, begin_cell, end_cell):
                     clear_until = s + _BLOCK
                     continue
             room = _layer(
-                points[i], ks[i], axis, at_layer, one_layer, begin_at, end_at, low, cell, shape, begin_cell, end_cell
+                points[i], ks[i], axis, at_layer, single, begin_at, end_at, low, cell, shape, begin_cell, end_cell
             )
             if room > _WIDE:
                 break
