@@ -5,11 +5,16 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench clean
+# Tests of the kernels, which `make test` also runs with bounds checked; the rest of the suite: make test-bounds.
+BOUNDS := $(addprefix tests/test_,bounds.py cores.py cut.py diffract.py jit.py shapes.py sight.py spectrum.py utd.py)
+PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
+
+.PHONY: help demo test test-bounds bench clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
-	@echo "make test   ruff, ruff format, mypy, pytest"
+	@echo "make test   ruff, ruff format, mypy, pytest; the three scenes and the kernels' tests with bounds checked"
+	@echo "make test-bounds   all tests with the bounds of every array in compiled code checked"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
 	@echo "make clean  remove $(VENV), out and caches"
 
@@ -20,7 +25,11 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
+	$(PYTEST)
+	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDS)
+
+test-bounds: $(VENV)/.installed-dev
+	NUMBA_BOUNDSCHECK=1 $(PYTEST)
 
 bench: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)

@@ -104,7 +104,7 @@ def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float)
     return lengths, amplitudes
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
     u, v, w = x[0] - origin[b, 0], x[1] - origin[b, 1], x[2] - origin[b, 2]
     return (
@@ -114,7 +114,7 @@ def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _image(source, vertex, normal, b, turn, origin, place):  # type: ignore[no-untyped-def]
     """Mirror a point in the plane of a vertex where body b has carried it."""
     p = _moved(vertex, b, turn, origin, place)
@@ -125,7 +125,7 @@ def _image(source, vertex, normal, b, turn, origin, place):  # type: ignore[no-u
     return source[0] - h * x, source[1] - h * y, source[2] - h * z
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _apart(a, b):  # type: ignore[no-untyped-def]
     return ((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2) ** 0.5
 
@@ -139,7 +139,8 @@ def _ways(vertices, normals, kind, body, at, used, points, turn, origin, place, 
         if kind[j] == REFLECT:
             forth = _image(forth, vertices[j], normals[j], body[j], turn, origin, place)
     if at == used:
-        out[:] = _apart(forth, back)
+        for c in range(len(out)):
+            out[c] = _apart(forth, back)
         return
     for j in range(used - 1, at, -1):
         if kind[j] == REFLECT:
@@ -149,7 +150,8 @@ def _ways(vertices, normals, kind, body, at, used, points, turn, origin, place, 
     last = len(points)
     out[last] = _apart(forth, centre) + _apart(back, centre)
     if kind[at] != SCATTER:
-        out[:last] = out[last]
+        for c in range(last):
+            out[c] = out[last]
         return
     for c in range(last):
         p = _moved(points[c], b, turn, origin, place)

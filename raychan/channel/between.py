@@ -12,6 +12,7 @@ from raychan.channel.edge_grid import fill_grid, packed
 from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, within
 from raychan.channel.surface import Surface
 from raychan.kernels.jit import njit
+from raychan.kernels.patch import copy_to
 from raychan.kernels.rows import in_two
 from raychan.tables import MIRROR
 
@@ -93,7 +94,7 @@ def between(surface: Surface) -> Between:
     return found
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _widths(points, ks):  # type: ignore[no-untyped-def]
     """Return how far a tube's corners lie from its centre [m], and how far its rays spread for each metre."""
     wide, spread = 0.0, 0.0
@@ -107,7 +108,7 @@ def _widths(points, ks):  # type: ignore[no-untyped-def]
     return wide, spread
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _span(points, ks, wide, spread, reach, ball, radius):  # type: ignore[no-untyped-def]
     """Return from where to where (to `reach`) a tube passes through the balls about bodies; equal: nowhere."""
     begin, end = np.inf, 0.0
@@ -129,7 +130,7 @@ def _span(points, ks, wide, spread, reach, ball, radius):  # type: ignore[no-unt
     return (begin, end) if begin < end else (0.0, 0.0)
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _layer(points, ks, axis, at, count, near, far_off, low, cell, shape, begin, end):  # type: ignore[no-untyped-def]
     """Write the box of cells that a tube passes from `near` to `far_off` along its rays in `count` layers of cells
     across an axis, from layer `at` on; return how many there are in one layer."""
@@ -155,7 +156,16 @@ def _layer(points, ks, axis, at, count, near, far_off, low, cell, shape, begin, 
     return room
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
+def _steepest(k):  # type: ignore[no-untyped-def]
+    """Return the axis along which a ray runs most."""
+    axis = 0
+    for c in range(1, 3):
+        axis = c if abs(k[c]) > abs(k[axis]) else axis
+    return axis
+
+
+@njit(cache=True, forceinline=True)
 def _layers(points, ks, axis, near, far_off, low, cell, shape):  # type: ignore[no-untyped-def]
     """Return the first and the last layer across an axis that a tube passes."""
     least, most = np.inf, -np.inf
@@ -166,7 +176,7 @@ def _layers(points, ks, axis, near, far_off, low, cell, shape):  # type: ignore[
     return first, min(int((most - low[axis]) / cell + _BESIDE), shape[axis] - 1)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
     """Tell whether any block of a box of cells holds an edge."""
     for i in range(begin[0] // _BLOCK, (end[0] + _BLOCK - 1) // _BLOCK):
@@ -179,32 +189,14 @@ def _crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _across(  # type: ignore[no-untyped-def]
-    rows,
-    points,
-    ks,
-    length,
-    far,
-    flat,
-    hit,
-    reach,
-    extent,
-    first_point,
-    normal,
-    edges,
-    sheets,
-    first,
-    index,
-    low,
-    cell,
-    shape,
-    crowd,
-    ball,
-    radius,
-    out,
-):
+    rows, points, ks, length, far, flat, hit, reach, extent, first_point, normal, edges, sheets, first, index, low,
+    cell, shape, crowd, ball, radius, out,
+):  # fmt: skip
     tried = np.full(len(edges), -1, np.int32)
     side, source, planes, section = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 3))
     begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
+    # Not constants: for each of those the compiler would make `_layer` anew.
+    single, many = np.int64(1), np.int64(_BLOCK)
     for i in rows:
         centre, k = points[i, 3], ks[i, 3]
         lands = hit[i, 3] >= 0
@@ -214,13 +206,12 @@ def _across(  # type: ignore[no-untyped-def]
         plane, at_plane = normal[max(hit[i, 3], 0)], first_point[max(hit[i, 3], 0)]
         sign = -1.0 if dot(k, plane) > 0.0 else 1.0
         here = pyramid(points[i], source, k, parallel, planes)
-        section[:] = points[i]
+        for q in range(4):
+            copy_to(section[q], points[i, q])
         wide, spread = _widths(points[i], ks[i])
         far_end = reach[i, 3] if lands else extent
         begin_at, end_at = _span(points[i], ks[i], wide, spread, far_end, ball, radius)
-        axis = 0
-        for c in range(1, 3):
-            axis = c if abs(k[c]) > abs(k[axis]) else axis
+        axis = _steepest(k)
         for q in range(3):
             if ks[i, q, axis] * math.copysign(1.0, k[axis]) <= _ALONG:
                 end_at = min(end_at, _ABREAST * cell / spread)
@@ -236,11 +227,13 @@ def _across(  # type: ignore[no-untyped-def]
             at_layer = low_layer + s if k[axis] > 0.0 else high_layer - s
             if s % _BLOCK == 0:
                 block = at_layer if k[axis] > 0.0 else at_layer - _BLOCK + 1
-                _layer(points[i], ks[i], axis, block, _BLOCK, begin_at, end_at, low, cell, shape, begin_cell, end_cell)
+                _layer(points[i], ks[i], axis, block, many, begin_at, end_at, low, cell, shape, begin_cell, end_cell)
                 if not _crowded(crowd, begin_cell, end_cell):
                     clear_until = s + _BLOCK
                     continue
-            room = _layer(points[i], ks[i], axis, at_layer, 1, begin_at, end_at, low, cell, shape, begin_cell, end_cell)
+            room = _layer(
+                points[i], ks[i], axis, at_layer, single, begin_at, end_at, low, cell, shape, begin_cell, end_cell
+            )
             if room > _WIDE:
                 break
             for ci in range(begin_cell[0], end_cell[0]):
@@ -284,4 +277,4 @@ def _across(  # type: ignore[no-untyped-def]
                         part = (end - begin) * size
                         if part > best and apart(a, b, section, source, k, parallel, side):
                             best = part
-                            out[i] = side
+                            copy_to(out[i], side)

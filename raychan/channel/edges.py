@@ -7,17 +7,18 @@ import math
 import numpy as np
 
 from raychan.kernels.jit import njit
+from raychan.kernels.patch import copy_to
 
 _MANY = 64  # edges around a plane beyond which halving is cheaper than looking at each
 _INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _normal(a, b, image, k, far):  # type: ignore[no-untyped-def]
     """Return a vector normal to the plane through segment ab and the image."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -28,7 +29,7 @@ def _normal(a, b, image, k, far):  # type: ignore[no-untyped-def]
     return dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
     """Write the normals of the planes through the image and a tube's sides, one over the centre's height long, inward;
     return how far the centre lies ahead along k [m]."""
@@ -42,7 +43,7 @@ def pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
     return (corners[3, 0] - image[0]) * k[0] + (corners[3, 1] - image[1]) * k[1] + (corners[3, 2] - image[2]) * k[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def scale_at(a, b, image, k, far, here):  # type: ignore[no-untyped-def]
     """Return the tube's width at the middle of segment ab over that at its footprint, `here` [m] ahead of the image."""
     if far:
@@ -53,7 +54,7 @@ def scale_at(a, b, image, k, far, here):  # type: ignore[no-untyped-def]
     return min(max(edge / here, 0.01), 100.0)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped-def]
     """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays."""
     for e in range(3):
@@ -70,7 +71,7 @@ def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped
     return begin, max(end, begin)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
     """Write into side (3,) the corners' distances from the plane through the image and segment ab; return whether that
     parts them."""
@@ -85,12 +86,12 @@ def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
     return low < 0.0 < high
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def size_of(a, b):  # type: ignore[no-untyped-def]
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def above(ha, hb):  # type: ignore[no-untyped-def]
     """Return the part (0 to 1) of a segment whose ends have heights ha, hb that lies above zero; equal: none."""
     if ha <= 0.0 and hb <= 0.0:
@@ -100,6 +101,12 @@ def above(ha, hb):  # type: ignore[no-untyped-def]
     return 0.0, 1.0 if hb > 0.0 else ha / (ha - hb)
 
 
+@njit(cache=True, forceinline=True)
+def _height(a, p, n):  # type: ignore[no-untyped-def]
+    """Return how far a lies before the plane through p of normal n [m]."""
+    return (a[0] - p[0]) * n[0] + (a[1] - p[1]) * n[1] + (a[2] - p[2]) * n[2]
+
+
 @njit(cache=True)
 def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type: ignore[no-untyped-def]
     """Write into side (3,) the corners' distances from the plane through the source and the line where two planes meet.
@@ -107,10 +114,10 @@ def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type
     Returns whether it parts the rays that land on plane a from those that land on plane b (bodies that
     run into each other have no edge there).
     """
-    c1 = dot(k, n1) if far else dot(source - p1, n1)
-    c2 = dot(k, n2) if far else dot(source - p2, n2)
-    m = c2 * n1 - c1 * n2
-    size = np.sqrt(dot(m, m))
+    c1 = dot(k, n1) if far else _height(source, p1, n1)
+    c2 = dot(k, n2) if far else _height(source, p2, n2)
+    m = c2 * n1[0] - c1 * n2[0], c2 * n1[1] - c1 * n2[1], c2 * n1[2] - c1 * n2[2]
+    size = math.sqrt(dot(m, m))
     if size < 1e-12:
         return False
     offset = c2 * dot(p1, n1) - c1 * dot(p2, n2)
@@ -125,7 +132,7 @@ def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type
                 sign = wanted
             elif sign * wanted <= 0.0:
                 return False
-    return side.min() < 0.0 and side.max() > 0.0
+    return min(side[0], side[1], side[2]) < 0.0 and max(side[0], side[1], side[2]) > 0.0
 
 
 @njit(cache=True)
@@ -147,7 +154,7 @@ def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side
         pa, na = (first[fa], normal[fa]) if fa >= 0 else (points[3], own)
         pb, nb = (first[fb], normal[fb]) if fb >= 0 else (points[3], own)
         if _between(points, source, k, far, plane, pa, na, pb, nb, a, b, work):
-            side[:] = work
+            copy_to(side, work)
             break
 
 
@@ -162,11 +169,11 @@ def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side
     """
     work = np.empty(3)
     for i in range(points.shape[0]):
-        if not side[i].any():
+        if side[i, 0] == 0.0 and side[i, 1] == 0.0 and side[i, 2] == 0.0:
             _meeting_line(points[i], source[i], k[i], far, plane[i], facet[i], first, normal, own[i], side[i], work)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _longest(corners, source, k, far, plane, first_edge, outline, planes, side, work):  # type: ignore[no-untyped-def]
     """Write into side (3,), if there is one, the distances of the corners from the edge of which the longest part lies
     inside a tube; return whether there is."""
@@ -190,7 +197,7 @@ def _longest(corners, source, k, far, plane, first_edge, outline, planes, side, 
                 continue
             if apart(a, b, corners, source, k, far, work):
                 best = (end - begin) * size_of(a, b)
-                side[:] = work
+                copy_to(side, work)
     return best > 0.0
 
 
@@ -206,7 +213,7 @@ def edges_within(  # type: ignore[no-untyped-def]
     (n, 4) [m] so far; flat (n,) whether rays come from one point, or one direction if far; hit, reach (n, 4) facet on
     which each ray lands, -1 for none (so far as `extent` [m]), and after how far; plane, first, normal of facets.
     """
-    at, source, landed = np.empty((4, 3)), np.empty(3), np.empty(4, np.int64)
+    at, source, landed = np.empty((4, 3)), np.empty(3), np.empty(4, np.int32)
     planes, work = np.empty((3, 3)), np.empty(3)
     for i in rows:
         k = ways[i, 3]

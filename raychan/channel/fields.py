@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.kernels.currents import reflected_wave, shadow_wave
 from raychan.kernels.fresnel import coefficients
 from raychan.kernels.jit import njit
+from raychan.kernels.patch import copy_to
 from raychan.kernels.po import huygens, triangle_terms
 from raychan.kernels.polar import dot, reflect, transmit
 from raychan.kernels.rows import in_two
@@ -130,7 +131,7 @@ def _transfer(  # type: ignore[no-untyped-def]
         if not far:
             k_in = _heading(tx, vertices[i, 0]) if used > 0 else _heading(tx, rx)
         for p in range(ins):
-            arriving[p] = e_tx[i, p]
+            copy_to(arriving[p], e_tx[i, p])
         for j in range(at):
             mat = material[i, j]
             c = coefficients(
@@ -148,7 +149,7 @@ def _transfer(  # type: ignore[no-untyped-def]
         # Out: the receiver's field by reciprocity, over the rest of the chain backwards.
         k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
         for q in range(outs):
-            leaving[q] = e_rx[i, q]
+            copy_to(leaving[q], e_rx[i, q])
         for j in range(used - 1, at, -1):
             mat = material[i, j]
             c = coefficients(
@@ -215,14 +216,16 @@ def _rates(  # type: ignore[no-untyped-def]
     out = np.empty(n)
     x, v, y, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for i in range(n):
-        x[:], v[:] = tx, tx_velocity
+        copy_to(x, tx)
+        copy_to(v, tx_velocity)
         total = 0.0
         for j in range(d + 1):
             last = j == d or kind[i, j] == 0
             if last:
-                y[:], w[:] = rx, rx_velocity
+                copy_to(y, rx)
+                copy_to(w, rx_velocity)
             else:
-                y[:] = vertices[i, j]
+                copy_to(y, vertices[i, j])
                 b = max(body[i, j], 0)
                 s, o = spin[b], origin[b]
                 w[0] = velocity[b, 0] + s[1] * (y[2] - o[2]) - s[2] * (y[1] - o[1])
@@ -232,6 +235,7 @@ def _rates(  # type: ignore[no-untyped-def]
             total += (w[0] - v[0]) * k[0] + (w[1] - v[1]) * k[1] + (w[2] - v[2]) * k[2]
             if last:
                 break
-            x[:], v[:] = y, w
+            copy_to(x, y)
+            copy_to(v, w)
         out[i] = 0.5 * total
     return out

@@ -70,20 +70,20 @@ def _screens(surface: Surface) -> Any:
     return surface.screens
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _angle(a, b):  # type: ignore[no-untyped-def]
     """Return the angle [rad] between two vectors."""
     size = math.sqrt(dot(a, a) * dot(b, b))
     return math.acos(min(max(dot(a, b) / size, -1.0), 1.0)) if size > 0.0 else 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _half(radius, distance):  # type: ignore[no-untyped-def]
     """Return half the angle [rad] under which a ball is seen; pi from within."""
     return math.asin(radius / distance) if radius < distance else math.pi
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _over(centre, radius, d, image, point, normal, middle, reach, work):  # type: ignore[no-untyped-def]
     """Tell whether something in a ball, at d from the image, could be met over a mirror within a ball about middle."""
     height = 0.0
@@ -97,7 +97,7 @@ def _over(centre, radius, d, image, point, normal, middle, reach, work):  # type
     return _angle(work, d) <= widest + _WIDE
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _hidden(centre, radius, body, point, normal, owner, first, edge, inward):  # type: ignore[no-untyped-def]
     """Tell whether a wall of another body hides a ball: it lies behind, within the planes through the wall's edges."""
     for w in range(len(owner)):
@@ -119,7 +119,7 @@ def _hidden(centre, radius, body, point, normal, owner, first, edge, inward):  #
     return False
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _eclipsed(centre, radius, body, image, far, core, size, owner):  # type: ignore[no-untyped-def]
     """Tell whether a ball lies wholly in the shadow of a core of another body: within its cone or, from far, cylinder,
     and behind where rays enter the core."""

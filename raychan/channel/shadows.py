@@ -12,6 +12,7 @@ from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of,
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
 from raychan.kernels.jit import njit
+from raychan.kernels.patch import copy_to
 from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
@@ -82,7 +83,7 @@ def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
     return np.ascontiguousarray(edges), np.ascontiguousarray(smooth)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _place(p, image, far, out):  # type: ignore[no-untyped-def]
     """Write the place of p on the unit sphere about the image, or on the plane across a direction; return how far off
     it lies [m]."""
@@ -200,10 +201,10 @@ def _across(  # type: ignore[no-untyped-def]
                     continue
                 if apart(a, b, points[i], image, k, far, side):
                     best = length
-                    out[i] = side
+                    copy_to(out[i], side)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _cells(low_end, high_end, low, cell, count):  # type: ignore[no-untyped-def]
     # A tube may lie wholly beside the grid.
     begin = min(max(int((low_end - low) / cell), 0), count)

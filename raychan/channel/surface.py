@@ -71,7 +71,7 @@ class Surface(Tracer):
 
     def ends(self, half: Ints) -> Floats:
         """Return both ends (e, 2, 3) [m] of half edges."""
-        found: Floats = ends(self.facets.vertices, np.ascontiguousarray(half))
+        found: Floats = ends(self.facets.vertices, np.ascontiguousarray(half, np.int64))
         return found
 
     @once

@@ -16,6 +16,8 @@ from rich.text import Text
 if TYPE_CHECKING:
     from raychan.run.result import Result
 
+_COMPILING = "compiling"
+_LONG = 3.0  # s of compiling from which it is told where there is no bar
 _SOME = ("azimuth deg", "error dB", "folded: true m", "true m/s")  # columns of a table where a row has them
 _WIDE = 150  # columns where the output is no terminal, so that no line is cut
 
@@ -101,9 +103,14 @@ def _known(value: float, digits: str) -> str:
 
 @contextmanager
 def progress(quiet: bool = False) -> Iterator[Callable[[str, float], None]]:
-    """Give a function to tell the progress to: bars on a terminal, nothing elsewhere."""
+    """Give a function to tell the progress to: bars on a terminal; elsewhere nothing, but a line where compiled code
+    must be made first."""
+    from raychan.kernels.compiling import lost, watched
+
     if quiet or not sys.stderr.isatty():
-        yield lambda stage, share: None
+        with watched(_line() if not quiet else lambda done, ahead, seconds: None):
+            yield lambda stage, share: None
+        warn(filter(None, [lost()]))
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -121,4 +128,22 @@ def progress(quiet: bool = False) -> Iterator[Callable[[str, float], None]]:
                 tasks[stage] = bars.add_task(stage, total=1.0)
             bars.update(tasks[stage], completed=min(1.0, share))  # type: ignore[arg-type]
 
-        yield tell
+        def compiling(done: int, ahead: int, seconds: float) -> None:
+            tell(_COMPILING, done / max(done + ahead, 1))
+            bars.update(tasks[_COMPILING], description=f"{_COMPILING}, once, about {seconds:.0f} s")  # type: ignore[arg-type]
+
+        with watched(compiling):
+            yield tell
+    warn(filter(None, [lost()]))
+
+
+def _line() -> Callable[[int, int, float], None]:
+    """Return what says in one line, the first time, that a command compiles for long."""
+    said: list[float] = []
+
+    def compiling(done: int, ahead: int, seconds: float) -> None:
+        if seconds > _LONG and not said:
+            said.append(seconds)
+            print(f"{_COMPILING}, once, about {seconds:.0f} s ({ahead} kernels)", file=sys.stderr)
+
+    return compiling

@@ -13,7 +13,7 @@ import numpy as np
 from raychan.kernels.jit import njit
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def field_towards(look, table):  # type: ignore[no-untyped-def]
     """Return the table's value in a direction (3,), linear in both angles."""
     steps = table.shape[0] - 1

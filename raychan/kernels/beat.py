@@ -52,7 +52,7 @@ def _beat_sum(amplitude, delay, growth, carrier, slope, repetition, step, first,
                 out[m - first, s] += amplitude[p] * complex(math.cos(angle), math.sin(angle))
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, forceinline=True)
 def wave(turn):  # type: ignore[no-untyped-def]
     """Return cosine and sine of -2 pi times a number of turns, by their series about the nearest quarter."""
     quarter = math.floor(4.0 * turn + 0.5)
@@ -69,7 +69,7 @@ def wave(turn):  # type: ignore[no-untyped-def]
     return (-re if q == 1.0 or q == 2.0 else re), (im if q >= 2.0 else -im)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, forceinline=True)
 def _chebyshev(n, x):  # type: ignore[no-untyped-def]
     before, this = x, 1.0
     for _ in range(n):

@@ -10,7 +10,7 @@ from raychan.kernels.beat import wave
 from raychan.kernels.jit import njit
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, forceinline=True)
 def _place(n, fine, cell):  # type: ignore[no-untyped-def]
     """Return the point of a table below `cell`, the share of the next one, and the sign."""
     period = math.floor(cell / n)
@@ -33,7 +33,7 @@ def periodic(table, n, fine, cells):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
     """Return the range [m] at which an echo stands mid frame, and its phase there."""
     carrier, slope, centre, swept, _, _, _, light = ramp
@@ -42,7 +42,7 @@ def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
     return 0.5 * light * then, complex(cosine, sine)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
     """Return the response of both windows to an echo that stands at a range [m] mid frame."""
     _, slope, _, _, middle, repetition, resolution, light = ramp
@@ -83,7 +83,7 @@ def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # typ
     return waves, ranges
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type: ignore[no-untyped-def]
     weight = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
     total[c, g] += wave
@@ -94,7 +94,7 @@ def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type
         strongest[c, g], most[c, g] = i, weight
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _apart(cells, n):  # type: ignore[no-untyped-def]
     """Return how far a response over n cells is from its peak, or that of a period on."""
     if cells > n:

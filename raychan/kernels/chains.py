@@ -15,7 +15,7 @@ from raychan.kernels.jit import njit
 from raychan.kernels.patch import length_to
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _onto(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
     """Return where the way from a place to an image meets the mirror's plane; the place itself if it never does."""
     dx, dy, dz = image[0] - x, image[1] - y, image[2] - z
@@ -134,7 +134,7 @@ def rays_from(points, image, far):  # type: ignore[no-untyped-def]
     return k, length
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def weight(p, images, far, normal, table, look):  # type: ignore[no-untyped-def]
     """Return the field that the end's antenna, with a table of its beam (empty: alike everywhere), sends to p."""
     if len(table) == 0:

@@ -39,7 +39,7 @@ def shadow_wave(e: Vec, k: Vec, to: Vec, element: Vec, t_s: complex, t_p: comple
     return dot(g, magnetic) + dot(g, electric)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _toward(p, image, far):  # type: ignore[no-untyped-def]
     return 1.0 if far else math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
 

@@ -98,13 +98,13 @@ def sound_parts(points, many):  # type: ignore[no-untyped-def]
     return out[:count]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _mean(w, x, out):  # type: ignore[no-untyped-def]
     for c in range(3):
         out[c] = w[0] * x[0, c] + w[1] * x[1, c] + w[2] * x[2, c]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _to_unit(v):  # type: ignore[no-untyped-def]
     size = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     if size > 0.0:
@@ -112,7 +112,7 @@ def _to_unit(v):  # type: ignore[no-untyped-def]
             v[c] /= size
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _length_on(w, p, k, length):  # type: ignore[no-untyped-def]
     """Return the length [m] at a corner of weights w (3,) on the parent's edges, by the cubic Hermite rule."""
     for a in range(3):

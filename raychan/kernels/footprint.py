@@ -9,7 +9,7 @@ import numpy as np
 from raychan.kernels.jit import njit
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def element_of(v, b, w, out):  # type: ignore[no-untyped-def]
     """Write the vector [m^2] normal to the true surface at w (3,): its area for a unit of the last two coordinates.
 
@@ -24,7 +24,7 @@ def element_of(v, b, w, out):  # type: ignore[no-untyped-def]
         out[c] = along_d * aside_e - along_e * aside_d
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _mean_cosine(normal, k, back):  # type: ignore[no-untyped-def]
     total = 0.0
     for c in range(3):
@@ -32,7 +32,7 @@ def _mean_cosine(normal, k, back):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _back(p, image, far, k):  # type: ignore[no-untyped-def]
     """Write the unit direction in which a wave from the end travels at p (3,), and return its length [m]."""
     if far:
@@ -51,7 +51,7 @@ def _back(p, image, far, k):  # type: ignore[no-untyped-def]
     return size
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _share(w):  # type: ignore[no-untyped-def]
     """Return the share of its facet that a patch of corners w (3, 3) takes, below 0 where it runs the other way."""
     share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])

@@ -73,7 +73,8 @@ def spread(grid, flat, x, y, strengths, pieces):  # type: ignore[no-untyped-def]
         row, column = math.ceil(x[i] - 0.5 * width), math.ceil(y[i] - 0.5 * width)
         at[0], at[1] = 2.0 * (row - x[i]) + width - 1.0, 2.0 * (column - y[i]) + width - 1.0
         at_x, at_y = at[0], at[1]
-        over[:], along[:] = pieces[0], pieces[0]
+        for j in range(width):
+            over[j] = along[j] = pieces[0, j]
         for d in range(1, len(pieces)):
             coefficients = pieces[d]
             for j in range(width):
@@ -135,13 +136,15 @@ def weigh(first, weight, place, pieces):  # type: ignore[no-untyped-def]
         for s in range(place.shape[1]):
             start = math.ceil(place[m, s] - 0.5 * width)
             at = 2.0 * (start - place[m, s]) + width - 1.0
-            value[:] = pieces[0]
+            for j in range(width):
+                value[j] = pieces[0, j]
             for d in range(1, len(pieces)):
                 coefficients = pieces[d]
                 for j in range(width):
                     value[j] = value[j] * at + coefficients[j]
             first[m, s] = start
-            weight[m, s, :] = value
+            for j in range(width):
+                weight[m, s, j] = value[j]
 
 
 @njit(cache=True, nogil=True, fastmath=True)

@@ -13,10 +13,12 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core import config
 from numba.core.registry import CPUDispatcher
 
 from raychan.kernels.kept import Kept
 
+_CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
 _CONSTANTS = int, float, complex, str, tuple
 
 KERNELS: list[Kernel] = []  # all that are kept on disk, as their modules are imported
@@ -30,10 +32,11 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
     compile.
     """
 
+    kept: Kept
     stamp: bytes
 
     def __call__(self, *args: Any) -> Any:
-        return super().__call__(*args) if numba.config.BOUNDSCHECK else super().__call__(*map(_open, args))
+        return super().__call__(*args) if _CHECKED else super().__call__(*map(_open, args))
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -43,10 +46,10 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def compiled(function: Callable[..., Any]) -> Any:
         made: Any = numba.njit(**options)(function)
-        if keep and isinstance(made, CPUDispatcher):  # with NUMBA_DISABLE_JIT it is the function itself
+        if keep and not _UNCOMPILED:
             made.__class__ = Kernel
-            made._cache = Kept(function)
-            made.stamp = made._cache.stamped(hashlib.sha256(_within_reach(function, made._cache.source)).digest())
+            made._cache = made.kept = Kept(function)
+            made.stamp = made.kept.stamped(hashlib.sha256(_within_reach(function, made.kept.source)).digest())
             KERNELS.append(made)
         return made
 

@@ -14,11 +14,13 @@ import pickle
 import platform
 import uuid
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import llvmlite
 import numba
+from numba.core import config
 from numba.core.caching import FunctionCache
 from numba.core.serialize import dumps
 
@@ -40,7 +42,7 @@ class Kept(FunctionCache):  # type: ignore[no-any-unimported]
         super().__init__(function)
         self.source: Any = self._impl.locator.get_source_stamp()
         self.folder = Path(self._cache_path)
-        switches = [(name, getattr(numba.config, name, None)) for name in _SWITCHES]
+        switches = [(name, getattr(config, name, None)) for name in _SWITCHES]
         how = _digest(numba.__version__, llvmlite.__version__, platform.python_version(), switches)
         self._base = f"{self._impl.filename_base}.{how.hex()[:8]}"
         self.stamped(_digest(self.source))
@@ -53,7 +55,7 @@ class Kept(FunctionCache):  # type: ignore[no-any-unimported]
 
     def is_there(self) -> bool:
         """Tell whether code for any signature is kept."""
-        return next(self.folder.glob(f"{self._prefix}.*.code"), None) is not None
+        return any(name.startswith(f"{self._prefix}.") for name in _names(self.folder, _changed(self.folder)))
 
     def _file(self, key: object) -> Path:
         return self.folder / f"{self._prefix}.{_digest(key).hex()[:16]}.code"
@@ -88,6 +90,19 @@ class Kept(FunctionCache):  # type: ignore[no-any-unimported]
             if not file.name.startswith(f"{self._prefix}."):
                 with contextlib.suppress(OSError):
                     file.unlink()
+
+
+@lru_cache(maxsize=64)
+def _names(folder: Path, changed: int) -> list[str]:
+    """Return the names of the files in a folder as it was when it last changed."""
+    return [] if changed < 0 else os.listdir(folder)
+
+
+def _changed(folder: Path) -> int:
+    try:
+        return folder.stat().st_mtime_ns
+    except OSError:
+        return -1
 
 
 def _write(file: Path, content: bytes) -> None:

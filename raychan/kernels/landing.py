@@ -17,12 +17,12 @@ from raychan.kernels.patch import length_to
 _DRAWN = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _twice_area(p, k):  # type: ignore[no-untyped-def]
     """Return twice the area of a triangle as seen along k."""
     ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
@@ -30,7 +30,7 @@ def _twice_area(p, k):  # type: ignore[no-untyped-def]
     return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _strength(j, materials, cosine, wavenumber):  # type: ignore[no-untyped-def]
     """Return the larger of |R_s|, |R_p| of a material."""
     kind, eps, thickness, roughness = materials
@@ -164,7 +164,7 @@ def fates(rows, points, way, hit, agree, first, normal):  # type: ignore[no-unty
     return kept[:count], facet[:count], reach[:count]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _normal_at(v, n, p, out):  # type: ignore[no-untyped-def]
     """Write the unit normal of the true surface behind p, a point of the plane of a facet (v, n: corners, normals)."""
     ax, ay, az = v[1, 0] - v[0, 0], v[1, 1] - v[0, 1], v[1, 2] - v[0, 2]

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from raychan.kernels.jit import njit
-from raychan.kernels.patch import dot, middle, place_on
+from raychan.kernels.patch import copy_corners, dot, middle, place_on
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
     """Return 1 if all of a facet's true surface is turned to the image, -1 if all away, 0 if that is not sure."""
     low, high = np.inf, -np.inf
@@ -27,7 +27,7 @@ def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
     return 1 if low > 0.0 else (-1 if high < 0.0 else 0)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _towards(v, n, b, x, y, z, image, far):  # type: ignore[no-untyped-def]
     """Return the cosine of incidence at barycentric (x, y, z) of the true surface: above 0 where it faces the image."""
     xy, yz, zx = x * y, y * z, z * x
@@ -42,7 +42,7 @@ def _towards(v, n, b, x, y, z, image, far):  # type: ignore[no-untyped-def]
     return along / math.sqrt(size * reach)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy")
 def _parts_towards(v, n, b, is_open, w, image, far, side, p, out):  # type: ignore[no-untyped-def]
     """Write the parts of a patch that face the image into out (3, 3, 3), of an open sheet those of either side; return
     how many.
@@ -54,7 +54,7 @@ def _parts_towards(v, n, b, is_open, w, image, far, side, p, out):  # type: igno
         side[q] = _towards(v, n, b, w[q, 0], w[q, 1], w[q, 2], image, far)
         low, high, total = min(low, side[q]), max(high, side[q]), total + side[q]
     if not (high > 1e-9 and low < -1e-9):
-        out[0] = w
+        copy_corners(out[0], w)
         return 1 if is_open or total > 0.0 else 0
     for q in range(3):
         if side[q] == 0.0:
@@ -68,9 +68,19 @@ def _parts_towards(v, n, b, is_open, w, image, far, side, p, out):  # type: igno
         for q in range(3):
             place_on(v, b, out[j, q, 0], out[j, q, 1], out[j, q, 2], p[q])
         if _twice_area(p) > 2e-14:
-            out[count] = out[j]
+            copy_corners(out[count], out[j])
             count += 1
     return count
+
+
+@njit(cache=True)
+def _with_room(facets, barys, room):  # type: ignore[no-untyped-def]
+    """Return facets and barys in arrays that have room for more."""
+    more_facets, more_barys = np.empty(room, facets.dtype), np.empty((room, 3, 3))
+    for i in range(len(facets)):
+        more_facets[i] = facets[i]
+        copy_corners(more_barys[i], barys[i])
+    return more_facets, more_barys
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -92,19 +102,19 @@ def lit_parts(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-unt
         if lit < 0:
             continue
         if count + 3 + m - i > len(facets):
-            facets = np.append(facets, np.empty(m // 4 + 9, facet.dtype))
-            barys = np.concatenate((barys, np.empty((m // 4 + 9, 3, 3))))
+            facets, barys = _with_room(facets[:count], barys[:count], len(facets) + m // 4 + 9)
         found = 1
-        part[0] = bary[i]
+        copy_corners(part[0], bary[i])
         if lit == 0:
             found = _parts_towards(v[f], n[f], b[f], is_open[f], bary[i], image, far, side, p, part)
         for j in range(found):
-            facets[count], barys[count] = f, part[j]
+            facets[count] = f
+            copy_corners(barys[count], part[j])
             count += 1
     return facets[:count], barys[:count]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _three(w, side, part):  # type: ignore[no-untyped-def]
     """Write the three parts of a triangle cut where `side` (3,) changes sign: the lone corner's first."""
     positive = int(side[0] > 0.0) + int(side[1] > 0.0) + int(side[2] > 0.0)
@@ -123,7 +133,7 @@ def _three(w, side, part):  # type: ignore[no-untyped-def]
         part[2, 0, x], part[2, 1, x], part[2, 2, x] = u, w[c, x], t
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _twice_area(p):  # type: ignore[no-untyped-def]
     ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
     bx, by, bz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]

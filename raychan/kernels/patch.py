@@ -15,12 +15,26 @@ from raychan.kernels.jit import njit
 _ALIKE = 1.0 + 1e-9  # sizes nearer than this are one: rounding must not choose between them
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
+def copy_to(out, a):  # type: ignore[no-untyped-def]
+    """Write a into out, one axis; numba compiles a page of Python's strings, for its message, into `out[:] = a`."""
+    for c in range(len(out)):
+        out[c] = a[c]
+
+
+@njit(cache=True, forceinline=True)
+def copy_corners(out, w):  # type: ignore[no-untyped-def]
+    """Write the corners w (3, 3) into out."""
+    for c in range(3):
+        out[c, 0], out[c, 1], out[c, 2] = w[c, 0], w[c, 1], w[c, 2]
+
+
+@njit(cache=True, forceinline=True)
 def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
     """Write into p the point of the true surface at barycentric (x, y, z)."""
     xy, yz, zx = x * y, y * z, z * x
@@ -28,7 +42,7 @@ def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
         p[c] = x * v[0, c] + y * v[1, c] + z * v[2, c] - xy * b[0, c] - yz * b[1, c] - zx * b[2, c]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def middle(w):  # type: ignore[no-untyped-def]
     """Return the barycentric coordinates of a patch's centre."""
     return (
@@ -38,7 +52,7 @@ def middle(w):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _face(n, x, y, z, out):  # type: ignore[no-untyped-def]
     """Write into out the unit normal of the true surface at barycentric (x, y, z)."""
     for c in range(3):
@@ -48,7 +62,7 @@ def _face(n, x, y, z, out):  # type: ignore[no-untyped-def]
         out[c] /= size
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
     """Write into k the direction in which a ray of the source travels at p; return its length."""
     if far:
@@ -62,26 +76,26 @@ def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
     return length
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def length_to(p, image, far):  # type: ignore[no-untyped-def]
     if far:
         return -dot(p, image)
     return math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def largest(a, b, c):  # type: ignore[no-untyped-def]
     if a * _ALIKE >= b and a * _ALIKE >= c:
         return 0
     return 1 if b * _ALIKE >= c else 2
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def distance(p, q):  # type: ignore[no-untyped-def]
     return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _seen(p, q, image, far):  # type: ignore[no-untyped-def]
     """Return how long pq looks from the end of a way [m]."""
     whole, along, size = 0.0, 0.0, 0.0
@@ -162,7 +176,8 @@ def halved(facet, bary, edge, jitter, level):  # type: ignore[no-untyped-def]
         # Which way is drawn by lot, the same lot in every run.
         share = 0.5 + (jitter if ((facet[i] * 40503 >> 7) + level) & 1 else -jitter)
         facets[2 * i], facets[2 * i + 1] = facet[i], facet[i]
-        barys[2 * i], barys[2 * i + 1] = bary[i], bary[i]
+        copy_corners(barys[2 * i], bary[i])
+        copy_corners(barys[2 * i + 1], bary[i])
         for x in range(3):
             cut = share * bary[i, a, x] + (1.0 - share) * bary[i, c, x]
             barys[2 * i, c, x], barys[2 * i + 1, a, x] = cut, cut

@@ -43,7 +43,7 @@ def huygens(
 _TURN = 0.5 / math.pi
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _turned(phase: float) -> complex:
     """Return exp(-j phase)."""
     cosine, sine = wave(_TURN * phase)
@@ -59,7 +59,7 @@ def _edge(a: float, b: float, ea: complex, eb: complex) -> complex:
     return 1j * (eb - ea) / gap
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _mended(
     p0: float, p1: float, p2: float, t0: complex, t1: complex, t2: complex, lost: complex
 ) -> tuple[complex, complex, complex]:
@@ -142,7 +142,7 @@ _PER_PIECE = 16  # points of a Gauss rule in the time of a piece
 _SIX = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _inner(w: float, c: float) -> complex:
     """Return one end's share in the integral of exp(-j phi) along a line, over exp(-j phi): phi' = w, phi'' = c."""
     x = c / (w * w)
@@ -210,7 +210,7 @@ def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _quadratic(phases, d01, d12, d20, v, w):  # type: ignore[no-untyped-def]
     u = 1.0 - v - w
     return u * phases[0] + v * phases[1] + w * phases[2] + 4.0 * (d01 * u * v + d12 * v * w + d20 * w * u)

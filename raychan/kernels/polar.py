@@ -10,13 +10,13 @@ from raychan.kernels.jit import njit
 Vec = tuple[Any, Any, Any]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Return a . b without conjugation."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def cross(a, b):  # type: ignore[no-untyped-def]
     """Return a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

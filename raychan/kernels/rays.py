@@ -16,7 +16,7 @@ _BESIDE = 1e-3  # of a facet's length along a ray: what a grazing ray's hit may 
 _PACES = 64.0  # the same in paces of the ray, of which a small facet is no more
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
     """Return the distance from x + along d to the plane through v of normal n, along d."""
     slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
@@ -38,7 +38,7 @@ def plane_distances(facet, origin, direction, first, normal):  # type: ignore[no
     return out
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _holds(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
     """Tell whether x + t d, a point of a facet's plane, lies on it, or at most `margin` [m] outside."""
     for a in range(3):
@@ -122,7 +122,7 @@ def companions(todo, origin, direction, ahead, pace, centre, turn):  # type: ign
     return o, d
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _met(v, x, d, t, pace):  # type: ignore[no-untyped-def]
     """Tell whether the distance t [m] along a ray to a facet's plane is one to the facet: not before it nor beyond.
 
@@ -140,7 +140,7 @@ def _met(v, x, d, t, pace):  # type: ignore[no-untyped-def]
     return low - room < t < high + room
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _beside(j, hit, x, d, ahead, pace, vertices, first, normal):  # type: ignore[no-untyped-def]
     """Return what stands for a facet that a ray runs along: the nearest that its companions meet, -1 if nothing; -2 if
     they run along one too."""
@@ -204,7 +204,7 @@ def land(  # type: ignore[no-untyped-def]
     return again[:count].copy()
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _clear(  # type: ignore[no-untyped-def]
     a, b, t, x, d, limit, slack, touch, plane, smooth, vertices, normal, margin
 ):

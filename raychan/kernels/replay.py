@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from raychan.kernels.jit import njit
+from raychan.kernels.patch import copy_to
 from raychan.kernels.rays import plane_distance
 
 REFLECT, TRANSMIT, SCATTER = 1, 2, 3
@@ -24,7 +25,7 @@ def way_back(last, slots, history, first, corners, passed):  # type: ignore[no-u
             passed[i, c] = -1
         for s in range(slots[i] - 1, -1, -1):
             if s < first:
-                corners[i, s] = place[at]
+                copy_to(corners[i, s], place[at])
             elif s < first + layers and kind[at] == TRANSMIT:
                 passed[i, s - first] = facet[at]
             at = before[at]

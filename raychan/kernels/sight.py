@@ -35,7 +35,7 @@ def put_down(points, facet, bary, curved, vertices):  # type: ignore[no-untyped-
     return out
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, forceinline=True)
 def _slack(true, first, normal, image, far):  # type: ignore[no-untyped-def]
     """Return by how much [m] a tube's own neighbours may stand before it: some of what it rises over its facet."""
     hover, slope, size = 0.0, 0.0, 0.0
