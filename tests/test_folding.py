@@ -16,6 +16,7 @@ from raychan.cli import invoke
 from raychan.process.detect import detect
 from raychan.process.spectrum import middle_frequency, range_doppler
 from raychan.run.explain import explain
+from raychan.run.folding import aliased
 from raychan.run.provenance import chains, explain_cell, provenance, response_of
 from raychan.run.result import ExplainedDetections
 from raychan.run.tell import warned
@@ -172,3 +173,19 @@ def test_only_what_is_folded_is_warned_of():
     (line,) = warned(d, 0.5, rdmap)
     assert line.startswith("1 of 2 detections is folded (number 2): beyond 19.19 m or 24.18 m/s")
     assert warned(seen(SMALL, [9.0, 15.0], 3.0, [2e-5, 1e-5]), 0.5, rdmap) == []
+
+
+@pytest.mark.parametrize(
+    ("wave", "at", "far", "folded"),
+    [
+        (SMALL, 11.0, 0.0, False),
+        (SMALL, 11.2 + SMALL.unambiguous_range, 0.2, True),
+        (SMALL, -11.0 + 2.0 * SMALL.unambiguous_range, 22.0 - SMALL.unambiguous_range, True),
+        (REAL, 2.0 * REAL.unambiguous_range - 11.1, 0.1, True),
+        (REAL, 11.0 + 6.0 * REAL.unambiguous_range, 0.0, True),
+    ],
+)
+def test_the_nearest_alias_in_range_is_told_where_rates_are_unknown(wave, at, far, folded):
+    rx = dataclasses.replace(receiver(), waveform=wave)
+    away, other = aliased(np.array([at]), 11.0, response_of(rx))
+    assert away[0] == pytest.approx(abs(far), abs=1e-9) and other[0] == folded

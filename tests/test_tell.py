@@ -13,6 +13,7 @@ from PIL import Image
 from records import paths, result
 from texts import ISOTROPIC, walker
 
+from raychan.channel.occlusion import Occlusion
 from raychan.channel.rcs import stated_error
 from raychan.cli import invoke, show
 from raychan.report.canvas import figure as drawing
@@ -21,6 +22,9 @@ from raychan.run.converged import LARGEST, LARGEST_DB, SCATTER, figure
 from raychan.run.ledger import UNKNOWN, Entry
 from raychan.run.store import load_result, save_result, summary
 from raychan.run.tell import counts, marks, noted, warned
+from raychan.study.sweep import Seen, Step, cells
+from raychan.study.validation.sections import Echo
+from raychan.study.visibility import Visibility
 from raychan.tables import REFLECT
 from raychan.tables import SCATTER as SCATTERS
 
@@ -156,3 +160,10 @@ def test_a_run_says_what_its_ledger_puts_above_its_weakest_detection(tmp_path, c
     assert all(f"{name} " in line and f"{level:+.0f} dB" in line for name, level in above.items())
     assert line.count(" dB") == len(above)
     assert summary(load_result(out))["warnings"] == told["warnings"]
+
+
+def test_studies_print_no_figure_for_an_unknown_error():
+    seen = Seen(9.0, 0.0, 0.0, 30.0, math.nan, "direct", "suv")
+    step = Step((1.0,), seen, Visibility("suv", Occlusion(0.0, None, None, 0.0, (), None), {}, ()), 20.0)
+    assert cells(step)[:8] == ["yes", "direct", "9.0000", "0.0000", "0.0000", "30.00", "", "suv"]
+    assert Echo(9.0, 30.0, math.nan).text() == "9.00 m, 30.0 dB ± ?"

@@ -35,7 +35,7 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
         said.append(
             f"{_of(~found.converged)} {verb} not converged ({_numbers(~found.converged)}): two launches differ there "
             f"by about as much as they find, so the error is unknown; a smaller tolerance than {tolerance_db:g} dB "
-            "(--tolerance, model.tolerance_db) or fewer bounces may help"
+            "(--tolerance, model.tolerance_db) may help"
         )
     if found.folded.any():
         first = int(np.flatnonzero(found.folded)[0])
