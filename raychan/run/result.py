@@ -7,6 +7,7 @@ from typing import Any
 
 from raychan.radar.waveform import Waveform
 from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
+from raychan.telling import Drawn, Told
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
 
@@ -69,7 +70,7 @@ class Explanation:
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(Told, Drawn):
     """Everything from the paths to the detections, and where each detection came from."""
 
     paths: Paths

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.tables import LAYER, MIRROR, Facets, Points
+from raychan.telling import Told
 from raychan.world import check, edit, shipped
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, nearest
@@ -28,7 +29,7 @@ from raychan.world.still import Still
 __all__ = ["Body", "Scene", "SceneError"]
 
 
-class Scene:
+class Scene(Told):
     """Bodies, materials, a radar and settings.
 
     Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar a table as in a scene
