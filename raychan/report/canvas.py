@@ -47,16 +47,16 @@ def figure(width: float, height: float, layout: Any = "constrained") -> Any:
     return made
 
 
-def show_figure(width: float, height: float) -> Any:
-    """Return an empty figure of pyplot, which a notebook or `pyplot.show()` shows."""
+def show_figure(width: float, height: float, layout: Any = "constrained") -> Any:
+    """Return an empty figure of pyplot, which a notebook or `pyplot.show()` shows; sizes in inches."""
     import matplotlib.pyplot as plt
 
     with style():
-        made = plt.figure(figsize=(width, height), layout="constrained")
+        made = plt.figure(figsize=(width, height), layout=layout)
     if hasattr(made.canvas, "get_renderer"):
         return made
     plt.close(made)  # a backend that cannot measure text
-    return figure(width, height)
+    return figure(width, height, layout)
 
 
 def on(axes: Any, width: float, height: float) -> tuple[Any, Any]:

@@ -21,7 +21,7 @@ def draw(thing: Any, axes: Any = None) -> Any:
     with style():
         if isinstance(thing, Result):
             if axes is None:
-                axes = tuple(show_figure(8.2, 8.2).subplots(2, 1, height_ratios=(4.6, 3.6)))
+                axes = _two()
             rdmap_picture(thing, axes=axes[0])
             profile_picture(thing, axes=axes[1])
             return axes
@@ -35,6 +35,13 @@ def draw(thing: Any, axes: Any = None) -> Any:
         else:
             raise TypeError(f"there is no picture of a {type(thing).__name__}")
     return axes
+
+
+def _two() -> tuple[Any, Any]:
+    """Return axes for map and profile that stay where they are: labels are placed for good when the map is drawn."""
+    made = show_figure(8.2, 8.2, layout=None)
+    made.subplots_adjust(left=0.1, right=0.97, bottom=0.07, top=0.96, hspace=0.28)
+    return tuple(made.subplots(2, 1, height_ratios=(4.6, 3.6)))
 
 
 def _map(m: RangeDoppler, axes: Any) -> None:
