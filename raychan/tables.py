@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.telling import Drawn, Told
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 Ints = NDArray[np.signedinteger[Any]]
@@ -41,7 +43,7 @@ def column(axes: str, dtype: Any = np.float64, unit: str = "1", doc: str = "", f
     return field(metadata=meta)
 
 
-class Record:
+class Record(Told):
     """Base of all records: checks and freezes every declared column when built."""
 
     def __post_init__(self) -> None:
@@ -233,7 +235,7 @@ class Paths(Record):
 
 
 @dataclass(frozen=True)
-class Profile(Record):
+class Profile(Record, Drawn):
     """Power-delay profile as received in the waveform's bandwidth."""
 
     range: Floats = column("r", unit="m", doc="c tau / 2")
@@ -252,7 +254,7 @@ class Cube(Record):
 
 
 @dataclass(frozen=True)
-class RangeDoppler(Record):
+class RangeDoppler(Record, Drawn):
     """Range-Doppler map; scaled so that a lone path's peak reads its received power."""
 
     range: Floats = column("r", unit="m")

@@ -46,7 +46,9 @@ def info(
     figures, computed from its pattern, beside the published ones if its file has them; of a mesh its health.
     """
     from raychan.world.meshfile import SUFFIXES, load
+    from raychan.world.shipped import found
 
+    source = found(source)
     if source.suffix.lower() in SUFFIXES:
         _mesh(load(source, unit=unit), source)
         return

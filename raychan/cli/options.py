@@ -32,7 +32,8 @@ def meant(limit: Limit, option: str, value: Any, whole: bool = False) -> None:
 
 
 # typer takes [m] for a style of its own and swallows it: in help, units are words.
-SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
+_SCENE = "Scene file (TOML), or the name of one that comes with raychan, such as urban."
+SceneFile = Annotated[Path, typer.Argument(help=_SCENE, metavar="SCENE", show_default=False)]
 Seed = Annotated[
     int,
     typer.Option(help="Seed of the noise; equal seeds give equal detections.", callback=within(limits.SEED, True)),

@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
 
 def run(
-    scene: SceneFile,
+    scene: SceneFile = None,  # type: ignore[assignment]
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR")
-    ],
+        Path | None,
+        typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR"),
+    ] = None,
     seed: Seed = 0,
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,
@@ -46,6 +47,8 @@ def run(
 ) -> None:
     """Simulate a scene: paths, power-delay profile, I/Q cube, range-Doppler map, detections.
 
+    Without SCENE: list the scenes that come with raychan.
+
     Writes result.nc (netCDF-4: all of it), detections.csv, summary.json (timings, error reached, what was left out) and
     three pictures. When all is ready they take the place of an earlier run's at once; other files in DIR stay.
 
@@ -56,12 +59,28 @@ def run(
 
     if frame_interval is not None and frames is None:
         raise typer.BadParameter("it needs --frames", param_hint="--frame-interval")
+    if scene is None:
+        _list()
+        return
+    if out is None:
+        raise typer.BadParameter("it is missing: where shall the results go?", param_hint="--out")
     loaded = Scene.load(scene).override(set_ or [])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
     if frames is None:
         _single(loaded, out, options, not no_pictures)
     else:
         _sequence(loaded, out, frames, frame_interval, options, not no_pictures)
+
+
+def _list() -> None:
+    """Print the scenes that come with raychan."""
+    from raychan.world import shipped
+    from raychan.world.scene import Scene
+
+    rows = [(name, Scene.load(name).title) for name in shipped.names()]
+    screen = show.console()
+    screen.print(show.table("Scenes that come with raychan", ("name", ""), rows, left=(0, 1)))
+    screen.print("raychan run NAME --out DIR")
 
 
 def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:

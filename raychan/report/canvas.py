@@ -47,6 +47,25 @@ def figure(width: float, height: float, layout: Any = "constrained") -> Any:
     return made
 
 
+def show_figure(width: float, height: float, layout: Any = "constrained") -> Any:
+    """Return an empty figure of pyplot, which a notebook or `pyplot.show()` shows; sizes in inches."""
+    import matplotlib.pyplot as plt
+
+    with style():
+        made = plt.figure(figsize=(width, height), layout=layout)
+    if hasattr(made.canvas, "get_renderer"):
+        return made
+    plt.close(made)  # a backend that cannot measure text
+    return figure(width, height, layout)
+
+
+def on(axes: Any, width: float, height: float) -> tuple[Any, Any]:
+    """Return the figure of axes and them; without any, a figure of that size and its own."""
+    if axes is None:
+        axes = figure(width, height).add_subplot()
+    return axes.figure, axes
+
+
 def collections() -> Any:
     """Return matplotlib's module of collections in 3-D."""
     from mpl_toolkits.mplot3d import art3d

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import MARKS, Placer, figure, outlined, save, style
+from raychan.report.canvas import MARKS, Placer, on, outlined, save, style
 from raychan.run.provenance import chains, explain_cell, response_of
 from raychan.run.result import Explanation, Result
+from raychan.tables import RangeDoppler
 from raychan.units import dbm, watt
 
 Floats = NDArray[np.float64]
@@ -21,20 +22,18 @@ _LABELS = 12
 _PEAKS = 10
 
 
-def rdmap_picture(result: Result, path: str | Path) -> Path:
-    """Draw the range-Doppler map in dBm with its detections marked by label and named by their bodies."""
+def rdmap_picture(result: Result, path: str | Path | None = None, axes: Any = None) -> Path | None:
+    """Draw the range-Doppler map in dBm with its detections marked by label and named by their bodies.
+
+    Args: path of the picture, or None; axes to draw into, or None for a figure of its own.
+    """
     m, d = result.rdmap, result.detections
     far = _reach(result)
     keep = m.range <= far
     power = dbm(np.maximum(m.power[:, keep], watt(-300.0)))
-    floor = dbm(m.noise) - 3.0 if m.noise > 0.0 else -np.inf
-    top = np.ceil(power.max() / 5.0) * 5.0
-    low = np.floor(max(floor, top - _DYNAMIC_DB) / 5.0) * 5.0
-    if top - low < 15.0:
-        top = low + 15.0
+    low, top = levels(m, power)
     with style():
-        made = figure(8.2, 4.6)
-        axes = made.add_subplot()
+        made, axes = on(axes, 8.2, 4.6)
         r, v = m.range[keep], m.rate
         image = axes.pcolormesh(r, v, power, vmin=low, vmax=top, cmap="viridis", shading="nearest", rasterized=True)
         axes.set(xlabel="range [m]", ylabel="range rate [m/s]   (receding is positive)", title="Range-Doppler map")
@@ -54,11 +53,22 @@ def rdmap_picture(result: Result, path: str | Path) -> Path:
                 textcoords="offset points", ha="right", color="white", fontsize=7, alpha=0.9,
             )  # fmt: skip
         _name_detections(result, axes)
-        return save(made, path)
+        return None if path is None else save(made, path)
 
 
-def profile_picture(result: Result, path: str | Path) -> Path:
-    """Draw the power-delay profile in dBm against range, its peaks named by the bodies that make them."""
+def levels(m: RangeDoppler, power: Floats) -> tuple[float, float]:
+    """Return the span of power worth drawing of a map [dBm]."""
+    floor = dbm(m.noise) - 3.0 if m.noise > 0.0 else -np.inf
+    top = np.ceil(power.max() / 5.0) * 5.0
+    low = np.floor(max(floor, top - _DYNAMIC_DB) / 5.0) * 5.0
+    return float(low), float(max(top, low + 15.0))
+
+
+def profile_picture(result: Result, path: str | Path | None = None, axes: Any = None) -> Path | None:
+    """Draw the power-delay profile in dBm against range, its peaks named by the bodies that make them.
+
+    Args as for `rdmap_picture`.
+    """
     p = result.profile
     far = _reach(result)
     keep = p.range <= far
@@ -67,8 +77,7 @@ def profile_picture(result: Result, path: str | Path) -> Path:
     noise = dbm(p.noise) if p.noise > 0.0 else -np.inf
     low = max(noise - 12.0, top - 110.0)
     with style():
-        made = figure(8.2, 3.6)
-        axes = made.add_subplot()
+        made, axes = on(axes, 8.2, 3.6)
         axes.plot(p.range[keep], np.maximum(power[keep], low), lw=1.1, color="#225588")
         axes.fill_between(p.range[keep], low, np.maximum(power[keep], low), color="#225588", alpha=0.12, lw=0)
         if p.noise > 0.0:
@@ -83,7 +92,7 @@ def profile_picture(result: Result, path: str | Path) -> Path:
         axes.set_ylim(low, top + 0.18 * (top - low))
         axes.grid(alpha=0.25, lw=0.5)
         _name_peaks(result, axes, power, far)
-        return save(made, path)
+        return None if path is None else save(made, path)
 
 
 def _reach(result: Result) -> float:

@@ -61,6 +61,8 @@ def _cuts(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Fl
     angle, other, names = azimuth, elevation, ("azimuth", "elevation")
     if len(azimuth) == 1:
         angle, other, names, dbsm, error = elevation, azimuth, names[::-1], dbsm.T, error.T
+    if polar and len(angle) > 2 and np.isclose(abs(2.0 * angle[-1] - angle[-2] - angle[0]), 360.0):
+        angle, dbsm, error = (np.concatenate([x, x[..., :1]], axis=-1) for x in (angle, dbsm, error))  # a full turn
     axes = made.add_subplot(projection="polar" if polar else None)
     axes.set_title(title)
     low, high = _limits(dbsm, error)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from raychan.radar.waveform import Waveform
 from raychan.tables import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler, column
+from raychan.telling import Drawn, Told
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
 
@@ -110,7 +111,7 @@ class ExplainedDetections(Detections):
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(Told, Drawn):
     """Everything from the paths to the detections, and where each detection came from."""
 
     paths: Paths

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from raychan.units import watt
-from raychan.world import edit
+from raychan.world import edit, shipped
 from raychan.world.checked import checked
 from raychan.world.errors import SceneError, nearest
 from raychan.world.schema import AntennaTable, RadarTable
@@ -61,7 +61,7 @@ def antenna_table(given: str | AntennaTable, folder: Path, key: str, file: Any =
     """
     if isinstance(given, AntennaTable):
         return given, file
-    path = folder / given
+    path = shipped.found(given, folder)
     try:
         text = path.read_text(encoding="utf-8")
     except (FileNotFoundError, IsADirectoryError, NotADirectoryError):

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.tables import LAYER, MIRROR, Facets, Points
-from raychan.world import check, edit
+from raychan.telling import Told
+from raychan.world import check, edit, shipped
 from raychan.world.body import Body
 from raychan.world.checked import checked
 from raychan.world.errors import SceneError, nearest
@@ -30,7 +31,7 @@ from raychan.world.still import Still
 __all__ = ["Body", "Scene", "SceneError"]
 
 
-class Scene:
+class Scene(Told):
     """Bodies, materials, a radar and settings.
 
     Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar a table as in a scene
@@ -79,12 +80,16 @@ class Scene:
 
     @classmethod
     def load(cls, path: str | Path) -> Scene:
-        """Return the scene of a TOML file; SceneError where file, syntax, key or value is wrong."""
-        file = Path(path)
+        """Return the scene of a TOML file, or one that comes with raychan by its name, such as 'urban'.
+
+        Raises: SceneError where file, syntax, key or value is wrong.
+        """
+        file = shipped.found(path)
         try:
             text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
-            raise SceneError("file not found", file=file, allowed="a scene file that exists") from None
+            allowed = f"a scene file that exists, or {nearest(file.stem, shipped.names())}"
+            raise SceneError("file not found", file=file, allowed=allowed) from None
         except (OSError, UnicodeDecodeError) as e:
             reason = getattr(e, "strerror", None) or e
             raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e

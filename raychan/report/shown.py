@@ -1,0 +1,54 @@
+"""What `.plot()` of a result, a map or a profile draws, for a notebook or a window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from raychan.report.canvas import show_figure, style
+from raychan.report.figures import levels, profile_picture, rdmap_picture
+from raychan.run.result import Result
+from raychan.tables import Profile, RangeDoppler
+from raychan.units import dbm, watt
+
+
+def draw(thing: Any, axes: Any = None) -> Any:
+    """Draw a Result, a RangeDoppler or a Profile and return the axes.
+
+    Args: axes to draw into; of a Result two, for map and profile; None makes a figure of pyplot.
+    """
+    with style():
+        if isinstance(thing, Result):
+            if axes is None:
+                axes = _two()
+            rdmap_picture(thing, axes=axes[0])
+            profile_picture(thing, axes=axes[1])
+            return axes
+        if axes is None:
+            axes = show_figure(8.2, 4.6).add_subplot()
+        if isinstance(thing, RangeDoppler):
+            _map(thing, axes)
+        elif isinstance(thing, Profile):
+            axes.plot(thing.range, dbm(np.maximum(thing.power, watt(-300.0))), lw=1.1, color="#225588")
+            axes.set(xlabel="range [m]", ylabel="received power [dBm]", title="Power-delay profile")
+        else:
+            raise TypeError(f"there is no picture of a {type(thing).__name__}")
+    return axes
+
+
+def _two() -> tuple[Any, Any]:
+    """Return axes for map and profile that stay where they are: labels are placed for good when the map is drawn."""
+    made = show_figure(8.2, 8.2, layout=None)
+    made.subplots_adjust(left=0.1, right=0.97, bottom=0.07, top=0.96, hspace=0.28)
+    return tuple(made.subplots(2, 1, height_ratios=(4.6, 3.6)))
+
+
+def _map(m: RangeDoppler, axes: Any) -> None:
+    power = dbm(np.maximum(m.power, watt(-300.0)))
+    low, top = levels(m, power)
+    image = axes.pcolormesh(
+        m.range, m.rate, power, vmin=low, vmax=top, cmap="viridis", shading="nearest", rasterized=True
+    )
+    axes.set(xlabel="range [m]", ylabel="range rate [m/s]   (receding is positive)", title="Range-Doppler map")
+    axes.figure.colorbar(image, ax=axes, label="received power [dBm]", pad=0.01, aspect=30)

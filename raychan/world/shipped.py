@@ -1,0 +1,37 @@
+"""The scenes and antennas that come with raychan, by name: in the wheel beside the code, in a checkout above it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_CODE = Path(__file__).resolve().parents[1]
+
+
+def folder() -> Path | None:
+    """Return the folder of the scenes that come with raychan; None where they were left out."""
+    if (_CODE / "scenes").is_dir():
+        return _CODE / "scenes"
+    above = _CODE.parent
+    return above / "scenes" if (above / "pyproject.toml").is_file() and (above / "scenes").is_dir() else None
+
+
+def names() -> list[str]:
+    """Return the names of the scenes that come with raychan."""
+    there = folder()
+    return sorted(file.stem for file in there.glob("*.toml")) if there else []
+
+
+def found(path: str | Path, within: Path | None = None) -> Path:
+    """Return a file as it is given, or the one of that name that comes with raychan where there is no such file.
+
+    Args: path of a file, or a name such as 'urban' or 'antennas/patch'; within, the folder that `path` refers to.
+    """
+    file = Path(path) if within is None else within / path
+    there = folder()
+    if file.is_file() or there is None or Path(path).is_absolute():
+        return file
+    own = there / path
+    for choice in (own, own.with_name(f"{own.name}.toml")):
+        if choice.is_file() and choice.resolve().is_relative_to(there.resolve()):
+            return choice
+    return file
