@@ -1,4 +1,4 @@
-"""What a run will ask of the machine, before it starts: memory, refused beyond a share of the machine's, and rough time.
+"""What a run will ask of the machine, told before it starts: memory, refused beyond a share of it, and rough time.
 
 Both are sums of counts times constants measured on the project's machine (2 cores) over cubes of 3e4 to 2e7 samples,
 one to eight receivers and 1 to 64 map cells a sample; time, over those and the three scenes as well.
