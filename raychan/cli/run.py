@@ -55,6 +55,7 @@ def run(
     With --frames, DIR holds frame_0000, frame_0001, ..., each such a directory and written as soon as it is ready, and
     detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 is what a run without --frames gives.
     """
+    from raychan.run.demand import check_demand, long_run
     from raychan.world.scene import Scene
 
     if frame_interval is not None and frames is None:
@@ -66,6 +67,8 @@ def run(
         raise typer.BadParameter("it is missing: where shall the results go?", param_hint="--out")
     loaded = Scene.load(scene).override(set_ or [])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
+    check_demand(loaded)
+    show.warn(long_run(loaded, frames or 1))
     if frames is None:
         _single(loaded, out, options, not no_pictures)
     else:

@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 METHODS = ("ca", "os")
+GUARD, TRAIN = (2, 2), (3, 3)
+"""Guard and training cells (rate, range) where none are asked for."""
 RANK = 0.5
 """Share of the training cells below the ordered statistic: up to half of them may hold targets."""
 _STRIDE = 2  # resolution cells
@@ -60,6 +62,31 @@ class Training:
     """Number of independent cells."""
 
 
+def _offsets(count: tuple[int, int], guard: tuple[int, int], train: tuple[int, int]) -> tuple[Ints, list[int]]:
+    """Return the training cells (t, 2) in resolution cells, and how many strides they reach along each axis."""
+    steps = []
+    for axis in (0, 1):
+        # On half the axis at most, so that no cell is taken twice, neither wrapped nor moved to the other side.
+        room = (count[axis] // (2 + 2 * axis) - 1) // _STRIDE
+        steps.append(max(0, min(guard[axis] // _STRIDE + train[axis], room)))
+    v, r = np.meshgrid(*(_STRIDE * np.arange(-n, n + 1) for n in steps), indexing="ij")
+    outside = (np.abs(v) > guard[0]) | (np.abs(r) > guard[1])
+    return np.stack([v[outside], r[outside]], axis=1), steps
+
+
+def fitting_guard(
+    count: tuple[int, int], guard: tuple[int, int] | None = None, train: tuple[int, int] | None = None
+) -> tuple[int, int] | None:
+    """Return the guard (rate, range) nearest to the wanted one that leaves training cells on a map of so many
+    resolution cells, or None if none does; guard and train as for `training`, None for those of `detect`."""
+    wanted, cells = guard or GUARD, train or TRAIN
+    for less in range(max(wanted) + 1):
+        some = max(0, wanted[0] - less), max(0, wanted[1] - less)
+        if len(_offsets(count, some, cells)[0]):
+            return some
+    return None
+
+
 def training(
     grid: Grid, guard: tuple[int, int], train: tuple[int, int], windows: tuple[str, str] = ("hann", "hann")
 ) -> Training:
@@ -69,14 +96,7 @@ def training(
     """
     if min(*guard, *train) < 0:
         raise ValueError(f"guard = {guard}, train = {train}: must not be negative")
-    steps = []
-    for axis in (0, 1):
-        # On half the axis at most, so that no cell is taken twice, neither wrapped nor moved to the other side.
-        room = (grid.count[axis] // (2 + 2 * axis) - 1) // _STRIDE
-        steps.append(max(0, min(guard[axis] // _STRIDE + train[axis], room)))
-    v, r = np.meshgrid(*(_STRIDE * np.arange(-n, n + 1) for n in steps), indexing="ij")
-    outside = (np.abs(v) > guard[0]) | (np.abs(r) > guard[1])
-    cells = np.stack([v[outside], r[outside]], axis=1)
+    cells, steps = _offsets(grid.count, guard, train)
     if not len(cells):
         raise ValueError(
             f"guard = {guard}, train = {train}: no training cells on a map of {grid.count} resolution cells"

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from raychan.process.angle import azimuth
-from raychan.process.cfar import Grid, bias, factor, level, training
+from raychan.process.cfar import GUARD, TRAIN, Grid, bias, factor, level, training
 from raychan.process.spectrum import middle_frequency
 from raychan.radar.lobes import Envelope
 from raychan.radar.waveform import Waveform
@@ -30,8 +30,8 @@ def detect(
     pfa: float = 1e-7,
     min_snr_db: float = 20.0,
     method: str = "os",
-    guard: tuple[int, int] = (2, 2),
-    train: tuple[int, int] = (3, 3),
+    guard: tuple[int, int] = GUARD,
+    train: tuple[int, int] = TRAIN,
     ego_speed: float = 0.0,
     windows: tuple[str, str] = ("hann", "hann"),
     waveform: Waveform | None = None,

@@ -18,11 +18,13 @@ from raychan.channel.surface import Surface, surface_of
 from raychan.channel.tubes import Refinement
 from raychan.frames import direction
 from raychan.kernels.rows import at_once
+from raychan.process.cfar import Grid, fitting_guard
 from raychan.process.detect import detect
 from raychan.process.spectrum import range_doppler
 from raychan.radar.sensor import Sensor
 from raychan.radar.windows import processing_gain, window
 from raychan.run.auto import Choice, choose
+from raychan.run.demand import check_demand
 from raychan.run.gather import Gather, Launched
 from raychan.run.ledger import ledger
 from raychan.run.microdoppler import needed, retraced
@@ -103,6 +105,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         TOLERANCE_DB.check("tolerance_db", tolerance_db)
     if max_bounces is not None:
         BOUNCES.check("max_bounces", max_bounces, whole=True)
+    check_demand(scene)
     sensor, settings = scene.sensor, scene.processing
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
     model = _changed(scene.model, changes)
@@ -217,7 +220,12 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         timings=clock.timings,
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
         stats=channel.stats | counts(known, tolerance),
-        warnings=(*scene.warnings, *_told(channel.launched), *told(known, tolerance, rdmap, left_out)),
+        warnings=(
+            *scene.warnings,
+            *check_demand(scene),
+            *_told(channel.launched),
+            *told(known, tolerance, rdmap, left_out),
+        ),
         scene=scene.bare(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
@@ -229,6 +237,9 @@ def received(cube: Cube, sensor: Sensor, settings: Any) -> tuple[RangeDoppler, D
     rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
     # The scene file names range before rate; a map's axes are rate, then range.
     sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
+    guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
+    if guard is not None:
+        sizes["guard"] = guard
     detections = detect(
         rdmap,
         pfa=settings.pfa,

@@ -54,6 +54,7 @@ class Limit:
 
 LENGTH = Limit(0.0, 1e6, "m", "a scene is no wider than a radar's horizon", above=True)
 PLACE = Limit(-1e6, 1e6, "m", "a scene is no wider than a radar's horizon; count from an origin near it")
+WIDTH = Limit(0.0, 1e4, "m", "float32 rays do not tell the facets of a wider body apart; is it the unit, as mm?")
 SAG = Limit(1e-6, 10.0, "m", "a facet finer than a micrometre is flat at any wavelength allowed")
 HOOPS = Limit(1, 1000, "", "a rack of so many hoops")
 OFFSET_MM = Limit(-1e5, 1e5, "mm", "receivers of one radar stand within 100 m of each other")

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from raychan.world.errors import SceneError, nearest
+from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
 
+_FARTHEST = 1e12  # in the unit of a file; beyond lies only what was read wrong
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "ft": 0.3048}
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 _AXES = {s + a: (1.0 if s == "+" else -1.0) * np.eye(3)[i] for s in "+-" for i, a in enumerate("xyz")}
@@ -36,8 +38,8 @@ def load(
         raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
     if unit not in UNITS:
         raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
-    if not (np.isfinite(scale) and scale > 0.0):
-        raise SceneError(f"{scale!r} is not possible", file=file, key="scale", value=scale, allowed="above 0")
+    if not SCALE.allows(scale):
+        raise SceneError(f"{scale!r} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
     up = up or ("y" if file.suffix.lower() in (".glb", ".gltf") else "z")
     turn = _turn(up, forward or ("z" if up.endswith("y") else "x"), file)
     try:
@@ -60,6 +62,7 @@ def from_trimesh(source: Any, crease_deg: float = CREASE_DEG, matrix: Floats | N
     m = np.eye(3) if matrix is None else np.asarray(matrix, float)
     vertices, faces, part, base = [], [], [], 0
     for i, (_, v, f) in enumerate(pieces):
+        _possible(v)
         vertices.append(v @ m.T)
         faces.append((f if np.linalg.det(m) > 0.0 else f[:, ::-1]) + base)
         part.append(np.full(len(f), i, np.int32))
@@ -67,9 +70,28 @@ def from_trimesh(source: Any, crease_deg: float = CREASE_DEG, matrix: Floats | N
     if not faces:
         raise SceneError("mesh is empty: no triangles", allowed="at least one triangle")
     names = tuple(name for name, _, _ in pieces)
-    return make_mesh(
+    mesh = make_mesh(
         np.concatenate(vertices), np.concatenate(faces), np.concatenate(part), names, crease_deg=crease_deg
     )
+    return _sized(mesh)
+
+
+def _possible(v: Floats) -> None:
+    """Raise SceneError where corners (n, 3) in the file's unit are no places."""
+    wrong = int((~np.isfinite(v)).any(axis=1).sum())
+    if wrong:
+        raise SceneError(f"{wrong} vertices hold NaN or infinity", value=wrong, allowed="finite coordinates")
+    far = float(np.abs(v).max(initial=0.0))
+    if far > _FARTHEST:
+        raise SceneError(f"a vertex at {far:.3g}", value=far, allowed=f"coordinates within +-{_FARTHEST:g}")
+
+
+def _sized(mesh: Mesh) -> Mesh:
+    """Return a mesh that is no larger than a body can be."""
+    size = max(mesh.report.size)
+    if not WIDTH.allows(size):
+        raise SceneError(f"the mesh is {size:.4g} m across", key="unit", value=size, allowed=WIDTH.allowed)
+    return mesh
 
 
 def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
@@ -80,7 +102,9 @@ def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
         transform, key = source.graph[node]
         geometry = source.geometry[key]
         if len(getattr(geometry, "faces", ())):
-            v = np.asarray(geometry.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
+            own = np.asarray(geometry.vertices, float)
+            _possible(own)
+            v = own @ transform[:3, :3].T + transform[:3, 3]
             f = np.asarray(geometry.faces)
             found.append((str(key), v, f if np.linalg.det(transform[:3, :3]) > 0.0 else f[:, ::-1]))
     if len(found) == 1:
