@@ -25,7 +25,7 @@ def outlets(surface: Surface, leg: Leg, points: Floats, facet: Ints) -> tuple[Fl
     inward = np.einsum("ij,ij->i", d, surface.normal[facet]) > 0.0
     rows = np.flatnonzero(surface.shell[facet] & inward)
     points, facet = points.copy(), facet.copy()
-    way, far = -d[rows], np.inf if leg.far else length[rows]
+    way, far = -d[rows], np.full(len(rows), np.inf) if leg.far else length[rows]
     skip, start, depth = facet[rows], np.zeros(len(rows)), np.ones(len(rows), int)
     for _ in range(_MOST):
         if not len(rows):
@@ -39,6 +39,5 @@ def outlets(surface: Surface, leg: Leg, points: Floats, facet: Ints) -> tuple[Fl
         facet[rows[out]] = hit[out]
         on = met & ~out
         start = np.where(on, t + surface.touch, 0.0)[on]
-        rows, way, skip, depth = rows[on], way[on], skip[on], depth[on]
-        far = far if leg.far else far[on]
+        rows, way, far, skip, depth = rows[on], way[on], far[on], skip[on], depth[on]
     return points, facet

@@ -27,7 +27,7 @@ def first_surface(
     Physical optics has currents where a surface is lit, and they radiate everywhere. They are those of two waves: the
     reflected one, which other bodies and other parts of this one may block, and the incident one's, the shadow
     radiation, which cancels the incident wave behind the body: whatever stands there too is in a shadow already, so it
-    is never blocked. Source: Ufimtsev, Fundamentals of the Physical Theory of Diffraction, 2014, secs. 1.3, 1.4.
+    is never blocked. Source: Ufimtsev, Fundamentals of the Physical Theory of Diffraction, 2014, ch. 1.
     """
     seen, corners, passed = settle(surface, leg, out, tubes, found, True, which=LIT)
     total = _radiated(surface, leg, out, seen, (corners, passed), frequency, basis, REFLECTED)

@@ -16,6 +16,7 @@ from raychan.channel.found import Found
 from raychan.channel.legs import Leg
 from raychan.channel.shoot import tube_routes
 from raychan.channel.surface import Surface
+from raychan.channel.terminator import terminator_error
 from raychan.channel.tubes import Refinement, Tubes
 from raychan.frames import direction, theta_phi
 from raychan.tables import Facets
@@ -81,6 +82,8 @@ def rcs(
     """
     _check(frequency, polarization, distance, tolerance_db, max_bounces)
     bistatic = rx_azimuth_deg is not None or rx_elevation_deg is not None or rx_distance is not None
+    if rx_distance is not None and np.isinf(rx_distance) != np.isinf(distance):
+        raise ValueError(f"rx_distance = {rx_distance!r} m: must be inf where distance is, and near where it is near")
     rx_az = azimuth_deg if rx_azimuth_deg is None else rx_azimuth_deg
     rx_el = elevation_deg if rx_elevation_deg is None else rx_elevation_deg
     angles = np.broadcast_arrays(
@@ -200,7 +203,10 @@ def _refined(
     rays, error_db, value, by_bounce = surface.rays, _MAX_ERROR_DB, 0j, np.zeros(bounces, complex)
     curved = _CURVED if surface.curved.any() else 0.0
     # A body without edges ends in the dark along one ring, all of which may return in phase.
-    ring = _TERMINATOR if surface.convex_alone and curved and not surface.smooth.any() else 0.0
+    ring = 0.0
+    if surface.convex_alone and curved and not surface.smooth.any():
+        k = 2.0 * np.pi * frequency / C0
+        ring = _TERMINATOR / k + (terminator_error(surface, leg, out, k, row, col) if out != leg else 0.0)
     cover = _COVER_ALONE if surface.convex_alone else _COVER
     # Long tubes may miss the same in two launches.
     cover *= np.sqrt(_stretch(surface, max_rays))
@@ -214,7 +220,7 @@ def _refined(
         value = complex(by_bounce.sum())
         if before is not None:
             change = abs(value - before)
-            shared = curved * rule.phase * abs(value) + ring / rule.wavenumber
+            shared = curved * rule.phase * abs(value) + ring
             error_db = stated_error(value, change + shared, cover)
             spent = (surface.rays - rays) * _GROWTH > max_rays
             # In a null of this polarisation nothing is left to find.

@@ -27,7 +27,7 @@ def reflected_wave(e: Vec, k: Vec, to: Vec, element: Vec, r_s: complex, r_p: com
 def shadow_wave(e: Vec, k: Vec, to: Vec, element: Vec, t_s: complex, t_p: complex, g: Vec) -> complex:
     """Project on g what the currents n x H, -n x E of the wave (e, k) itself on a vector element of area (on the lit
     side) radiate in the direction `to`, less what goes on behind it (T_s, T_p): the shadow radiation, nothing in
-    backscatter. With `reflected_wave` it is physical optics, 2 n x H on a conductor (Ufimtsev 2014, secs. 1.3, 1.4)."""
+    backscatter. With `reflected_wave` it is physical optics, 2 n x H on a conductor (Ufimtsev 2014, ch. 1)."""
     size = math.sqrt(dot(element, element))
     if size == 0.0:
         return 0j

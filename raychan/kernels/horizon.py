@@ -19,7 +19,7 @@ def radiating(points, k, normals, image, far, which):  # type: ignore[no-untyped
 
     Args: points, k, normals (n, 4, 3) of arriving tubes, the centre last; image (3,) [m] of the end, or the direction
     to it when far; which of FACING, OBLIQUE, LIT. The reflected wave's obliquity is (cos_i + r . n) / 2 towards r: it
-    goes on beyond the horizon r . n = 0 and ends where it changes its sign (Ufimtsev 2014, sec. 1.3).
+    goes on beyond the horizon r . n = 0 and ends where it changes its sign (Ufimtsev 2014, ch. 1).
     """
     share, facing = np.empty(len(points)), np.empty(len(points), np.bool_)
     for i in range(len(points)):

@@ -1,0 +1,36 @@
+"""Terminator: what physical optics itself misses of a smooth body at whose terminator its currents end at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from raychan.channel.legs import Leg
+from raychan.channel.surface import Surface
+from raychan.frames import theta_phi
+
+_FOCK = 0.25  # of the belt's amplitude: what its true currents differ by where those of physical optics end smoothly
+
+
+def terminator_error(surface: Surface, leg: Leg, out: Leg, wavenumber: float, row: int, col: int) -> float:
+    """Return how far [m] a bistatic amplitude of a smooth convex body may be off for its terminator's sake.
+
+    Light ends on a ring, of the radius a of a sphere of the body's area. Its two bright points scatter
+    a sqrt(2 / (pi k a sin g)) D at an angle g off the forward direction, over a depth k D = 1 / (1 - cos g) that is at
+    most the belt of light and dark, k a (2 / k a)^(1/3) (Fock 1946). In the bistatic plane the currents of physical
+    optics end with full strength, sin g of which is seen: all of it is false. Across it they end smoothly.
+    Args: row, col polarisation (V, H) of receiver and transmitter. Source: Bowman, Senior, Uslenghi, Electromagnetic
+    and Acoustic Scattering by Simple Shapes, 1969, ch. 10.
+    """
+    ends = [x.end / np.linalg.norm(x.end) for x in (leg, out)]
+    cosine = float(np.clip(-ends[0] @ ends[1], -1.0, 1.0))
+    sine = float(np.sqrt(1.0 - cosine**2))
+    size = wavenumber * float(np.sqrt(surface.area.sum() / (4.0 * np.pi)))
+    ring = size * min(1.0, float(np.sqrt(2.0 / (np.pi * size * max(sine, 1e-12)))))
+    depth = 1.0 / (1.0 - cosine + (0.5 / size**2) ** (1.0 / 3.0))
+    within = 1.0
+    if sine > 1e-6:
+        across = np.cross(*ends) / sine
+        for end, which in zip(ends, (col, row), strict=True):
+            within *= float(np.linalg.norm(np.cross(theta_phi(end[None])[which][0], across)))
+    smooth = _FOCK * 0.5 * (1.0 + cosine)
+    return ring * depth * (within * sine + smooth) / wavenumber
