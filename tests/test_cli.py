@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 
@@ -37,7 +38,7 @@ def test_run_prints_the_detections_and_writes_what_it_says(scene, tmp_path, caps
 
 def test_explain_and_view_read_what_run_wrote(scene, tmp_path, capsys):
     out = tmp_path / "out"
-    run(scene, out)
+    assert run(scene, out) == 0
     capsys.readouterr()
     assert invoke(["explain", str(out), "--range", "9", "--speed", "0"]) == 0
     assert "radar > sign > radar, 1 interaction, 9.0" in capsys.readouterr().out
@@ -49,7 +50,7 @@ def test_explain_and_view_read_what_run_wrote(scene, tmp_path, capsys):
 
 def test_equal_seeds_give_equal_bytes_and_other_seeds_do_not(scene, tmp_path):
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
-        run(scene, tmp_path / name, "--seed", str(seed))
+        assert run(scene, tmp_path / name, "--seed", str(seed)) == 0
     a, b, c = ((tmp_path / n / "detections.csv").read_bytes() for n in "abc")
     assert a == b != c
 
@@ -57,7 +58,7 @@ def test_equal_seeds_give_equal_bytes_and_other_seeds_do_not(scene, tmp_path):
 def test_set_overrides_a_key_and_the_result_remembers(scene, tmp_path):
     from raychan.run.store import load_result
 
-    run(scene, tmp_path / "out", "--set", "bodies.sign.position=[6, 0, 1]")
+    assert run(scene, tmp_path / "out", "--set", "bodies.sign.position=[6, 0, 1]") == 0
     again = load_result(tmp_path / "out")
     assert again.detections.range[0] == pytest.approx(6.0, abs=0.1)
     assert list(again.scene.facets().origin[0]) == [6.0, 0.0, 1.0]
@@ -192,9 +193,19 @@ print(code, sorted({"numpy", "xarray", "numba"} & set(sys.modules)))
 """
 
 
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs a shell with PIPESTATUS")
+def test_a_reader_that_goes_away_is_no_error(scene):
+    command = f"{sys.executable} -m raychan info {scene}"
+    done = subprocess.run(
+        ["bash", "-c", f"{command} | head -1; echo ${{PIPESTATUS[0]}}"],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("A plate ahead\n0\n", "")
+
+
 def test_help_is_light_and_names_every_command():
     done = python(_HELP)
-    assert done.stdout.endswith("0 []\n"), done.stdout + done.stderr
+    assert done.returncode == 0 and done.stdout.endswith("0 []\n"), done.stdout + done.stderr
     for command in ("run", "info", "explain", "view"):
         assert f" {command} " in done.stdout
 

@@ -178,5 +178,6 @@ def test_where_no_place_for_compiled_loops_can_be_written_they_are_kept_for_the_
     done = subprocess.run(
         [sys.executable, "-c", _READ_ONLY], capture_output=True, text=True, timeout=120, check=False, env=free
     )
+    assert done.returncode == 0, done.stderr
     place, kept = done.stdout.split()
     assert int(kept) > 0 and not os.path.exists(place), done.stderr

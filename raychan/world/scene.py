@@ -88,8 +88,8 @@ class Scene(Told):
         try:
             text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
-            allowed = f"a scene file that exists, or {nearest(file.stem, shipped.names())}"
-            raise SceneError("file not found", file=file, allowed=allowed) from None
+            more = f", or {nearest(file.stem, shipped.names())}" if shipped.names() else ""
+            raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
         except (OSError, UnicodeDecodeError) as e:
             reason = getattr(e, "strerror", None) or e
             raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e
