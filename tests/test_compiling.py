@@ -177,3 +177,19 @@ def test_no_kernel_of_the_three_scenes_is_compiled_twice_for_frozen_arrays_layou
     assert len(scenes) == 3
     ran = subprocess.run([sys.executable, "-c", _SCENES, *scenes], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout) == (0, ""), ran.stdout + ran.stderr
+
+
+def test_a_command_without_a_terminal_says_in_one_line_that_it_compiles(tmp_path: Path):
+    code = """
+import sys, toy
+from raychan.cli import show
+show._LONG = 0.0
+sys.stderr = sys.stdout
+with show.progress() as tell:
+    tell("trace", 0.5)
+    toy.half(1.0)
+    toy.half(1)
+"""
+    said = printed(command(tmp_path, code))
+    assert said.startswith("compiling, once, about ") and said.endswith(" s (3 kernels)") and said.count("\n") == 0
+    assert printed(command(tmp_path, code)) == ""
