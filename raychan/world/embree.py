@@ -20,6 +20,7 @@ from raychan.kernels.facets import extents, planes_of, turned
 from raychan.kernels.rays import arrive, companions, land, near_ball, plane_distances, set_out
 from raychan.kernels.rows import in_two, once
 from raychan.tables import LAYER, Facets
+from raychan.world.backed import backed
 from raychan.world.still import Still, columns, lasting
 
 Floats = NDArray[np.float64]
@@ -60,10 +61,11 @@ class Group:
     """Facets that are cast at together, in the world's frame or one of their own.
 
     Args: corners gives them, (n, 3, 3) [m]; extents (b, 2, 3) [m] that they do not reach beyond; rows (n,) their
-    numbers among all, None if they are all.
+    numbers among all, None if they are all; behind [m] by which a hit must lie before those of earlier groups.
     """
 
-    def __init__(self, corners: Callable[[], Floats], extents: Floats, rows: Ints | None) -> None:
+    def __init__(self, corners: Callable[[], Floats], extents: Floats, rows: Ints | None, behind: float = 0.0) -> None:
+        self.behind = behind
         low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
         self.centre, self.radius = 0.5 * (low + high), 0.5001 * float(np.linalg.norm(high - low))
         self.mesh, self._rows = Triangles(corners, self.centre), rows
@@ -116,7 +118,19 @@ class Tracer:
             # Far from the origin coordinates themselves are only known to their float64 spacing.
             blur = 8.0 * float(np.spacing(np.maximum(-low, high).max()))
             self.touch, self._nearest = _TOUCH * self._size + blur, _NEAREST * self._size + blur
-            self._groups = [Group(lambda: v, self.extents, None)] if still is None else self._parted(still)
+            self._groups = self._whole() if still is None else self._parted(still)
+
+    def _whole(self) -> list[Group]:
+        """Return all facets together, but for layers upon something opaque, which counts before them."""
+        v = self.facets.vertices
+        upon = backed(v - self._centre, self.normal, self.area, self.is_layer, self.touch)
+        if not upon.any():
+            return [Group(lambda: v, self.extents, None)]
+        rest, thin = (np.flatnonzero(x).astype(np.int32) for x in (~upon, upon))
+        return [
+            Group(lambda: v[rest], self.extents, rest),
+            Group(lambda: v[thin], self.extents, thin, behind=self.touch),
+        ]
 
     def _parted(self, still: Still) -> list[Group]:
         """Return what stands still, what is large and moves, and all that is small and moves, each by itself."""
@@ -184,7 +198,8 @@ class Tracer:
         found, t = np.full(len(rows), _MISS, np.int32), np.full(len(rows), np.inf)
         self._cast(group, origin[rows], direction[rows], skip[rows], begin[rows], found, t)
         # Of two in the same place the first counts, whichever group it is of.
-        closer = (t < distance[rows]) | ((t == distance[rows]) & (found < facet[rows]) & (found >= 0))
+        tie = (t == distance[rows]) & (found < facet[rows]) & (group.behind == 0.0)
+        closer = (found >= 0) & ((t + group.behind < distance[rows]) | tie)
         facet[rows[closer]], distance[rows[closer]] = found[closer], t[closer]
 
     def _cast(
