@@ -44,10 +44,15 @@ def rcs_picture(
             axes.set_ylim(low, high)
             axes.grid(alpha=0.25, lw=0.5)
             mark = "band" if len(angle) > 1 else "bar"
-            least, most = (f"{x:.2g}" for x in (error_db.min(), error_db.max()))
+            known = error_db[np.isfinite(error_db)]
+            least, most = (f"{x:.2g}" for x in (known.min(initial=np.inf), known.max(initial=0.0)))
             note = (
                 f"{mark}: stated error, {least} to {most} dB" if least != most else f"{mark}: stated error, {most} dB"
             )
+            if not known.size:
+                note = "no stated error"
+            if known.size < error_db.size:
+                axes.plot([], [], "o", mfc="none", color="black", label="error unknown")
             axes.legend(loc="best", ncols=2 if len(other) > 4 else 1, title=note, title_fontsize=8, alignment="left")
         return save(made, path)
 
@@ -58,23 +63,28 @@ def _limits(dbsm: Floats, error_db: Floats) -> tuple[float, float]:
     if not real.any():
         return -100.0, -90.0
     top, least = float(dbsm[real].max()), float(dbsm[real].min())
-    room = max(3.0, min(6.0, float(error_db[real & (dbsm == top)].max(initial=0.0))))
+    room = max(3.0, min(6.0, float(np.nan_to_num(error_db[real & (dbsm == top)]).max(initial=0.0))))
     return max(least, top - _RANGE_DB) - room, top + room
 
 
 def _line(axes: Any, angle: Floats, dbsm: Floats, error: Floats, colour: str, label: str) -> None:
     """Draw one cut: a line, or a point where there is one angle, over its band of error."""
+    known = np.isfinite(error)
     if len(angle) == 1:
-        axes.errorbar(angle, dbsm, yerr=error, fmt="o", color=colour, capsize=4, label=label)
+        filled = {} if known.all() else {"mfc": "none"}
+        axes.errorbar(angle, dbsm, yerr=np.nan_to_num(error), fmt="o", color=colour, capsize=4, label=label, **filled)
         return
+    axes.plot(angle[~known], dbsm[~known], "o", ms=4, mfc="none", color=colour)
     axes.fill_between(angle, dbsm - error, dbsm + error, color=colour, alpha=0.3, lw=0)
-    axes.plot(angle, dbsm, color=colour, lw=1.1, label=label)
+    axes.plot(angle, np.where(known, dbsm, np.nan), color=colour, lw=1.1, label=label)
 
 
 def _map(made: Any, axes: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Floats) -> None:
     """Draw RCS over both angles, and contours where the stated error passes 1 dB."""
     image = axes.pcolormesh(azimuth, elevation, dbsm, cmap="viridis", shading="nearest", rasterized=True)
     made.colorbar(image, ax=axes, label="RCS [dBsm]", pad=0.01, aspect=30)
+    # What is not known is above any error.
+    error = np.where(np.isfinite(error), error, np.inf)
     if error.min() < 1.0 < error.max():
         axes.contour(azimuth, elevation, error, levels=[1.0], colors="white", linewidths=0.8)
         axes.annotate("white: stated error 1 dB", (0.0, -0.16), xycoords="axes fraction", fontsize=8)
