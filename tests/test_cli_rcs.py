@@ -139,6 +139,8 @@ def test_many_elevations_are_drawn_as_a_map(plate, tmp_path):
         (["--shape", "plate", "--tolerance", "inf"], "between 0.001 and 40 dB"),
         (["--shape", "plate", "--azimuth", "1e30"], "ten turns"),
         (["--shape", "plate", "--material", "pecc"], "pec"),
+        (["--shape", "plate", "--crease", "10"], "built-in shape"),
+        (["tests/none.ply", "--crease", "181"], "0 to 180"),
         (["--shape", "plate", "--out", "no/such/place.csv"], "no directory"),
         (["--shape", "plate", "--out", "table.txt"], ".csv"),
         (["--shape", "plate", "--plot", "picture.tiff"], ".png"),
@@ -164,8 +166,45 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(plate, tmp_path, monkeypatch, c
     assert "interrupted" in capsys.readouterr().err
 
 
+def made(*errors):
+    n = len(errors)
+    return Rcs(np.ones(n), np.array(errors), np.full(n, 10), np.ones(n, int), np.zeros((n, 2, 2), complex))
+
+
 def test_missed_tolerance_is_told(capsys, monkeypatch):
-    one = Rcs(np.array([1.0]), np.array([0.7]), np.array([10]), np.array([1]))
-    monkeypatch.setattr("raychan.channel.rcs.rcs", lambda *_, **__: one)
+    monkeypatch.setattr("raychan.channel.rcs.rcs", lambda *_, **__: made(0.7))
     assert invoke(["rcs", "--shape", "plate"]) == 0
     assert "1 of 1 angles miss the tolerance of 0.25 dB; largest stated error: 0.70 dB" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("errors", [(0.1, np.nan, 0.2), (np.nan, np.nan, np.nan)])
+def test_an_unknown_error_is_never_a_figure(errors, tmp_path, capsys, monkeypatch):
+    known = made(*errors).converged
+    assert known.tolist() == [np.isfinite(e) for e in errors]
+    # The command asks for one angle at a time where there are few.
+    each = iter(errors)
+    monkeypatch.setattr("raychan.channel.rcs.rcs", lambda *_, **__: made(next(each)))
+    out, png = tmp_path / "a.csv", tmp_path / "a.png"
+    assert invoke(["rcs", "--shape", "plate", "--azimuth", "0:2:1", "--out", str(out), "--plot", str(png)]) == 0
+    said = capsys.readouterr()
+    assert said.out.split("written:")[0].count("unknown") == (~known).sum()
+    assert f"{(~known).sum()} of 3 angles did not converge: their error is unknown" in said.err
+    assert [(r["error_db"], r["converged"]) for r in rows(out)] == [
+        (f"{e:g}", "true") if np.isfinite(e) else ("", "false") for e in errors
+    ]
+    assert png.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_crease_angle_decides_and_doubtful_folds_are_told(tmp_path, capsys):
+    """A prism of 24 facets, seen at a corner: round by itself, flat by request."""
+    file, out = tmp_path / "prism.ply", tmp_path / "a.csv"
+    trimesh.creation.cylinder(0.05, 0.05, sections=24).export(file)
+    found = []
+    for crease in ("20", "10"):
+        assert invoke(["rcs", str(file), "--azimuth", "7.5", "--crease", crease, "--out", str(out)]) == 0
+        found.append(float(rows(out)[0]["rcs_dbsm"]))
+        told = "24 folds of up to 15 deg are taken for smooth; 24 of them may be edges: --crease decides"
+        assert (told in capsys.readouterr().err) == (crease == "20")
+    assert abs(found[0] - found[1]) > 1.0
+    assert invoke(["info", str(file)]) == 0
+    assert "24 folds of up to 15 deg" in " ".join(capsys.readouterr().err.split())

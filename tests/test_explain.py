@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from records import WAVE, paths, receiver, result
 
-from raychan.channel.rcs import stated_error
+from raychan.channel.error import stated_error
 from raychan.process.spectrum import range_doppler
 from raychan.radar.antenna import Isotropic
 from raychan.radar.sensor import Sensor

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.channel.rcs import stated_error
+from raychan.channel.error import stated_error
 from raychan.channel.solve import refinement, solve
 from raychan.run.chain import Clock, drowned, noise_of_cell, quiet_map, result_of, trace
 from raychan.signal.cube import synthesize

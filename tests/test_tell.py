@@ -13,12 +13,12 @@ from PIL import Image
 from records import paths, result
 from texts import ISOTROPIC, walker
 
+from raychan.channel.error import LARGEST, LARGEST_DB, SCATTER, stated_error
 from raychan.channel.occlusion import Occlusion
-from raychan.channel.rcs import stated_error
 from raychan.cli import invoke, show
 from raychan.report.canvas import figure as drawing
 from raychan.report.figures import _mark_detections, rdmap_picture
-from raychan.run.converged import LARGEST, LARGEST_DB, SCATTER, figure
+from raychan.run.converged import figure
 from raychan.run.ledger import UNKNOWN, Entry
 from raychan.run.store import load_result, save_result, summary
 from raychan.run.tell import counts, marks, noted, warned

@@ -29,7 +29,7 @@ def terminator_error(surface: Surface, leg: Leg, out: Leg, wavenumber: float, ro
     depth = 1.0 / (1.0 - cosine + (0.5 / size**2) ** (1.0 / 3.0))
     within = 1.0
     if sine > 1e-6:
-        across = np.cross(*ends) / sine
+        across = np.cross(ends[0], ends[1]) / sine
         for end, which in zip(ends, (col, row), strict=True):
             within *= float(np.linalg.norm(np.cross(theta_phi(end[None])[which][0], across)))
     smooth = _FOCK * 0.5 * (1.0 + cosine)

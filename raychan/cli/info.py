@@ -67,6 +67,8 @@ def info(
 def _mesh(mesh: Any, source: Path) -> None:
     import numpy as np
 
+    from raychan.world.readings import folds_told
+
     low, high = mesh.bounds
     areas = np.bincount(mesh.part, mesh.areas, minlength=len(mesh.part_names))
     counts = np.bincount(mesh.part, minlength=len(mesh.part_names))
@@ -82,7 +84,7 @@ def _mesh(mesh: Any, source: Path) -> None:
     screen.print(show.table(str(source), ("mesh", ""), facts, left=(0, 1)))
     parts = [(n, str(c), f"{a:.4g}") for n, c, a in zip(mesh.part_names, counts, areas, strict=True)]
     screen.print(show.table("", ("part", "facets", "area m2"), parts))
-    show.warn(r.warnings())
+    show.warn([*r.warnings(), *([folds] if (folds := folds_told(mesh, "crease_deg (raychan rcs: --crease)")) else [])])
 
 
 def _scene(scene: Any) -> None:

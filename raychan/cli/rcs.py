@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 _MOST_ANGLES = 1_000_000
 _CHUNKS = 50
-_UNSURE_DB = 60.0  # the error that raychan.rcs states where it knows nothing
 
 
 def rcs(
@@ -61,6 +61,14 @@ def rcs(
     scale: Annotated[
         float, typer.Option(help="Further factor on the mesh's size.", callback=within(limits.SCALE))
     ] = 1.0,
+    crease: Annotated[
+        float | None,
+        typer.Option(
+            help="Folds of the mesh under this angle are smooth; 20 if not given.",
+            metavar="DEG",
+            callback=within(limits.CREASE),
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Write a table to this file.", metavar="FILE.csv")
     ] = None,
@@ -80,7 +88,9 @@ def rcs(
         raise typer.BadParameter(f"{len(az) * len(el)} angles wanted; at most {_MOST_ANGLES} can be")
     if polar:
         _can_be_polar(plot, len(az), len(el))
-    mesh, name = _target(source or [], shape, unit, up, scale)
+    if shape is not None and crease is not None:
+        raise typer.BadParameter("--crease is for mesh files: a built-in shape knows which of its folds are edges")
+    mesh, name = _target(source or [], shape, unit, up, scale, crease)
     grid = np.meshgrid(az, el)
     try:
         far = float(distance)
@@ -116,7 +126,7 @@ def rcs(
     screen = show.console()
     screen.print(_table(title, rows))
     show.warn(mesh.report.warnings() if shape is None else [])
-    _warn(found, tolerance)
+    _warn(mesh, found, tolerance)
     if files:
         screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
 
@@ -164,14 +174,20 @@ def _can_be_polar(plot: Path | None, azimuths: int, elevations: int) -> None:
         raise typer.BadParameter(f"{elevations} cuts wanted; at most {MOST_CUTS} can be", param_hint="--polar")
 
 
-def _target(source: list[str], shape: str | None, unit: str, up: str | None, scale: float) -> tuple[Mesh, str]:
+def _target(
+    source: list[str], shape: str | None, unit: str, up: str | None, scale: float, crease: float | None
+) -> tuple[Mesh, str]:
     """Return the mesh of a file, or of a built-in shape with its parameters, and what to call it."""
     if shape is None:
+        from raychan.world.mesh import CREASE_DEG
         from raychan.world.meshfile import load
 
         if len(source) != 1:
             raise typer.BadParameter("one mesh file is wanted, or --shape NAME with its parameters")
-        return load(source[0], unit=unit, up=up, scale=scale), Path(source[0]).name
+        angle = CREASE_DEG if crease is None else crease
+        if not 0.0 <= angle <= 180.0:
+            raise typer.BadParameter(f"--crease: {angle:g} deg is not possible; allowed: 0 to 180")
+        return load(source[0], unit=unit, up=up, scale=scale, crease_deg=angle), Path(source[0]).name
     from raychan.world.shapes import build
 
     return build(shape, dict(_parameter(text) for text in source)), " ".join([shape, *source])
@@ -210,36 +226,49 @@ def _sweep(mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, A
             raise typer.BadParameter(str(error)) from error
         done += len(rows)
         tell("rcs", done / len(az))
-    return Rcs(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("sigma", "error_db", "rays", "bounces")))
+    return Rcs(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Rcs)))
 
 
-def _rows(az: Any, el: Any, found: Rcs) -> list[tuple[float, float, float, float, float, int, int]]:
+def _rows(az: Any, el: Any, found: Rcs) -> list[tuple[float, float, float, float, float, int, int, bool]]:
     import numpy as np
 
     with np.errstate(divide="ignore"):
         dbsm = 10.0 * np.log10(found.sigma)
-    columns = (az, el, found.sigma, dbsm, found.error_db, found.rays, found.bounces)
+    columns = (az, el, found.sigma, dbsm, found.error_db, found.rays, found.bounces, found.converged)
     return list(zip(*(c.tolist() for c in columns), strict=True))
 
 
 def _csv(rows: list[Any]) -> str:
-    head = "azimuth_deg,elevation_deg,sigma_m2,rcs_dbsm,error_db,rays,bounces"
-    lines = [f"{a:.10g},{e:.10g},{s:.8g},{d:.6g},{x:.4g},{r},{b}" for a, e, s, d, x, r, b in rows]
+    head = "azimuth_deg,elevation_deg,sigma_m2,rcs_dbsm,error_db,rays,bounces,converged"
+    lines = [
+        f"{a:.10g},{e:.10g},{s:.8g},{d:.6g},{f'{x:.4g}' if c else ''},{r},{b},{str(c).lower()}"
+        for a, e, s, d, x, r, b, c in rows
+    ]
     return "\n".join([head, *lines, ""])
 
 
 def _table(title: str, rows: list[Any]) -> Any:
     cells = [
-        (f"{a:g}", f"{e:g}", f"{d:.2f}", "unknown" if x >= _UNSURE_DB else f"{x:.3f}", f"{r}", f"{b}")
-        for a, e, _, d, x, r, b in rows
+        (f"{a:g}", f"{e:g}", f"{d:.2f}", f"{x:.3f}" if c else "unknown", f"{r}", f"{b}")
+        for a, e, _, d, x, r, b, c in rows
     ]
     heads = ("azimuth deg", "elevation deg", "RCS dBsm", "error dB", "rays", "bounces")
     return show.table(title, heads, cells, left=())
 
 
-def _warn(found: Rcs, tolerance: float) -> None:
+def _warn(mesh: Mesh, found: Rcs, tolerance: float) -> None:
+    """Tell in a line each how the mesh was read, if it may mean something else, and what missed the tolerance."""
+    from raychan.world.readings import folds_told
+
+    said = [text for text in [folds_told(mesh, "--crease")] if text]
+    known, count = found.converged, found.error_db.size
     over = int((found.error_db > tolerance).sum())
     if over:
-        count, worst = found.error_db.size, float(found.error_db.max())
-        most = "unknown" if worst >= _UNSURE_DB else f"{worst:.2f} dB"
-        show.warn([f"{over} of {count} angles miss the tolerance of {tolerance:g} dB; largest stated error: {most}"])
+        worst = float(found.error_db[known].max())
+        said.append(
+            f"{over} of {count} angles miss the tolerance of {tolerance:g} dB; largest stated error: {worst:.2f} dB"
+        )
+    if not known.all():
+        lost = int((~known).sum())
+        said.append(f"{lost} of {count} angles did not converge: their error is unknown")
+    show.warn(said)

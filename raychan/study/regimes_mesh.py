@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from raychan.channel.error import stated_error
 from raychan.channel.legs import Leg
-from raychan.channel.rcs import rcs, stated_error
+from raychan.channel.rcs import rcs
 from raychan.channel.surface import Surface
 from raychan.frames import rotation
 from raychan.study.regimes_base import (

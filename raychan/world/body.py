@@ -20,6 +20,7 @@ from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
 from raychan.world.meshfile import from_trimesh, load
 from raychan.world.motion import Motion
+from raychan.world.readings import folds_told
 
 ROLES = {"scatterer": SCATTERER, "mirror": MIRROR, "blocker": BLOCKER}
 _SIZES = (1e-3, 200.0)
@@ -165,6 +166,8 @@ class Body:
     def notes(self) -> list[str]:
         """Return warnings about a mesh from outside: its health, and a size that suggests another unit."""
         said = [] if self.shape else [f"body '{self.name}': {text}" for text in self.geometry.report.warnings()]
+        folds = folds_told(self.geometry, "crease_deg")
+        said += [f"body '{self.name}': {folds}"] if folds else []
         size = max(self.geometry.report.size)
         if self.shape is None and not _SIZES[0] * 10 <= size <= _SIZES[1]:
             said.append(f"body '{self.name}' is {size:.4g} m across: check unit and scale")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,12 +16,12 @@ from raychan.world.cores import closed_pieces, cores_of
 from raychan.world.errors import SceneError
 from raychan.world.flatten import merge_flat
 from raychan.world.joints import Joints, joined, places
+from raychan.world.smoothing import folds, smoothed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
 
 CREASE_DEG = 20.0
-_CANCELLED = 1e-9  # of their sum of sizes: weighted normals that leave no direction
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,8 @@ class Mesh:
     """Triangles in a body's own frame.
 
     Fields: vertices (v, 3) [m]; faces (f, 3), counter-clockwise seen from outside; part (f,) index into part_names;
-    normals (f, 3, 3) unit normals of the true surface at the corners; part_materials names by part, or ().
+    normals (f, 3, 3) unit normals of the true surface at the corners; part_materials names by part, or (); crease_deg
+    the fold [deg] under which edges were taken for smooth and normals estimated, None where they are known.
     """
 
     vertices: Floats
@@ -68,6 +69,7 @@ class Mesh:
     normals: Floats
     report: MeshReport
     part_materials: tuple[str, ...] = field(default=())
+    crease_deg: float | None = None
 
     @cached_property
     def joints(self) -> Joints:
@@ -83,6 +85,11 @@ class Mesh:
             solid = closed_pieces(self.joints, np.array(opaque, bool)[self.part])
             self._cores[opaque] = cores_of(self.corners[solid])
         return self._cores[opaque]
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What others found out about it, once."""
+        return {}
 
     @cached_property
     def _cores(self) -> dict[tuple[bool, ...], tuple[Floats, Floats]]:
@@ -154,35 +161,22 @@ def make_mesh(
     used, f = np.unique(f, return_inverse=True)
     v, f = v[used], f.reshape(-1, 3).astype(np.int32)
     report = _report(v, f, zero, twins, flipped)
-    return Mesh(v, f, kind, part_names, corner_normals, report, part_materials)
+    crease = crease_deg if normals is None else None
+    return Mesh(v, f, kind, part_names, corner_normals, report, part_materials, crease)
+
+
+def creased(mesh: Mesh, crease_deg: float) -> Mesh:
+    """Return a mesh with its normals estimated by another crease angle [deg]; itself where they are known."""
+    if mesh.crease_deg in (None, crease_deg):
+        return mesh
+    return replace(mesh, normals=smooth_normals(mesh.vertices, mesh.faces, crease_deg), crease_deg=crease_deg)
 
 
 def smooth_normals(vertices: Floats, faces: Ints, crease_deg: float = CREASE_DEG) -> Floats:
-    """Return corner normals (f, 3, 3), smoothed over edges that bend less than crease_deg.
-
-    Each face weighs by the sine of its corner over both edge lengths, which is exact for vertices on a sphere: an
-    angle of 0.1 degrees is 0.1 rad of two-way phase at 77 GHz over a 2 cm facet. Source: Max (1999), J. Graphics
-    Tools 4(2).
-    """
-    n = len(faces)
-    cross = _cross(vertices, faces)
-    unit = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+    """Return corner normals (f, 3, 3), smoothed over edges that bend less than crease_deg (see `smoothing`)."""
     a, b, ea, eb, opposed = _edge_pairs(faces)
-    soft = opposed & (np.einsum("ij,ij->i", unit[a], unit[b]) > np.cos(np.radians(crease_deg)))
-    a, b, ea, eb = a[soft], b[soft], ea[soft], eb[soft]
-    # Edge e runs from corner e to e + 1; its neighbour walks it the other way.
-    links = np.concatenate([[3 * a + ea, 3 * b + (eb + 1) % 3], [3 * a + (ea + 1) % 3, 3 * b + eb]], axis=1)
-    group = _components(links[0], links[1], 3 * n)
-    c = vertices[faces]
-    to_next, to_last = np.roll(c, -1, axis=1) - c, np.roll(c, 1, axis=1) - c
-    squares = np.einsum("nij,nij->ni", to_next, to_next) * np.einsum("nij,nij->ni", to_last, to_last)
-    weighted = (np.cross(to_next, to_last) / squares[..., None]).reshape(-1, 3)
-    total = np.stack([np.bincount(group, weighted[:, i]) for i in range(3)], axis=1)[group]
-    size = np.linalg.norm(total, axis=1, keepdims=True)
-    # About a point where a surface is folded on itself no normal is smooth: each facet keeps its own.
-    lost = size <= _CANCELLED * np.bincount(group, np.linalg.norm(weighted, axis=1))[group][:, None]
-    flat = np.repeat(unit, 3, axis=0)
-    return np.where(lost, flat, total / np.where(lost, 1.0, size)).reshape(n, 3, 3)
+    pair = np.stack([3 * a + ea, 3 * b + eb], axis=1)[opposed]
+    return smoothed(vertices, faces, pair[folds(vertices, faces, pair) < np.radians(crease_deg)])
 
 
 def _cross(v: Floats, f: Ints) -> Floats:

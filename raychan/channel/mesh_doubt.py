@@ -1,0 +1,86 @@
+"""What a mesh leaves open and physical optics cannot know, as parts of a cross-section's stated error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.surface import Surface
+from raychan.tables import Facets
+from raychan.world.readings import Readings
+
+Floats = NDArray[np.float64]
+
+# The factors were chosen on the shapes of tests/truth/shapes.py of seed 1; the test judges on another.
+_FITS = 1.5  # of what the other fit of normals changes: both miss alike in part
+_FACETS = 0.002  # of the value: what the quadratic patches behind facets miss although their normals are right
+_EDGES_DB = 1.1  # of what the doubtful folds as edges change, in dB
+_PARTLY = 0.5  # of the field's change: where some of the folds are edges, and not the others
+_CREEPING = 2.3  # of x^(4/3) exp(-2.2 x^(1/3)) / k: the creeping wave of a sphere of k a = x, at the most
+_RESONANCE = 6.0  # k a under which that falls again, but not what physical optics is off by
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Surfaces that a mesh may stand for beside the one taken: by another fit of its normals, and with edges."""
+
+    fitted: Surface | None
+    creased: Surface | None
+
+    @property
+    def rays(self) -> int:
+        """Rays cast on them so far."""
+        return sum(s.rays for s in (self.fitted, self.creased) if s is not None)
+
+    def error_db(
+        self, first: complex, value: complex, of: Callable[[Surface], complex], state: Callable[..., float]
+    ) -> float:
+        """Return the error [dB] to state for what a mesh leaves open.
+
+        Args: first, value the amplitudes of the surface taken by the first launch and by the last; of returns that of
+        another by the first; state turns (value, change, cover) into dB.
+        """
+        told = 0.0
+        if self.fitted is not None:
+            told += state(first, _FITS * abs(of(self.fitted) - first) + _FACETS * abs(first), 1.0)
+        if self.creased is not None and first and value:
+            other = of(self.creased)
+            partly = 20.0 * np.log10(1.0 + _PARTLY * abs(other - first) / abs(first))
+            apart = max(abs(20.0 * np.log10(max(abs(other), 1e-300) / abs(a))) for a in (first, value))
+            told += max(float(partly), _EDGES_DB * float(apart))
+        return told
+
+
+def doubt_of(facets: Facets, found: Readings) -> Doubt:
+    """Return the other surfaces of a body by itself, given the readings of its mesh."""
+    fitted, creased = (None if n is None else Surface(facets.replace(normals=n)) for n in (found.fitted, found.creased))
+    return Doubt(fitted, creased)
+
+
+def creeping(surface: Surface, wavenumber: float) -> tuple[float, float]:
+    """Return what waves creeping around a body change of its amplitude: at most [m] and at most as a share of it.
+
+    Both are those of the PEC sphere as wide as the body is at its thinnest, Mie's series less physical optics over
+    k a = 0.3 to 300; infinite cylinders of both polarisations lie below it. Nothing is said of bodies without curved
+    sides, which have no creeping wave, and of open sheets.
+    Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
+    """
+    if not surface.curved.any() or surface.both_sides.any():
+        return 0.0, 0.0
+    size = wavenumber * 0.5 * _thinnest(surface)
+    x = max(size, _RESONANCE)
+    wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-2.2 * np.cbrt(x))
+    return float(wave / wavenumber), float(2.0 * wave / max(size, 1e-300))
+
+
+def _thinnest(surface: Surface) -> float:
+    """Return the least extent [m] of a body along its principal axes."""
+    v = surface.facets.vertices
+    centre = np.average(v.mean(axis=1), axis=0, weights=surface.area)
+    off = (v - centre).reshape(-1, 3)
+    weight = np.repeat(surface.area, 3)
+    axes = np.linalg.eigh((off * weight[:, None]).T @ off)[1]
+    return float(np.ptp(off @ axes, axis=0).min())

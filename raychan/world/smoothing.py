@@ -1,0 +1,166 @@
+"""Normals of the smooth surface that a mesh stands for, estimated at its corners from the facets around them.
+
+Everywhere: vertices (v, 3) [m]; faces (f, 3); pair (e, 2) half edges of both sides of an edge, half edge 3 f + k runs
+from corner k of facet f to the next.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.signedinteger[Any]]
+Bools = NDArray[np.bool_]
+
+NEAR = 4.0
+"""Power of the distance by which neighbours weigh less in a fit."""
+_UNKNOWNS = 9
+_LEAST_PIVOT = 1e-4  # of equations scaled to a diagonal of ones: below it the neighbours do not determine a surface
+_FITTED = 0.3  # of the neighbours' rms height: what a fit to a smooth surface may leave of it
+_HUB = 30  # neighbours: the pole of a globe, whose other neighbours are too many and too far
+_CANCELLED = 1e-9  # of their sum of sizes: weighted normals that leave no direction
+_CHUNK = 8192  # vertices fitted at once
+
+
+def folds(vertices: Floats, faces: Ints, pair: Ints) -> Floats:
+    """Return the angle (e,) [rad] by which the facets of each pair turn from each other."""
+    unit = _unit(_cross(vertices, faces))
+    a, b = unit[pair[:, 0] // 3], unit[pair[:, 1] // 3]
+    sine = np.linalg.norm(np.cross(a, b), axis=1)
+    return np.arctan2(sine, np.einsum("ij,ij->i", a, b))
+
+
+def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> Floats:
+    """Return corner normals (f, 3, 3), smoothed over the edges given, which the facets walk in opposite ways.
+
+    Each face weighs by the sine of its corner over both edge lengths, which is exact for vertices on a sphere: an
+    angle of 0.1 degrees is 0.1 rad of two-way phase at 77 GHz over a 2 cm facet. On other bodies it is off by the
+    unevenness of the facets; where the neighbours determine a cubic surface, its gradient takes that out.
+    Sources: Max (1999), J. Graphics Tools 4(2); Cazals, Pouget (2005), Computer Aided Geometric Design 22, 121.
+    """
+    n = len(faces)
+    one, other = pair.T
+    # Edge e runs from corner e to e + 1; its neighbour walks it the other way.
+    links = np.concatenate([[one, _next(other)], [_next(one), other]], axis=1)
+    group = components(links.T, 3 * n)
+    c = vertices[faces]
+    to_next, to_last = np.roll(c, -1, axis=1) - c, np.roll(c, 1, axis=1) - c
+    squares = np.einsum("nij,nij->ni", to_next, to_next) * np.einsum("nij,nij->ni", to_last, to_last)
+    weighted = (np.cross(to_next, to_last) / np.maximum(squares, 1e-300)[..., None]).reshape(-1, 3)
+    count = int(group.max()) + 1
+    total = _sums(group, weighted, count)
+    # About a point where a surface is folded on itself no normal is smooth: each facet keeps its own.
+    whole = np.bincount(group, np.linalg.norm(weighted, axis=1), count)
+    lost = np.linalg.norm(total, axis=1) <= _CANCELLED * whole
+    total = _unit(total)
+    place = np.zeros_like(total)
+    place[group] = c.reshape(-1, 3)
+    shared = np.flatnonzero((np.bincount(group) > 1) & ~lost)
+    near = _neighbours(group.reshape(n, 3), len(total))
+    for some in np.array_split(shared, len(shared) // _CHUNK + 1):
+        total[some] = _corrected(place, total, some, near[some], power)
+    own = np.repeat(_unit(_cross(vertices, faces)), 3, axis=0)
+    return np.asarray(np.where(lost[group][:, None], own, total[group]).reshape(n, 3, 3))
+
+
+def components(links: Ints, n: int) -> NDArray[np.int64]:
+    """Return the number (n,) of the set that each of n things hangs together with by links (e, 2)."""
+    a, b = links.T
+    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _corrected(place: Floats, first: Floats, rows: Ints, near: csr_matrix, power: float) -> Floats:
+    """Return the normals of some smooth vertices, corrected by the cubic surface z(x, y) through their neighbours.
+
+    Args: place, first (g, 3) all vertices and their first normals; rows (m,) those wanted; near (m, g) neighbours.
+    """
+    normal, at = first[rows], np.repeat(np.arange(len(rows)), np.diff(near.indptr))
+    d = place[near.indices] - place[rows][at]
+    u, w = _frame(normal, d, at)
+    x, y, z = (np.einsum("ij,ij->i", d, axis[at]) for axis in (u, w, normal))
+    sx, sy = (_rms(c, at, len(rows)) for c in (x, y))
+    s, t, zx, zy = x / sx[at], y / sy[at], z / sx[at], z / sy[at]
+    # Heights over the square of the distance in space, not in the plane: a sphere is met exactly.
+    basis = np.stack([s, t, s * s + zx * zx, s * t, t * t + zy * zy, s**3, s * s * t, s * t * t, t**3], axis=1)
+    weight = np.maximum(s * s + t * t, 1e-12) ** (-0.5 * power)
+    solved, able = _least_squares(basis, weight, z, at, len(rows))
+    left = z - np.einsum("ij,ij->i", basis, solved[at])
+    rest, all_ = (np.bincount(at, weight * c * c, len(rows)) for c in (left, z))
+    able &= (np.diff(near.indptr) >= _UNKNOWNS) & (rest < _FITTED**2 * all_)
+    slope = solved[:, :2] / np.stack([sx, sy], axis=1)
+    # No first estimate is off by as much as the surface turns on the way to its neighbours.
+    able &= np.linalg.norm(slope, axis=1) < _rms(z, at, len(rows)) / np.hypot(sx, sy)
+    slope[~able] = 0.0
+    return _unit(normal - slope[:, :1] * u - slope[:, 1:] * w)
+
+
+def _least_squares(basis: Floats, weight: Floats, z: Floats, at: Ints, n: int) -> tuple[Floats, Bools]:
+    """Return the weighted least-squares fits (n, k) of z (m,) in a basis (m, k), grouped by at (m,), and which of them
+    the rows determine. Cholesky's method, all fits at once."""
+    k = basis.shape[1]
+    m, scaled = np.empty((n, k, k)), basis * weight[:, None]
+    for i in range(k):
+        m[:, i:, i] = m[:, i, i:] = _sums(at, scaled[:, i : i + 1] * basis[:, i:], n)
+    size = np.sqrt(np.maximum(np.einsum("nii->ni", m), 1e-300))
+    m /= size[:, :, None] * size[:, None, :]
+    y = _sums(at, scaled * z[:, None], n) / size
+    able = np.ones(n, bool)
+    for i in range(k):
+        able &= m[:, i, i] > _LEAST_PIVOT
+        pivot = np.where(able, m[:, i, i], 1.0)
+        factor = m[:, i + 1 :, i] / pivot[:, None]
+        m[:, i + 1 :, i:] -= factor[:, :, None] * m[:, i : i + 1, i:]
+        y[:, i + 1 :] -= factor * y[:, i : i + 1]
+    m[~able], y[~able] = np.eye(k), 0.0
+    for i in reversed(range(k)):
+        y[:, i] = (y[:, i] - np.einsum("nj,nj->n", m[:, i, i + 1 :], y[:, i + 1 :])) / m[:, i, i]
+    return y / size, able
+
+
+def _frame(normal: Floats, d: Floats, at: Ints) -> tuple[Floats, Floats]:
+    """Return two axes (n, 3) across each normal, the first along which its neighbours d (m, 3) reach farthest."""
+    u = _unit(np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])))
+    w = np.cross(normal, u)
+    x, y = np.einsum("ij,ij->i", d, u[at]), np.einsum("ij,ij->i", d, w[at])
+    xx, xy, yy = _sums(at, np.stack([x * x, x * y, y * y], axis=1), len(normal)).T
+    turn = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
+    return c * u + s * w, c * w - s * u
+
+
+def _neighbours(corners: NDArray[np.int64], n: int) -> csr_matrix:
+    """Return which of n smooth vertices are neighbours over two rings, given the facets' corners (f, 3)."""
+    a, b = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    one = coo_matrix((np.ones(2 * len(a), np.int32), (np.append(a, b), np.append(b, a))), shape=(n, n)).tocsr()
+    few = np.flatnonzero(np.diff(one.indptr) <= _HUB)
+    every = (one + one[:, few] @ one[few]).tocoo()
+    kept = every.row != every.col
+    return coo_matrix((every.data[kept], (every.row[kept], every.col[kept])), shape=(n, n)).tocsr()
+
+
+def _next(half: Ints) -> Ints:
+    return np.where(half % 3 == 2, half - 2, half + 1)
+
+
+def _sums(group: Ints, values: Floats, n: int) -> Floats:
+    return np.stack([np.bincount(group, column, n) for column in values.T], axis=1)
+
+
+def _rms(values: Floats, group: Ints, n: int) -> Floats:
+    count = np.maximum(np.bincount(group, minlength=n), 1)
+    return np.sqrt(np.maximum(np.bincount(group, values**2, n) / count, 1e-300))
+
+
+def _cross(v: Floats, f: Ints) -> Floats:
+    return np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
+
+
+def _unit(rows: Floats) -> Floats:
+    size = np.linalg.norm(rows, axis=1, keepdims=True)
+    return rows / np.where(size > 0.0, size, 1.0)

@@ -1,0 +1,90 @@
+"""What a mesh leaves open and physical optics cannot know is in the stated error, on shapes whose truth is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.special import h2vp, hankel2, jv, jvp
+from truth import mie, shapes
+
+from raychan.channel.mesh_doubt import creeping
+from raychan.channel.rcs import rcs
+from raychan.channel.surface import Surface
+from raychan.channel.target import facets_of
+from raychan.units import C0
+from raychan.world.mesh import make_mesh
+from raychan.world.meshfile import from_trimesh
+from raychan.world.readings import readings
+
+F = 77e9
+K = 2.0 * np.pi * F / C0
+
+
+def db(x):
+    return 10.0 * np.log10(x)
+
+
+@pytest.mark.parametrize(("subdivisions", "most_deg"), [(3, 0.1), (4, 0.03), (5, 0.005)])
+@pytest.mark.parametrize("axes", [(0.2, 0.2, 0.2), (0.3, 0.2, 0.12)])
+def test_estimated_normals_of_an_ellipsoid_are_its_gradient(axes, subdivisions, most_deg):
+    mesh = from_trimesh(trimesh.creation.icosphere(subdivisions).apply_scale(axes))
+    true = mesh.corners / np.square(axes)
+    true /= np.linalg.norm(true, axis=2, keepdims=True)
+    assert np.degrees(np.linalg.norm(mesh.normals - true, axis=2)).max() < most_deg
+
+
+def test_an_ellipsoid_of_many_facets_is_its_closed_form():
+    """Physical optics of an ellipsoid, terminator and all; the first estimate of normals was 0.2 dB off."""
+    axes, rng = np.array([0.3, 0.2, 0.12]), np.random.default_rng(5)
+    mesh = trimesh.creation.icosphere(5).apply_scale(axes)
+    az, el = rng.uniform(-180.0, 180.0, 6), rng.uniform(-60.0, 60.0, 6)
+    got = rcs(mesh, F, az, el)
+    looks = (shapes.po.direction(np.radians(a), np.radians(e)) for a, e in zip(az, el, strict=True))
+    error = np.abs(db(got.sigma / [4 * np.pi * abs(shapes.ellipsoid(axes, d)) ** 2 for d in looks]))
+    assert error.max() < 0.05
+    assert (error <= got.error_db).mean() > 0.8
+
+
+def test_the_stated_error_covers_smooth_and_flat_bodies_not_looked_at_before():
+    """Seed 12; factors were chosen on seed 1. An error that is not known covers nothing and is left out."""
+    _, e, s = shapes.judged(12, 80)
+    known = np.isfinite(s)
+    assert known.mean() > 0.8
+    assert np.mean(e[known] <= s[known]) >= 0.95
+    assert np.median(s[known] / e[known]) < 5.0
+
+
+def test_a_mesh_that_knows_its_normals_is_in_no_doubt():
+    ball = trimesh.creation.icosphere(2, 0.1)
+    mesh = make_mesh(ball.vertices, ball.faces, normals=np.asarray(ball.vertices)[ball.faces] / 0.1)
+    found = readings(mesh)
+    assert found.fitted is None and found.creased is None
+    assert readings(from_trimesh(trimesh.creation.box())).creased is None
+
+
+def test_small_spheres_lie_within_the_stated_error():
+    """Mie's series at ka = 1 to 50, where a wave creeps around the sphere, and little of it at ka = 300."""
+    sizes = np.concatenate([np.geomspace(1.0, 50.0, 25), [300.0]])
+    got = [rcs(trimesh.creation.icosphere(3, ka / K), F, 20.0, 10.0) for ka in sizes]
+    error = [abs(db(float(g.sigma) / mie.rcs(ka / K, K))) for g, ka in zip(got, sizes, strict=True)]
+    stated = np.array([float(g.error_db) for g in got])
+    known = np.isfinite(stated)
+    assert known[sizes > 2.0].all()
+    assert (np.array(error)[known] <= stated[known]).all()
+    assert stated[-1] < 0.1
+
+
+@pytest.mark.parametrize("radius_k", [1.5, 4.0, 12.0, 40.0])
+def test_thin_cylinders_lie_within_what_creeping_waves_may_change(radius_k):
+    """The series of the infinite cylinder, both polarisations (Harrington 1961, sec. 5-9), and physical optics."""
+    n = np.arange(int(radius_k + 6 * radius_k ** (1 / 3) + 14))
+    fold = np.where(n == 0, 1.0, 2.0) * (-1.0) ** n
+    node, weight = np.polynomial.legendre.leggauss(400)
+    angle = 0.5 * np.pi * node
+    lit = np.sum(0.5 * np.pi * weight * np.cos(angle) * np.exp(2j * radius_k * np.cos(angle)))
+    optics = abs(0.5 * radius_k * lit)
+    mesh = trimesh.creation.cylinder(radius_k / K, 40.0 / K, sections=64)
+    share = creeping(Surface(facets_of(mesh, "pec", F)), K)[1]
+    for field in (jv(n, radius_k) / hankel2(n, radius_k), jvp(n, radius_k) / h2vp(n, radius_k)):
+        assert abs(abs(np.sum(fold * field)) / optics - 1.0) < share
