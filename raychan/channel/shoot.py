@@ -41,7 +41,8 @@ def tube_routes(
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
     mirror_planes = _planes_in(surface, outs)
-    for tubes in launch(surface, leg, direct, bodies, found, more):
+    others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
+    for tubes in launch(surface, leg, direct, bodies, found, more, others):
         if first is not None:
             first(tubes, found)
         yield from _followed(surface, leg, outs, tubes, mirror_planes, bounces, found, first is None)
