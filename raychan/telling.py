@@ -16,7 +16,6 @@ import numpy as np
 from raychan.units import C0, db, dbm
 
 _ROWS = 12
-_UNSURE_DB = 60.0  # as an error it stands for "unknown"
 
 
 @dataclass(frozen=True)
@@ -184,7 +183,7 @@ def _scene(scene: Any) -> Facts:
 
 def _result(r: Any) -> Facts:
     heads, rows = detection_rows(r.detections)
-    why = [(f"{e.error_db:.2f}" if e.error_db < _UNSURE_DB else "unknown", e.label, e.bodies) for e in r.provenance]
+    why = [(f"{e.error_db:.2f}" if e.converged else "unknown", e.label, e.bodies) for e in r.provenance]
     name = r.scene.title if r.scene is not None else r.path
     lines = [("paths", f"{len(r.paths.delay):,}"), ("seed", str(r.seed)), *(("warning", text) for text in r.warnings)]
     lines.append(("detections", str(len(rows))))

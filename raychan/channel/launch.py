@@ -26,6 +26,7 @@ from raychan.channel.tubes import (
     stand,
     unit,
 )
+from raychan.kernels.horizon import OBLIQUE
 from raychan.kernels.lit import lit_parts
 from raychan.kernels.patch import edge_to_cut, halved
 from raychan.kernels.sight import aims, partly_seen, put_down, read_rays
@@ -36,14 +37,17 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 _BATCH = 1 << 17  # tubes launched at once: few scenes have more on one leg
+RUNNING = 0.1  # of what tubes that do not face an end would add up to in phase: about what they do
 GAPS = 1  # cuts of a hidden tube in search of a part that is seen
 
 
-def launch(surface: Surface, leg: Leg, out: Leg, pieces: Bools, found: Found, more: bool) -> Iterator[Tubes]:
+def launch(
+    surface: Surface, leg: Leg, out: Leg, pieces: Bools, found: Found, more: bool, others: list[Leg]
+) -> Iterator[Tubes]:
     """Yield the tubes of first bounces seen over `leg`, fine enough for a return over `out`, in batches.
 
     Args: pieces (p,) which may carry a first bounce; those of the leg's own mirrors never do; found what was so far;
-    more whether the tubes will bounce again.
+    more whether the tubes will bounce again; others by which they may leave too.
     """
     f, rule = surface.facets, found.rule
     shape = f.vertices, f.normals, surface.bulge
@@ -53,7 +57,25 @@ def launch(surface: Surface, leg: Leg, out: Leg, pieces: Bools, found: Found, mo
     facet = seeds(surface, leg, allowed)
     for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
         part, bary = lit_parts(part, bary, *shape, surface.both_sides, leg.image, leg.far)
-        yield _cut_for_sight(surface, leg, out, stand(surface, leg, part, bary), found, more)
+        tubes = stand(surface, leg, part, bary)
+        if leg.mirrors:
+            tubes = _returning(surface, leg, out, others, tubes, found)
+        yield _cut_for_sight(surface, leg, out, tubes, found, more)
+
+
+def _returning(surface: Surface, leg: Leg, out: Leg, others: list[Leg], tubes: Tubes, found: Found) -> Tubes:
+    """Return the tubes that face the end of `out`, and of the rest what counts over it or one of the others."""
+    _, facing = out.radiating(tubes.points, tubes.k, tubes.normals, OBLIQUE)
+    away = np.flatnonzero(~facing)
+    some, best, length = tubes.take(away), np.zeros(len(away)), np.zeros(len(away))
+    for other in [out, *others] if len(away) else []:
+        share, _ = other.radiating(some.points, some.k, some.normals, OBLIQUE)
+        ph = phases_of(surface, leg, other, some, found.rule)
+        better = ph.bound * share > best
+        best[better], length[better] = (ph.bound * share)[better], ph.length[better]
+    keep = facing.copy()
+    keep[away[found.that_count(RUNNING * best, length, 0)]] = True
+    return tubes.take(keep)
 
 
 def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> Iterator[tuple[Ints, Floats]]:

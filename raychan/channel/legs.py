@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.channel.beam import Beam
 from raychan.channel.surface import Surface
 from raychan.kernels.chains import bounces, may_leave, possible, rays_from, stretch, weights
+from raychan.kernels.horizon import radiating
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -141,6 +142,11 @@ class Leg:
         """Tell from which tubes (n, 4, 3) [m] something could come to the end by way of each mirror's circle."""
         ok: Bools = may_leave(points, *self._chain)
         return ok
+
+    def radiating(self, points: Floats, k: Floats, normals: Floats, which: int) -> tuple[Floats, Bools]:
+        """Tell which tubes radiate towards the end, and which face it (see `kernels.horizon.radiating`)."""
+        share, facing = radiating(points, k, normals, self.image, self.far, which)
+        return share, facing
 
     def visible(
         self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from raychan.channel.cut import divide, halves
 from raychan.channel.found import Found
-from raychan.channel.launch import GAPS, sight
+from raychan.channel.launch import GAPS, RUNNING, sight
 from raychan.channel.legs import Leg, View
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import Phases, Tubes, phases_of
 from raychan.frames import sizes
-from raychan.kernels.horizon import FACING, OBLIQUE, radiating
+from raychan.kernels.horizon import FACING, LIT, OBLIQUE
 from raychan.kernels.sight import BENT, READY, SHADED, sort_out
 
 Floats = NDArray[np.float64]
@@ -38,18 +38,20 @@ def settle(
     kept: list[tuple[Tubes, View, Phases]] = []
     rule = found.rule
     for level in range(rule.levels + 1):
-        share, facing = radiating(tubes.points, tubes.k, tubes.normals, out.image, out.far, which)
+        share, facing = out.radiating(tubes.points, tubes.k, tubes.normals, which)
         rows = np.flatnonzero(share > 0.0)
         tubes, share, facing = tubes.take(rows), share[rows], facing[rows]
         ph = phases_of(surface, leg, out, tubes, rule)
         if which == OBLIQUE and not facing.all():
             # Beyond the horizon most is out of phase with its neighbours, and little of it counts.
             weak = np.flatnonzero(~facing)
-            left = found.that_count(ph.bound[weak] * share[weak], ph.length[weak], 0)
+            left = found.that_count(RUNNING * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
         matters = ph.bound > found.doubt(ph.length)
-        view = sight(surface, out, tubes, matters, first, rule, level < GAPS, beyond=~facing)
+        # Of what little a scene sees of them, currents beyond the horizon are asked for by their centres alone.
+        asked = matters if which == LIT else matters & facing
+        view = sight(surface, out, tubes, asked, first, rule, level < GAPS, beyond=~facing)
         cut = matters if level < rule.levels else np.zeros_like(matters)
         if veiled:
             view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False

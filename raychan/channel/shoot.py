@@ -42,7 +42,8 @@ def tube_routes(
     found = so_far or Found(rule)
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
     images = _Images.of(surface, outs)
-    for tubes in launch(surface, leg, direct, pieces, found, more):
+    others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
+    for tubes in launch(surface, leg, direct, pieces, found, more, others):
         if first is not None:
             first(tubes, found)
         yield from _followed(surface, leg, outs, tubes, images, bounces, found, first is None)

@@ -21,16 +21,16 @@ def terminator_error(surface: Surface, leg: Leg, out: Leg, wavenumber: float, ro
     Args: row, col polarisation (V, H) of receiver and transmitter. Source: Bowman, Senior, Uslenghi, Electromagnetic
     and Acoustic Scattering by Simple Shapes, 1969, ch. 10.
     """
-    ends = [x.end / np.linalg.norm(x.end) for x in (leg, out)]
-    cosine = float(np.clip(-ends[0] @ ends[1], -1.0, 1.0))
+    tx, rx = (np.asarray(x.end / np.linalg.norm(x.end), float) for x in (leg, out))
+    cosine = float(np.clip(-tx @ rx, -1.0, 1.0))
     sine = float(np.sqrt(1.0 - cosine**2))
     size = wavenumber * float(np.sqrt(surface.area.sum() / (4.0 * np.pi)))
     ring = size * min(1.0, float(np.sqrt(2.0 / (np.pi * size * max(sine, 1e-12)))))
     depth = 1.0 / (1.0 - cosine + (0.5 / size**2) ** (1.0 / 3.0))
     within = 1.0
     if sine > 1e-6:
-        across = np.cross(ends[0], ends[1]) / sine
-        for end, which in zip(ends, (col, row), strict=True):
+        across = np.cross(tx, rx) / sine
+        for end, which in ((tx, col), (rx, row)):
             within *= float(np.linalg.norm(np.cross(theta_phi(end[None])[which][0], across)))
     smooth = _FOCK * 0.5 * (1.0 + cosine)
     return ring * depth * (within * sine + smooth) / wavenumber

@@ -11,7 +11,6 @@ from raychan.report.canvas import PALETTE, drawn_as, figure, style
 
 Floats = NDArray[np.float64]
 
-UNSURE_DB = 60.0  # the error that raychan.rcs states where it knows nothing
 _ROUNDING_DB = 20.0 * np.log10(np.finfo(float).eps)  # so far below its peak a pattern is but rounding: no return
 MOST_CUTS = 8
 """Cuts that are drawn as lines; more become a map."""
@@ -31,7 +30,6 @@ def rcs_picture(
     Args: azimuth (a,) and elevation (e,) [deg], dbsm and error_db (e, a) [dBsm, dB]; title a line; suffix of the file;
     polar: angle round a circle, which at most MOST_CUTS cuts can be. One angle is written as a figure.
     """
-    error_db = np.where(error_db < UNSURE_DB, error_db, np.nan)
     dbsm = np.where(dbsm > dbsm.max() + _ROUNDING_DB, dbsm, -np.inf)
     with style():
         made = figure(6.4, 6.0) if polar and dbsm.size > 1 else figure(7.6, 4.2)
@@ -124,7 +122,7 @@ def _map(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Flo
     shown = np.where(np.isfinite(dbsm), dbsm, np.nan)
     image = axes.pcolormesh(azimuth, elevation, shown, cmap="viridis", shading="nearest", rasterized=True)
     made.colorbar(image, ax=axes, label="RCS [dBsm]", pad=0.01, aspect=30)
-    wide = np.where(np.isnan(error), UNSURE_DB, error)
+    wide = np.where(np.isnan(error), np.inf, error)
     if wide.min() < 1.0 < wide.max():
         axes.contour(azimuth, elevation, wide, levels=[1.0], colors="white", linewidths=0.8)
         axes.annotate("white line: stated error 1 dB", (0.0, -0.16), xycoords="axes fraction", fontsize=8)
