@@ -9,7 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from raychan.study import regimes_angle, regimes_leaks, regimes_material, regimes_mesh, regimes_rays, regimes_signal
+from raychan.study import (
+    regimes_angle,
+    regimes_inside,
+    regimes_leaks,
+    regimes_material,
+    regimes_mesh,
+    regimes_rays,
+    regimes_signal,
+)
 from raychan.study.regimes_base import Outcome, Regime, Row
 
 Progress = Callable[[str, float], None]
@@ -19,6 +27,7 @@ REGIMES: tuple[Regime, ...] = (
     *regimes_leaks.REGIMES,
     *regimes_rays.REGIMES,
     *regimes_mesh.REGIMES,
+    *regimes_inside.REGIMES,
     *regimes_material.REGIMES,
     *regimes_signal.REGIMES,
 )
