@@ -9,6 +9,7 @@ from helpers import facets, ground, quad
 
 from raychan.channel.launch import sight
 from raychan.channel.legs import Leg, Mirror
+from raychan.channel.shadows import shadows_of
 from raychan.channel.surface import Surface
 from raychan.channel.tubes import Refinement, stand
 from raychan.kernels.lit import lit_parts
@@ -117,3 +118,18 @@ def test_parts_that_are_lit_are_where_points_face_the_source(end):
     sure = np.abs(cosine) > 0.02
     np.testing.assert_array_equal(within[sure], cosine[sure] > 0.0)
     assert (within & sure).any() and not within.all()
+
+
+def test_a_tube_far_beside_all_silhouettes_has_no_shadow():
+    # The grid of the silhouettes' directions spans 1 mm; the wall, 160 degrees.
+    crumb = trimesh.creation.box(extents=(1e-3, 1e-3, 1e-3))
+    crumb.apply_translation((4.0, 0.0, 0.0))
+    wide = across(6.0, (-30.0, -30.0), (30.0, 30.0))
+    surface = Surface(facets([crumb, wide], role=[0, 1]))
+    leg = Leg(end=np.zeros(3))
+    tubes = small_tubes(surface, leg, np.random.default_rng(3))
+    side = shadows_of(surface, leg).across(tubes.points, tubes.facet, np.full(len(tubes), 1e-5))
+    y, z = tubes.points[..., 1], tubes.points[..., 2]
+    clear = (np.hypot(y, z) > 20.0).all(axis=1) & ((y > 1.0).all(axis=1) | (z > 1.0).all(axis=1))
+    assert clear.sum() > 20
+    assert not side[clear].any()

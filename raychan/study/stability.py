@@ -8,7 +8,16 @@ from pathlib import Path
 from time import perf_counter
 
 from raychan.run.files import csv_bytes, write_whole
-from raychan.study import regimes_angle, regimes_leaks, regimes_material, regimes_mesh, regimes_rays, regimes_signal
+from raychan.study import (
+    regimes_angle,
+    regimes_inside,
+    regimes_leaks,
+    regimes_material,
+    regimes_mesh,
+    regimes_rays,
+    regimes_signal,
+    regimes_worlds,
+)
 from raychan.study.regimes_base import Outcome, Regime, Row
 
 Progress = Callable[[str, float], None]
@@ -18,8 +27,10 @@ REGIMES: tuple[Regime, ...] = (
     *regimes_leaks.REGIMES,
     *regimes_rays.REGIMES,
     *regimes_mesh.REGIMES,
+    *regimes_inside.REGIMES,
     *regimes_material.REGIMES,
     *regimes_signal.REGIMES,
+    *regimes_worlds.REGIMES,
 )
 HEADS = ("regime", "case", "expected", "seen", "tolerance", "unit", "passed", "truth", "note")
 
