@@ -8,7 +8,8 @@ from weakref import proxy
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.edge_grid import fill_grid, packed
+from raychan.channel.cells import ALONG, BLOCK, crowded, layer, layers, span, widths
+from raychan.channel.edge_grid import fill_grid, most_within, packed
 from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, within
 from raychan.channel.surface import Surface
 from raychan.kernels.jit import njit
@@ -22,11 +23,8 @@ Bools = NDArray[np.bool_]
 
 _MOST_CELLS = 2_000_000
 _LEAST_CELL = 0.02  # m
-_BLOCK = 8  # cells a side that are passed over at once where they hold no edge
 _WIDE = 150  # cells in a layer beyond which a tube is halved before anyone asks what stands in it
 _ABREAST = 10  # cells beyond which this holds for a fan of rays of which some run along the layers
-_ALONG = 0.1  # cosine to the axis under which rays do
-_BESIDE = 0.25  # cells that a tube is taken to be wider: edges are in the cells that they pass within half of one
 _MANY = 500  # tubes from which on a second thread pays
 _CLEAR = 1e-5  # m: what lies nearer to a surface belongs to it
 
@@ -39,6 +37,7 @@ class Between:
         self.surface = proxy(surface)
         ends = surface.edge_ends
         low, high = (ends.min(axis=(0, 1)), ends.max(axis=(0, 1))) if len(ends) else (np.zeros(3), np.ones(3))
+        low, high, self.cut_off = most_within(ends.mean(axis=1), low, high)
         volume = float(np.prod(high - low + _LEAST_CELL))
         self.cell = max(_LEAST_CELL, (volume / _MOST_CELLS) ** (1.0 / 3.0))
         self.low = low - self.cell
@@ -46,8 +45,8 @@ class Between:
         self.first, self.index = fill_grid(ends, self.low, self.cell, self.shape)
         self.edges, self.planes = packed(self.index, ends, surface.edge_faces, surface.normal)
         held = np.flatnonzero(np.diff(self.first))
-        blocks = np.stack(np.unravel_index(held, tuple(self.shape))) // _BLOCK
-        self.crowd = np.zeros(tuple(self.shape // _BLOCK + 1), np.bool_)
+        blocks = np.stack(np.unravel_index(held, tuple(self.shape))) // BLOCK
+        self.crowd = np.zeros(tuple(self.shape // BLOCK + 1), np.bool_)
         self.crowd[tuple(blocks)] = True
         centre, radius, empty = surface.balls
         solid = ~empty & (surface.facets.role != MIRROR)
@@ -78,8 +77,8 @@ class Between:
         def some(part: slice) -> None:
             _across(
                 rows[part], points, k, length, far, flat, hit, reach, s.extent, s.first, s.normal,
-                self.edges, self.planes, self.first, self.index, self.low, self.cell, self.shape, self.crowd,
-                self.centre, self.radius, side,
+                self.edges, self.planes, self.first, self.index, self.low, self.cell, self.shape, self.cut_off,
+                self.crowd, self.centre, self.radius, side,
             )  # fmt: skip
 
         in_two(len(rows), some, _MANY)
@@ -95,68 +94,6 @@ def between(surface: Surface) -> Between:
 
 
 @njit(cache=True, forceinline=True)
-def _widths(points, ks):  # type: ignore[no-untyped-def]
-    """Return how far a tube's corners lie from its centre [m], and how far its rays spread for each metre."""
-    wide, spread = 0.0, 0.0
-    for q in range(3):
-        a, b = 0.0, 0.0
-        for c in range(3):
-            a += (points[q, c] - points[3, c]) ** 2
-            b += (ks[q, c] - ks[3, c]) ** 2
-        wide, spread = max(wide, a), max(spread, b)
-    wide, spread = np.sqrt(wide), np.sqrt(spread)
-    return wide, spread
-
-
-@njit(cache=True, forceinline=True)
-def _span(points, ks, wide, spread, reach, ball, radius):  # type: ignore[no-untyped-def]
-    """Return from where to where (to `reach`) a tube passes through the balls about bodies; equal: nowhere."""
-    begin, end = np.inf, 0.0
-    for j in range(len(ball)):
-        along, apart = 0.0, 0.0
-        for c in range(3):
-            d = ball[j, c] - points[3, c]
-            along += d * ks[3, c]
-            apart += d * d
-        size = radius[j] + wide + spread * max(along, 0.0)
-        room = size * size - (apart - along * along)
-        if room <= 0.0:
-            continue
-        half = np.sqrt(room)
-        if along + half <= 0.0:
-            continue
-        begin, end = min(begin, max(along - half, 0.0)), max(end, along + half)
-    end = min(end, reach)
-    return (begin, end) if begin < end else (0.0, 0.0)
-
-
-@njit(cache=True, forceinline=True, error_model="numpy")
-def _layer(points, ks, axis, at, count, near, far_off, low, cell, shape, begin, end):  # type: ignore[no-untyped-def]
-    """Write the box of cells that a tube passes from `near` to `far_off` along its rays in `count` layers of cells
-    across an axis, from layer `at` on; return how many there are in one layer."""
-    floor, room, per = low[axis] + cell * (at - _BESIDE), 1, 1.0 / cell
-    for c in range(3):
-        begin[c], end[c] = shape[c], 0
-    for q in range(4):
-        along, start, stop = ks[q, axis], near, far_off
-        # A ray that runs along the layers counts whole.
-        if abs(along) > _ALONG:
-            over = 1.0 / along
-            one = (floor - points[q, axis]) * over
-            other = one + (count + 2.0 * _BESIDE) * cell * over
-            start = min(max(min(one, other), near), far_off)
-            stop = min(max(max(one, other), near), far_off)
-        for c in range(3):
-            x, y = points[q, c] + start * ks[q, c], points[q, c] + stop * ks[q, c]
-            begin[c] = min(begin[c], max(int((min(x, y) - low[c]) * per - _BESIDE), 0))
-            end[c] = max(end[c], min(int((max(x, y) - low[c]) * per + _BESIDE) + 1, shape[c]))
-    begin[axis], end[axis] = max(at, 0), min(at + count, shape[axis])
-    for c in range(3):
-        room *= max(end[c] - begin[c], 0) if c != axis else 1
-    return room
-
-
-@njit(cache=True, forceinline=True)
 def _steepest(k):  # type: ignore[no-untyped-def]
     """Return the axis along which a ray runs most."""
     axis = 0
@@ -165,38 +102,16 @@ def _steepest(k):  # type: ignore[no-untyped-def]
     return axis
 
 
-@njit(cache=True, forceinline=True)
-def _layers(points, ks, axis, near, far_off, low, cell, shape):  # type: ignore[no-untyped-def]
-    """Return the first and the last layer across an axis that a tube passes."""
-    least, most = np.inf, -np.inf
-    for q in range(4):
-        x, y = points[q, axis] + near * ks[q, axis], points[q, axis] + far_off * ks[q, axis]
-        least, most = min(least, x, y), max(most, x, y)
-    first = max(int((least - low[axis]) / cell - _BESIDE), 0)
-    return first, min(int((most - low[axis]) / cell + _BESIDE), shape[axis] - 1)
-
-
-@njit(cache=True, forceinline=True)
-def _crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
-    """Tell whether any block of a box of cells holds an edge."""
-    for i in range(begin[0] // _BLOCK, (end[0] + _BLOCK - 1) // _BLOCK):
-        for j in range(begin[1] // _BLOCK, (end[1] + _BLOCK - 1) // _BLOCK):
-            for k in range(begin[2] // _BLOCK, (end[2] + _BLOCK - 1) // _BLOCK):
-                if crowd[i, j, k]:
-                    return True
-    return False
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def _across(  # type: ignore[no-untyped-def]
     rows, points, ks, length, far, flat, hit, reach, extent, first_point, normal, edges, sheets, first, index, low,
-    cell, shape, crowd, ball, radius, out,
+    cell, shape, cut_off, crowd, ball, radius, out,
 ):  # fmt: skip
     tried = np.full(len(edges), -1, np.int32)
     side, source, planes, section = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 3))
     begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
-    # Not constants: for each of those the compiler would make `_layer` anew.
-    single, many = np.int64(1), np.int64(_BLOCK)
+    # Not constants: for each of those the compiler would make `layer` anew.
+    single, many = np.int64(1), np.int64(BLOCK)
     for i in rows:
         centre, k = points[i, 3], ks[i, 3]
         lands = hit[i, 3] >= 0
@@ -208,31 +123,46 @@ def _across(  # type: ignore[no-untyped-def]
         here = pyramid(points[i], source, k, parallel, planes)
         for q in range(4):
             copy_to(section[q], points[i, q])
-        wide, spread = _widths(points[i], ks[i])
+        wide, spread = widths(points[i], ks[i])
         far_end = reach[i, 3] if lands else extent
-        begin_at, end_at = _span(points[i], ks[i], wide, spread, far_end, ball, radius)
+        begin_at, end_at = span(points[i], ks[i], wide, spread, far_end, ball, radius)
         axis = _steepest(k)
         for q in range(3):
-            if ks[i, q, axis] * math.copysign(1.0, k[axis]) <= _ALONG:
+            if ks[i, q, axis] * math.copysign(1.0, k[axis]) <= ALONG:
                 end_at = min(end_at, _ABREAST * cell / spread)
         (x, y, z), w = (-k, 0.0) if parallel else (source, 1.0)
         best = 0.0
-        low_layer, high_layer = _layers(points[i], ks[i], axis, begin_at, end_at, low, cell, shape)
-        layers = high_layer - low_layer + 1 if end_at > begin_at else 0
+        low_layer, high_layer = layers(points[i], ks[i], axis, begin_at, end_at, low, cell, shape, cut_off)
+        count = high_layer - low_layer + 1 if end_at > begin_at else 0
         clear_until = 0
-        for s in range(layers):
+        for s in range(count):
             if s < clear_until:
                 continue
             # From the mirror on: what is far off is left out where the tube grows too wide.
             at_layer = low_layer + s if k[axis] > 0.0 else high_layer - s
-            if s % _BLOCK == 0:
-                block = at_layer if k[axis] > 0.0 else at_layer - _BLOCK + 1
-                _layer(points[i], ks[i], axis, block, many, begin_at, end_at, low, cell, shape, begin_cell, end_cell)
-                if not _crowded(crowd, begin_cell, end_cell):
-                    clear_until = s + _BLOCK
+            if s % BLOCK == 0:
+                block = at_layer if k[axis] > 0.0 else at_layer - BLOCK + 1
+                layer(
+                    points[i], ks[i], axis, block, many, begin_at, end_at, low, cell, shape, cut_off, begin_cell,
+                    end_cell,
+                )  # fmt: skip
+                if not crowded(crowd, begin_cell, end_cell):
+                    clear_until = s + BLOCK
                     continue
-            room = _layer(
-                points[i], ks[i], axis, at_layer, single, begin_at, end_at, low, cell, shape, begin_cell, end_cell
+            room = layer(
+                points[i],
+                ks[i],
+                axis,
+                at_layer,
+                single,
+                begin_at,
+                end_at,
+                low,
+                cell,
+                shape,
+                cut_off,
+                begin_cell,
+                end_cell,
             )
             if room > _WIDE:
                 break

@@ -3,9 +3,38 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.channel.edges import starts_again
 from raychan.kernels.jit import njit
+
+Floats = NDArray[np.float64]
+
+
+_CROWD = 0.05  # of the edges on either side, which are not counted to where most are
+_ROOM = 2.0  # widths of where most edges are, that a grid reaches beyond it
+_SPREAD = 4.0  # times the width of such a grid that edges spread before it is used
+
+
+def most_within(middle: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, bool]:
+    """Return the bounds of a grid for edges of these middles (n, 3) and bounds low, high (3,), and whether it is cut
+    off where few edges are: a spike of a kilometre must not leave a body of a metre in one cell.
+
+    What is beyond such a grid belongs to its outermost cells.
+    """
+    if len(middle) == 0:
+        return low, high, False
+    first, last = np.quantile(middle, (_CROWD, 1.0 - _CROWD), axis=0)
+    width = float((last - first).max())
+    if not 0.0 < (1.0 + 2.0 * _ROOM) * width * _SPREAD < float((high - low).max()):
+        return low, high, False
+    return np.maximum(low, first - _ROOM * width), np.minimum(high, last + _ROOM * width), True
+
+
+@njit(cache=True, inline="always")
+def _held(at, count):  # type: ignore[no-untyped-def]
+    """Return the number of a cell, the outermost for what is beyond."""
+    return int(min(max(at, 0.0), count - 1.0))
 
 
 @njit(cache=True, nogil=True)
@@ -22,9 +51,9 @@ def fill_grid(ends, low, cell, shape):  # type: ignore[no-untyped-def]
             last = -1
             for s in range(steps + 1):
                 t = s / steps
-                i = int((a[0] + t * (b[0] - a[0]) - low[0]) / cell)
-                j = int((a[1] + t * (b[1] - a[1]) - low[1]) / cell)
-                k = int((a[2] + t * (b[2] - a[2]) - low[2]) / cell)
+                i = _held((a[0] + t * (b[0] - a[0]) - low[0]) / cell, shape[0])
+                j = _held((a[1] + t * (b[1] - a[1]) - low[1]) / cell, shape[1])
+                k = _held((a[2] + t * (b[2] - a[2]) - low[2]) / cell, shape[2])
                 at = (i * shape[1] + j) * shape[2] + k
                 if at == last:
                     continue

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.edge_grid import most_within
 from raychan.channel.edges import above, apart, dot, pyramid, scale_at, size_of, starts_again, within
 from raychan.channel.legs import Leg
 from raychan.channel.surface import Surface
@@ -32,6 +33,7 @@ class Shadows:
         self._from = surface.normal, surface.smooth, leg.image, leg.far, surface.touch
         if len(self.edges):
             low, high = _bounds(self.edges, leg.image, leg.far)
+            low, high, _ = most_within(_places(self.edges.mean(axis=1), leg.image, leg.far), low, high)
             axes = np.sort(np.argsort(high - low, kind="stable")[1:])
             low, high = low[axes], high[axes]
             cell = max(float((high - low).max()) / _CELLS, 1e-9)
@@ -99,6 +101,15 @@ def _place(p, image, far, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _places(points, image, far):  # type: ignore[no-untyped-def]
+    """Return the places (n, 3) of points (n, 3) [m]."""
+    out = np.empty_like(points)
+    for i in range(len(points)):
+        _place(points[i], image, far, out[i])
+    return out
+
+
+@njit(cache=True, nogil=True)
 def _bounds(edges, image, far):  # type: ignore[no-untyped-def]
     """Return the least and the most (3,) of the places of all ends."""
     low, high, x = np.full(3, np.inf), np.full(3, -np.inf), np.empty(3)
@@ -125,9 +136,10 @@ def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped
             for c in range(3):
                 p[c] = a[c] + s * (b[c] - a[c])
             reach = _place(p, image, far, x)
-            i, j = int((x[axes[0]] - low[0]) / cell), int((x[axes[1]] - low[1]) / cell)
-            at = i * shape[1] + j
-            if 0 <= i < shape[0] and 0 <= j < shape[1] and last != at:
+            i, j = x[axes[0]] - low[0], x[axes[1]] - low[1]
+            # What is beyond the grid belongs to its outermost cells.
+            at = int(min(max(i / cell, 0.0), shape[0] - 1.0)) * shape[1] + int(min(max(j / cell, 0.0), shape[1] - 1.0))
+            if last != at:
                 last = at
                 if count == len(cells):
                     cells, owner = np.append(cells, np.empty_like(cells)), np.append(owner, np.empty_like(owner))
@@ -206,6 +218,5 @@ def _across(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _cells(low_end, high_end, low, cell, count):  # type: ignore[no-untyped-def]
-    # A tube may lie wholly beside the grid.
-    begin = min(max(int((low_end - low) / cell), 0), count)
-    return begin, max(min(int((high_end - low) / cell) + 1, count), begin)
+    begin, end = (low_end - low) / cell, (high_end - low) / cell
+    return int(min(max(begin, 0.0), count - 1.0)), int(min(max(end, 0.0), count - 1.0)) + 1

@@ -12,6 +12,7 @@ import numpy as np
 from raychan.kernels.jit import njit
 
 _FAR = 32.0  # radii of the ball about all facets from which an origin is far off
+_ALONG = 1e-9  # sine of the angle under which a ray runs along a facet: far from the origin rounding is of this size
 _BESIDE = 1e-3  # of a facet's length along a ray: what a grazing ray's hit may lie beside it
 _PACES = 64.0  # the same in paces of the ray, of which a small facet is no more
 
@@ -123,12 +124,12 @@ def companions(todo, origin, direction, ahead, pace, centre, turn):  # type: ign
 
 
 @njit(cache=True, forceinline=True)
-def _met(v, x, d, t, pace):  # type: ignore[no-untyped-def]
+def _met(v, n, x, d, t, pace):  # type: ignore[no-untyped-def]
     """Tell whether the distance t [m] along a ray to a facet's plane is one to the facet: not before it nor beyond.
 
-    A facet seen edge-on, which float32 meets, has no such distance in float64, or any: the ray runs along its plane.
+    A facet seen edge-on, which float32 meets, has none, or any: the ray runs along its plane but for rounding.
     """
-    if not math.isfinite(t):
+    if not (abs(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) > _ALONG and math.isfinite(t)):
         return False
     low, high = np.inf, -np.inf
     for q in range(3):
@@ -150,7 +151,7 @@ def _beside(j, hit, x, d, ahead, pace, vertices, first, normal):  # type: ignore
         if other < 0:
             continue
         new = plane_distance(normal[other], first[other], x, 0.0, d)
-        if other == hit[3 * j] or not _met(vertices[other], x, d, new, pace):
+        if other == hit[3 * j] or not _met(vertices[other], normal[other], x, d, new, pace):
             return -2
         if ahead < new < old:
             h, old = other, new
@@ -174,7 +175,8 @@ def land(  # type: ignore[no-untyped-def]
         i = todo[j]
         x, d = origin[i], direction[i]
         h = hit[3 * j]
-        if h >= 0 and not _met(vertices[h], x, d, plane_distance(normal[h], first[h], x, 0.0, d), pace[i]):
+        t = plane_distance(normal[h], first[h], x, 0.0, d) if h >= 0 else 0.0
+        if h >= 0 and not _met(vertices[h], normal[h], x, d, t, pace[i]):
             h = _beside(j, hit, x, d, ahead[i], pace[i], vertices, first, normal)
             if h == -2:
                 pace[i] *= 2.0
@@ -187,8 +189,11 @@ def land(  # type: ignore[no-untyped-def]
                 continue
             old = np.inf if h < 0 else plane_distance(normal[h], first[h], x, ahead[i], d)
             new = plane_distance(normal[other], first[other], x, ahead[i], d)
-            if 0.0 < new < old - pace[i] and _holds(
-                vertices[other], normal[other], x, ahead[i] + new, d, edge * pace[i]
+            at = ahead[i] + new
+            if (
+                0.0 < new < old - pace[i]
+                and _met(vertices[other], normal[other], x, d, at, pace[i])
+                and _holds(vertices[other], normal[other], x, at, d, edge * pace[i])
             ):
                 h = other
         if h < 0:
