@@ -2,14 +2,16 @@
 # PYTHON is the interpreter that makes the environment; anything from 3.11 on will do.
 PYTHON ?= python3
 VENV ?= .venv
+FUZZ ?= --minutes 30
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench clean
+.PHONY: help demo test fuzz bench clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
 	@echo "make test   ruff, ruff format, mypy, pytest"
+	@echo "make fuzz   random scene files, meshes and flags for half an hour (FUZZ=--help: more)"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
 	@echo "make clean  remove $(VENV), out and caches"
 
@@ -21,6 +23,9 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
+
+fuzz: $(VENV)/.installed-dev
+	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
 
 bench: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)

@@ -32,7 +32,8 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
             continue
         low, high = mesh.bounds
         if (local >= low).all() and (local <= high).all() and mesh.winding(local) > 0.5:
-            where = "a place outside all bodies"
+            # A mesh in the wrong unit swallows the radar.
+            where = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
             raise SceneError(f"radar is inside '{body.name}'", key="radar.position", value=at.tolist(), allowed=where)
 
 
