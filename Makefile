@@ -2,6 +2,7 @@
 # PYTHON is the interpreter that makes the environment; anything from 3.11 on will do.
 PYTHON ?= python3
 VENV ?= .venv
+FUZZ ?= --minutes 30
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
@@ -9,12 +10,13 @@ BIN := $(VENV)/bin
 BOUNDS := $(addprefix tests/test_,bounds.py cores.py cut.py diffract.py jit.py shapes.py sight.py spectrum.py utd.py)
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: help demo test test-bounds bench clean
+.PHONY: help demo test test-bounds fuzz bench clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
 	@echo "make test   ruff, ruff format, mypy, pytest; the three scenes and the kernels' tests with bounds checked"
 	@echo "make test-bounds   all tests with the bounds of every array in compiled code checked"
+	@echo "make fuzz   random scene files, meshes and flags for half an hour (FUZZ=--help: more)"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
 	@echo "make clean  remove $(VENV), out and caches"
 
@@ -30,6 +32,9 @@ test: $(VENV)/.installed-dev
 
 test-bounds: $(VENV)/.installed-dev
 	NUMBA_BOUNDSCHECK=1 $(PYTEST)
+
+fuzz: $(VENV)/.installed-dev
+	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
 
 bench: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)

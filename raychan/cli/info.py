@@ -38,7 +38,15 @@ def info(
             show_default=False,
         ),
     ],
-    unit: Annotated[str, typer.Option(help="Unit of a mesh file: m, cm, mm, inch, ft.")] = "m",
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of a mesh file: m, cm, mm, inch, ft; m if not given.", show_default=False)
+    ] = None,
+    up: Annotated[
+        str | None,
+        typer.Option(
+            help="The mesh file's axis that points up; y for GLB and z else if not given.", show_default=False
+        ),
+    ] = None,
 ) -> None:
     """Say what is in a scene, an antenna or a mesh.
 
@@ -50,8 +58,11 @@ def info(
 
     source = found(source)
     if source.suffix.lower() in SUFFIXES:
-        _mesh(load(source, unit=unit), source)
+        _mesh(load(source, unit=unit or "m", up=up), source, unit or "m", up)
         return
+    for option, value in (("--unit", unit), ("--up", up)):
+        if value is not None:
+            raise typer.BadParameter(f"{source} is no mesh file ({', '.join(SUFFIXES)})", param_hint=option)
     from raychan.world.mount import antenna_of, antenna_table, is_antenna
 
     if is_antenna(source):
@@ -64,9 +75,10 @@ def info(
     _scene(Scene.load(source))
 
 
-def _mesh(mesh: Any, source: Path) -> None:
+def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
     import numpy as np
 
+    from raychan.world.meshfile import oddities
     from raychan.world.readings import folds_told
 
     low, high = mesh.bounds
@@ -84,7 +96,8 @@ def _mesh(mesh: Any, source: Path) -> None:
     screen.print(show.table(str(source), ("mesh", ""), facts, left=(0, 1)))
     parts = [(n, str(c), f"{a:.4g}") for n, c, a in zip(mesh.part_names, counts, areas, strict=True)]
     screen.print(show.table("", ("part", "facets", "area m2"), parts))
-    show.warn([*r.warnings(), *([folds] if (folds := folds_told(mesh, "crease_deg (raychan rcs: --crease)")) else [])])
+    folds = folds_told(mesh, "crease_deg (raychan rcs: --crease)")
+    show.warn([*r.warnings(), *oddities(mesh, source, unit, up, "--"), *([folds] if folds else [])])
 
 
 def _scene(scene: Any) -> None:

@@ -15,7 +15,7 @@ from raychan.process.cfar import GUARD, fitting_guard
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
-_SAMPLE_BYTES, _CELL_BYTES = 80.0, 52.0
+_BYTES, _SAMPLE_BYTES, _CELL_BYTES = 2e6, 120.0, 64.0  # at the peak, as tracemalloc counts
 _SAMPLE_SECONDS, _CELL_SECONDS, _FACET_SECONDS = 1e-6, 1.3e-7, 5e-5  # of one core
 _SHARE = 0.5
 _MOST = 64e9
@@ -45,7 +45,7 @@ def demand(scene: Scene) -> Demand:
     facets = sum(len(body.geometry.faces) for body in scene.bodies)
     tracings = 1 if scene.model.retrace == "auto" else scene.model.retrace
     work = samples * _SAMPLE_SECONDS + cells * _CELL_SECONDS + facets * tracings * _FACET_SECONDS
-    return Demand(samples * _SAMPLE_BYTES + cells * _CELL_BYTES, work / min(os.cpu_count() or 1, 2))
+    return Demand(_BYTES + samples * _SAMPLE_BYTES + cells * _CELL_BYTES, work / min(os.cpu_count() or 1, 2))
 
 
 def allowed_memory() -> float:

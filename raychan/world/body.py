@@ -18,12 +18,11 @@ from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
-from raychan.world.meshfile import from_trimesh, load
+from raychan.world.meshfile import from_trimesh, load, oddities
 from raychan.world.motion import Motion
 from raychan.world.readings import folds_told
 
 ROLES = {"scatterer": SCATTERER, "mirror": MIRROR, "blocker": BLOCKER}
-_SIZES = (1e-3, 200.0)
 
 
 @dataclass(frozen=True)
@@ -164,11 +163,21 @@ class Body:
         return np.asarray(self.rcs_point, float)
 
     def notes(self) -> list[str]:
-        """Return warnings about a mesh from outside: its health, and a size that suggests another unit."""
-        said = [] if self.shape else [f"body '{self.name}': {text}" for text in self.geometry.report.warnings()]
-        folds = folds_told(self.geometry, "crease_deg")
-        said += [f"body '{self.name}': {folds}"] if folds else []
-        size = max(self.geometry.report.size)
-        if self.shape is None and not _SIZES[0] * 10 <= size <= _SIZES[1]:
-            said.append(f"body '{self.name}' is {size:.4g} m across: check unit and scale")
-        return said
+        """Return warnings about a mesh from outside: its health, a unit or axis that seems wrong, no material."""
+        if self.shape:
+            return []
+        mesh, key = self.geometry, f"bodies.{self.name}."
+        said = list(mesh.report.warnings())
+        is_file = isinstance(self.mesh, (str, Path))
+        said += oddities(mesh, self.mesh if is_file else "", self.unit, self.up if is_file else "z", key)
+        folds = folds_told(mesh, f"{key}crease_deg")
+        said += [folds] if folds else []
+        bare = [] if mesh.part_materials or self.material or self.rcs is not None else self._bare_parts()
+        if bare:
+            what = "it" if len(bare) == len(mesh.part_names) else f"parts {', '.join(bare)}"
+            said.append(f"no material given, {what} is taken as a perfect conductor ({key}material)")
+        return [f"body '{self.name}': {text}" for text in said]
+
+    def _bare_parts(self) -> list[str]:
+        """Return the parts for which `materials` has no name or pattern."""
+        return [p for p in self.geometry.part_names if not any(fnmatchcase(p, known) for known in self.materials)]

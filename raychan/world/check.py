@@ -34,12 +34,10 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
         place = place_of(mesh.corners, local)
         if place != Place.OUTSIDE:
             where = "inside" if place == Place.INSIDE else "on the surface of"
-            raise SceneError(
-                f"radar is {where} '{body.name}'",
-                key="radar.position",
-                value=at.tolist(),
-                allowed="a place outside all bodies",
-            )
+            # A mesh in the wrong unit swallows the radar.
+            allowed = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
+            problem = f"radar is {where} '{body.name}'"
+            raise SceneError(problem, key="radar.position", value=at.tolist(), allowed=allowed)
 
 
 def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:

@@ -11,6 +11,8 @@ from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
 
+_SIZES = 0.01, 150.0  # m: what a body of a scene measures as a rule
+_USUAL = 3.0  # m
 _FARTHEST = 1e12  # in the unit of a file; beyond lies only what was read wrong
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "ft": 0.3048}
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -40,8 +42,7 @@ def load(
         raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
     if not SCALE.allows(scale):
         raise SceneError(f"{scale!r} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
-    up = up or ("y" if file.suffix.lower() in (".glb", ".gltf") else "z")
-    turn = _turn(up, forward or ("z" if up.endswith("y") else "x"), file)
+    turn = _turn(*axes_taken(file, up, forward), file)
     try:
         import trimesh
 
@@ -51,6 +52,43 @@ def load(
         raise e.at(file=file) from None
     except Exception as e:  # trimesh's readers raise whatever their parsers do
         raise SceneError(f"cannot be read as a mesh ({e})", file=file, allowed="a valid " + file.suffix) from e
+
+
+def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:
+    """Return which of a file's axes are taken as up and as forward."""
+    taken = up or ("y" if Path(path).suffix.lower() in (".glb", ".gltf") else "z")
+    return taken, forward or ("z" if taken.endswith("y") else "x")
+
+
+def unit_hint(size: float, unit: str = "m") -> str:
+    """Return the unit that would make a thing of a size [m], read in `unit`, one of a few metres; '' if none would."""
+    sizes = {name: size / UNITS[unit] * metres for name, metres in UNITS.items() if name != unit}
+    best = min(sizes, key=lambda name: abs(np.log(sizes[name] / _USUAL)))
+    return f'unit = "{best}" makes it {sizes[best]:.3g} m' if 0.1 <= sizes[best] / _USUAL <= 10.0 else ""
+
+
+def oddities(mesh: Mesh, path: str | Path, unit: str = "m", up: str | None = None, key: str = "") -> list[str]:
+    """Return a line each on what a file does not say and was guessed, where the guess looks wrong: unit and up axis.
+
+    Args: `key` goes before the names of the keys that mend it, as 'bodies.car.'.
+    """
+    said, size = [], max(mesh.report.size)
+    if not _SIZES[0] <= size <= _SIZES[1]:
+        hint = f"{key}{h}" if (h := unit_hint(size, unit)) else f"{key}scale"
+        said.append(f"{size:.4g} m across: check unit and scale ({hint})")
+    if up is None:
+        taken, ahead = axes_taken(path, up, None)
+        low, extent = mesh.bounds[0], np.ptp(mesh.bounds, axis=0)
+        stands = np.abs(low) <= 0.02 * extent
+        length, width, height = extent
+        facts = f"{length:.3g} x {width:.3g} x {height:.3g} m (x forward, y left, z up)"
+        # What stands on the plane through its origin shows by which axis it was meant to stand.
+        if not stands[2] and stands[:2].sum() == 1 and extent[stands].min() > 0.0:
+            meant = (ahead, "xyz".replace(taken, "").replace(ahead, ""))[int(np.argmax(stands[:2]))]
+            said.append(f'{taken} was taken as up, but it stands on {meant} = 0: {facts}; {key}up = "{meant}" turns it')
+        elif taken == "y":
+            said.append(f"{taken} was taken as up, as glTF has it: {facts}; {key}up says otherwise")
+    return said
 
 
 def from_trimesh(source: Any, crease_deg: float = CREASE_DEG, matrix: Floats | None = None) -> Mesh:

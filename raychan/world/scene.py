@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.tables import LAYER, MIRROR, Facets, Points
 from raychan.telling import Told
-from raychan.world import check, edit, shipped
+from raychan.world import check, edit, encounters, shipped
 from raychan.world.body import Body
 from raychan.world.checked import checked
 from raychan.world.errors import SceneError, nearest
@@ -210,16 +210,19 @@ class Scene(Told):
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What a user should know: meshes that were mended, materials out of range, targets that fold."""
+        """What a user should know: odd meshes, materials out of range, overlaps, nothing in view, targets that fold."""
         said = [note for body in self.bodies for note in body.notes()]
         used = {
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
         }
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
-        if self.radar is not None:
-            said += check.edge_on(self.bodies, self.radar)
-            said += check.aliases(self.bodies, self.radar, self.sensor.waveform)
-        return said
+        opaque = [all(m.kind != LAYER for m in self._chosen(b)) for b in self.bodies]
+        said += encounters.overlaps(self.bodies, opaque)
+        if self.radar is None:
+            return said
+        said += check.edge_on(self.bodies, self.radar)
+        said += encounters.unseen(self.bodies, self.sensor)
+        return said + check.aliases(self.bodies, self.radar, self.sensor.waveform)
 
     def _chosen(self, body: Body) -> list[Material]:
         """Return the materials of a body's parts: the scene's own first, then the built-in ones."""

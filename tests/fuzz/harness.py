@@ -16,6 +16,7 @@ HANG = 60.0
 """Seconds that a command may take."""
 _FIRST = 600.0  # the same for the first commands of a process, which may have to compile
 _BATCH = 60
+WORKER = ["-m", "fuzz.worker"]
 _ROOT = Path(__file__).parents[2]
 
 
@@ -43,7 +44,7 @@ def _watched(batch: list[int], seed: int, work: Path, kind: str, outcome: Outcom
     work.mkdir(parents=True, exist_ok=True)
     notes = work / f"notes_{seed}_{batch[0]}.jsonl"
     notes.write_text("")
-    command = [sys.executable, "-m", "fuzz.worker", str(notes), str(work), str(seed), kind, *map(str, batch)]
+    command = [sys.executable, *WORKER, str(notes), str(work), str(seed), kind, *map(str, batch)]
     path = os.pathsep.join([str(_ROOT / "tests"), str(_ROOT), os.environ.get("PYTHONPATH", "")])
     log = work / f"log_{seed}_{batch[0]}.txt"
     with log.open("wb") as sink:
