@@ -47,8 +47,8 @@ def test_an_ellipsoid_of_many_facets_is_its_closed_form():
 
 
 def test_the_stated_error_covers_smooth_and_flat_bodies_not_looked_at_before():
-    """Seed 12; factors were chosen on seed 1. An error that is not known covers nothing and is left out."""
-    _, e, s = shapes.judged(12, 80)
+    """Seed 31; factors were chosen on seed 1. An error that is not known covers nothing and is left out."""
+    _, e, s = shapes.judged(31, 24)
     known = np.isfinite(s)
     assert known.mean() > 0.8
     assert np.mean(e[known] <= s[known]) >= 0.95
