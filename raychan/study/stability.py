@@ -9,13 +9,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from raychan.study import regimes_angle, regimes_leaks, regimes_material, regimes_mesh, regimes_rays, regimes_signal
+from raychan.study import (
+    regimes_angle,
+    regimes_bistatic,
+    regimes_leaks,
+    regimes_material,
+    regimes_mesh,
+    regimes_rays,
+    regimes_signal,
+)
 from raychan.study.regimes_base import Outcome, Regime, Row
 
 Progress = Callable[[str, float], None]
 
 REGIMES: tuple[Regime, ...] = (
     *regimes_angle.REGIMES,
+    *regimes_bistatic.REGIMES,
     *regimes_leaks.REGIMES,
     *regimes_rays.REGIMES,
     *regimes_mesh.REGIMES,
