@@ -77,7 +77,23 @@ def test_unknown_regime_is_told_with_the_known_ones():
 
 @pytest.mark.parametrize(
     "key",
-    ["grazing", "edge_on", "brewster", "total", "layers", "vacuum", "folding", "dynamic", "split", "panes", "joined"],
+    [
+        "grazing",
+        "edge_on",
+        "bistatic",
+        "brewster",
+        "total",
+        "layers",
+        "vacuum",
+        "folding",
+        "dynamic",
+        "split",
+        "panes",
+        "joined",
+        "worlds",
+        "open_sheets",
+        "on_a_plane",
+    ],
 )
 def test_regimes_with_an_exact_truth_stand(key):
     (tried,) = study.stability(quick=True, only=[key])

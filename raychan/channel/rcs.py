@@ -87,8 +87,8 @@ def rcs(
     """
     _check(frequency, polarization, distance, tolerance_db, max_bounces, crease_deg)
     bistatic = rx_azimuth_deg is not None or rx_elevation_deg is not None or rx_distance is not None
-    if rx_distance is not None and np.isinf(rx_distance) != np.isinf(distance):
-        raise ValueError(f"rx_distance = {rx_distance!r} m: must be inf where distance is, and near where it is near")
+    if rx_distance is not None and not (rx_distance > 0.0 and np.isinf(rx_distance) == np.isinf(distance)):
+        raise ValueError(f"rx_distance = {rx_distance!r} m: must be above 0, and inf where distance is")
     rx_az = azimuth_deg if rx_azimuth_deg is None else rx_azimuth_deg
     rx_el = elevation_deg if rx_elevation_deg is None else rx_elevation_deg
     angles = np.broadcast_arrays(

@@ -10,6 +10,7 @@ from time import perf_counter
 from raychan.run.files import csv_bytes, write_whole
 from raychan.study import (
     regimes_angle,
+    regimes_bistatic,
     regimes_inside,
     regimes_leaks,
     regimes_material,
@@ -24,6 +25,7 @@ Progress = Callable[[str, float], None]
 
 REGIMES: tuple[Regime, ...] = (
     *regimes_angle.REGIMES,
+    *regimes_bistatic.REGIMES,
     *regimes_leaks.REGIMES,
     *regimes_rays.REGIMES,
     *regimes_mesh.REGIMES,
