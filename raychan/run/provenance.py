@@ -35,7 +35,7 @@ class Chains:
     bodies: tuple[tuple[str, ...], ...]
     """Bodies met, in order, but for thin layers passed."""
     targets: Ints
-    """Chain of targets, the ground and the radar's carrier left out, of each chain of parts."""
+    """Chain of targets, the ground and the radar's carrier left out, of each chain of parts; there and back are one."""
 
 
 def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
@@ -52,7 +52,8 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
         left = [b for b in bodies[-1] if b not in background]
         link = tuple(b for i, b in enumerate(left) if i == 0 or b != left[i - 1])
-        targets.append(known.setdefault(link, len(known)))
+        # There and back again are one way: equal by reciprocity.
+        targets.append(known.setdefault(min(link, link[::-1]), len(known)))
     return Chains(index, tuple(names), tuple(bodies), np.array(targets, np.int64))
 
 
