@@ -131,7 +131,7 @@ def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_
         return within(self, leg)
 
     # The weakest tubes are let go up to a sum, to which hidden ones would add.
-    monkeypatch.setattr(Found, "that_count", lambda self, bound, length: np.arange(len(bound)))
+    monkeypatch.setattr(Found, "that_count", lambda self, bound, length, many=0: np.arange(len(bound)))
     monkeypatch.setattr(Screens, "within", counted)
     ours = paths()
     assert max(calls) > 0
