@@ -186,3 +186,14 @@ def test_a_path_passes_a_pane_and_comes_back_from_inside_by_the_slab_formula(one
     # Their planes of incidence are one plane: singular values are those of s and p.
     found = np.linalg.svd(gains[at[0]], compute_uv=False)
     np.testing.assert_allclose(np.sort(found), np.sort(wanted), rtol=1e-9)
+
+
+@pytest.mark.parametrize("deep", [0.3, 0.3005, 0.301])
+def test_the_rcs_of_a_glass_box_is_the_series_of_its_panes(deep):
+    glass = rc.Material(6.31, 0.0, thickness=THICK)
+    sigma = rc.rcs(trimesh.creation.box(extents=(deep, 0.2, 0.3)), F, 0.0, material=glass, max_bounces=3).sigma
+    r, _, t, _ = slab.layer(1.0, 6.31 + 0j, THICK, K)
+    # The front; through it the back; and once more to and fro between the panes.
+    phases = np.exp(1j * K * deep * np.array([1.0, -1.0, -3.0]))
+    field = np.array([r, t**2 * r, t**2 * r**3]) @ phases * 0.06 * K / (2.0 * np.pi)
+    assert 10.0 * np.log10(sigma / (4.0 * np.pi * abs(field) ** 2)) == pytest.approx(0.0, abs=1e-6)
