@@ -59,7 +59,8 @@ class Told:
 
     def facts(self) -> Facts:
         """Return what is told: of a record its columns, their sizes and spans."""
-        return _OWN.get(type(self).__name__, _columns)(self)
+        known = (_OWN[kind.__name__] for kind in type(self).__mro__ if kind.__name__ in _OWN)
+        return next(known, _columns)(self)
 
     def __repr__(self) -> str:
         return self.facts().text()
@@ -160,7 +161,7 @@ def detection_rows(d: Any) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 def _detections(d: Any) -> Facts:
     heads, rows = detection_rows(d)
-    return Facts(f"Detections: {len(rows)}", (), heads if rows else (), tuple(rows))
+    return Facts(f"{type(d).__name__}: {len(rows)}", (), heads if rows else (), tuple(rows))
 
 
 def _scene(scene: Any) -> Facts:

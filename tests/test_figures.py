@@ -38,7 +38,7 @@ def printed() -> set[float]:
 
 def test_no_printed_figure_is_typed_into_the_package():
     figures = printed()
-    assert {10.36, 27.63, 568.62, 28.75, 0.5036} <= figures and len(figures) > 80
+    assert {10.36, 27.63, 568.62, 28.75, 0.5035} <= figures and len(figures) > 80
     met = []
     for file in sorted((ROOT / "raychan").rglob("*.py")):
         with open(file, "rb") as source:

@@ -56,7 +56,7 @@ def test_empty_scene_is_valid():
     scene = Scene.from_text(RADAR)
     f, p = scene.facets(), scene.points()
     assert f.vertices.shape == (0, 3, 3) and f.role.shape == (0,) and p.sigma.shape[0] == 0
-    assert scene.warnings == []
+    assert [w.split(":")[0] for w in scene.warnings] == ["no body is in view"]
 
 
 def test_roles():
@@ -318,7 +318,7 @@ def test_nan_and_empty_meshes_name_file_and_body(tmp_path, bad):
 
 def test_folding_targets_are_told_with_their_alias():
     text = RADAR + SPHERE.replace("10.0", "80.0") + "velocity_mps = [20.0, 0.0, 0.0]\n"
-    said = Scene.from_text(text).warnings
+    said = [x for x in Scene.from_text(text).warnings if "appears" in x]
     w = Scene.from_text(text).sensor.waveform
     assert f"appears at {79.5 - w.unambiguous_range:.2f} m" in said[0]
     assert f"appears at {20.0 - 2.0 * w.unambiguous_rate:.2f} m/s" in said[1]

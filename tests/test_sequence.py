@@ -88,7 +88,7 @@ def test_what_moves_with_the_radar_is_traced_once_and_only_its_noise_differs(fil
 
 @pytest.mark.parametrize("bad", [{"count": 0}, {"count": 2, "interval": 0.0}, {"count": 2, "interval": float("nan")}])
 def test_bad_arguments_are_told_before_anything_is_computed(file, bad):
-    with pytest.raises(ValueError, match=r"must be"):
+    with pytest.raises(ValueError, match=r"must lie between"):
         frames(rc.Scene.load(file), **bad)
 
 

@@ -72,7 +72,7 @@ def test_a_result_tells_its_detections_and_what_made_them(made):
     assert "truck.tail > walker" in " ".join(Tags(made._repr_html_()).texts)
     assert "2 paths" in repr(made.paths) and "5 to 9 m" in repr(made.paths) and "suv, truck, walker" in repr(made.paths)
     assert "-63.0 dBm at 8.99 m, -6.84 m/s" in repr(made.rdmap) and "noise" in repr(made.rdmap)
-    assert repr(made.detections).splitlines()[0] == "Detections: 2"
+    assert repr(made.detections).splitlines()[0] == "ExplainedDetections: 2"
 
 
 def test_an_empty_result_tells_that_it_is_empty():

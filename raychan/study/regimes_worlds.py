@@ -22,11 +22,11 @@ from raychan.world.scene import Scene
 from raychan.world.shapes import build
 
 _RADAR: dict[str, Any] = {
-    "noise": True,
+    "power_dbm": 40.0,
     "waveform": {"bandwidth_mhz": 600.0, "chirp_us": 40.0, "chirps": 16, "samples": 128},
 }
 _CORNERS: tuple[tuple[str, str, dict[str, Any], tuple[float, float], float], ...] = (
-    ("box", "box", {"length": 0.6, "width": 0.4, "height": 0.5}, (9.0, 1.0), 0.0),
+    ("dihedral", "dihedral", {"size": 0.2, "height": 0.3}, (9.0, 1.0), 180.0),
     ("ball", "sphere", {"radius": 0.3}, (14.0, -2.0), 0.0),
     ("corner", "trihedral", {"size": 0.2}, (18.0, 3.0), 180.0),
     ("post", "cylinder", {"radius": 0.1, "height": 1.0}, (22.0, -1.0), 0.0),

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
 
-_MOST = 1024  # chords of an arc: a ball of so many has a million facets
+_MOST = 1000  # chords of an arc: a ball of so many has a million facets
 
 
 @dataclass(frozen=True)
