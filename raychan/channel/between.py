@@ -150,21 +150,11 @@ def _across(  # type: ignore[no-untyped-def]
                     clear_until = s + BLOCK
                     continue
             room = layer(
-                points[i],
-                ks[i],
-                axis,
-                at_layer,
-                single,
-                begin_at,
-                end_at,
-                low,
-                cell,
-                shape,
-                cut_off,
-                begin_cell,
+                points[i], ks[i], axis, at_layer, single, begin_at, end_at, low, cell, shape, cut_off, begin_cell,
                 end_cell,
-            )
-            if room > _WIDE:
+            )  # fmt: skip
+            # The outermost layers of a grid that is cut off hold all that lies beyond: no width tells anything there.
+            if room > _WIDE and not (cut_off and (at_layer == 0 or at_layer == shape[axis] - 1)):
                 break
             for ci in range(begin_cell[0], end_cell[0]):
                 for cj in range(begin_cell[1], end_cell[1]):

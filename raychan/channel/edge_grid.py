@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 _CROWD = 0.05  # of the edges on either side, which are not counted to where most are
 _ROOM = 2.0  # widths of where most edges are, that a grid reaches beyond it
-_SPREAD = 4.0  # times the width of such a grid that edges spread before it is used
+_SPREAD = 50.0  # times the width of such a grid that edges spread before it is used
 
 
 def most_within(middle: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats, bool]:
