@@ -72,8 +72,9 @@ def test_sphere_is_physical_optics_of_all_that_is_lit_summed_point_by_point(pol)
 
 
 def test_mie_lies_within_the_stated_error_of_spheres_from_all_sides():
-    """In the bistatic plane and across it, four sizes; light's end is where physical optics itself is off."""
-    angles, off, stated, within = np.arange(5.0, 181.0, 12.5), [], [], []
+    """In the bistatic plane and across it, four sizes; light's end is where physical optics itself is off, and by too
+    much for a figure near the forward direction of the worse polarisation."""
+    angles, off, stated = np.arange(5.0, 181.0, 12.5), [], []
     for radius in (0.009, 0.016, 0.037, 0.06):
         mesh = trimesh.creation.icosphere(subdivisions=4, radius=radius)
         exact = mie.amplitudes(radius, K, np.pi - np.radians(angles))
@@ -81,9 +82,11 @@ def test_mie_lies_within_the_stated_error_of_spheres_from_all_sides():
             got = rcs(mesh, F, 0.0, polarization=pol, rx_azimuth_deg=angles, tolerance_db=10.0)
             error = np.abs(db(got.sigma / (4 * np.pi * np.abs(exact[i]) ** 2)))
             off, stated = np.append(off, error), np.append(stated, got.error_db)
-            within.append(error <= got.error_db)
-    assert np.mean(within) >= 0.95
-    assert np.median(stated[off > 0.05] / off[off > 0.05]) < 12.0
+    known = np.isfinite(stated)
+    assert known.mean() > 0.85
+    assert np.mean(off[known] <= stated[known]) >= 0.95
+    told = known & (off > 0.05)
+    assert np.median(stated[told] / off[told]) < 12.0
 
 
 @pytest.mark.parametrize("tx", [0.0, 33.0, 70.0])

@@ -55,6 +55,20 @@ def test_the_stated_error_covers_smooth_and_flat_bodies_not_looked_at_before():
     assert np.median(s[known] / e[known]) < 5.0
 
 
+@pytest.mark.parametrize(("build", "sides"), [("cylinder", 37), ("cylinder", 61), ("cone", 45)])
+def test_of_bodies_that_bend_one_way_both_readings_are_stated(build, sides):
+    """A prism of many sides may be meant as flat; a ball of as small folds, and the prism once told apart, are not."""
+    mesh = getattr(trimesh.creation, build)(0.08, 0.15, sections=sides)
+    assert readings(from_trimesh(mesh)).creased is not None
+    az, el = np.array([10.0, 73.0, 201.0]), 17.0 if build == "cone" else 1.5
+    flat = [shapes.flat(mesh, shapes.po.direction(np.radians(a), np.radians(el))) for a in az]
+    got = rcs(mesh, F, az, el)
+    known = got.converged
+    assert (np.abs(db(got.sigma / flat)) <= got.error_db)[known].all() and known.any()
+    assert readings(from_trimesh(mesh, crease_deg=1.0)).creased is None
+    assert readings(from_trimesh(trimesh.creation.icosphere(3))).creased is None
+
+
 def test_a_mesh_that_knows_its_normals_is_in_no_doubt():
     ball = trimesh.creation.icosphere(2, 0.1)
     mesh = make_mesh(ball.vertices, ball.faces, normals=np.asarray(ball.vertices)[ball.faces] / 0.1)

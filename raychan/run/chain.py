@@ -200,7 +200,9 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
         reasons, left_out = at_once(
             lambda: provenance(paths, rdmap, detections, receiver, error.power),
-            lambda: ledger(paths, channel.surface, channel.points, sensor, settings, channel.model, weakest),
+            lambda: ledger(
+                paths, channel.surface, channel.points, sensor, settings, channel.model, weakest, scene.bodies
+            ),
         )
         if turned:
             left_out["intra-frame motion"] = motion(turned)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +16,10 @@ from raychan.channel.surface import Surface
 from raychan.kernels.fresnel import coefficients_array
 from raychan.radar.sensor import Sensor
 from raychan.run.auto import interactions, layers, peak
+from raychan.run.tessellated import strongest_bend
 from raychan.tables import MIRROR, Facets, Paths, Points
 from raychan.units import C0, db
+from raychan.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -36,11 +39,18 @@ class Entry:
 
 
 def ledger(
-    paths: Paths, surface: Surface, points: Points, sensor: Sensor, settings: Any, model: Any, weakest: float
+    paths: Paths,
+    surface: Surface,
+    points: Points,
+    sensor: Sensor,
+    settings: Any,
+    model: Any,
+    weakest: float,
+    bodies: Collection[Body] = (),
 ) -> dict[str, Any]:
     """Return what was left out, by mechanism, against the weakest detection's power [W].
 
-    Args: settings, model the scene's processing and what was modelled.
+    Args: settings, model the scene's processing and what was modelled; bodies those of the scene.
     """
     if not weakest > 0.0 or not len(surface.facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
@@ -50,6 +60,7 @@ def ledger(
         "diffraction": _diffraction(surface, sensor, weakest),
         "diffraction to point targets": _around(surface, points, sensor, settings, model, weakest),
         "diffuse scattering": _diffuse(surface, sensor, weakest),
+        "tessellation": _tessellation(paths, surface, bodies, sensor, settings, weakest),
         "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
         "intra-frame motion": _motion(paths, surface.facets, sensor),
     }
@@ -62,6 +73,7 @@ _NAMES = (
     "diffraction",
     "diffraction to point targets",
     "diffuse scattering",
+    "tessellation",
     "range migration",
     "intra-frame motion",
 )
@@ -191,6 +203,20 @@ def _samples(
         facet.append(np.full(x.size, one))
         weight.append(np.repeat(radius * step, len(angle)) * np.radians(3.0))
     return np.concatenate(points), np.concatenate(facet), np.concatenate(weight)
+
+
+def _tessellation(
+    paths: Paths, surface: Surface, bodies: Collection[Body], sensor: Sensor, settings: Any, weakest: float
+) -> Entry:
+    """Facets that were taken for smooth, if they are flat."""
+    estimated = {b.name for b in bodies if b.geometry.crease_deg is not None}
+    if not estimated:
+        return Entry(NOTHING, "exact", "every body knows its surface")
+    name, phase, changed = strongest_bend(paths, surface, estimated, sensor, settings)
+    if not name:
+        return Entry(NOTHING, "exact", "no body that returns has smoothed facets")
+    how = f"facets of {name} are taken for smooth: against flat ones {phase:.2g} rad (rms) of its strongest cell"
+    return Entry(float(db(changed / weakest)), "estimate", how)
 
 
 def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:

@@ -17,6 +17,8 @@ Bools = NDArray[np.bool_]
 _EVEN = 0.0  # power of the distance in the other fit: neighbours far and near weigh alike
 _BEND = 1e-5  # rad: less is flat
 _WIDE = 0.5  # of the crease angle: folds between it and the crease angle itself may be edges
+_STRIPS = 0.125  # of the crease angle: the same where the surface bends one way only, as prisms and cones do
+_ONE_WAY = 0.02  # of a patch's bending: as much across, and it bends both ways
 _UNEVEN = 0.17  # of facets about an edge: how far their heights may differ, over their sum
 _FEW = 4  # folds: fewer tell nothing of a tessellation
 
@@ -36,9 +38,10 @@ class Readings:
 def readings(mesh: Mesh) -> Readings:
     """Return what else a mesh may stand for.
 
-    Folds may be edges on patches that turn by more than half the crease angle from facet to facet, and where the
-    facets are no tessellation of a smooth surface: those of grids, of subdivided solids and of sections are alike on
-    both sides of an edge, those of a hull around points are not.
+    Folds may be edges on patches that turn by more than half the crease angle from facet to facet (an eighth where
+    they bend one way only: a prism of 36 sides is a body of its own as much as a cylinder), and where the facets are
+    no tessellation of a smooth surface: those of grids, of subdivided solids and of sections are alike on both sides
+    of an edge, those of a hull around points are not.
     """
     if "readings" not in mesh.kept:
         mesh.kept["readings"] = _found(mesh)
@@ -75,8 +78,7 @@ def _folds(mesh: Mesh) -> tuple[Ints, Floats, Bools]:
     bent = fold > _BEND
     if not bent.any():
         return pair[:0], fold[:0], bent[:0]
-    wide = np.radians(_WIDE * (mesh.crease_deg or 0.0))
-    return pair, fold, bent & _doubted(mesh, pair, np.where(bent, fold, 0.0), wide)
+    return pair, fold, bent & _doubted(mesh, pair, np.where(bent, fold, 0.0))
 
 
 def soft_folds(mesh: Mesh) -> tuple[Ints, Floats]:
@@ -89,19 +91,46 @@ def soft_folds(mesh: Mesh) -> tuple[Ints, Floats]:
     return pair[soft], fold[soft]
 
 
-def _doubted(mesh: Mesh, pair: Ints, fold: Floats, wide: float) -> Bools:
-    """Return which soft edges (e,) are of a patch that folds by more than `wide` [rad] or whose facets are uneven, both
-    in the mean over its edges by how much it bends there."""
-    v, corner = mesh.vertices, mesh.faces.ravel()
+def _doubted(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
+    """Return which soft edges (e,) are of a patch that folds by much or whose facets are uneven, both in the mean over
+    its edges by how much it bends there."""
     one, other = pair.T
-    span = v[corner[np.where(one % 3 == 2, one - 2, one + 1)]] - v[corner[one]]
+    span = _spans(mesh, pair)
     weight = fold * np.linalg.norm(span, axis=1)
     # Heights over one edge go by the areas.
     a, b = mesh.areas[one // 3], mesh.areas[other // 3]
-    patch = components(pair // 3, len(mesh.faces))[one // 3]
+    of_facet = components(pair // 3, len(mesh.faces))
+    patch, crease = of_facet[one // 3], np.radians(mesh.crease_deg or 0.0)
 
     def mean(x: Floats) -> Floats:
         return np.asarray(np.bincount(patch, weight * x) / np.maximum(np.bincount(patch, weight), 1e-300))
 
+    wide = crease * np.where(_one_way(mesh, pair, fold, of_facet)[: patch.max() + 1], _STRIPS, _WIDE)
     doubtful = (mean(np.abs(a - b) / (a + b)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
     return np.asarray(doubtful[patch])
+
+
+def _one_way(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> Bools:
+    """Return which patches bend one way only, facet for facet, given the patch (f,) of each facet.
+
+    A facet bends across each of its edges by the fold times the edge's length; the tensor of that has one direction.
+    Source: Cohen-Steiner, Morvan, Restricted Delaunay triangulations and normal cycle, 2003.
+    """
+    span = _spans(mesh, pair)
+    length = np.linalg.norm(span, axis=1)
+    along = span / np.maximum(length, 1e-300)[:, None]
+    tensor = np.zeros((len(mesh.faces), 3, 3))
+    for half in pair.T:
+        corners = mesh.corners[half // 3]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        across = np.cross(along, normal / np.linalg.norm(normal, axis=1, keepdims=True))
+        np.add.at(tensor, half // 3, (fold * length)[:, None, None] * across[:, :, None] * across[:, None, :])
+    bends = np.linalg.eigvalsh(tensor)
+    most, least = (np.bincount(patch, bends[:, i]) for i in (2, 1))
+    return np.asarray(least < _ONE_WAY * most)
+
+
+def _spans(mesh: Mesh, pair: Ints) -> Floats:
+    """Return the vectors (e, 3) [m] along edges."""
+    v, corner, one = mesh.vertices, mesh.faces.ravel(), pair[:, 0]
+    return np.asarray(v[corner[np.where(one % 3 == 2, one - 2, one + 1)]] - v[corner[one]])
