@@ -76,7 +76,7 @@ def test_open_meshes_and_meshes_without_a_material_are_told(tmp_path):
     lines = told(tmp_path, sheet, more="")
     assert any("not watertight" in x for x in lines)
     assert any("perfect conductor (bodies.it.material)" in x for x in lines)
-    assert told(tmp_path, block(1.0, 1.0, 1.0), more='materials = { "*" = "glass" }') == []
+    assert told(tmp_path, block(1.0, 1.0, 1.1), more='materials = { "*" = "glass" }') == []
 
 
 def test_bodies_that_reach_into_each_other_are_told_and_those_that_touch_are_not():
