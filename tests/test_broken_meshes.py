@@ -46,7 +46,9 @@ def test_the_cross_section_of_a_broken_mesh_is_a_number(seed):
         except SceneError as e:
             assert e.allowed
             return
-    assert np.isfinite(found.sigma).all() and (found.sigma >= 0.0).all() and np.isfinite(found.error_db).all()
+    assert np.isfinite(found.sigma).all() and (found.sigma >= 0.0).all() and np.isfinite(found.amplitude).all()
+    # No figure is an error only where the launches tell nothing.
+    assert not np.isinf(found.error_db).any() and (found.error_db[found.converged] >= 0.0).all()
 
 
 def test_a_corner_at_which_a_surface_folds_back_on_itself_keeps_the_normals_of_its_facets():
@@ -90,7 +92,7 @@ def test_shadows_across_a_body_are_those_of_the_body_without_its_spike():
     """A speck far off, edge-on, cuts off the grid of directions: every shadow edge is found nevertheless."""
     bodies = [trimesh.creation.icosphere(subdivisions=3, radius=0.6), trimesh.creation.box((0.4, 0.5, 0.3))]
     bodies[1].apply_translation((2.0, 0.3, 0.1))
-    speck = trimesh.Trimesh([[0, 3e4, 0], [1, 3e4, 0], [0, 3e4 + 1, 0]], [[0, 1, 2]], process=False)
+    speck = trimesh.Trimesh([[0, 9e3, 0], [1, 9e3, 0], [0, 9e3 + 1, 0]], [[0, 1, 2]], process=False)
     rng = np.random.default_rng(2)
     points = (
         rng.uniform(-0.8, 0.8, (400, 1, 3)) * (0, 1, 1) + rng.uniform(-0.15, 0.15, (400, 4, 3)) * (0, 1, 1) - (3, 0, 0)

@@ -12,9 +12,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-_UNKNOWN = re.compile(r"azimuth|error|true_|speed_of")
-"""Columns of detections that may hold NaN for what is not known."""
-
 
 def problems_of(argv: list[str]) -> tuple[int | str, list[str]]:
     """Run a command; return its exit code, and what it did that it may not."""
@@ -76,8 +73,11 @@ def _file(path: Path) -> list[str]:
     def look(name: str, item: object) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "fc":
             values = np.asarray(item[()])
-            allowed = name.startswith("detections/") and _UNKNOWN.search(name)
-            if not np.isfinite(values).all() and not (allowed and not np.isinf(values).any()):
+            # What says that NaN stands for what is not there may hold it; a level in dB only where there is no power.
+            unknown = np.isnan(values) & np.isnan(item.attrs.get("_FillValue", 0.0))
+            if name.endswith("/power_dbm"):
+                unknown &= item.parent["power"][()] == 0.0
+            if not (np.isfinite(values) | unknown).all():
                 found.append(f"result.nc: {name} is not finite")
 
     with h5py.File(path) as file:
