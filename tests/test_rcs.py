@@ -355,7 +355,10 @@ def random_case(rng, i):
         return mesh, material, az, el, d, true
     elif kind == 2:
         r, h, el = rng.uniform(0.03, 0.1), rng.uniform(0.05, 0.3), rng.uniform(-3.0, 3.0)
-        mesh, s = tube(r, h, int(rng.choice([64, 128]))), po.cylinder(r, h, K, view(az, el, d))
+        made = tube(r, h, int(rng.choice([64, 128])))
+        side = np.abs(made.face_normals[:, 2]) < 0.5
+        out = np.where(side[:, None, None], made.triangles * [1.0, 1.0, 0.0] / r, made.face_normals[:, None])
+        mesh, s = make_mesh(made.vertices, made.faces, normals=out), po.cylinder(r, h, K, view(az, el, d))
     elif kind == 3:
         a, el, az = rng.uniform(0.03, 0.05) if near else rng.uniform(0.05, 0.1), rng.uniform(-5.0, 5.0), 0.7 * az
         faces = corner.dihedral_faces(a, a * rng.uniform(0.5, 1.0))
