@@ -72,9 +72,8 @@ def merge_flat(
     begin = np.searchsorted(owner[by_owner], np.arange(len(f) + 1))
     for p in np.flatnonzero(whole):
         corners = _loop(by_owner[begin[p] : begin[p + 1]], following, stop, is_corner)
-        # Begin at the lowest corner, so that the same outline is always fanned alike.
-        lowest = min(range(len(corners)), key=lambda i: tuple(v[corners[i]]))
-        corners = corners[lowest:] + corners[:lowest]
+        begins = _first(v[corners])
+        corners = corners[begins:] + corners[:begins]
         fans.append(np.array([[corners[0], corners[i], corners[i + 1]] for i in range(1, len(corners) - 1)]))
         parts.append(np.full(len(corners) - 2, part[first_face[p]]))
     return np.concatenate(fans), np.concatenate(parts)
@@ -88,6 +87,19 @@ def _loop(mine: Ints, following: Ints, stop: Ints, is_corner: NDArray[np.bool_])
             corners.append(int(stop[edge]))
         edge = int(following[edge])
     return corners
+
+
+def _first(corners: Floats) -> int:
+    """Return the corner (c, 3) [m] at which a fan begins: however an outline was cut or stands in space, it is fanned
+    alike. It is told by the lengths of the edges from it on, of equal ones by where it stands."""
+    length = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    told = [tuple(row) for row in np.round(length / length.max(), 6)[_round(len(length))]]
+    return min(range(len(corners)), key=lambda i: (tuple(-x for x in told[i]), tuple(corners[i])))
+
+
+def _round(n: int) -> Ints:
+    """Return the numbers 0 to n - 1 from each on, in a ring (n, n)."""
+    return (np.arange(n)[:, None] + np.arange(n)) % n
 
 
 def _unit(d: Floats) -> Floats:

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
 
 CREASE_DEG = 20.0
+_ALIKE = 5e-4  # of the crease angle: folds of one angle are read alike, though a file rounds its vertices
 
 
 @dataclass(frozen=True)
@@ -172,11 +173,16 @@ def creased(mesh: Mesh, crease_deg: float) -> Mesh:
     return replace(mesh, normals=smooth_normals(mesh.vertices, mesh.faces, crease_deg), crease_deg=crease_deg)
 
 
+def crease_angle(crease_deg: float) -> float:
+    """Return the angle [rad] under which folds are smooth, for a crease angle [deg]."""
+    return float((1.0 + _ALIKE) * np.radians(crease_deg))
+
+
 def smooth_normals(vertices: Floats, faces: Ints, crease_deg: float = CREASE_DEG) -> Floats:
     """Return corner normals (f, 3, 3), smoothed over edges that bend less than crease_deg (see `smoothing`)."""
     a, b, ea, eb, opposed = _edge_pairs(faces)
     pair = np.stack([3 * a + ea, 3 * b + eb], axis=1)[opposed]
-    return smoothed(vertices, faces, pair[folds(vertices, faces, pair) < np.radians(crease_deg)])
+    return smoothed(vertices, faces, pair[folds(vertices, faces, pair) < crease_angle(crease_deg)])
 
 
 def _cross(v: Floats, f: Ints) -> Floats:

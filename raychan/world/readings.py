@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.world.mesh import Mesh
+from raychan.world.mesh import Mesh, crease_angle
 from raychan.world.smoothing import components, folds, smoothed
 
 Floats = NDArray[np.float64]
@@ -87,7 +87,7 @@ def soft_folds(mesh: Mesh) -> tuple[Ints, Floats]:
     corner = mesh.faces.astype(np.int64).ravel()
     opposed = corner[pair[:, 0]] != corner[pair[:, 1]]
     fold = folds(mesh.vertices, mesh.faces, pair)
-    soft = opposed & (fold < np.radians(mesh.crease_deg or 0.0))
+    soft = opposed & (fold < crease_angle(mesh.crease_deg or 0.0))
     return pair[soft], fold[soft]
 
 
@@ -100,7 +100,7 @@ def _doubted(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
     # Heights over one edge go by the areas.
     a, b = mesh.areas[one // 3], mesh.areas[other // 3]
     of_facet = components(pair // 3, len(mesh.faces))
-    patch, crease = of_facet[one // 3], np.radians(mesh.crease_deg or 0.0)
+    patch, crease = of_facet[one // 3], crease_angle(mesh.crease_deg or 0.0)
 
     def mean(x: Floats) -> Floats:
         return np.asarray(np.bincount(patch, weight * x) / np.maximum(np.bincount(patch, weight), 1e-300))
