@@ -161,6 +161,12 @@ def detection_rows(d: Any) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 def _detections(d: Any) -> Facts:
     heads, rows = detection_rows(d)
+    if rows and hasattr(d, "converged"):
+        told = [f"{e:.2f}" if known else "unknown" for e, known in zip(d.error_db, d.converged, strict=True)]
+        folded = [f"{r:.2f}" if f else "" for r, f in zip(d.true_range, d.folded, strict=True)]
+        numbers = (str(i + 1) for i in range(len(rows)))
+        rows = [(n, *row, e, f) for n, row, e, f in zip(numbers, rows, told, folded, strict=True)]
+        heads = ("#", *heads, "error dB", "folded: true m")
     return Facts(f"{type(d).__name__}: {len(rows)}", (), heads if rows else (), tuple(rows))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,10 +14,12 @@ from typer.testing import CliRunner
 import raychan as rc
 from raychan.channel.edge_grid import most_within
 from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of
+from raychan.channel.rcs import facets_of, scattering
 from raychan.channel.shadows import Shadows
 from raychan.channel.surface import Surface
+from raychan.channel.tubes import Refinement
 from raychan.cli import app
+from raychan.units import C0
 from raychan.world.errors import SceneError
 from raychan.world.mesh import make_mesh, smooth_normals
 from raychan.world.meshfile import from_trimesh
@@ -115,3 +118,24 @@ def test_the_command_tells_what_was_mended_and_ends_well(tmp_path):
     ran = CliRunner().invoke(app, ["rcs", str(file)])
     assert ran.exit_code == 0
     assert "1 faces of zero area dropped" in ran.output and "3 duplicate faces dropped" in ran.output
+
+
+@pytest.mark.parametrize("argv", [["run", "{}", "--out", "out"], ["view", "{}", "--screenshot", "a.png"]])
+def test_a_mesh_where_a_scene_is_wanted_is_told(argv, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "box.ply"
+    trimesh.creation.box().export(file)
+    ran = CliRunner().invoke(app, [word.format(file) for word in argv])
+    assert ran.exit_code == 2 or isinstance(ran.exception, SceneError)
+    assert "is a mesh, not a scene" in f"{ran.output} {ran.exception}"
+    assert [p.name for p in tmp_path.iterdir()] == ["box.ply"]
+
+
+def test_a_launch_that_its_budget_cut_short_says_so():
+    surface = Surface(facets_of(trimesh.creation.icosphere(subdivisions=2, radius=0.5), "pec", F))
+    leg = Leg(end=np.array([1.0, 0.0, 0.0]), far=True)
+    fine = Refinement(wavenumber=2.0 * np.pi * F / C0, max_edge=0.02)
+    scattering(surface, leg, leg, F, 1, replace(fine, max_tubes=10_000_000))
+    assert surface.uncut == 0
+    scattering(surface, leg, leg, F, 1, replace(fine, max_tubes=1000))
+    assert surface.uncut > 0

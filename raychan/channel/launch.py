@@ -55,7 +55,7 @@ def launch(
     allowed = pieces & (surface.piece_role == SCATTERER)
     allowed[leg.pieces(surface)] = False
     facet = seeds(surface, leg, allowed)
-    for part, bary in _cut_for_phase(facet, shape, ways, rule, not more):
+    for part, bary in _cut_for_phase(surface, facet, shape, ways, rule, not more):
         part, bary = lit_parts(part, bary, *shape, surface.both_sides, leg.image, leg.far)
         tubes = stand(surface, leg, part, bary)
         if leg.mirrors:
@@ -78,7 +78,9 @@ def _returning(surface: Surface, leg: Leg, out: Leg, others: list[Leg], tubes: T
     return tubes.take(keep)
 
 
-def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool) -> Iterator[tuple[Ints, Floats]]:
+def _cut_for_phase(
+    surface: Surface, facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool
+) -> Iterator[tuple[Ints, Floats]]:
     """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts; yield
     facets and corners of the parts in batches, so that memory does not grow with their number.
 
@@ -97,6 +99,7 @@ def _cut_for_phase(facet: Ints, shape: Any, ways: Any, rule: Refinement, across:
         spent += len(facet)
         edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
         if spent > rule.max_tubes:
+            surface.uncut += int(np.count_nonzero(edge >= 0))
             edge[:] = -1
         ready, more = edge < 0, edge >= 0
         if held + np.count_nonzero(ready) > _BATCH:

@@ -39,6 +39,7 @@ _RAYS = 200.0  # of two launches over a flat body, about, for an area of max_edg
 _COVER_ALONE = 1.05  # the same where a body hides nothing of itself, so that launches cannot both miss it
 _CURVED = 0.01  # of the value a radian of a rule's `phase`: what launches over the same curved facets all miss
 _TERMINATOR = 0.25  # of 1 / k: what light's sudden end leaves a sphere of any radius in physical optics, not in Mie
+_TUBES = 30_000  # a launch may always cut, if max_rays allow
 _NULL = 1e-4  # of the strongest polarisation: -80 dB
 _GROWTH = 2.6  # rays of the next refinement over those of all before it, about
 
@@ -203,9 +204,11 @@ def _refined(
     # Long tubes may miss the same in two launches.
     cover *= np.sqrt(_stretch(surface, max_rays))
     rules = [
-        replace(step, max_tubes=max(1000, max_rays // 4)) for step in refinements(surface, frequency, max_rays=max_rays)
+        replace(step, max_tubes=_most_tubes(i, max_rays))
+        for i, step in enumerate(refinements(surface, frequency, max_rays=max_rays))
     ]
     for rule in rules:
+        coarse = surface.uncut
         s = _both_ways(surface, leg, out, frequency, bounces, rule)
         by_bounce = s[:, row, col]
         value = complex(by_bounce.sum())
@@ -218,7 +221,9 @@ def _refined(
             spent = (surface.rays + doubt.rays - rays) * _GROWTH > max_rays
             # In a null of this polarisation nothing is left to find.
             null = change < _NULL * np.abs(s.sum(axis=0)).max()
-            if stated_error(value, off, 1.0) <= tolerance_db or spent or null:
+            agreed = stated_error(value, off, 1.0) <= tolerance_db or null
+            # Two launches may miss the same in tubes that their number alone kept from being cut.
+            if spent or (surface.uncut == coarse and agreed):
                 break
         before = value
 
@@ -229,14 +234,23 @@ def _refined(
     # miss of the same bright spots, in phase at worst; other waves and other readings know nothing of that phase and
     # add in squares.
     around, share = creeping(surface, rules[0].wavenumber)
-    off += doubt.normals(first, other) * abs(value)
+    sure = value != 0.0 and stated_error(value, off, 1.0) <= LARGEST_DB
+    # Where the launches tell nothing, another reading of the mesh adds nothing.
+    off += doubt.normals(first, other) * abs(value) if sure else 0.0
     error_db = stated_error(value, math.hypot(off, max(around if ring else 0.0, share * abs(value))), 1.0)
-    error_db = math.hypot(error_db, doubt.edges_db(first, value, other))
+    error_db = math.hypot(error_db, doubt.edges_db(first, value, other)) if sure else np.inf
     counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
     # Nothing has no level to be off by.
     known = error_db if value and error_db <= LARGEST_DB else np.nan
     cast = surface.rays + doubt.rays - rays
     return 4.0 * np.pi * abs(value) ** 2, known, cast, int(counted.max(initial=-1)) + 1, s.sum(axis=0)
+
+
+def _most_tubes(step: int, max_rays: int) -> int:
+    """Return how many tubes a launch may cut: of the first two, a quarter of what later ones may, so that a body whose
+    every tube needs many rays does not spend all at once."""
+    later = max(1000, max_rays // 4)
+    return later if step > 1 else max(later // 4, min(later, _TUBES))
 
 
 def _both_ways(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:

@@ -51,6 +51,7 @@ class Surface(Tracer):
         self.dull = lasting(still, "dull", lambda: poor[facets.material])
         self.matter = facets.material, (m.kind, m.eps, m.thickness, m.roughness)
         self.bulge, self.curved = columns(still, "bulges", lambda rows: bulges(v[rows], n[rows]))
+        self.uncut = 0  # tubes that budgets kept from being cut, over all launches
         # What others made of all this, once.
         self.between: Any = None
         self.screens: Any = None

@@ -132,6 +132,8 @@ def invoke(argv: list[str]) -> int:
 
 def _unprinted() -> int | None:
     """Print what waits to be printed; return the exit code where standard output does not take it."""
+    if sys.stdout is None:  # closed by whoever started the command
+        return None
     try:
         sys.stdout.flush()
         return None

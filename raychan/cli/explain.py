@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from raychan.run.explain import CellExplanation, CellPaths
 
+_COUNTS = 1e-3  # of the strongest wave in the cell: what is weaker is not listed
 _OTHERS = 5  # detections beside the one taken that are named
 
 
@@ -117,7 +118,9 @@ def _listed(paths: CellPaths, most: int) -> Table:
 
     from raychan.units import dbm
 
-    count = min(most, len(paths.row))
+    brought = np.abs(paths.wave)
+    counting = int((brought > _COUNTS * brought.max(initial=0.0)).sum())
+    count = min(most, counting)
     heads = (
         "in cell dBm",
         "deg",
@@ -138,10 +141,11 @@ def _listed(paths: CellPaths, most: int) -> Table:
             f"{np.degrees(paths.phase[i]):+.1f}", f"{paths.range[i]:.3f}", f"{paths.rate[i]:+.3f}", *ends,
             f"{paths.interactions[i]}: {', '.join(paths.met[paths.chain[i]]) or 'none'}",
         ])  # fmt: skip
-    rest = len(paths.row) - count
+    rest = counting - count
     left = paths.wave[count:].sum()
-    others = f"; {rest} weaker ones add up to {dbm(abs(left) ** 2):.1f} dBm in the cell" if rest else ""
-    return show.table(f"{count} of {len(paths.row)} paths{others}", heads, rows, left=(8,))
+    others = f"; the weaker ones add up to {dbm(abs(left) ** 2):.1f} dBm" if rest else ""
+    title = f"{count} of {counting} paths within 60 dB of the strongest in the cell{others}"
+    return show.table(title, heads, rows, left=(8,))
 
 
 def _sum(why: CellExplanation) -> str:

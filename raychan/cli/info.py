@@ -16,6 +16,7 @@ _WORDS = {
     "tx_gain": "transmit gain",
     "rx_gain": "receive gain",
     "eirp": "EIRP",
+    "max_path_loss": "most one-way loss to that noise, receive gain aside",
     "noise": "noise in a sample (kT0 F fs)",
     "coherent_gain": "gain of chirps x samples",
     "sensitivity": "noise in a cell of the map (rectangular windows)",
@@ -173,15 +174,17 @@ def _radar(sensor: Any) -> list[Table]:
 
 
 def _chirp(w: Any) -> list[tuple[str, str]]:
+    # A map's rates are those of the ramp's middle.
+    of_middle = w.carrier / w.middle
     return [
         ("carrier, bandwidth", f"{w.carrier / 1e9:g} GHz, {w.bandwidth / 1e6:g} MHz"),
         ("chirp sampled, repeated", f"{w.chirp_duration * 1e6:g} us, {w.repetition * 1e6:g} us"),
         ("chirps x samples", f"{w.n_chirps} x {w.n_samples} {'I/Q' if w.complex_sampling else 'real'}"),
         ("sample rate", f"{w.sample_rate / 1e6:.4g} MS/s"),
         ("range resolution (rectangular window)", f"{w.range_resolution:.4g} m"),
-        ("range rate resolution (rectangular window)", f"{w.rate_resolution:.4g} m/s"),
+        ("range rate resolution (rectangular window)", f"{w.rate_resolution * of_middle:.4g} m/s"),
         ("unambiguous range", f"{w.unambiguous_range:.4g} m"),
-        ("unambiguous range rate", f"+-{w.unambiguous_rate:.4g} m/s"),
+        ("unambiguous range rate", f"+-{w.unambiguous_rate * of_middle:.4g} m/s"),
     ]
 
 

@@ -88,6 +88,8 @@ def rcs(
         raise typer.BadParameter(f"{len(az) * len(el)} angles wanted; at most {_MOST_ANGLES} can be")
     if polar:
         _can_be_polar(plot, len(az), len(el))
+    if shape is not None and (unit != "m" or up is not None or scale != 1.0):
+        raise typer.BadParameter("--unit, --up and --scale are for mesh files: a built-in shape is in metres, z up")
     if shape is not None and crease is not None:
         raise typer.BadParameter("--crease is for mesh files: a built-in shape knows which of its folds are edges")
     mesh, name = _target(source or [], shape, unit, up, scale, crease)
@@ -125,7 +127,11 @@ def rcs(
     write_together(files)
     screen = show.console()
     screen.print(_table(title, rows))
-    show.warn(mesh.report.warnings() if shape is None else [])
+    if shape is None and source:
+        from raychan.world.meshfile import oddities
+
+        show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
+    _bounces(found, max_bounces)
     _warn(mesh, found, tolerance)
     if files:
         screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
@@ -185,8 +191,6 @@ def _target(
         if len(source) != 1:
             raise typer.BadParameter("one mesh file is wanted, or --shape NAME with its parameters")
         angle = CREASE_DEG if crease is None else crease
-        if not 0.0 <= angle <= 180.0:
-            raise typer.BadParameter(f"--crease: {angle:g} deg is not possible; allowed: 0 to 180")
         return load(source[0], unit=unit, up=up, scale=scale, crease_deg=angle), Path(source[0]).name
     from raychan.world.shapes import build
 
@@ -254,6 +258,14 @@ def _table(title: str, rows: list[Any]) -> Any:
     ]
     heads = ("azimuth deg", "elevation deg", "RCS dBsm", "error dB", "rays", "bounces")
     return show.table(title, heads, cells, left=())
+
+
+def _bounces(found: Rcs, most: int) -> None:
+    """Tell where the last bounce allowed still counts: of those beyond it nothing is stated."""
+    last = int((found.bounces >= most).sum())
+    if last and most > 1:
+        more = f"what further ones bring is not in the error (--max-bounces, now {most})"
+        show.warn([f"at {last} of {found.bounces.size} angles the last bounce allowed still counts: {more}"])
 
 
 def _warn(mesh: Mesh, found: Rcs, tolerance: float) -> None:

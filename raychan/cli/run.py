@@ -17,11 +17,20 @@ if TYPE_CHECKING:
     from raychan.world.scene import Scene
 
 
+def _directory(text: str) -> Path:
+    """Return a directory's path; an empty name, as of a variable that is not set, is none."""
+    if not str(text).strip():
+        raise typer.BadParameter("it is empty: where shall the results go?")
+    return Path(text)
+
+
 def run(
     scene: SceneFile = None,  # type: ignore[assignment]
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR"),
+        typer.Option(
+            "--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=_directory
+        ),
     ] = None,
     seed: Seed = 0,
     tolerance: Tolerance = None,

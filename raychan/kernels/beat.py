@@ -137,6 +137,7 @@ def stretched(place, factor, frame, rest, falloff):  # type: ignore[no-untyped-d
     order_b, order_a = int(rest[0, 2]), int(rest[1, 2])
     most = max(order_b, order_a)
     turns_b, turns_a = 2.0 * math.pi * rest[0, 3], 2.0 * math.pi * rest[1, 3]
+    size_b, size_a = np.ones(order_b + 1), np.ones(order_a + 1)
     for m in range(chirps):
         late = (m - chirps // 2) * repetition
         for s in range(samples):
@@ -149,12 +150,17 @@ def stretched(place, factor, frame, rest, falloff):  # type: ignore[no-untyped-d
                 value = value * at + falloff[d]
             far, long = (late + t) * t, (late + t) ** 2
             cosine, sine = wave(shift * u + rest[0, 0] * far + rest[1, 0] * long)
+            if order_b > 0:
+                for k in range(order_b + 1):
+                    size_b[k] = _bessel(k, turns_b * far)
+            if order_a > 0:
+                for j in range(order_a + 1):
+                    size_a[j] = _bessel(j, turns_a * long)
             p, quarter = 0, complex(value * cosine, value * sine)
             for j in range(order_a + 1):
                 turned = quarter
                 for k in range(min(order_b, most - j) + 1):
-                    size = _bessel(k, turns_b * far) if order_b > 0 else 1.0
-                    factor[p, m, s] = turned * (size * _bessel(j, turns_a * long) if order_a > 0 else size)
+                    factor[p, m, s] = turned * (size_b[k] * size_a[j])
                     turned *= -1j
                     p += 1
                 quarter *= -1j

@@ -17,6 +17,7 @@ from raychan.units import undb
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+_MOST_BYTES = 100_000_000  # a grid of tenths of a degree over the sphere
 _CUTS = ("plane", "angle_deg", "gain_dbi")
 _SPHERE = ("azimuth_deg", "elevation_deg", "gain_dbi")
 
@@ -52,6 +53,8 @@ class MeasuredPattern:
         """
         path = Path(path)
         try:
+            if path.exists() and (not path.is_file() or path.stat().st_size > _MOST_BYTES):
+                raise PatternError(f"{path}: must be a file of at most {_MOST_BYTES // 1_000_000} MB")
             with open(path, newline="", encoding="utf-8-sig") as file:
                 rows = list(csv.DictReader(file, skipinitialspace=True))
                 columns = set(rows[0]) if rows else set()

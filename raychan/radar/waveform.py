@@ -58,6 +58,11 @@ class Waveform:
         return C0 / self.carrier
 
     @property
+    def middle(self) -> float:
+        """Frequency at the middle sample of a ramp [Hz]: what turns a Doppler shift into the range rate of a map."""
+        return self.carrier + 0.5 * self.bandwidth * (1.0 - 1.0 / self.n_samples)
+
+    @property
     def range_resolution(self) -> float:
         """c/2B: the range cell of a rectangular window [m]."""
         return C0 / (2.0 * self.bandwidth)

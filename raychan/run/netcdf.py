@@ -48,6 +48,12 @@ _TITLES = {
     "rx": "position of the receiver",
 }
 _STANDARD = {"rate": "radial_velocity_of_scatterers_away_from_instrument"}
+_KINDS = ("none", "reflect", "transmit", "scatter", "point_target", "diffract")
+_COMMENTS = {
+    "delay": "from transmitter to receiver, both ways; range is c delay / 2",
+    "body": "row of the attribute body_names; -1 in unused slots",
+    "part": "row of the attribute part_names; -1 in unused slots",
+}
 _SCALARS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_resolution": "m s-1"} | {
     "unambiguous_range": "m",
     "unambiguous_rate": "m s-1",
@@ -137,10 +143,16 @@ def _column(group: Any, name: str, f: dataclasses.Field[Any], value: Any, packed
     """Write a column of a record: the two parts of a complex one, truths as 0 and 1."""
     axes = [_ROWS[name] if a in "nw" else _AXES.get(a) or _fixed(f.name, a) for a in f.metadata["axes"]]
     title = _TITLES.get(f.name, f.name.replace("_", " "))
+    if name == "error" and f.name == "power":
+        title = "stated error of the received power"
     unit = f.metadata["unit"]
     about = {"units": _UNITS.get(unit, unit.replace("/", " ").replace("m s", "m s-1")), "long_name": title}
     if f.metadata["doc"]:
         about["comment"] = f.metadata["doc"]
+    if f.name == "kind":
+        about["flag_values"] = np.arange(len(_KINDS), dtype=np.int8)
+        about["flag_meanings"] = " ".join(_KINDS)
+    about |= {"comment": _COMMENTS[f.name]} if f.name in _COMMENTS else {}
     if f.name in _STANDARD:
         about["standard_name"] = _STANDARD[f.name]
     if not f.metadata["finite"]:

@@ -59,7 +59,7 @@ def synthesize(
                 turned = scaled * np.exp(-2j * np.pi * wave.carrier * later)
                 layer[...] = _direct(turned, paths.delay + later, growth, wave)
         else:
-            _fast(samples, [(grid, grid.prepared(part)) for grid, part in grids], elements)
+            _fast(samples, grids, elements)
     if not wave.complex_sampling:
         samples.imag = 0.0
     quiet = Cube(samples=samples, noise_power=0.0)
@@ -86,16 +86,22 @@ def _direct(amplitude: Complexes, delay: Floats, growth: Floats, wave: Waveform)
 
 
 def _fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: Floats) -> None:
+    """Write what all receivers get, grid by grid: what a long frame needs to read off one may be gigabytes."""
     threads = os.cpu_count() or 1
+    sums = samples if len(grids) == 1 else np.zeros(samples.shape, np.complex128)
     with ThreadPoolExecutor(max_workers=threads) as pool:
         # As many receivers as cores: a core each. Else all cores work on one. The sums are the same.
         outer, inner = (pool.map, map) if len(elements) >= threads > 1 else (map, pool.map)
+        while grids:
+            grid, echoes = grids.pop()
+            ready = grid.prepared(echoes)
 
-        def receiver(layer: Samples, element: Floats) -> None:
-            total = np.zeros(layer.shape, np.complex128)
-            for grid, echoes in grids:
-                grid.add(total, echoes, element, inner)
-            layer[...] = total
+            def receiver(layer: Complexes, element: Floats, grid: Keystone = grid, ready: Echoes = ready) -> None:
+                total = np.zeros(layer.shape, np.complex128)
+                grid.add(total, ready, element, inner)
+                layer += total
 
-        for _ in outer(receiver, samples, elements):
-            pass
+            for _ in outer(receiver, sums, elements):
+                pass
+    if sums is not samples:
+        samples[...] = sums

@@ -62,7 +62,7 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
     """Return a warning for each body whose nearest point reads a folded range or range rate, and what it will read."""
     said = []
     at, own = np.array(radar.position), np.array(radar.velocity_mps)
-    limit, top = waveform.unambiguous_range, waveform.unambiguous_rate
+    limit, top = waveform.unambiguous_range, waveform.unambiguous_rate * waveform.carrier / waveform.middle
     for body in bodies:
         if body.kind == MIRROR or _near_and_slow(body, at, own, limit, top):
             continue
@@ -74,13 +74,13 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
             seen = folded_range(far, limit, waveform.complex_sampling)
             said.append(
                 f"body '{body.name}' at {far:.2f} m is beyond the unambiguous range {limit:.2f} m: "
-                f"it appears at {seen:.2f} m"
+                f"it appears near {seen:.0f} m"
             )
         if abs(rate) > top:
             seen = (rate + top) % (2.0 * top) - top
             said.append(
                 f"body '{body.name}' at {rate:.2f} m/s is beyond the unambiguous range rate {top:.2f} m/s: "
-                f"it appears at {seen:.2f} m/s"
+                f"it appears near {seen:.1f} m/s"
             )
     return said
 

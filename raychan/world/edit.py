@@ -6,15 +6,24 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 from raychan.world.errors import SceneError, nearest
+from raychan.world.meshfile import SUFFIXES
 
 LATER = "# later by [s]: "
 """Begins the line with which the text of a scene says that it is taken at another time than that of its poses."""
 
 _XYZ = ("x", "y", "z")
 _VECTORS = ("position", "velocity_mps", "rcs_point")
+
+
+def refuse_mesh(file: Path) -> None:
+    """Raise SceneError for the name of a mesh where a scene is wanted."""
+    if file.suffix.lower() in SUFFIXES:
+        takes = "a scene file (.toml), in which a body names the mesh; `info` and `rcs` take meshes themselves"
+        raise SceneError("is a mesh, not a scene", file=file, allowed=takes)
 
 
 def parsed(text: str, file: Any = None) -> dict[str, Any]:

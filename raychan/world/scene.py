@@ -85,6 +85,7 @@ class Scene(Told):
         Raises: SceneError where file, syntax, key or value is wrong.
         """
         file = shipped.found(path)
+        edit.refuse_mesh(file)
         try:
             text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
