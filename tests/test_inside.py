@@ -197,3 +197,39 @@ def test_the_rcs_of_a_glass_box_is_the_series_of_its_panes(deep):
     phases = np.exp(1j * K * deep * np.array([1.0, -1.0, -3.0]))
     field = np.array([r, t**2 * r, t**2 * r**3]) @ phases * 0.06 * K / (2.0 * np.pi)
     assert 10.0 * np.log10(sigma / (4.0 * np.pi * abs(field) ** 2)) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("most", [1, 3, 5, 7, 9])
+def test_a_box_of_panes_rings_as_often_as_bounces_are_allowed(most):
+    """R + sum of T^2 R^(2n+1) exp(-2jkL(n+1)): each turn between the panes takes two bounces more."""
+    length, side = 0.5004, (0.3, 0.2)
+    pane = rc.Material(eps_r=20.0, sigma=0.2, thickness=0.0041)
+    found = rc.rcs(trimesh.creation.box((length, *side)), 77e9, 0.0, material=pane, max_bounces=most, tolerance_db=0.05)
+    k = 2.0 * np.pi * 77e9 / 299_792_458.0
+    r, _, t, _ = slab.layer(1.0, 20.0 - 0.2j / (2 * np.pi * 77e9 * 8.8541878128e-12), 0.0041, k)
+    turns = sum(t**2 * r ** (2 * n + 1) * np.exp(-2j * k * length * (n + 1)) for n in range((most + 1) // 2))
+    exact = 4.0 * np.pi * abs(side[0] * side[1] * k / (2.0 * np.pi) * (r + turns)) ** 2
+    assert 10 * np.log10(found.sigma / exact) == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 30.0])
+def test_a_curved_body_cut_into_two_at_any_triangles_is_the_same_surface(yaw):
+    whole = trimesh.creation.cylinder(radius=0.4, height=1.0, sections=48)
+    first = np.random.default_rng(7).random(len(whole.faces)) < 0.5
+    parts = [trimesh.Trimesh(whole.vertices, whole.faces[rows]) for rows in (first, ~first)]
+
+    def corners(*meshes):
+        place = {"position": (6.0, 0.5, 0.0), "yaw_deg": yaw, "material": "pec"}
+        bodies = [rc.Body(name=f"b{i}", mesh=m, **place) for i, m in enumerate(meshes)]
+        f = rc.Scene(bodies=bodies, frequency=77e9).facets()
+        order = np.lexsort(f.vertices.mean(axis=1).round(6).T)
+        return f.vertices[order].mean(axis=1), f.normals[order].mean(axis=1)
+
+    one, two = corners(whole), corners(*parts)
+    side = np.abs(one[0][:, 2]) < 0.4
+    level = np.abs(two[0][:, 2]) < 0.4
+    assert side.sum() == level.sum() == 96
+    # Where the cut runs along a quad's diagonal it may be halved the other way.
+    radial = (two[0] - [6.0, 0.5, 0.0])[level, :2]
+    radial /= np.linalg.norm(radial, axis=1, keepdims=True)
+    assert (np.einsum("ij,ij->i", radial, two[1][level, :2]) > 0.995).all()

@@ -39,7 +39,7 @@ def tube_routes(
     the tubes on their first surface, whose own routes are then not among those yielded.
     """
     direct = outs[0]
-    found = so_far or Found(rule)
+    found = so_far or Found(rule.for_depth(bounces))
     more = bounces > len(leg.mirrors) + 1 and not surface.convex_alone
     images = _Images.of(surface, outs)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]

@@ -123,7 +123,7 @@ def solve_into(
     if found is not None:
         carry(found)
     stats.add("points", since)
-    so_far = Found(rule)
+    so_far = Found(rule.for_depth(bounces))
     for i, leg in enumerate(legs):
         if progress:
             progress("trace", i / len(legs))

@@ -7,7 +7,7 @@ gradients (the directions) by a Hermite rule that is exact to third order; on th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ Bools = NDArray[np.bool_]
 
 CENTRE = 3
 MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
+_MOST_SLOTS = 120  # of a history: their number is kept in a byte
 _MANY = 4096  # tubes from which on a second thread pays
 
 
@@ -53,6 +54,10 @@ class Refinement:
     layers: int = 2
     max_tubes: int = 100_000_000
     jitter: float = 0.0
+
+    def for_depth(self, bounces: int) -> Refinement:
+        """Return the same rule with history enough for so many bounces, and layers on every stretch between them."""
+        return replace(self, slots=min(max(self.slots, bounces + self.layers * (bounces + 1) + 3), _MOST_SLOTS))
 
 
 @dataclass

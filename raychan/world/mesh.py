@@ -173,6 +173,12 @@ def creased(mesh: Mesh, crease_deg: float) -> Mesh:
     return replace(mesh, normals=smooth_normals(mesh.vertices, mesh.faces, crease_deg), crease_deg=crease_deg)
 
 
+def opposed_pairs(faces: Ints) -> tuple[Ints, Ints]:
+    """Return the two faces (e,) of each edge that exactly two of them walk, in opposite ways."""
+    a, b, _, _, opposed = _edge_pairs(faces)
+    return a[opposed], b[opposed]
+
+
 def crease_angle(crease_deg: float) -> float:
     """Return the angle [rad] under which folds are smooth, for a crease angle [deg]."""
     return float((1.0 + _ALIKE) * np.radians(crease_deg))

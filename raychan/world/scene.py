@@ -26,6 +26,7 @@ from raychan.world.mesh import Floats
 from raychan.world.mount import sensor_of
 from raychan.world.placed import placed, stack
 from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile
+from raychan.world.seams import over_seams
 from raychan.world.still import Still
 
 __all__ = ["Body", "Scene", "SceneError"]
@@ -166,6 +167,7 @@ class Scene(Told):
                 _ = body.motion, body.kind
             except SceneError as e:
                 raise e.at(key="bodies") from None
+        self.bodies = over_seams(self.bodies)
         check.radar_outside(self.bodies, self.radar)
         if self.radar is not None:
             _ = self.sensor
