@@ -53,7 +53,8 @@ def refinement(
 
     Args: floor [1/m] the scattered amplitude that drowns in noise; layers that a stretch may pass; jitter another
     lattice; cell [m] of two-way length that the radar tells apart. The constants are those at which two launches of the
-    shapes in the tests differ by about half the tolerance; at half the noise a tube, cells 13 dB above it do.
+    shapes in the tests differ by about half the tolerance; at half the noise a tube, cells 13 dB above it do: a coarser
+    tolerance leaves no more than that, for what many tubes under a higher floor leave adds up to more than is stated.
     """
     fine = tolerance_db / 0.5
     return Refinement(
@@ -62,7 +63,7 @@ def refinement(
         turn=min(0.3, 0.15 * fine),
         relative=min(0.15, 0.05 * fine),
         max_edge=0.3 * min(1.0, np.sqrt(fine)),
-        floor=0.5 * floor * fine,
+        floor=0.5 * floor * min(fine, 1.0),
         cell=cell,
         layers=layers,
         slots=8 + layers,
