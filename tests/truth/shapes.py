@@ -79,6 +79,9 @@ def flat(mesh, look):
     return 4.0 * np.pi * abs(s) ** 2
 
 
+BEND_ONE_WAY = ("cylinder", "prism")  # kinds of bodies that may be meant as round or as flat
+
+
 def case(rng, i):
     """Name, mesh, azimuth, elevation [deg] and true sigma [m^2] of one of eight kinds of bodies, the first four smooth
     but for their rims, the others flat."""
