@@ -10,13 +10,14 @@ BIN := $(VENV)/bin
 BOUNDS := $(addprefix tests/test_,bounds.py cores.py cut.py diffract.py jit.py shapes.py sight.py spectrum.py utd.py)
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: help demo test test-bounds fuzz bench clean
+.PHONY: help demo test test-bounds fuzz signatures bench clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
 	@echo "make test   ruff, ruff format, mypy, pytest; the three scenes and the kernels' tests with bounds checked"
 	@echo "make test-bounds   all tests with the bounds of every array in compiled code checked"
 	@echo "make fuzz   random scene files, meshes and flags for half an hour (FUZZ=--help: more)"
+	@echo "make signatures   list anew what a cold run compiles, for its second process (some minutes)"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
 	@echo "make clean  remove $(VENV), out and caches"
 
@@ -35,6 +36,9 @@ test-bounds: $(VENV)/.installed-dev
 
 fuzz: $(VENV)/.installed-dev
 	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
+
+signatures: $(VENV)/.installed-dev
+	PYTHONPATH=tests $(BIN)/python -m signatures
 
 bench: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)

@@ -63,6 +63,29 @@ def test_processes_that_compile_at_once_all_compute_right_and_leave_what_is_righ
     assert printed(command(tmp_path, _READ.format(kinds=_KINDS))) == "8"
 
 
+def test_processes_that_compile_at_once_share_the_work(tmp_path: Path):
+    code = _READ.format(kinds=_KINDS) + "print(sum(f.stats.cache_misses.total() for f in (toy.half, toy.mixed)))"
+    made = [int(printed(process).split()[-1]) for process in [command(tmp_path, code) for _ in range(4)]]
+    assert sum(made) == len(files(tmp_path))
+
+
+def test_a_process_that_waits_for_anothers_compiling_goes_on_when_that_one_is_killed(tmp_path: Path):
+    hangs = """
+import numba.core.compiler as c, time
+c.Compiler.compile_extra = lambda *a: (print(flush=True), time.sleep(99))
+"""
+    code = _READ.format(kinds=["float64"])
+    stuck = command(tmp_path, hangs + code)
+    assert stuck.stdout is not None
+    stuck.stdout.readline()  # now it holds the lock
+    waits = command(tmp_path, code)
+    with pytest.raises(subprocess.TimeoutExpired):
+        waits.wait(8.0)
+    stuck.kill()
+    stuck.communicate()
+    assert printed(waits) == "0"
+
+
 def test_code_of_a_half_written_or_another_file_is_made_anew(tmp_path: Path):
     code = _READ.format(kinds=["float64"])
     printed(command(tmp_path, code))

@@ -115,7 +115,7 @@ def _reflection(surface: Surface, facet: int, k_in: Floats, k_out: Floats, k: fl
     row = surface.facets.material[facet]
     normal = surface.normal[facet]
     cosine = max(abs(float(k_in @ normal)), abs(float(k_out @ normal)))
-    c = coefficients(int(m.kind[row]), complex(m.eps[row]), m.thickness[row], m.roughness[row], cosine, k)
+    c = coefficients(m.kind[row], complex(m.eps[row]), m.thickness[row], m.roughness[row], cosine, k)
     return c[0], c[1]
 
 

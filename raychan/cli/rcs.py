@@ -107,7 +107,7 @@ def rcs(
         "tolerance_db": tolerance,
         "max_bounces": max_bounces,
     }
-    with show.progress() as tell:
+    with show.progress(kernels="rcs") as tell:
         found = _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell)
     rows = _rows(grid[0].ravel(), grid[1].ravel(), found)
     title = f"{name}, {frequency_ghz:g} GHz, {polarization.upper()}, " + (

@@ -105,15 +105,24 @@ def _known(value: float, digits: str) -> str:
 
 
 @contextmanager
-def progress(quiet: bool = False) -> Iterator[Callable[[str, float], None]]:
+def progress(quiet: bool = False, kernels: str = "run") -> Iterator[Callable[[str, float], None]]:
     """Give a function to tell the progress to: bars on a terminal; elsewhere nothing, but a line where compiled code
-    must be made first."""
-    from raychan.kernels.compiling import lost, watched
+    must be made first. `kernels` names the list of what is compiled ahead."""
+    from raychan.kernels.ahead import helped
+    from raychan.kernels.compiling import lost, missing
+
+    with helped(kernels, len(missing())), _told(quiet) as tell:
+        yield tell
+    warn(filter(None, [lost()]))
+
+
+@contextmanager
+def _told(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    from raychan.kernels.compiling import watched
 
     if quiet or not sys.stderr.isatty():
         with watched(_line() if not quiet else lambda done, ahead, seconds: None):
             yield lambda stage, share: None
-        warn(filter(None, [lost()]))
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -137,7 +146,6 @@ def progress(quiet: bool = False) -> Iterator[Callable[[str, float], None]]:
 
         with watched(compiling):
             yield tell
-    warn(filter(None, [lost()]))
 
 
 def _line() -> Callable[[int, int, float], None]:

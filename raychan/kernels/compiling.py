@@ -12,7 +12,7 @@ from numba.core import event
 from raychan.kernels.jit import KERNELS, Kernel
 from raychan.kernels.kept import unkept
 
-_EACH = 0.25  # s that a kernel takes on two quiet cores, a rough mean over a cold run; soon this run has its own
+_EACH = 0.25  # s of a cold run a kernel, two processes on two quiet cores; soon this run has its own mean
 _OWN = 20  # kernels after which the mean is this run's own
 
 Told = Callable[[int, int, float], None]

@@ -14,6 +14,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import config
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 from raychan.kernels.kept import Kept
@@ -37,6 +38,10 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
 
     def __call__(self, *args: Any) -> Any:
         return super().__call__(*args) if _CHECKED else super().__call__(*map(_open, args))
+
+    def compile(self, sig: Any) -> Any:
+        with global_compiler_lock, self.kept.held():
+            return super().compile(sig)
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:

@@ -3,6 +3,9 @@
 Numba keeps an index beside its data files and picks a data file's name by what the index holds: two processes that
 compile at once leave an index of one with code of the other. Here there is no index. A file's name is made of all that
 its code depends on, it appears whole or not at all, and it says itself what it holds.
+
+Who compiles holds a lock meanwhile: another process that needs the same code waits for it. Waiting goes only from a
+function to those it calls, so no two processes wait for each other.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ import os
 import pickle
 import platform
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +26,11 @@ import numba
 from numba.core import config
 from numba.core.caching import FunctionCache
 from numba.core.serialize import dumps
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
 
 # What else compiled code depends on: versions, and numba's switches that change what is generated.
 _SWITCHES = ("BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "LLVM_REFPRUNE_PASS")
@@ -46,6 +54,7 @@ class Kept(FunctionCache):  # type: ignore[no-any-unimported]
         how = _digest(numba.__version__, llvmlite.__version__, platform.python_version(), switches)
         self._base = f"{self._impl.filename_base}.{how.hex()[:8]}"
         self.stamped(_digest(self.source))
+        self._locks: list[contextlib.ExitStack] = []
 
     def stamped(self, stamp: bytes) -> bytes:
         """Set what the code is made of, and return it; code made of anything else is not used, and cleared."""
@@ -55,13 +64,32 @@ class Kept(FunctionCache):  # type: ignore[no-any-unimported]
 
     def is_there(self) -> bool:
         """Tell whether code for any signature is kept."""
-        return any(name.startswith(f"{self._prefix}.") for name in _names(self.folder, _changed(self.folder)))
+        names = _names(self.folder, _changed(self.folder))
+        return any(name.startswith(f"{self._prefix}.") and name.endswith(".code") for name in names)
 
     def _file(self, key: object) -> Path:
         return self.folder / f"{self._prefix}.{_digest(key).hex()[:16]}.code"
 
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Let go, at its end, of the lock that was taken within to compile."""
+        with contextlib.ExitStack() as lock:
+            self._locks.append(lock)
+            try:
+                yield
+            finally:
+                self._locks.pop()
+
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
         key = self._index_key(sig, target_context.codegen())
+        code = self._read(key, target_context)
+        if code is None and self._locks:
+            with contextlib.suppress(OSError):
+                self._locks[-1].enter_context(_alone(self._file(key).with_suffix(".lock")))
+                code = self._read(key, target_context)  # another process may have made it meanwhile
+        return code
+
+    def _read(self, key: Any, target_context: Any) -> Any:
         try:
             content = self._file(key).read_bytes()
         except OSError:
@@ -90,6 +118,22 @@ class Kept(FunctionCache):  # type: ignore[no-any-unimported]
             if not file.name.startswith(f"{self._prefix}."):
                 with contextlib.suppress(OSError):
                     file.unlink()
+
+
+@contextlib.contextmanager
+def _alone(file: Path) -> Iterator[None]:
+    """Hold a lock that other processes wait for; where the system has none, nobody waits."""
+    if fcntl is None:
+        yield
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("ab") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                file.unlink()
 
 
 @lru_cache(maxsize=64)

@@ -95,7 +95,7 @@ class Tracer:
     def __init__(self, facets: Facets, still: Still | None = None) -> None:
         self.facets = facets
         v, n = facets.vertices, len(facets.vertices)
-        self.first = v[:, 0]
+        self.first = np.ascontiguousarray(v[:, 0])
         self.normal, self.area = columns(still, "planes", lambda rows: planes_of(v[rows]))
         self.extents = _extents(facets, still)
         kind = facets.materials.kind
