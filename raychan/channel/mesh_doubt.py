@@ -25,15 +25,17 @@ _RESONANCE = 6.0  # k a under which that falls again, but not what physical opti
 
 @dataclass(frozen=True)
 class Doubt:
-    """Surfaces that a mesh may stand for beside the one taken: by another fit of its normals, and with edges."""
+    """Surfaces that a mesh may stand for beside the one taken: by another fit of its normals, with edges for doubtful
+    folds, and with smooth folds for doubtful edges."""
 
     fitted: Surface | None
     creased: Surface | None
+    rounded: Surface | None
 
     @property
     def rays(self) -> int:
         """Rays cast on them so far."""
-        return sum(s.rays for s in (self.fitted, self.creased) if s is not None)
+        return sum(s.rays for s in (self.fitted, self.creased, self.rounded) if s is not None)
 
     def normals(self, first: complex, of: Callable[[Surface], complex]) -> float:
         """Return how far off an amplitude may be, as a share of it, because normals are estimated.
@@ -45,19 +47,25 @@ class Doubt:
         return _FITS * abs(of(self.fitted) - first) / abs(first) + _FACETS
 
     def edges_db(self, first: complex, value: complex, of: Callable[[Surface], complex]) -> float:
-        """Return how far off a level [dB] may be because doubtful folds are edges; value by the last launch."""
-        if self.creased is None or not (first and value):
+        """Return how far off a level [dB] may be because doubtful folds are edges, or the other way round; value by the
+        last launch."""
+        if not (first and value):
             return 0.0
-        other = of(self.creased)
-        partly = 20.0 * np.log10(1.0 + _PARTLY * abs(other - first) / abs(first))
-        apart = max(abs(20.0 * np.log10(max(abs(other), 1e-300) / abs(a))) for a in (first, value))
-        return float(max(partly, _EDGES_DB * apart))
+        said = [0.0]
+        for surface in (self.creased, self.rounded):
+            if surface is None:
+                continue
+            other = of(surface)
+            partly = 20.0 * np.log10(1.0 + _PARTLY * abs(other - first) / abs(first))
+            apart = max(abs(20.0 * np.log10(max(abs(other), 1e-300) / abs(a))) for a in (first, value))
+            said += [partly, _EDGES_DB * apart]
+        return float(max(said))
 
 
 def doubt_of(facets: Facets, found: Readings) -> Doubt:
     """Return the other surfaces of a body by itself, given the readings of its mesh."""
-    fitted, creased = (None if n is None else Surface(facets.replace(normals=n)) for n in (found.fitted, found.creased))
-    return Doubt(fitted, creased)
+    other = (found.fitted, found.creased, found.rounded)
+    return Doubt(*(None if normals is None else Surface(facets.replace(normals=normals)) for normals in other))
 
 
 def creeping(surface: Surface, wavenumber: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.bistatic import first_surface
-from raychan.channel.error import COVER, LARGEST_DB, stated_error
+from raychan.channel.error import COVER, LARGEST_DB, MAX_ERROR_DB, stated_error
 from raychan.channel.fields import transfer
 from raychan.channel.found import Found
 from raychan.channel.legs import Leg
@@ -233,15 +233,16 @@ def _refined(
     # What no refinement mends: what the mesh leaves open, and waves that creep around the body. Launches and normals
     # miss of the same bright spots, in phase at worst; other waves and other readings know nothing of that phase and
     # add in squares.
-    around, share = creeping(surface, rules[0].wavenumber)
+    around, share = creeping(doubt.rounded or surface, rules[0].wavenumber)
     sure = value != 0.0 and stated_error(value, off, 1.0) <= LARGEST_DB
     # Where the launches tell nothing, another reading of the mesh adds nothing.
     off += doubt.normals(first, other) * abs(value) if sure else 0.0
     error_db = stated_error(value, math.hypot(off, max(around if ring else 0.0, share * abs(value))), 1.0)
-    error_db = math.hypot(error_db, doubt.edges_db(first, value, other)) if sure else np.inf
+    # How far apart two readings are is a figure, however far.
+    folds_db = doubt.edges_db(first, value, other) if sure else 0.0
     counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
     # Nothing has no level to be off by.
-    known = error_db if value and error_db <= LARGEST_DB else np.nan
+    known = min(math.hypot(error_db, folds_db), MAX_ERROR_DB) if sure and error_db <= LARGEST_DB else np.nan
     cast = surface.rays + doubt.rays - rays
     return 4.0 * np.pi * abs(value) ** 2, known, cast, int(counted.max(initial=-1)) + 1, s.sum(axis=0)
 
