@@ -100,7 +100,7 @@ def rcs(
         raise ValueError("angles must be finite numbers of degrees")
     body = mesh_of(mesh, crease_deg)
     surface = Surface(facets_of(body, material, frequency))
-    doubt = doubt_of(surface.facets, readings(body))
+    doubt = doubt_of(surface, readings(body), 2.0 * np.pi * frequency / C0)
     row, col = _POLARIZATIONS[polarization.upper()]
     out, matrix = np.zeros((4, angles[0].size)), np.zeros((angles[0].size, 2, 2), complex)
     for i, (az, el, raz, rel) in enumerate(zip(*(a.ravel() for a in angles), strict=True)):
@@ -236,7 +236,7 @@ def _refined(
     around, share = creeping(doubt.rounded or surface, rules[0].wavenumber)
     sure = value != 0.0 and stated_error(value, off, 1.0) <= LARGEST_DB
     # Where the launches tell nothing, another reading of the mesh adds nothing.
-    off += doubt.normals(first, other) * abs(value) if sure else 0.0
+    off += doubt.facets(first, value, other) * abs(value) if sure else 0.0
     error_db = stated_error(value, math.hypot(off, max(around if ring else 0.0, share * abs(value))), 1.0)
     # How far apart two readings are is a figure, however far.
     folds_db = doubt.edges_db(first, value, other) if sure else 0.0
