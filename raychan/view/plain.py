@@ -39,7 +39,13 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
             faces.set_zorder(0 if flat else 1)
             axes.add_collection3d(faces)
         if drawing.rays:
-            lines = solids.Line3DCollection([r.points for r in drawing.rays], cmap="plasma", linewidths=1.4, zorder=2)
+            lines = solids.Line3DCollection(
+                [r.points for r in drawing.rays],
+                cmap="plasma",
+                linewidths=1.4,
+                linestyles=["solid" if r.converged else "dashed" for r in drawing.rays],
+                zorder=2,
+            )
             lines.set_array(np.array([r.power for r in drawing.rays]))
             axes.add_collection3d(lines)
             made.colorbar(lines, cax=made.add_axes((0.91, 0.2, 0.015, 0.6)), label="received power [dBm]")
@@ -54,4 +60,5 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
         axes.view_init(elev=28.0, azim=-132.0)
         axes.set_zlabel("z [m]")
         made.suptitle(drawing.title)
+        made.text(0.02, 0.03, drawing.note, fontsize=8)
         return save(made, path)
