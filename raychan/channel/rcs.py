@@ -47,7 +47,9 @@ _GROWTH = 2.6  # rays of the next refinement over those of all before it, about
 @dataclass(frozen=True)
 class Rcs:
     """Radar cross-sections: `sigma` [m^2], `error_db` stated error, NaN where the launches tell nothing, `rays` cast
-    and most `bounces` that counted, each of the shape of the angles given; `amplitude` of that shape and (2, 2) [m],
+    and most `bounces` that counted, `further_db` what a bounce beyond max_bounces would change if it brought as much as
+    the last allowed one (an estimate, not in error_db; 0 for a convex body, NaN where max_bounces is 1 and it is not
+    convex), each of the shape of the angles given; `amplitude` of that shape and (2, 2) [m],
     the scattering matrix, rows the receiver's V, H, columns the transmitter's: sigma = 4 pi |amplitude|^2."""
 
     sigma: Floats
@@ -55,6 +57,7 @@ class Rcs:
     rays: NDArray[np.int64]
     bounces: NDArray[np.int64]
     amplitude: Complexes
+    further_db: Floats
 
     @property
     def converged(self) -> NDArray[np.bool_]:
@@ -102,7 +105,7 @@ def rcs(
     surface = Surface(facets_of(body, material, frequency))
     doubt = doubt_of(surface, readings(body), 2.0 * np.pi * frequency / C0)
     row, col = _POLARIZATIONS[polarization.upper()]
-    out, matrix = np.zeros((4, angles[0].size)), np.zeros((angles[0].size, 2, 2), complex)
+    out, matrix = np.zeros((5, angles[0].size)), np.zeros((angles[0].size, 2, 2), complex)
     for i, (az, el, raz, rel) in enumerate(zip(*(a.ravel() for a in angles), strict=True)):
         leg = _leg(direction(az, el), distance)
         back = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
@@ -113,8 +116,8 @@ def rcs(
             surface, doubt, leg, back, frequency, max_bounces, tolerance_db, max_rays, row, col
         )
     shape = angles[0].shape
-    sigma, error, rays, bounces = (o.reshape(shape) for o in out)
-    return Rcs(sigma, error, rays.astype(np.int64), bounces.astype(np.int64), matrix.reshape(*shape, 2, 2))
+    sigma, error, rays, bounces, further = (o.reshape(shape) for o in out)
+    return Rcs(sigma, error, rays.astype(np.int64), bounces.astype(np.int64), matrix.reshape(*shape, 2, 2), further)
 
 
 def refinements(
@@ -189,9 +192,9 @@ def _refined(
     max_rays: int,
     row: int,
     col: int,
-) -> tuple[float, float, int, int, Complexes]:
-    """Return (sigma, error in dB, rays, bounces, matrix), refining until the last two launches agree or rays run
-    out."""
+) -> tuple[float, float, int, int, float, Complexes]:
+    """Return (sigma, error in dB, rays, bounces, further in dB, matrix), refining until the last two launches agree or
+    rays run out."""
     before, first = None, 0j
     rays, off, value, by_bounce = surface.rays + doubt.rays, np.inf, 0j, np.zeros(bounces, complex)
     curved = _CURVED if surface.curved.any() else 0.0
@@ -244,7 +247,16 @@ def _refined(
     # Nothing has no level to be off by.
     known = min(math.hypot(error_db, folds_db), MAX_ERROR_DB) if sure and error_db <= LARGEST_DB else np.nan
     cast = surface.rays + doubt.rays - rays
-    return 4.0 * np.pi * abs(value) ** 2, known, cast, int(counted.max(initial=-1)) + 1, s.sum(axis=0)
+    most, further = int(counted.max(initial=-1)) + 1, _further(surface, by_bounce)
+    return 4.0 * np.pi * abs(value) ** 2, known, cast, most, further, s.sum(axis=0)
+
+
+def _further(surface: Surface, by_bounce: Complexes) -> float:
+    """Return by how much [dB] a level would change if one more bounce brought as much as the last of those given."""
+    if surface.convex_alone:
+        return 0.0
+    whole = abs(by_bounce.sum())
+    return np.nan if len(by_bounce) == 1 or not whole else float(20.0 * np.log10(1.0 + abs(by_bounce[-1]) / whole))
 
 
 def _most_tubes(step: int, max_rays: int) -> int:
