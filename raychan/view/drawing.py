@@ -63,13 +63,12 @@ class Ray:
         if self.converged:
             return [self.points]
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
-        made = []
-        for start in np.arange(0.0, along[-1], 2.0 * dash):
-            at = np.unique(
-                np.clip(
-                    np.append(along[(along > start) & (along < start + dash)], [start, start + dash]), 0.0, along[-1]
-                )
-            )
+        # Even about the middle, so that the way back does not fill the gaps of the way there.
+        middle, made = 0.5 * along[-1], []
+        count = int(middle // (2.0 * dash)) + 1
+        for start in middle + 2.0 * dash * np.arange(-count, count + 1) - 0.5 * dash:
+            inner = along[(along > start) & (along < start + dash)]
+            at = np.unique(np.clip([start, *inner, start + dash], 0.0, along[-1]))
             made.append(np.stack([np.interp(at, along, x) for x in self.points.T], axis=1))
         return [m for m in made if len(m) > 1]
 
