@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from raychan.tables import POINT, REFLECT, SCATTER
 from raychan.units import dbm
 from raychan.view.drawing import Drawing, draw, rays_in
 from raychan.view.scene import drawing_of
+from raychan.view.web import page
+from raychan.world.scene import Scene
 
 GROUND, SUV, TRUCK, WALKER = range(4)
 TAIL = [(SUV, SCATTER)]
@@ -30,6 +33,9 @@ shape = "box"
 params = {{ length = 0.1, width = 0.1, height = 2.0 }}
 position = [5.0, -3.0, 0.0]
 """
+
+
+WORLD = Scene.from_text(SCENE)
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +118,34 @@ def test_a_cell_of_noise_is_shown_without_rays_and_with_a_warning(ran, tmp_path,
     assert invoke(["view", str(ran), "--range", "30", "--html", str(page)]) == 0
     assert "no path explains this cell" in capsys.readouterr().err
     assert '"rays": []' in page.read_text()
+
+
+def test_rays_of_a_detection_that_is_not_converged_are_dashed_and_the_others_whole(tmp_path):
+    p = paths([9.0, 12.0], [0.0, 0.0], [1e-5, 9e-6], [TAIL, GHOST])
+    r = result(p, [(9.0, 0.0, 1e-10), (12.0, 0.0, 81e-12)])
+    doubted = replace(r.provenance[1], error_db=float("nan"))
+    drawing = drawing_of(WORLD, replace(r, provenance=(r.provenance[0], doubted)))
+    whole, broken = sorted(drawing.rays, key=lambda ray: not ray.converged)
+    assert len(whole.strokes(0.5)) == 1
+    made = broken.strokes(0.5)
+    length = np.linalg.norm(np.diff(broken.points, axis=0), axis=1).sum()
+    drawn = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in made)
+    assert drawn == pytest.approx(0.5 * length, abs=0.51)
+    assert "dashed" in drawing.note and "not converged" in broken.text
+    drawing.save(tmp_path / "d.npz")
+    assert [ray.converged for ray in Drawing.load(tmp_path / "d.npz").rays] == [ray.converged for ray in drawing.rays]
+    text = page(drawing, tmp_path / "p.html").read_text()
+    assert "not converged" in text and drawing.note in text
+    assert drawing_of(WORLD, r).note == ""
+
+
+def test_view_takes_the_number_of_a_detection(ran, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("RAYCHAN_NO_OPENGL", "1")
+    assert invoke(["view", str(ran), "--detection", "1", "--html", str(tmp_path / "a.html")]) == 0
+    place = load_result(ran).detections.range[0]
+    assert f"{place:.2f} m" in (tmp_path / "a.html").read_text()
+    capsys.readouterr()
+    assert invoke(["view", str(ran), "--detection", "999", "--html", str(tmp_path / "b.html")]) == 2
+    assert "no detection has the number 999" in capsys.readouterr().err
+    assert invoke(["view", str(ran), "--detection", "1", "--range", "9", "--html", str(tmp_path / "b.html")]) == 2
+    assert not (tmp_path / "b.html").exists()

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from raychan.channel.rcs import Rcs
+from raychan.channel.rcs import Rcs, rcs
 from raychan.cli import invoke
 from raychan.units import C0
+from raychan.world.shapes import build
 
 
 @pytest.fixture
@@ -168,7 +169,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(plate, tmp_path, monkeypatch, c
 
 def made(*errors):
     n = len(errors)
-    return Rcs(np.ones(n), np.array(errors), np.full(n, 10), np.ones(n, int), np.zeros((n, 2, 2), complex))
+    return Rcs(np.ones(n), np.array(errors), np.full(n, 10), np.ones(n, int), np.zeros((n, 2, 2), complex), np.zeros(n))
 
 
 def test_missed_tolerance_is_told(capsys, monkeypatch):
@@ -208,3 +209,27 @@ def test_the_crease_angle_decides_and_doubtful_folds_are_told(tmp_path, capsys):
     assert abs(found[0] - found[1]) > 1.0
     assert invoke(["info", str(file)]) == 0
     assert "24 folds of up to 15 deg" in " ".join(capsys.readouterr().err.split())
+
+
+def test_what_further_bounces_may_change_is_told_where_it_matters(capsys):
+    """A corner returns by its third bounce, and nothing by a fourth; a ball has one."""
+    corner = ["rcs", "--shape", "trihedral", "--azimuth", "5", "--elevation", "5"]
+    assert invoke([*corner, "--max-bounces", "3"]) == 0
+    said = capsys.readouterr().err
+    assert "what further bounces bring is not in the error (--max-bounces, now 3)" in " ".join(said.split())
+    assert invoke([*corner, "--max-bounces", "4"]) == 0
+    assert "further bounces" not in capsys.readouterr().err
+    assert invoke([*corner, "--max-bounces", "1"]) == 0
+    assert "the body is not convex" in capsys.readouterr().err
+    assert invoke(["rcs", "--shape", "sphere", "--max-bounces", "1"]) == 0
+    assert "further bounces" not in capsys.readouterr().err
+
+
+def test_further_db_is_what_one_more_bounce_like_the_last_would_change():
+    """sigma by two and by three bounces tells the third one's amplitude, at most; a box has none."""
+    mesh = build("trihedral")
+    two, three = (rcs(mesh, 77e9, 5.0, 5.0, max_bounces=n) for n in (2, 3))
+    third = abs(three.amplitude[0, 0] - two.amplitude[0, 0]) / abs(three.amplitude[0, 0])
+    assert three.further_db == pytest.approx(20.0 * np.log10(1.0 + third), abs=0.3)
+    assert rcs(build("box"), 77e9, 35.0).further_db == 0.0
+    assert np.isnan(rcs(mesh, 77e9, 35.0, max_bounces=1).further_db)

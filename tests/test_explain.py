@@ -72,7 +72,7 @@ def test_cells_explained_together_are_what_each_is_alone_though_far_paths_are_le
             mine = known.part == g
             assert abs(total[i, g] - alone[mine].sum()) < 1e-3 * wave
             assert sizes[i, 0, g] == mine.sum()
-            assert sizes[i, 2, g] == pytest.approx((np.abs(alone) * at)[mine].sum(), abs=1e-3 * wave * at.max())
+            assert sizes[i, 2, g] == pytest.approx((np.abs(alone) ** 2 * at)[mine].sum(), abs=1e-3 * wave**2 * at.max())
         lead = known.part[int(np.argmax(np.abs(alone)))]
         assert strongest[i, lead] == np.argmax(np.abs(alone))
 

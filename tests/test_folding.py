@@ -9,12 +9,12 @@ import math
 import numpy as np
 import pytest
 from echoes import SMALL, sensor
-from records import paths, receiver
+from records import paths, receiver, result
 from texts import ISOTROPIC, upright, walker
 
 from raychan.cli import invoke
 from raychan.process.detect import detect
-from raychan.process.spectrum import middle_frequency, range_doppler
+from raychan.process.spectrum import range_doppler
 from raychan.run.explain import explain
 from raychan.run.folding import aliased
 from raychan.run.provenance import chains, explain_cell, provenance, response_of
@@ -27,7 +27,7 @@ from raychan.units import C0
 SUV, WALKER = 1, 3
 REAL = dataclasses.replace(SMALL, complex_sampling=False)
 CELL = SMALL.range_resolution
-TOP = C0 / (4.0 * middle_frequency(SMALL) * SMALL.repetition)  # unambiguous rate of the map
+TOP = C0 / (4.0 * SMALL.middle * SMALL.repetition)  # unambiguous rate of the map
 LINE = 2.0 * TOP / SMALL.n_chirps
 
 
@@ -46,7 +46,7 @@ def shown(wave, r, v):
     period = wave.range_resolution * wave.n_samples
     slow = (v + TOP) % (2.0 * TOP) - TOP
     # A folded rate leaves what its alias lacks in the beat.
-    at = r + (v - slow) * middle_frequency(wave) / wave.slope
+    at = r + (v - slow) * wave.middle / wave.slope
     if wave.complex_sampling or at % period < 0.5 * period:
         return at % period, slow
     return -at % period, -slow
@@ -189,3 +189,11 @@ def test_the_nearest_alias_in_range_is_told_where_rates_are_unknown(wave, at, fa
     rx = dataclasses.replace(receiver(), waveform=wave)
     away, other = aliased(np.array([at]), 11.0, response_of(rx))
     assert away[0] == pytest.approx(abs(far), abs=1e-9) and other[0] == folded
+
+
+def test_the_leading_chain_stands_where_the_true_range_is():
+    """One rule: power-weighted over the paths of the chain that feed the cell; chains that do not lead too."""
+    p = paths([9.0, 9.1, 9.2], [0.0] * 3, [3e-5, 1e-5, 1e-5], 3 * [[(SUV, SCATTER)]])
+    why = explain(result(p, [(9.0, 0.0, 9e-10)]), 9.0)
+    assert why.contributions[0].range == why.true_range
+    assert why.contributions[0].rate == why.true_rate

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.bistatic import first_surface
-from raychan.channel.error import COVER, LARGEST_DB, stated_error
+from raychan.channel.error import COVER, LARGEST_DB, MAX_ERROR_DB, stated_error
 from raychan.channel.fields import transfer
 from raychan.channel.found import Found
 from raychan.channel.legs import Leg
@@ -47,7 +47,9 @@ _GROWTH = 2.6  # rays of the next refinement over those of all before it, about
 @dataclass(frozen=True)
 class Rcs:
     """Radar cross-sections: `sigma` [m^2], `error_db` stated error, NaN where the launches tell nothing, `rays` cast
-    and most `bounces` that counted, each of the shape of the angles given; `amplitude` of that shape and (2, 2) [m],
+    and most `bounces` that counted, `further_db` what a bounce beyond max_bounces would change if it brought as much as
+    the last allowed one (an estimate, not in error_db; 0 for a convex body, NaN where max_bounces is 1 and it is not
+    convex), each of the shape of the angles given; `amplitude` of that shape and (2, 2) [m],
     the scattering matrix, rows the receiver's V, H, columns the transmitter's: sigma = 4 pi |amplitude|^2."""
 
     sigma: Floats
@@ -55,6 +57,7 @@ class Rcs:
     rays: NDArray[np.int64]
     bounces: NDArray[np.int64]
     amplitude: Complexes
+    further_db: Floats
 
     @property
     def converged(self) -> NDArray[np.bool_]:
@@ -100,9 +103,9 @@ def rcs(
         raise ValueError("angles must be finite numbers of degrees")
     body = mesh_of(mesh, crease_deg)
     surface = Surface(facets_of(body, material, frequency))
-    doubt = doubt_of(surface.facets, readings(body))
+    doubt = doubt_of(surface, readings(body), 2.0 * np.pi * frequency / C0)
     row, col = _POLARIZATIONS[polarization.upper()]
-    out, matrix = np.zeros((4, angles[0].size)), np.zeros((angles[0].size, 2, 2), complex)
+    out, matrix = np.zeros((5, angles[0].size)), np.zeros((angles[0].size, 2, 2), complex)
     for i, (az, el, raz, rel) in enumerate(zip(*(a.ravel() for a in angles), strict=True)):
         leg = _leg(direction(az, el), distance)
         back = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
@@ -113,8 +116,8 @@ def rcs(
             surface, doubt, leg, back, frequency, max_bounces, tolerance_db, max_rays, row, col
         )
     shape = angles[0].shape
-    sigma, error, rays, bounces = (o.reshape(shape) for o in out)
-    return Rcs(sigma, error, rays.astype(np.int64), bounces.astype(np.int64), matrix.reshape(*shape, 2, 2))
+    sigma, error, rays, bounces, further = (o.reshape(shape) for o in out)
+    return Rcs(sigma, error, rays.astype(np.int64), bounces.astype(np.int64), matrix.reshape(*shape, 2, 2), further)
 
 
 def refinements(
@@ -189,9 +192,9 @@ def _refined(
     max_rays: int,
     row: int,
     col: int,
-) -> tuple[float, float, int, int, Complexes]:
-    """Return (sigma, error in dB, rays, bounces, matrix), refining until the last two launches agree or rays run
-    out."""
+) -> tuple[float, float, int, int, float, Complexes]:
+    """Return (sigma, error in dB, rays, bounces, further in dB, matrix), refining until the last two launches agree or
+    rays run out."""
     before, first = None, 0j
     rays, off, value, by_bounce = surface.rays + doubt.rays, np.inf, 0j, np.zeros(bounces, complex)
     curved = _CURVED if surface.curved.any() else 0.0
@@ -233,17 +236,27 @@ def _refined(
     # What no refinement mends: what the mesh leaves open, and waves that creep around the body. Launches and normals
     # miss of the same bright spots, in phase at worst; other waves and other readings know nothing of that phase and
     # add in squares.
-    around, share = creeping(surface, rules[0].wavenumber)
+    around, share = creeping(doubt.rounded or surface, rules[0].wavenumber)
     sure = value != 0.0 and stated_error(value, off, 1.0) <= LARGEST_DB
     # Where the launches tell nothing, another reading of the mesh adds nothing.
-    off += doubt.normals(first, other) * abs(value) if sure else 0.0
+    off += doubt.facets(first, value, other) * abs(value) if sure else 0.0
     error_db = stated_error(value, math.hypot(off, max(around if ring else 0.0, share * abs(value))), 1.0)
-    error_db = math.hypot(error_db, doubt.edges_db(first, value, other)) if sure else np.inf
+    # How far apart two readings are is a figure, however far.
+    folds_db = doubt.edges_db(first, value, other) if sure else 0.0
     counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
     # Nothing has no level to be off by.
-    known = error_db if value and error_db <= LARGEST_DB else np.nan
+    known = min(math.hypot(error_db, folds_db), MAX_ERROR_DB) if sure and error_db <= LARGEST_DB else np.nan
     cast = surface.rays + doubt.rays - rays
-    return 4.0 * np.pi * abs(value) ** 2, known, cast, int(counted.max(initial=-1)) + 1, s.sum(axis=0)
+    most, further = int(counted.max(initial=-1)) + 1, _further(surface, by_bounce)
+    return 4.0 * np.pi * abs(value) ** 2, known, cast, most, further, s.sum(axis=0)
+
+
+def _further(surface: Surface, by_bounce: Complexes) -> float:
+    """Return by how much [dB] a level would change if one more bounce brought as much as the last of those given."""
+    if surface.convex_alone:
+        return 0.0
+    whole = abs(by_bounce.sum())
+    return np.nan if len(by_bounce) == 1 or not whole else float(20.0 * np.log10(1.0 + abs(by_bounce[-1]) / whole))
 
 
 def _most_tubes(step: int, max_rays: int) -> int:

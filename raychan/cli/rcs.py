@@ -131,7 +131,7 @@ def rcs(
         from raychan.world.meshfile import oddities
 
         show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
-    _bounces(found, max_bounces)
+    _bounces(found, max_bounces, tolerance)
     _warn(mesh, found, tolerance)
     if files:
         screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
@@ -260,12 +260,20 @@ def _table(title: str, rows: list[Any]) -> Any:
     return show.table(title, heads, cells, left=())
 
 
-def _bounces(found: Rcs, most: int) -> None:
-    """Tell where the last bounce allowed still counts: of those beyond it nothing is stated."""
-    last = int((found.bounces >= most).sum())
-    if last and most > 1:
-        more = f"what further ones bring is not in the error (--max-bounces, now {most})"
-        show.warn([f"at {last} of {found.bounces.size} angles the last bounce allowed still counts: {more}"])
+def _bounces(found: Rcs, most: int, tolerance: float) -> None:
+    """Tell in a line what bounces beyond the last allowed one may change, where that matters: no error holds it."""
+    import numpy as np
+
+    beyond = f"what further bounces bring is not in the error (--max-bounces, now {most})"
+    if most == 1:
+        if np.isnan(found.further_db[found.sigma > 0.0]).any():
+            show.warn([f"the body is not convex: {beyond}"])
+        return
+    last = int((found.further_db > tolerance).sum())
+    if last:
+        change = float(np.nanmax(found.further_db))
+        told = f"one that brings as much as the last allowed one changes up to {change:.2g} dB"
+        show.warn([f"at {last} of {found.bounces.size} angles {beyond}: {told}"])
 
 
 def _warn(mesh: Mesh, found: Rcs, tolerance: float) -> None:

@@ -33,12 +33,18 @@ def view(
         float | None,
         typer.Option(help="Speed of that detection in m/s; any if not given.", metavar="M/S"),
     ] = None,
+    detection: Annotated[
+        int | None,
+        typer.Option(
+            help="Show only the rays of the detection of this number, as `raychan run` lists it.", metavar="N"
+        ),
+    ] = None,
 ) -> None:
     """Show a scene, and the rays of a result coloured by the power they bring.
 
-    Without --screenshot or --html a window opens, where a click on a ray prints its chain of bodies. With --range only
-    the rays behind one detection are shown (behind the map cell where none is within a cell), and bodies that they do
-    not meet are seen through.
+    Without --screenshot or --html a window opens, where a click on a ray prints its chain of bodies. With --range or
+    --detection only the rays behind one detection are shown (behind the map cell where none is within a cell), and
+    bodies that they do not meet are seen through. Rays of a detection that is not converged are dashed.
     """
     from raychan.run.explain import explain
     from raychan.run.files import StoreError
@@ -48,19 +54,20 @@ def view(
 
     if speed is not None and range is None:
         raise typer.BadParameter("it needs --range", param_hint="--speed")
+    wanted = range is not None or detection is not None
     if source.is_dir() or source.suffix == ".nc":
         result = load_result(source)
         if result.scene is None:
             why = "a mesh or antenna file moved, or it was made in Python"
             raise StoreError(f"{source}: its scene cannot be read again ({why})")
         try:
-            cell = None if range is None else explain(result, range, speed)
+            cell = explain(result, range, speed, detection=detection) if wanted else None
         except ValueError as error:
             raise typer.BadParameter(str(error)) from error
         if cell is not None and not cell.contributions:
             show.warn(["no path explains this cell: noise"])
         drawing = drawing_of(result.scene, result, cell)
-    elif range is not None:
+    elif wanted:
         raise typer.BadParameter(f"{source} is a scene; a directory that `raychan run` wrote has cells to show")
     else:
         drawing = drawing_of(Scene.load(source))

@@ -85,7 +85,7 @@ def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # typ
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type: ignore[no-untyped-def]
-    weight = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
+    weight = wave.real * wave.real + wave.imag * wave.imag
     total[c, g] += wave
     size[c, 1, g] += weight
     size[c, 2, g] += weight * at_range
@@ -135,8 +135,8 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def cell_sums(group, count, waves, ranges, rates):  # type: ignore[no-untyped-def]
-    """Return sums of waves (1, g), sizes (1, 4, g): how many, their |wave|, and that times range and rate, and which is
-    the strongest (1, g) of each group, -1 if there is none.
+    """Return sums of waves (1, g), sizes (1, 4, g): how many, their powers |wave|^2, and these times range and rate,
+    and which is the strongest (1, g) of each group, -1 if there is none.
 
     Args: group (n,) of each echo, below `count`.
     """

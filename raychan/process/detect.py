@@ -8,7 +8,6 @@ from scipy.ndimage import maximum_filter
 
 from raychan.process.angle import azimuth
 from raychan.process.cfar import GUARD, TRAIN, Grid, bias, factor, level, training
-from raychan.process.spectrum import middle_frequency
 from raychan.radar.lobes import Envelope
 from raychan.radar.waveform import Waveform
 from raychan.tables import Detections, RangeDoppler
@@ -70,7 +69,7 @@ def detect(
     cells, power, snr, place, rate = cells[kept], power[kept], snr[kept], place[kept], rate[kept]
     angle = np.full(len(cells), np.nan)
     if waveform is not None and elements is not None:
-        angle = azimuth(map.spectrum[:, cells[:, 0], cells[:, 1]].T, elements, C0 / middle_frequency(waveform))
+        angle = azimuth(map.spectrum[:, cells[:, 0], cells[:, 1]].T, elements, C0 / waveform.middle)
     return Detections(
         range=map.range[0] + place[:, 1] * steps[1],
         rate=rate,

@@ -16,12 +16,6 @@ from raychan.units import C0
 Floats = NDArray[np.float64]
 
 
-def middle_frequency(waveform: Waveform) -> float:
-    """Return the frequency at the middle sample of a ramp [Hz]: what turns a Doppler shift into a range rate."""
-    step = waveform.chirp_duration / waveform.n_samples
-    return waveform.carrier + waveform.slope * 0.5 * (waveform.n_samples - 1) * step
-
-
 def range_doppler(
     cube: Cube,
     waveform: Waveform,
@@ -61,7 +55,7 @@ def range_doppler(
     spectrum = spectrum[..., : cells_r if waveform.complex_sampling else cells_r // 2]
 
     gain = float((taper_r**2).sum() / taper_r.sum() ** 2 * (taper_v**2).sum() / taper_v.sum() ** 2)
-    metre_per_hertz = 0.5 * C0 / middle_frequency(waveform)
+    metre_per_hertz = 0.5 * C0 / waveform.middle
     return RangeDoppler(
         range=np.arange(spectrum.shape[2]) * waveform.range_resolution / pad[0],
         rate=doppler * metre_per_hertz,

@@ -60,7 +60,12 @@ class Waveform:
     @property
     def middle(self) -> float:
         """Frequency at the middle sample of a ramp [Hz]: what turns a Doppler shift into the range rate of a map."""
-        return self.carrier + 0.5 * self.bandwidth * (1.0 - 1.0 / self.n_samples)
+        return self.carrier + self.swept
+
+    @property
+    def swept(self) -> float:
+        """Frequency swept from a ramp's start to its middle sample [Hz]."""
+        return 0.5 * self.bandwidth * (1.0 - 1.0 / self.n_samples)
 
     @property
     def range_resolution(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -125,6 +126,8 @@ def _explained(
     leader = int(strongest[first])
     label = label_of(paths, leader, known.bodies[first], receiver)
     true = truth(paths, np.flatnonzero(known.part == first), leader, response, cell.shown)
+    if not math.isnan(true.range):
+        parts = replace(parts[0], range=true.range, rate=true.rate), *parts[1:]
     error_db = figure(predicted, cell.error)
     return Explanation(*place, cell.power, predicted, error_db, label, parts, true.folded, true.range, true.rate)
 

@@ -46,7 +46,7 @@ class Response:
         """Return the response (n,) of the range window to paths of delays (n,) [s] at a range [m], their phase at mid
         sweep of the frame's first ramp in, and the ranges (n,) [m] at which they stand."""
         wave, at = self.waveform, 0.5 * C0 * delay
-        turn = self._swept * delay - 0.5 * wave.slope * delay**2
+        turn = wave.swept * delay - 0.5 * wave.slope * delay**2
         cells = np.ascontiguousarray((at - range) / wave.range_resolution)
         return periodic(self._range_tables[:, 0], len(self._range), _FINE, cells) * np.exp(-2j * np.pi * turn), at
 
@@ -112,8 +112,16 @@ class Response:
         pieces = max(1, min(count, int(np.ceil(moved / _STEP))))
         if pieces not in self._pieces:
             self._pieces[pieces] = self._rate_tables(pieces)
-        middle = wave.carrier + self._swept
-        ramp = (wave.carrier, wave.slope, wave.centre, self._swept, middle, wave.repetition, wave.range_resolution, C0)
+        ramp = (
+            wave.carrier,
+            wave.slope,
+            wave.centre,
+            wave.swept,
+            wave.middle,
+            wave.repetition,
+            wave.range_resolution,
+            C0,
+        )
         return ramp, (len(self._range), count, _FINE), self._range_tables, self._pieces[pieces]
 
     @property
@@ -125,8 +133,7 @@ class Response:
     def periods(self) -> tuple[float, float]:
         """Ranges [m] and rates [m/s] after which the map repeats; with real sampling it shows half of the former."""
         wave = self.waveform
-        middle = wave.carrier + self._swept
-        return wave.range_resolution * wave.n_samples, 0.5 * C0 / (middle * wave.repetition)
+        return wave.range_resolution * wave.n_samples, 0.5 * C0 / (wave.middle * wave.repetition)
 
     @property
     def resolutions(self) -> tuple[float, float]:
@@ -136,15 +143,11 @@ class Response:
     @property
     def drift(self) -> float:
         """Range by which a path shows too far for each m/s that it recedes faster than its cell [s]."""
-        return (self.waveform.carrier + self._swept) / self.waveform.slope
+        return self.waveform.middle / self.waveform.slope
 
     def stands(self, delay: Floats, rate: Floats, mid_frame: bool) -> tuple[Floats, Floats]:
         """Return the ranges (n,) [m] at which paths stand, mid frame or at its start, and their rates (n,) [m/s]."""
         return 0.5 * C0 * delay + (rate * self.waveform.centre if mid_frame else 0.0), rate
-
-    @property
-    def _swept(self) -> float:
-        return 0.5 * self.waveform.bandwidth * (1.0 - 1.0 / self.waveform.n_samples)
 
     def _rate_tables(self, pieces: int) -> tuple[Complexes, Floats]:
         """Return the rate response of each piece of the frame and that of its chirps' numbers, counted from its middle

@@ -50,6 +50,27 @@ class Ray:
     points: Floats
     power: float
     label: str
+    converged: bool = True
+    """Whether the stated error of the detection that it feeds is a figure."""
+
+    @property
+    def text(self) -> str:
+        """The way, its power and its label in words."""
+        return f"{self.name}: {self.power:.1f} dBm {self.label}{'' if self.converged else ', not converged'}"
+
+    def strokes(self, dash: float) -> list[Floats]:
+        """Return the lines to draw, (k, 3) [m] each: the whole way, or dashes [m] of it where it is not converged."""
+        if self.converged:
+            return [self.points]
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
+        # Even about the middle, so that the way back does not fill the gaps of the way there.
+        middle, made = 0.5 * along[-1], []
+        count = int(middle // (2.0 * dash)) + 1
+        for start in middle + 2.0 * dash * np.arange(-count, count + 1) - 0.5 * dash:
+            inner = along[(along > start) & (along < start + dash)]
+            at = np.unique(np.clip([start, *inner, start + dash], 0.0, along[-1]))
+            made.append(np.stack([np.interp(at, along, x) for x in self.points.T], axis=1))
+        return [m for m in made if len(m) > 1]
 
 
 @dataclass(frozen=True)
@@ -65,6 +86,11 @@ class Drawing:
     """Names and places to write them."""
     caption: str = ""
     """What is shown, where only some of the rays are."""
+
+    @property
+    def note(self) -> str:
+        """What dashed rays mean, where there are any."""
+        return "" if all(ray.converged for ray in self.rays) else "dashed: of detections that are not converged"
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Return the lowest and highest corner of all but the ground."""
@@ -153,12 +179,12 @@ def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
     size = np.abs(paths.amplitude)
     index = {chain: i for i, chain in enumerate(known.names)}
     power: dict[int, float] = {}
-    label: dict[int, str] = {}
+    of: dict[int, Explanation] = {}
     for why in result.provenance:
         for part in why.contributions:
             g, watts = index.get(part.chain, -1), part.share * why.predicted
             if g >= 0 and watts > power.get(g, 0.0):
-                power[g], label[g] = watts, why.label
+                power[g], of[g] = watts, why
     if not power and len(size):
         whole = np.bincount(known.part, size**2) * result.receiver.power
         power = {int(g): float(whole[g]) for g in np.flatnonzero(whole > 0.0)}
@@ -168,7 +194,7 @@ def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
         if watts < least:
             continue
         rows = np.flatnonzero(known.part == g)
-        rays.append(_ray(paths, int(rows[np.argmax(size[rows])]), known.names[g], watts, label.get(g, "")))
+        rays.append(_ray(paths, int(rows[np.argmax(size[rows])]), known.names[g], watts, of.get(g)))
     return tuple(rays)
 
 
@@ -180,15 +206,16 @@ def rays_in(result: Result, cell: Explanation) -> tuple[Ray, ...]:
     rays = []
     for part in sorted(cell.contributions, key=lambda part: part.share):
         row = int(np.argmax(np.where(known.part == index[part.chain], size, -1.0)))
-        rays.append(_ray(paths, row, part.chain, part.share * cell.predicted, cell.label))
+        rays.append(_ray(paths, row, part.chain, part.share * cell.predicted, cell))
     return tuple(rays)
 
 
-def _ray(paths: Paths, row: int, chain: tuple[str, ...], watts: float, label: str) -> Ray:
+def _ray(paths: Paths, row: int, chain: tuple[str, ...], watts: float, why: Explanation | None) -> Ray:
     way = paths.way[row]
     used = int((paths.ways.kind[way] > 0).sum())
     points = np.concatenate([paths.tx[None], paths.ways.vertices[way, :used].astype(float), paths.rx[None]])
-    return Ray(" > ".join(chain) or "line of sight", points, float(dbm(watts)), label)
+    label, converged = ("", True) if why is None else (why.label, why.converged)
+    return Ray(" > ".join(chain) or "line of sight", points, float(dbm(watts)), label, converged)
 
 
 def _listed(lines: list[str]) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.report.canvas import collections, figure, save, style
 from raychan.view.drawing import Drawing
 
+_DASH = 0.015  # of the scene's diagonal
 _MOST = 6000  # triangles drawn of a shape; matplotlib sorts and paints them one by one
 
 
@@ -39,8 +40,10 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
             faces.set_zorder(0 if flat else 1)
             axes.add_collection3d(faces)
         if drawing.rays:
-            lines = solids.Line3DCollection([r.points for r in drawing.rays], cmap="plasma", linewidths=1.4, zorder=2)
-            lines.set_array(np.array([r.power for r in drawing.rays]))
+            dash = _DASH * float(np.linalg.norm(high - low))
+            strokes = [(line, ray.power) for ray in drawing.rays for line in ray.strokes(dash)]
+            lines = solids.Line3DCollection([x for x, _ in strokes], cmap="plasma", linewidths=1.4, zorder=2)
+            lines.set_array(np.array([power for _, power in strokes]))
             axes.add_collection3d(lines)
             made.colorbar(lines, cax=made.add_axes((0.91, 0.2, 0.015, 0.6)), label="received power [dBm]")
         axes.plot(*drawing.radar[:, None], marker=">", ms=9, color="#d62728", ls="none", zorder=3)
@@ -54,4 +57,5 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
         axes.view_init(elev=28.0, azim=-132.0)
         axes.set_zlabel("z [m]")
         made.suptitle(drawing.title)
+        made.text(0.02, 0.93, drawing.note, fontsize=8)
         return save(made, path)

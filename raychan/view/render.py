@@ -15,6 +15,7 @@ from raychan.view.drawing import Drawing
 _SIZE = (2000, 1125)
 _MAP = "plasma"
 _POWER = "received power [dBm]"
+_DASH = 8.0  # radii of a ray: a dash, and the gap after it
 _LEAST_SPAN_DB = 4.0  # of the scale, so that no two of its labels read alike
 
 
@@ -107,8 +108,8 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
     powers = [ray.power for ray in drawing.rays]
     limits = [min(powers), max(max(powers), min(powers) + _LEAST_SPAN_DB)]
     for ray in drawing.rays:
-        tube = pv.lines_from_points(ray.points).tube(radius=radius)
-        tube.field_data["what"] = [f"{ray.name}: {ray.power:.1f} dBm {ray.label}"]
+        tube = pv.merge([pv.lines_from_points(line).tube(radius=radius) for line in ray.strokes(_DASH * radius)])
+        tube.field_data["what"] = [ray.text]
         tube[_POWER] = np.full(tube.n_points, ray.power)
         plotter.add_mesh(
             tube, scalars=_POWER, cmap=_MAP, clim=limits, show_scalar_bar=False, lighting=False,
@@ -117,6 +118,8 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
         _POWER, vertical=False, position_x=0.03, position_y=0.86, width=0.28, height=0.1, color="#1a1a1a",
         title_font_size=24, label_font_size=22, fmt="%.0f", n_labels=5,
     )  # fmt: skip
+    if drawing.note:
+        plotter.add_text(drawing.note, position=(0.03, 0.82), viewport=True, font_size=12, color="#1a1a1a")
     bar.SetTextPositionToPrecedeScalarBar()  # below it; above it the title sits on the labels
 
 

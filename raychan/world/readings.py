@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.world.mesh import Mesh, crease_angle
 from raychan.world.smoothing import components, folds, smoothed
+from raychan.world.tessellation import rounded
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -28,11 +29,13 @@ class Readings:
     """Other readings of a mesh whose corner normals were estimated.
 
     Fields: fitted (f, 3, 3) corner normals by another fit where no fold is doubtful, creased those with the doubtful
-    folds as edges; None where they would be the same.
+    folds as edges, rounded those with the folds above the crease angle smooth that look like a tessellation's; None
+    where they would be the same.
     """
 
     fitted: Floats | None = None
     creased: Floats | None = None
+    rounded: Floats | None = None
 
 
 def readings(mesh: Mesh) -> Readings:
@@ -41,7 +44,8 @@ def readings(mesh: Mesh) -> Readings:
     Folds may be edges on patches that turn by more than half the crease angle from facet to facet (an eighth where
     they bend one way only: a prism of 36 sides is a body of its own as much as a cylinder), and where the facets are
     no tessellation of a smooth surface: those of grids, of subdivided solids and of sections are alike on both sides
-    of an edge, those of a hull around points are not.
+    of an edge, those of a hull around points are not. Folds above the crease angle may be smooth where they look like
+    a tessellation (see `tessellation`).
     """
     if "readings" not in mesh.kept:
         mesh.kept["readings"] = _found(mesh)
@@ -50,45 +54,78 @@ def readings(mesh: Mesh) -> Readings:
 
 
 def _found(mesh: Mesh) -> Readings:
-    pair, _, doubt = _folds(mesh)
-    if mesh.crease_deg is None or not len(pair):
+    if mesh.crease_deg is None:
         return Readings()
+    pair, _, doubt = _folds(mesh)
+    hard, _ = _hard_folds(mesh)
+    round_ = smoothed(mesh.vertices, mesh.faces, np.concatenate([_soft_folds(mesh)[0], hard])) if len(hard) else None
+    if not len(pair):
+        return Readings(rounded=round_)
     fitted = smoothed(mesh.vertices, mesh.faces, pair, _EVEN)
     # Where the folds themselves are in doubt, that is told by the other reading.
     fitted[pair[doubt] // 3] = mesh.normals[pair[doubt] // 3]
     creased = smoothed(mesh.vertices, mesh.faces, pair[~doubt]) if doubt.any() else None
-    return Readings(fitted if np.abs(fitted - mesh.normals).max() > _BEND else None, creased)
+    return Readings(fitted if np.abs(fitted - mesh.normals).max() > _BEND else None, creased, round_)
 
 
 def folds_told(mesh: Mesh, key: str) -> str:
-    """Return a sentence about folds that were taken for smooth and may be edges, and the key that decides; else ''."""
+    """Return a sentence about folds that were taken for smooth and may be edges, or for edges and may be smooth, and
+    the key that decides; else ''."""
     _, fold, doubt = _folds(mesh)
-    if not doubt.any():
-        return ""
-    smooth, largest = int((fold > _BEND).sum()), float(np.degrees(fold.max()))
-    return (
-        f"{smooth} folds of up to {largest:.3g} deg are taken for smooth; {int(doubt.sum())} of them may be edges: "
-        f"{key} decides"
-    )
+    _, hard = _hard_folds(mesh)
+    said = []
+    if doubt.any():
+        smooth, largest = int((fold > _BEND).sum()), float(np.degrees(fold.max()))
+        said.append(
+            f"{smooth} folds of up to {largest:.3g} deg are taken for smooth; {int(doubt.sum())} of them may be edges"
+        )
+    if len(hard):
+        low, high = np.degrees([hard.min(), hard.max()])
+        span = f"{low:.4g}" if high - low < 0.01 else f"{low:.4g} to {high:.4g}"
+        said.append(f"{len(hard)} folds of {span} deg are taken for edges and may be a curved surface")
+    return f"{'; '.join(said)}: {key} decides" if said else ""
 
 
 def _folds(mesh: Mesh) -> tuple[Ints, Floats, Bools]:
     """Return the soft edges of a mesh as half edges (e, 2), their folds (e,) [rad] and which of them may be edges."""
-    pair, fold = soft_folds(mesh)
+    pair, fold = _soft_folds(mesh)
     bent = fold > _BEND
     if not bent.any():
         return pair[:0], fold[:0], bent[:0]
     return pair, fold, bent & _doubted(mesh, pair, np.where(bent, fold, 0.0))
 
 
-def soft_folds(mesh: Mesh) -> tuple[Ints, Floats]:
+def _soft_folds(mesh: Mesh) -> tuple[Ints, Floats]:
     """Return the half edges (e, 2) over which a mesh was smoothed, and their folds (e,) [rad]."""
+    pair, fold = _all_folds(mesh)
+    soft = fold < crease_angle(mesh.crease_deg or 0.0)
+    return pair[soft], fold[soft]
+
+
+def _hard_folds(mesh: Mesh) -> tuple[Ints, Floats]:
+    """Return the half edges (e, 2) of folds above the crease angle that may be smooth, and these folds (e,) [rad]."""
+    pair, fold = _all_folds(mesh)
+    if not mesh.crease_deg or not len(pair):
+        return pair[:0], fold[:0]
+    smooth = rounded(mesh.joints, mesh.corners, pair, _outward(mesh, pair) * fold, crease_angle(mesh.crease_deg))
+    return pair[smooth], fold[smooth]
+
+
+def _all_folds(mesh: Mesh) -> tuple[Ints, Floats]:
+    """Return the half edges (e, 2) that two facets walk in opposite ways, and their folds (e,) [rad]."""
     pair = mesh.joints.pair
     corner = mesh.faces.astype(np.int64).ravel()
-    opposed = corner[pair[:, 0]] != corner[pair[:, 1]]
-    fold = folds(mesh.vertices, mesh.faces, pair)
-    soft = opposed & (fold < crease_angle(mesh.crease_deg or 0.0))
-    return pair[soft], fold[soft]
+    pair = pair[corner[pair[:, 0]] != corner[pair[:, 1]]]
+    return pair, folds(mesh.vertices, mesh.faces, pair)
+
+
+def _outward(mesh: Mesh, pair: Ints) -> Floats:
+    """Return 1 (e,) where the facets of a pair bend away from the side they face, -1 where towards it."""
+    c, (one, other) = mesh.corners, pair.T
+    a = c[one // 3]
+    normal = np.cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 0])
+    tip = c[other // 3, (other % 3 + 2) % 3] - c[other // 3, other % 3]
+    return np.where(np.einsum("ij,ij->i", normal, tip) > 0.0, -1.0, 1.0)
 
 
 def _doubted(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:

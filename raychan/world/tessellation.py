@@ -1,0 +1,125 @@
+"""Tessellation: which folds above the crease angle look like those of a curved surface cut into flat facets.
+
+Everywhere: pair (e, 2) half edges of both sides of an edge; fold (e,) [rad], positive where the facets bend outward.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.world.joints import Joints
+from raychan.world.smoothing import components
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.signedinteger[Any]]
+Bools = NDArray[np.bool_]
+
+BAND = 2.05
+"""Of the crease angle: folds up to this may be meant as smooth. At 20 deg a cylinder of nine sections (folds of
+40 deg) may, a prism of eight sides (45 deg) is an edge each."""
+_MOST = np.radians(41.0)  # whatever the crease angle: no square, hexagonal or octagonal bar is meant as round
+_ALONE = 0.75  # of a panel's bending across a fold: one that has more of it does not go on to the next panel
+_UNEVEN = 0.17  # of two panels about a fold: how far their widths may differ, over their sum
+_FEW = 4  # folds: fewer tell nothing of a tessellation
+
+
+def band(crease: float) -> tuple[float, float]:
+    """Return the least and largest fold [rad] that may be meant as smooth though it is above the crease angle [rad]."""
+    return crease, min(BAND * crease, _MOST)
+
+
+def rounded(joints: Joints, corners: Floats, pair: Ints, fold: Floats, crease: float) -> Bools:
+    """Return which edges (e,) above the crease angle [rad] may be meant as smooth.
+
+    Such folds go on from panel to panel by much the same angle and in the same sense, four or more of them, and the
+    panels are alike in width: sections of a cylinder, rings of a globe; not two sheets that meet at a ridge, a
+    chamfer, or the facets of a hull around points. Args: corners (f, 3, 3) [m] of the facets.
+    """
+    low, high = band(crease)
+    among = (np.abs(fold) >= low) & (np.abs(fold) < high)
+    found = np.zeros(len(pair), bool)
+    if not among.any():
+        return found
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    panel = _panels(joints, pair, fold, low)
+    length, across = _across(corners, pair)
+    uneven = np.minimum(_apart(area, pair // 3), _apart(np.asarray(np.bincount(panel, area), float), panel[pair // 3]))
+    for sense in (1.0, -1.0):
+        bend = np.where(np.abs(fold) < high, np.maximum(sense * fold, 0.0), 0.0) * length
+        these = among & (sense * fold > 0.0)
+        alone = _alone(panel[pair // 3], bend, across)
+        linked = these | (np.abs(fold) < low)
+        patch = components(pair[linked] // 3, len(corners))[pair[:, 0] // 3]
+        weight = np.where(these, bend, 0.0)
+        size = int(patch.max()) + 1
+        whole = np.maximum(np.bincount(patch, weight, size), 1e-300)
+        goes_on = np.bincount(patch, weight * (alone < _ALONE), size) / whole > 0.5
+        even = np.bincount(patch, weight * uneven, size) / whole < _UNEVEN
+        many = _pairs(panel[pair[these] // 3], patch[these], size) >= _FEW
+        found |= these & (goes_on & even & many)[patch]
+    return found
+
+
+def _panels(joints: Joints, pair: Ints, fold: Floats, low: float) -> Ints:
+    """Return the panel (f,) of each facet: its plane, or itself and the neighbour to which both bend least, as the two
+    halves of a quadrilateral that is not plane do."""
+    facet, n = pair // 3, len(joints.plane)
+    single = np.bincount(joints.plane)[joints.plane] == 1
+    usable = np.flatnonzero((np.abs(fold) < low) & single[facet].all(axis=1))
+    order = usable[np.argsort(np.abs(fold[usable]), kind="stable")]
+    least = np.full(n, -1)
+    # The last written stays: backwards, that is the least fold.
+    for side in (0, 1):
+        back = order[::-1]
+        here = facet[back, side]
+        rival = least[here]
+        better = (rival < 0) | (np.abs(fold[back]) <= np.abs(fold[rival]))
+        least[here[better]] = back[better]
+    halves = order[(least[facet[order, 0]] == order) & (least[facet[order, 1]] == order)]
+    by_plane = np.unique(joints.plane, return_index=True)[1][joints.plane]
+    links = np.concatenate([np.stack([np.arange(n), by_plane], axis=1), facet[halves]])
+    return components(links, n)
+
+
+def _across(corners: Floats, pair: Ints) -> tuple[Floats, Floats]:
+    """Return the lengths (e,) [m] of edges and the directions (e, 2, 3) across them in both facets."""
+    facet, k = pair // 3, pair % 3
+    one = corners[facet[:, 0], k[:, 0]]
+    span = corners[facet[:, 0], (k[:, 0] + 1) % 3] - one
+    length = np.linalg.norm(span, axis=1)
+    along = span / np.maximum(length, 1e-300)[:, None]
+    c = corners[facet]
+    normal = np.cross(c[:, :, 1] - c[:, :, 0], c[:, :, 2] - c[:, :, 0])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    return length, np.cross(along[:, None], normal)
+
+
+def _alone(panel: Ints, bend: Floats, across: Floats) -> Floats:
+    """Return of the bending of each edge's panels (e, 2) across it the share (e,) that the panel beside it has, on the
+    side where that is less: 1 where the fold does not go on, a half on a strip of equal folds."""
+    n = int(panel.max()) + 1
+    key = np.unique(np.sort(panel, axis=1) @ np.array([n, 1]), return_inverse=True)[1].ravel()
+    tensors = bend[:, None, None, None] * across[..., :, None] * across[..., None, :]
+    share, whole = np.ones(len(panel)), np.zeros((n, 3, 3))
+    np.add.at(whole, panel, tensors)
+    for side in (0, 1):
+        own = np.zeros((int(key.max()) + 1, 3, 3))
+        np.add.at(own, key, tensors[:, side])
+        way = across[:, side]
+        mine, all_ = (np.einsum("ei,eij,ej->e", way, t, way) for t in (own[key], whole[panel[:, side]]))
+        share = np.minimum(share, mine / np.maximum(all_, 1e-300))
+    return share
+
+
+def _apart(size: Floats, both: Ints) -> Floats:
+    a, b = size[both[:, 0]], size[both[:, 1]]
+    return np.asarray(np.abs(a - b) / np.maximum(a + b, 1e-300))
+
+
+def _pairs(panel: Ints, patch: Ints, n: int) -> Ints:
+    """Return how many pairs of panels (e, 2) each of n patches holds."""
+    rows = np.unique(np.column_stack([patch, np.sort(panel, axis=1)]), axis=0)
+    return np.bincount(rows[:, 0], minlength=n)
