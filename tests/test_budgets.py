@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from raychan.channel.surface import Surface
 from raychan.channel.target import facets_of
 from raychan.channel.tubes import Refinement
 from raychan.cli import app
+from raychan.run.demand import demand
 
 
 def tangle(count: int, seed: int) -> trimesh.Trimesh:
@@ -78,6 +80,26 @@ def test_an_stl_cut_short_says_how_many_bytes_are_missing(size, tmp_path):
     ran = CliRunner().invoke(app, ["info", str(file)])
     assert isinstance(ran.exception, rc.SceneError)
     assert f"cut short: {size} bytes there" in str(ran.exception)
+
+
+def test_a_long_frame_of_fast_bodies_is_told_to_take_longer_than_one_that_stands():
+    base = rc.Scene.load("occluded_pedestrian").override(["radar.waveform.chirps=100000", "radar.waveform.samples=16"])
+    name = base.bodies[-1].name
+    fast = base.override([f"bodies.{name}.velocity_mps=[30, 0, 0]"])
+    faster = base.override([f"bodies.{name}.velocity_mps=[60, 0, 0]"])
+    assert demand(faster).seconds > 1.5 * demand(fast).seconds
+
+
+def test_corners_at_infinity_are_told_without_a_word_of_arithmetic(tmp_path):
+    box = trimesh.creation.box()
+    box.vertices[3, 1] = np.inf
+    file = tmp_path / "far.stl"
+    with np.errstate(all="ignore"):
+        file.write_bytes(box.export(file_type="stl"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ran = CliRunner().invoke(app, ["info", str(file)])
+    assert "hold NaN or infinity" in str(ran.exception)
 
 
 _TOLD_TO_END = """

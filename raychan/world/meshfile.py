@@ -49,7 +49,9 @@ def load(
     try:
         import trimesh
 
-        scene = trimesh.load_scene(str(file), process=False)
+        # Corners at infinity are told below, not by the reader's arithmetic.
+        with np.errstate(all="ignore"):
+            scene = trimesh.load_scene(str(file), process=False)
         return from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
     except SceneError as e:
         raise e.at(file=file) from None
