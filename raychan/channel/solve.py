@@ -25,7 +25,9 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-_TUBES = 20_000_000  # that cuts for phase may come by: half a minute of one core
+_TUBES = (
+    10_000_000  # that cuts for phase may come by: a quarter of a minute of one core; urban streets at 0.1 dB: a million
+)
 _CUTS, _CUTS_A_FACET = 40_000, 4  # for sight; urban streets at 0.1 dB take 13,000
 Progress = Callable[[str, float], None]
 

@@ -86,8 +86,7 @@ def uncut(surface: Surface, *launches: Stats) -> tuple[str, ...]:
     body = f"body '{facets.body_names[worst]}': {int(left[worst]):,} tubes on its {area:.3g} m2"
     return (
         f"{body} were left coarser than asked for, too many hide parts of each other or are too large: errors may "
-        "exceed those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit, or "
-        "ask for a coarser tolerance",
+        "exceed those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit",
     )
 
 
