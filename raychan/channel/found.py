@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.surface import Surface
 from raychan.channel.tubes import Phases, Refinement
 from raychan.kernels.po import quadratic_means
 from raychan.kernels.rows import in_two
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
 
 _MANY = 4096  # tubes under which letting some go saves nothing
 _THREADS = 1000  # tubes from which on a second thread pays
@@ -24,6 +27,37 @@ class Found:
     def __init__(self, rule: Refinement) -> None:
         self.rule = rule
         self._level = np.zeros(1)
+        self._tubes, self._cuts, self._rays = 0, 0.0, -1
+        self.uncut = np.zeros(0, np.int64)
+        """Tubes (bodies,) that budgets kept from being cut."""
+
+    def affords_phase(self, surface: Surface, facet: Ints, wanted: Bools) -> Bools:
+        """Return which tubes (n,) on facets (n,) may be cut for their phase: none once there are `rule.max_tubes`."""
+        self._tubes += len(wanted)
+        return self._within(surface, facet, wanted, self._tubes > self.rule.max_tubes)
+
+    def affords(self, surface: Surface, facet: Ints, wanted: Bools, weight: float = 1.0) -> Bools:
+        """Return which tubes (n,) may be cut for what hides parts of them: none once `rule.max_cuts` are made, each
+        counted by its weight, or `rule.max_rays` cast by this launch."""
+        rest = 0.0 if self.spent(surface) else (self.rule.max_cuts - self._cuts) / weight
+        self._cuts += weight * np.count_nonzero(wanted)
+        within = wanted & (np.cumsum(wanted) <= rest)
+        return within | self._within(surface, facet, wanted & ~within, True)
+
+    def spent(self, surface: Surface) -> bool:
+        """Tell whether nothing may be cut any more for what hides it."""
+        if self._rays < 0:
+            self._rays = surface.rays
+        return self._cuts > self.rule.max_cuts or surface.rays - self._rays > self.rule.max_rays
+
+    def _within(self, surface: Surface, facet: Ints, wanted: Bools, spent: bool) -> Bools:
+        if not spent or not wanted.any():
+            return wanted
+        bodies = surface.facets.body[facet[wanted]]
+        count = np.bincount(bodies, minlength=max(len(surface.facets.role), len(self.uncut)))
+        self.uncut = count + np.pad(self.uncut, (0, len(count) - len(self.uncut)))
+        surface.uncut += int(np.count_nonzero(wanted))
+        return np.zeros_like(wanted)
 
     def _cell(self, length: Floats) -> NDArray[np.int64]:
         return np.asarray(np.maximum(length / self.rule.cell, 0.0), np.int64)

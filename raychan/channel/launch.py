@@ -49,13 +49,13 @@ def launch(
     Args: pieces (p,) which may carry a first bounce; those of the leg's own mirrors never do; found what was so far;
     more whether the tubes will bounce again; others by which they may leave too.
     """
-    f, rule = surface.facets, found.rule
+    f = surface.facets
     shape = f.vertices, f.normals, surface.bulge
     ways = leg.image, leg.far, out.image, out.far
     allowed = pieces & (surface.piece_role == SCATTERER)
     allowed[leg.pieces(surface)] = False
     facet = seeds(surface, leg, allowed)
-    for part, bary in _cut_for_phase(surface, facet, shape, ways, rule, not more):
+    for part, bary in _cut_for_phase(surface, facet, shape, ways, found, not more):
         part, bary = lit_parts(part, bary, *shape, surface.both_sides, leg.image, leg.far)
         tubes = stand(surface, leg, part, bary)
         if leg.mirrors:
@@ -79,29 +79,27 @@ def _returning(surface: Surface, leg: Leg, out: Leg, others: list[Leg], tubes: T
 
 
 def _cut_for_phase(
-    surface: Surface, facet: Ints, shape: Any, ways: Any, rule: Refinement, across: bool
+    surface: Surface, facet: Ints, shape: Any, ways: Any, found: Found, across: bool
 ) -> Iterator[tuple[Ints, Floats]]:
     """Cut along the edge on which the two-way phase bends most, until it is quadratic enough or no longer counts; yield
     facets and corners of the parts in batches, so that memory does not grow with their number.
 
     Args: across whether only an edge's length across the rays counts: tubes that bounce again are needed as short.
     """
+    rule = found.rule
     limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
     left = [(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), 0)]
     done: list[tuple[Ints, Floats]] = []
-    held, spent = 0, 0
+    held = 0
     while left:
         facet, bary, level = left.pop()
         if len(facet) > _BATCH:
             half = len(facet) // 2
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
-        spent += len(facet)
         edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
-        if spent > rule.max_tubes:
-            surface.uncut += int(np.count_nonzero(edge >= 0))
-            edge[:] = -1
-        ready, more = edge < 0, edge >= 0
+        more = found.affords_phase(surface, facet, edge >= 0)
+        ready = ~more
         if held + np.count_nonzero(ready) > _BATCH:
             yield _joined(done)
             done, held = [], 0
@@ -135,7 +133,8 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
     # a wall.
     view = centres(surface, leg, tubes, True, rule)
     found.add(ph.take(view.seen))
-    matters = (ph.bound > found.doubt(ph.length)) & (not surface.convex_alone)
+    ready = surface.convex_alone or found.spent(surface)
+    matters = (ph.bound > found.doubt(ph.length)) & (not ready)
     keep(view, view.seen & ~matters)
     known: View | None = view.take(matters)
     tubes, matters = tubes.take(matters), matters[matters]
@@ -143,7 +142,7 @@ def _cut_for_sight(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Fo
         if not len(tubes):
             break
         s = sight(surface, leg, tubes, matters, True, rule, level < GAPS, known)
-        split = s.mixed & matters & (level < rule.levels)
+        split = found.affords(surface, tubes.facet, s.mixed & matters & (level < rule.levels))
         keep(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)
         tubes, _ = divide(surface, leg, tubes, rows, s.side, True, rule.jitter)

@@ -207,14 +207,18 @@ def _refined(
     # Long tubes may miss the same in two launches.
     cover *= np.sqrt(_stretch(surface, max_rays))
     rules = [
-        replace(step, max_tubes=_most_tubes(i, max_rays))
+        replace(step, max_tubes=_most_tubes(i, max_rays), max_rays=max_rays)
         for i, step in enumerate(refinements(surface, frequency, max_rays=max_rays))
     ]
     for rule in rules:
-        coarse = surface.uncut
+        coarse, so_far = surface.uncut, surface.rays
         s = _both_ways(surface, leg, out, frequency, bounces, rule)
         by_bounce = s[:, row, col]
         value = complex(by_bounce.sum())
+        if surface.uncut > coarse and surface.rays - so_far > max_rays:
+            # What hides what was not found out: nobody knows by how much that is off.
+            off = np.inf
+            break
         if before is None:
             first = value
         else:

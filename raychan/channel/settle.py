@@ -48,14 +48,18 @@ def settle(
             left = found.that_count(RUNNING * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
-        matters = ph.bound > found.doubt(ph.length)
+        matters = (ph.bound > found.doubt(ph.length)) & (not found.spent(surface))
         # Of what little a scene sees of them, currents beyond the horizon are asked for by their centres alone.
         asked = matters if which == LIT else matters & facing
         view = sight(surface, out, tubes, asked, first, rule, level < GAPS, beyond=~facing)
         cut = matters if level < rule.levels else np.zeros_like(matters)
         if veiled:
             view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
-        what = sort_out(facing, view.centre.seen, view.some, view.mixed, ph.rough, cut)
+        how = facing, view.centre.seen, view.some, view.mixed, ph.rough
+        what = sort_out(*how, cut)
+        wanted = (what == BENT) | (what == SHADED)
+        cut &= ~wanted | found.affords(surface, tubes.facet, wanted)
+        what = sort_out(*how, cut)
         ready, bent, shaded = (np.flatnonzero(what == w) for w in (READY, BENT, SHADED))
         kept.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
         if not len(bent) and not len(shaded):

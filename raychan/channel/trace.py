@@ -25,6 +25,7 @@ Bools = NDArray[np.bool_]
 Rows = NDArray[np.signedinteger]
 
 _ALIKE = 0.98  # cosine within which normals of one smooth patch may differ over a tube
+_LIGHT = 0.1  # of the cost of a cut for sight: what one between bounces takes
 _MANY = 2000  # tubes from which on a second thread pays
 
 
@@ -80,6 +81,7 @@ def _step(
         matters = area > found.doubt(whole) * (1.0 + 0.5 * span)
     else:
         matters = area > found.doubt(whole)
+    matters &= not found.spent(surface)
     # Beside a centre that meets nothing no corner is cast: the outline of a body there runs through the tube.
     hit, t = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     agree = mid >= 0
@@ -89,7 +91,7 @@ def _step(
     agreeing(rows, hit, surface.plane, surface.smooth, surface.normal, _ALIKE, agree)
     side = _edges(surface, leg, tubes, points, way, hit, t, np.flatnonzero(matters))
     mixed = (~agree & (mid >= 0)) | side.any(axis=1)
-    split = mixed & matters & (flight.count[0] < rule.levels)
+    split = found.affords(surface, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _LIGHT)
     ready = np.flatnonzero(~split & (mid >= 0))
     landed.append(_land(surface, leg, tubes, ready, way, hit, agree, flight.through, rule))
     parts, rows = divide(surface, leg, tubes, np.flatnonzero(split), side, first, rule.jitter)

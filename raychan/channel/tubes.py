@@ -39,7 +39,8 @@ class Refinement:
     `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the
     same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
     [m] of first tubes; `levels` of cutting for sight and bounces; `slots` of history; `layers` that a stretch may
-    pass; `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
+    pass; `max_tubes` that cuts for phase may come by, `max_cuts` for sight and `max_rays` cast after which a launch
+    cuts no more (see `Found.affords`); `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
     """
 
     wavenumber: float
@@ -53,6 +54,8 @@ class Refinement:
     slots: int = 8
     layers: int = 2
     max_tubes: int = 100_000_000
+    max_cuts: float = np.inf
+    max_rays: float = np.inf
     jitter: float = 0.0
 
     def for_depth(self, bounces: int) -> Refinement:

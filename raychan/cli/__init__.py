@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import threading
+from types import FrameType
 
 import typer
 
@@ -39,9 +40,10 @@ Ranges are in metres, speeds in m/s; a positive range rate recedes.
 Exit code 0: done
   1: validate found an unknown or a healed difference
   2: the input is wrong, and the message says where
-  130: interrupted; it says what was written"""
+  130: interrupted, 143: told to end (SIGTERM); it says what was written"""
 
 _STOPPED = "interrupted; nothing was written"
+_ended: list[int] = []  # signals other than Ctrl-C that asked this process to end
 
 app = typer.Typer(
     help=_HELP,
@@ -76,7 +78,20 @@ app.add_typer(study, name="study")
 def main(argv: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     sys.unraisablehook = _interrupt_again
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _end)
     sys.exit(invoke(sys.argv[1:] if argv is None else argv))
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """End as Ctrl-C does, but for the exit code: what was begun is put away."""
+    _ended.append(number)
+    raise KeyboardInterrupt
+
+
+def _stopped(text: str) -> int:
+    """Say that the command was interrupted; return the exit code, 128 and the signal's number."""
+    return _fail(text, 128 + (_ended[-1] if _ended else signal.SIGINT))
 
 
 def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
@@ -97,17 +112,17 @@ def _interrupt() -> None:
 
 
 def invoke(argv: list[str]) -> int:
-    """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C."""
+    """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C, 143 for SIGTERM."""
     try:
         code = typer.main.get_command(app).main(args=argv, prog_name="raychan", standalone_mode=False)
         if (trouble := _unprinted()) is not None:
             return trouble
         # typer turns Ctrl-C into an exit code of its own, silently.
-        return _fail(_STOPPED, 130) if code == 130 else int(code or 0)
+        return _stopped(_STOPPED) if code == 130 else int(code or 0)
     except (KeyboardInterrupt, typer.Abort):
-        return _fail(_STOPPED, 130)
+        return _stopped(_STOPPED)
     except Interrupted as stop:
-        return _fail(str(stop), 130)
+        return _stopped(str(stop))
     except BrokenPipeError:
         return _unprinted() or 0
     except MemoryError:
@@ -120,7 +135,7 @@ def invoke(argv: list[str]) -> int:
         from raychan.world.errors import SceneError
 
         if was_interrupted(error):
-            return _fail(_STOPPED, 130)
+            return _stopped(_STOPPED)
 
         _unprinted()
         if isinstance(error, OSError) and error.errno and not error.filename:

@@ -92,19 +92,17 @@ def _bessel(n, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sources(x, y, strength, amplitude, delay, growth, later, ramp, grid, rest):  # type: ignore[no-untyped-def]
+def sources(x, y, strength, amplitude, delay, growth, later, ramp, grid, rest, terms):  # type: ignore[no-untyped-def]
     """Write where echoes (n,) stand on a grid, x (n,) rows of frequency per time and y (n,) columns of frequency per
     sample, and their strengths (n, p): see signal.keystone.
 
     Args: delay and growth as for `beat_sum` but at the middle instant, later (n,) [s] to be added to it; ramp carrier
     [Hz], slope [Hz/s], then, t [s], step [s]; grid delay, frequency, row zero, rows per Hz, middle row, columns a
     turn, margin; rest (2, 4): middle, 1 / half width, order and half
-    width of the two small terms.
+    width of the two small terms; terms (j,): the last order of the first that goes with each of the second.
     """
     carrier, slope, then, t, step = ramp
     middle, frequency, shift_0, dense, row_0, columns, margin = grid
-    order_b, order_a = int(rest[0, 2]), int(rest[1, 2])
-    most = max(order_b, order_a)
     for i in range(delay.size):
         tau, b = delay[i] + later[i], growth[i]
         off = tau - middle
@@ -118,24 +116,23 @@ def sources(x, y, strength, amplitude, delay, growth, later, ramp, grid, rest): 
         far = (b * slope * off * slope / frequency - rest[0, 0]) * rest[0, 1]
         late = (-0.5 * slope * b * b - rest[1, 0]) * rest[1, 1]
         p = 0
-        for j in range(order_a + 1):
-            for k in range(min(order_b, most - j) + 1):
+        for j in range(len(terms)):
+            for k in range(terms[j] + 1):
                 strength[i, p] = size * (_chebyshev(k, far) * _chebyshev(j, late))
                 p += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def stretched(place, factor, frame, rest, falloff):  # type: ignore[no-untyped-def]
+def stretched(place, factor, frame, rest, terms, falloff):  # type: ignore[no-untyped-def]
     """Write where in the transforms over shifts each sample (m, s) is read off, and its factors (p, m, s) there: see
     signal.keystone.
 
     Args: frame repetition, step [s], stretch [1/s], middle shift [Hz], rows per Hz, oversampling, length of the
-    transform; rest as for `sources`, with the half widths; falloff, coefficients of 1 over the kernel's transform.
+    transform; rest and terms as for `sources`; falloff, coefficients of 1 over the kernel's transform.
     """
     repetition, step, stretch, shift, dense, over, length = frame
     chirps, samples = place.shape
     order_b, order_a = int(rest[0, 2]), int(rest[1, 2])
-    most = max(order_b, order_a)
     turns_b, turns_a = 2.0 * math.pi * rest[0, 3], 2.0 * math.pi * rest[1, 3]
     size_b, size_a = np.ones(order_b + 1), np.ones(order_a + 1)
     for m in range(chirps):
@@ -159,7 +156,7 @@ def stretched(place, factor, frame, rest, falloff):  # type: ignore[no-untyped-d
             p, quarter = 0, complex(value * cosine, value * sine)
             for j in range(order_a + 1):
                 turned = quarter
-                for k in range(min(order_b, most - j) + 1):
+                for k in range(terms[j] + 1):
                     factor[p, m, s] = turned * (size_b[k] * size_a[j])
                     turned *= -1j
                     p += 1

@@ -32,7 +32,7 @@ from raychan.run.pieces import Retraced, Traced
 from raychan.run.provenance import provenance
 from raychan.run.result import ExplainedDetections, Receiver, Result
 from raychan.run.spread import claimed, launch_share, motion, without
-from raychan.run.tell import counts, told
+from raychan.run.tell import counts, told, uncut
 from raychan.signal.cube import noisy, synthesize
 from raychan.tables import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler, Routes
 from raychan.units import C0
@@ -77,6 +77,7 @@ class Channel:
     """The scene's, with what was asked for and what mode = "auto" chose."""
     chosen: Choice | None
     stats: dict[str, Any]
+    warnings: tuple[str, ...] = ()
     turned: Retraced | None = None
     """Samples of a frame that was traced more than once."""
 
@@ -162,7 +163,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         "tracings": len(turned.times) if turned else 1,
         "tolerance_db": model.tolerance_db,
     }
-    return Channel(surface, points, launched, others, model, chosen, cost, turned)
+    return Channel(surface, points, launched, others, model, chosen, cost, uncut(surface, stats, more), turned)
 
 
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
@@ -226,6 +227,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *scene.warnings,
             *check_demand(scene),
             *_told(channel.launched),
+            *channel.warnings,
             *told(known, tolerance, rdmap, left_out),
         ),
         scene=scene.bare(),

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from raychan.channel.solve import Stats
+from raychan.channel.surface import Surface
 from raychan.run.ledger import Entry
 from raychan.run.result import ExplainedDetections, Result
 from raychan.tables import RangeDoppler
@@ -70,6 +72,22 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: dict[str, Any
 def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: dict[str, Any]) -> list[str]:
     """Return all lines on detections."""
     return [*warned(found, tolerance_db, rdmap), *noted(found, tolerance_db, ledger)]
+
+
+def uncut(surface: Surface, *launches: Stats) -> tuple[str, ...]:
+    """Return a line if launches had more tubes on some bodies than may be cut."""
+    left = np.zeros(len(surface.facets.role), np.int64)
+    for stats in launches:
+        left[: len(stats.uncut)] += stats.uncut
+    if not left.any():
+        return ()
+    worst, facets = int(np.argmax(left)), surface.facets
+    area = float(surface.area[facets.body == worst].sum())
+    body = f"body '{facets.body_names[worst]}': {int(left[worst]):,} tubes on its {area:.3g} m2"
+    return (
+        f"{body} were left coarser than asked for, too many hide parts of each other or are too large: errors may "
+        "exceed those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit",
+    )
 
 
 def notes(result: Result) -> list[str]:

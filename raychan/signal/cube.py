@@ -89,12 +89,14 @@ def _fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: Floa
     """Write what all receivers get, grid by grid: what a long frame needs to read off one may be gigabytes."""
     threads = os.cpu_count() or 1
     sums = samples if len(grids) == 1 else np.zeros(samples.shape, np.complex128)
+    # One for all grids: to get so much anew costs more than to fill it.
+    room = np.empty(max(grid.room for grid, _ in grids), np.complex128)
     with ThreadPoolExecutor(max_workers=threads) as pool:
         # As many receivers as cores: a core each. Else all cores work on one. The sums are the same.
         outer, inner = (pool.map, map) if len(elements) >= threads > 1 else (map, pool.map)
         while grids:
             grid, echoes = grids.pop()
-            ready = grid.prepared(echoes)
+            ready = grid.prepared(echoes, room)
 
             def receiver(layer: Complexes, element: Floats, grid: Keystone = grid, ready: Echoes = ready) -> None:
                 total = np.zeros(layer.shape, np.complex128)

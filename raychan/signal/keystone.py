@@ -42,6 +42,7 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
 Each = Callable[..., Iterable[Any]]
 
 _SINGLE = 1e-6  # tolerance down to which transforms in single precision, and a kernel of 8 cells, do
@@ -50,6 +51,7 @@ _BLOCK = 64  # samples of a chirp whose transforms over shifts are made at a tim
 _ROOM = 1 << 28  # bytes of a grid
 _CHUNK = 1 << 18  # echoes gridded at a time
 _BOX = 8, 8
+_READ, _READY = 4.0, 4  # cells transformed in the time that a sample is read off a plane; planes, that it is laid out
 _CROWD = 64  # echoes in a box of cells up to which they are added up in single precision: 3e-7 of them
 
 
@@ -101,9 +103,9 @@ class Keystone:
         far_turn, late_turn = 2.0 * np.pi * far_span * (m + t) * t, 2.0 * np.pi * late_span * (m + t) ** 2
         small = 0.3 * tolerance
         self.rest_turn = far_turn * (far_turn > small), late_turn * (late_turn > small)
-        order = _order(sum(self.rest_turn), 0.3 * tolerance)
-        self.orders = tuple(order if z > 0.0 else 0 for z in self.rest_turn)
-        self.planes = sum(min(self.orders[0], order - j) + 1 for j in range(self.orders[1] + 1))
+        self.terms = _terms(*self.rest_turn, small)
+        self.orders = int(self.terms.max()), len(self.terms) - 1
+        self.planes = int(self.terms.sum()) + len(self.terms)
         self.rest = np.array(
             [
                 [middle, 1.0 / half if n else 0.0, n, half]
@@ -126,8 +128,18 @@ class Keystone:
         """Cells that are transformed."""
         return self.planes * (self.rows * self.columns + self.length * self.wave.n_samples)
 
-    def prepared(self, echoes: Echoes) -> Echoes:
-        """Return the echoes by row, and lay out how the grid is read off."""
+    @property
+    def work(self) -> float:
+        """What it costs, about, in cells that are transformed."""
+        return self.cells + _READ * float(self.planes + _READY) * self.wave.n_chirps * self.wave.n_samples
+
+    @property
+    def room(self) -> int:
+        """How many factors `prepared` lays out."""
+        return self.planes * self.wave.n_chirps * self.wave.n_samples
+
+    def prepared(self, echoes: Echoes, room: Complexes) -> Echoes:
+        """Return the echoes by row, and lay out how the grid is read off, in a room for as many numbers at least."""
         wave = self.wave
         shift = echoes.growth * (self.frequency - wave.slope * (echoes.delay - self.delay))
         turn = (wave.slope * echoes.delay + shift) * self.step
@@ -141,9 +153,9 @@ class Keystone:
         self.over = (1.0 - 2.0 * (k % 2)) / transform(self.width, k / self.length)
         self.along = 1.0 / transform(self.width, s / self.columns)
         shape = wave.n_chirps, wave.n_samples
-        place, self.factor = np.empty(shape), np.empty((self.planes, *shape), np.complex128)
+        place, self.factor = np.empty(shape), room[: self.room].reshape(self.planes, *shape)
         frame = np.array([wave.repetition, self.step, self.stretch, self.shift, self.dense, OVER, self.length])
-        stretched(place, self.factor, frame, self.rest, target_factor(self.width))
+        stretched(place, self.factor, frame, self.rest, self.terms, target_factor(self.width))
         # What all receivers share.
         self.first = np.empty(shape, np.int64)
         self.weight = np.empty((*shape, self.width), np.float32 if self.single else np.float64)
@@ -168,7 +180,7 @@ class Keystone:
             later = (some.arrival @ element) * (-1.0 / C0)
             x, y = np.empty(len(later)), np.empty(len(later))
             strength = np.empty((len(later), self.planes), self.sort)
-            sources(x, y, strength, some.amplitude, some.delay, some.growth, later, ramp, grid, self.rest)
+            sources(x, y, strength, some.amplitude, some.delay, some.growth, later, ramp, grid, self.rest, self.terms)
             first, end = math.ceil(x.min() - half), math.ceil(x.max() + half)
             cells = np.zeros((self.planes, end - first, self.columns + 2 * half), self.sort)
             flat = cells.view(cells.real.dtype).reshape(-1)
@@ -212,7 +224,9 @@ def keystones(echoes: Echoes, wave: Waveform, tolerance: float, reach: float) ->
     below = values <= 0.5 * sum(limits)
     if below.all() or not below.any():
         return [(grid, echoes)]
-    return [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach)]
+    parts = [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach)]
+    # More terms of the series may cost less than one more grid to read off for every sample.
+    return parts if large or sum(part.work for part, _ in parts) < grid.work else [(grid, echoes)]
 
 
 def _middle(values: Floats, margin: float) -> tuple[float, float]:
@@ -220,13 +234,29 @@ def _middle(values: Floats, margin: float) -> tuple[float, float]:
     return 0.5 * (low + high), 0.5 * (high - low) + margin
 
 
-def _order(turn: float, tolerance: float) -> int:
-    """Return the order at which the series of exp(j turn x) in Chebyshev polynomials, its terms 2 J_n, is cut."""
-    order, bound = 0, turn
-    while bound > tolerance:
-        order += 1
-        bound *= 0.5 * turn / (order + 1)
-    return order
+def _terms(far: float, late: float, tolerance: float) -> Ints:
+    """Return for each order (j,) of the late term's series the last order of the far one's that goes with it.
+
+    The series of exp(j turn x) in Chebyshev polynomials has terms 2 J_n(turn) < 2 (turn / 2)^n / n!; all products of
+    two that are left out add up to less than the tolerance.
+    """
+    sizes = [_sizes(turn, tolerance) for turn in (late, far)]
+    products = np.outer(*sizes)
+    order = np.sort(products, axis=None)
+    least = order[np.searchsorted(np.cumsum(order), tolerance)]
+    last: Ints = (products >= least).sum(axis=1) - 1
+    return last[last >= 0]
+
+
+def _sizes(turn: float, tolerance: float) -> Floats:
+    """Return bounds (n,) on the terms of a series, none above the one before, until they no longer matter."""
+    found = [1.0]
+    if turn > 0.0:
+        while found[-1] > 1e-3 * tolerance or len(found) < turn:
+            found.append(found[-1] * 0.5 * turn / len(found))
+        found[1:] = [2.0 * x for x in found[1:]]
+    falling = np.maximum.accumulate(np.array(found)[::-1])[::-1]
+    return np.minimum(falling, 2.0) if turn > 0.0 else falling
 
 
 def _fast(least: float) -> int:

@@ -16,6 +16,7 @@ _USUAL = 3.0  # m
 _FARTHEST = 1e12  # in the unit of a file; beyond lies only what was read wrong
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "ft": 0.3048}
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+_STL_HEAD, _STL_FACET = 84, 50  # bytes
 _AXES = {s + a: (1.0 if s == "+" else -1.0) * np.eye(3)[i] for s in "+-" for i, a in enumerate("xyz")}
 
 
@@ -43,15 +44,34 @@ def load(
     if not SCALE.allows(scale):
         raise SceneError(f"{scale!r} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
     turn = _turn(*axes_taken(file, up, forward), file)
+    if file.suffix.lower() == ".stl":
+        _whole_stl(file)
     try:
         import trimesh
 
-        scene = trimesh.load_scene(str(file), process=False)
+        # Corners at infinity are told below, not by the reader's arithmetic.
+        with np.errstate(all="ignore"):
+            scene = trimesh.load_scene(str(file), process=False)
         return from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
     except SceneError as e:
         raise e.at(file=file) from None
     except Exception as e:  # trimesh's readers raise whatever their parsers do
         raise SceneError(f"cannot be read as a mesh ({e})", file=file, allowed="a valid " + file.suffix) from e
+
+
+def _whole_stl(file: Path) -> None:
+    """Raise SceneError for a binary STL that is cut short: 84 bytes, then 50 a triangle, are expected."""
+    there = file.stat().st_size
+    with file.open("rb") as stream:
+        head = stream.read(1024)
+    if there == 0 or (head.lstrip().startswith(b"solid") and b"facet" in head):
+        return
+    count = int.from_bytes(head[80:84], "little") if there >= _STL_HEAD else 0
+    expected = _STL_HEAD + _STL_FACET * count
+    if there < expected:
+        least = "" if there >= _STL_HEAD else "at least "
+        problem = f"is cut short: {there} bytes there, {least}{expected} expected ({count} triangles)"
+        raise SceneError(problem, file=file, value=there, allowed="a whole STL")
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:

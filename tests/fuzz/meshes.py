@@ -33,6 +33,8 @@ def broken(mesh: trimesh.Trimesh, rng: Any) -> trimesh.Trimesh:
     """Return the mesh with one thing done to it that a file may hold."""
     v, f = np.array(mesh.vertices), np.array(mesh.faces)
     kind = rng.integers(14)
+    if not len(v) or not len(f):  # nothing is left to break
+        return mesh
     if kind == 0:  # flattened
         v[:, rng.integers(3)] *= float(rng.choice([0.0, 1e-12, 1e-6]))
     elif kind == 1:  # folded onto itself
