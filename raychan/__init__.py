@@ -25,12 +25,12 @@ _HOME = {
     "SceneError": "raychan.world.scene",
     "Material": "raychan.world.material",
     "PEC": "raychan.world.material",
-    "simulate": "raychan.run.chain",
+    "simulate": "raychan.run.simulate",
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
-    "load_result": "raychan.run.store",
-    "rcs": "raychan.channel.rcs",
-    "specular_paths": "raychan.channel.specular",
+    "load_result": "raychan.run.storage",
+    "rcs": "raychan.run.rcs",
+    "specular_paths": "raychan.run.specular_paths",
     "visibility": "raychan.study.visibility",
 }
 

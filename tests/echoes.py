@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from raychan.radar.antenna import Isotropic
-from raychan.radar.sensor import Sensor
+from raychan.radar.radar import Sensor
 from raychan.radar.waveform import Waveform
-from raychan.tables import Paths
+from raychan.records import Paths
 from raychan.units import C0
 
 WIDE = Waveform(77e9, 4e9, 25.6e-6, 40e-6, 128, 1024)

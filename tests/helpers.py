@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from raychan.tables import PEC, Facets, Materials
+from raychan.records import PEC, Facets, Materials
 
 
 def facets(meshes, materials=None, smooth=None, role=None, velocity=None):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from raychan.radar.waveform import Waveform
-from raychan.run.provenance import provenance
+from raychan.records import Cube, Detections, MapError, Paths, Profile, RangeDoppler
+from raychan.run.labels import provenance
 from raychan.run.result import ExplainedDetections, Receiver, Result
-from raychan.tables import Cube, Detections, MapError, Paths, Profile, RangeDoppler
 from raychan.units import C0
 
 WAVE = Waveform(

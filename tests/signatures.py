@@ -13,8 +13,8 @@ from typing import Any
 from numba import types
 from numba.core import event
 
-from raychan.kernels import ahead
-from raychan.kernels.jit import Kernel
+from raychan.compile import ahead
+from raychan.compile.jit import Kernel
 
 SCENES = ("living_street", "occluded_pedestrian", "urban")
 Row = tuple[str, str, str]

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from signatures import write_type
 
-from raychan.kernels import ahead
-from raychan.kernels.jit import Kernel
+from raychan.compile import ahead
+from raychan.compile.jit import Kernel
 
 LISTS = ahead.lists()
 ROWS = [(name, *row) for name, rows in LISTS.items() for row in rows]
@@ -26,15 +26,15 @@ def test_the_lists_name_kernels_that_are_there_and_types_that_read_back():
 @pytest.mark.skipif(bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="frozen arrays are compiled for by themselves")
 def test_what_the_second_process_compiled_the_first_only_loads(tmp_path: Path):
     file = tmp_path / "list.txt"
-    rows = [row for row in LISTS["run"] if row[0] == "raychan.kernels.fresnel"]
+    rows = [row for row in LISTS["run"] if row[0] == "raychan.em.fresnel"]
     assert len(rows) > 3
     file.write_text("[few]\n" + "\n".join(" ".join(row) for row in rows))
     compiles = f"""
 from pathlib import Path
-from raychan.kernels import ahead
+from raychan.compile import ahead
 rows = ahead.lists(Path({str(file)!r}))["few"]
 lost = ahead.compile_list(rows)
-import raychan.kernels.fresnel as fresnel
+import raychan.em.fresnel as fresnel
 hits = sum(getattr(fresnel, row[1]).stats.cache_hits.total() for row in rows)
 misses = sum(getattr(fresnel, row[1]).stats.cache_misses.total() for row in rows)
 print(lost, misses > 0, misses + hits)

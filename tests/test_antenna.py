@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from raychan.frames import direction, theta_phi
 from raychan.radar.antenna import Antenna, CosinePattern, Isotropic, UniformArray
 from raychan.radar.pattern import MeasuredPattern, PatternError, characteristics, gain_dbi
-from raychan.radar.sensor import Sensor
+from raychan.radar.radar import Sensor
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
-from raychan.world.mount import antenna_of
+from raychan.world.radar_mount import antenna_of
 from raychan.world.schema import AntennaTable
 
 WAVE = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128)

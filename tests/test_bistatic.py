@@ -8,14 +8,14 @@ import trimesh
 from helpers import facets, quad
 from truth import mie, po
 
-from raychan.channel.beyond import outlets
-from raychan.channel.fields import transfer
-from raychan.channel.legs import Leg, Mirror
-from raychan.channel.rcs import facets_of, rcs, refinements, scattering
-from raychan.channel.shoot import tube_routes
-from raychan.channel.surface import Surface
+from raychan.channel.transfer import transfer
 from raychan.frames import direction, theta_phi
+from raychan.run.rcs import facets_of, rcs, refinements, scattering
+from raychan.tracing.beyond_horizon import outlets
+from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.shooting import tube_routes
 from raychan.units import C0
+from raychan.world.geometry import Surface
 from raychan.world.material import Material
 
 F = 77e9

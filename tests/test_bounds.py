@@ -12,7 +12,7 @@ from helpers import facets, ground, quad
 
 from raychan import rcs
 from raychan.cli import invoke
-from raychan.kernels.facets import ends
+from raychan.geometry.triangles import ends
 
 SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
 checked = pytest.mark.skipif(not os.environ.get("NUMBA_BOUNDSCHECK"), reason="wants NUMBA_BOUNDSCHECK=1")
@@ -70,9 +70,9 @@ def njit(**options):
         return run
     return python
 
-import raychan.kernels.jit, raychan.kernels.rows
-raychan.kernels.jit.njit = njit
-raychan.kernels.rows.in_two = lambda n, work, least=0: work(slice(0, n))
+import raychan.compile.jit, raychan.parallel
+raychan.compile.jit.njit = njit
+raychan.parallel.in_two = lambda n, work, least=0: work(slice(0, n))
 
 import raychan
 from helpers import quad

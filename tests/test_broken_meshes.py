@@ -12,17 +12,17 @@ from broken_meshes import broken_mesh
 from typer.testing import CliRunner
 
 import raychan as rc
-from raychan.channel.edge_grid import most_within
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of, scattering
-from raychan.channel.shadows import Shadows
-from raychan.channel.surface import Surface
-from raychan.channel.tubes import Refinement
 from raychan.cli import app
+from raychan.geometry.edge_grid import most_within
+from raychan.run.rcs import facets_of, scattering
+from raychan.tracing.legs import Leg
+from raychan.tracing.shadow_edges import Shadows
+from raychan.tracing.tubes import Refinement
 from raychan.units import C0
 from raychan.world.errors import SceneError
+from raychan.world.geometry import Surface
 from raychan.world.mesh import make_mesh, smooth_normals
-from raychan.world.meshfile import from_trimesh
+from raychan.world.mesh_io import from_trimesh
 
 F = 77e9
 

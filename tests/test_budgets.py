@@ -12,13 +12,13 @@ import trimesh
 from typer.testing import CliRunner
 
 import raychan as rc
-from raychan.channel import solve
-from raychan.channel.found import Found
-from raychan.channel.surface import Surface
-from raychan.channel.target import facets_of
-from raychan.channel.tubes import Refinement
 from raychan.cli import app
-from raychan.run.demand import demand
+from raychan.run import solver
+from raychan.run.resources import demand
+from raychan.run.single_body import facets_of
+from raychan.tracing.contributions import Found
+from raychan.tracing.tubes import Refinement
+from raychan.world.geometry import Surface
 
 
 def tangle(count: int, seed: int) -> trimesh.Trimesh:
@@ -67,8 +67,8 @@ def test_a_scene_whose_tubes_were_too_many_to_cut_names_the_body(tmp_path, monke
     file.write_text(_SCENE)
     scene = rc.Scene.load(file)
     assert not [w for w in rc.simulate(scene).warnings if "left coarser" in w]
-    monkeypatch.setattr(solve, "_CUTS", 20)
-    monkeypatch.setattr(solve, "_CUTS_A_FACET", 0)
+    monkeypatch.setattr(solver, "_CUTS", 20)
+    monkeypatch.setattr(solver, "_CUTS_A_FACET", 0)
     told = [w for w in rc.simulate(scene).warnings if "left coarser" in w]
     assert len(told) == 1 and "'knot'" in told[0]
 
@@ -103,11 +103,11 @@ def test_corners_at_infinity_are_told_without_a_word_of_arithmetic(tmp_path):
 
 
 _TOLD_TO_END = """
-import time, raychan.run.chain, raychan.cli
+import time, raychan.run.simulate, raychan.cli
 def trace(*a):
     print("ready", flush=True)
     time.sleep(60.0)
-raychan.run.chain.trace = trace
+raychan.run.simulate.trace = trace
 raychan.cli.main(["run", "occluded_pedestrian", "--out", {out!r}])
 """
 

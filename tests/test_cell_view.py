@@ -13,9 +13,9 @@ from records import paths, result
 from texts import ISOTROPIC, upright, walker
 
 from raychan.cli import invoke
+from raychan.records import POINT, REFLECT, SCATTER
 from raychan.run.explain import explain
-from raychan.run.store import load_result
-from raychan.tables import POINT, REFLECT, SCATTER
+from raychan.run.storage import load_result
 from raychan.units import dbm
 from raychan.view.drawing import Drawing, draw, rays_in
 from raychan.view.scene import drawing_of

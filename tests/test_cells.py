@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from raychan.channel import between, shadows
-from raychan.run.chain import simulate
+from raychan.run.simulate import simulate
+from raychan.tracing import shadow_edges, silhouette_crossings
 from raychan.world.body import Body
 from raychan.world.scene import Scene
 
@@ -34,7 +34,7 @@ def echoes(yaw):
 @pytest.mark.parametrize("middle", [(12.0, 7.0, 1.0), (5.0, 0.0, 0.0), (0.0, 20.0, 3.0)])
 def test_a_grid_that_is_cut_off_leads_to_the_same_echoes(yaw, middle, monkeypatch):
     whole = echoes(yaw)
-    for module in (between, shadows):
+    for module in (silhouette_crossings, shadow_edges):
         low, high = np.array(middle) - 1.0, np.array(middle) + 1.0
         monkeypatch.setattr(module, "most_within", lambda m, a, b: (low[: len(a)], high[: len(a)], True))  # noqa: B023
     cut = echoes(yaw)

@@ -56,7 +56,7 @@ def test_equal_seeds_give_equal_bytes_and_other_seeds_do_not(scene, tmp_path):
 
 
 def test_set_overrides_a_key_and_the_result_remembers(scene, tmp_path):
-    from raychan.run.store import load_result
+    from raychan.run.storage import load_result
 
     assert run(scene, tmp_path / "out", "--set", "bodies.sign.position=[6, 0, 1]") == 0
     again = load_result(tmp_path / "out")
@@ -126,7 +126,7 @@ def python(code):
 
 _BESIDE = """
 import threading, time
-from raychan.kernels.rows import in_two
+from raychan.parallel import in_two
 def launched(here):
     # One launch is interrupted, the one beside it goes on and on.
     while threading.current_thread() is not threading.main_thread():
@@ -137,10 +137,10 @@ _STOPPED = (
     _BESIDE
     + """
 import os, signal, sys
-import raychan.run.chain, raychan.cli
+import raychan.run.simulate, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-raychan.run.chain.solve_into = lambda *a, **k: launched(lambda: os.kill(os.getpid(), signal.SIGINT))
+raychan.run.simulate.solve_into = lambda *a, **k: launched(lambda: os.kill(os.getpid(), signal.SIGINT))
 sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
 """
 )
@@ -154,10 +154,10 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
 
 
 _STOPPED_IN_LOOP = """
-import raychan.run.chain, raychan.cli
+import raychan.run.simulate, raychan.cli
 def result_of(*a):
     raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
-raychan.run.chain.result_of = result_of
+raychan.run.simulate.result_of = result_of
 raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
 """
 
@@ -171,11 +171,11 @@ _STOPPED_IN_C = (
     _BESIDE
     + """
 import ctypes, os, signal, time
-import raychan.run.chain, raychan.cli
+import raychan.run.simulate, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 stop = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))
-raychan.run.chain.solve_into = lambda *a, **k: launched(lambda: (stop(), time.sleep(50)))
+raychan.run.simulate.solve_into = lambda *a, **k: launched(lambda: (stop(), time.sleep(50)))
 raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
 """
 )

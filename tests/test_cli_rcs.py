@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from raychan.channel.rcs import Rcs, rcs
 from raychan.cli import invoke
+from raychan.run.rcs import Rcs, rcs
 from raychan.units import C0
 from raychan.world.shapes import build
 
@@ -160,7 +160,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(plate, tmp_path, monkeypatch, c
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("raychan.channel.rcs.rcs", stop)
+    monkeypatch.setattr("raychan.run.rcs.rcs", stop)
     out = tmp_path / "x.csv"
     assert invoke(["rcs", str(plate), "--out", str(out)]) == 130
     assert not out.exists()
@@ -173,7 +173,7 @@ def made(*errors):
 
 
 def test_missed_tolerance_is_told(capsys, monkeypatch):
-    monkeypatch.setattr("raychan.channel.rcs.rcs", lambda *_, **__: made(0.7))
+    monkeypatch.setattr("raychan.run.rcs.rcs", lambda *_, **__: made(0.7))
     assert invoke(["rcs", "--shape", "plate"]) == 0
     assert "1 of 1 angles miss the tolerance of 0.25 dB; largest stated error: 0.70 dB" in capsys.readouterr().err
 
@@ -184,7 +184,7 @@ def test_an_unknown_error_is_never_a_figure(errors, tmp_path, capsys, monkeypatc
     assert known.tolist() == [np.isfinite(e) for e in errors]
     # The command asks for one angle at a time where there are few.
     each = iter(errors)
-    monkeypatch.setattr("raychan.channel.rcs.rcs", lambda *_, **__: made(next(each)))
+    monkeypatch.setattr("raychan.run.rcs.rcs", lambda *_, **__: made(next(each)))
     out, png = tmp_path / "a.csv", tmp_path / "a.png"
     assert invoke(["rcs", "--shape", "plate", "--azimuth", "0:2:1", "--out", str(out), "--plot", str(png)]) == 0
     said = capsys.readouterr()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 _TOY = """
-from raychan.kernels.jit import njit
+from raychan.compile.jit import njit
 
 @njit(cache=True)
 def half(x):
@@ -105,7 +105,7 @@ def replace(*a):
     raise OSError(errno.ENOSPC, "No space left on device")
 os.replace = replace
 """
-    told = "\nfrom raychan.kernels.compiling import lost; print(lost())"
+    told = "\nfrom raychan.compile.progress import lost; print(lost())"
     said = printed(command(tmp_path, full + _READ.format(kinds=["float64"]) + told))
     assert "No space left on device" in said and "the next run compiles again" in said
     assert files(tmp_path) == []
@@ -154,7 +154,7 @@ except TypingError:
 
 _TOLD = """
 import json, toy
-from raychan.kernels.compiling import watched
+from raychan.compile.progress import watched
 told = []
 with watched(lambda *a: told.append(a)):
     toy.half(1.0)
@@ -174,8 +174,8 @@ _SCENES = """
 import sys
 from collections import Counter
 from numba.core import types
-from raychan.kernels.jit import KERNELS
-from raychan.run.chain import simulate
+from raychan.compile.jit import KERNELS
+from raychan.run.simulate import simulate
 from raychan.world.scene import Scene
 
 def plain(t):

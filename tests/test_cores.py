@@ -9,13 +9,13 @@ from helpers import facets, ground
 from test_kept import ball, wanted
 
 import raychan as rc
-from raychan.channel.found import Found
-from raychan.channel.legs import Leg, Mirror
-from raychan.channel.screens import Screens
-from raychan.channel.seeds import seeds
-from raychan.channel.surface import Surface, surface_of
-from raychan.kernels.solid import clearance, winding
-from raychan.tables import LAYER
+from raychan.geometry.closed_surfaces import clearance, winding
+from raychan.records import LAYER
+from raychan.tracing.contributions import Found
+from raychan.tracing.culling import seeds
+from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.occluders import Screens
+from raychan.world.geometry import Surface, surface_of
 from raychan.world.shapes import build
 
 NOTHING = np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32)

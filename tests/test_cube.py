@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from raychan.radar.waveform import Waveform
-from raychan.signal.cube import synthesize
+from raychan.signal.baseband import synthesize
 from raychan.signal.keystone import Echoes, keystones
 from raychan.signal.keystone import middle as centre
 from raychan.units import C0, db

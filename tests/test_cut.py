@@ -7,13 +7,13 @@ import pytest
 import trimesh
 from helpers import facets
 
-from raychan.channel.between import between
-from raychan.channel.cut import divide, halves
-from raychan.channel.history import History
-from raychan.channel.legs import Leg
-from raychan.channel.surface import Surface
-from raychan.channel.tubes import Tubes
-from raychan.kernels.landing import put_down
+from raychan.tracing.history import History
+from raychan.tracing.legs import Leg
+from raychan.tracing.resolve_hits import put_down
+from raychan.tracing.silhouette_crossings import between
+from raychan.tracing.subdivide import divide, halves
+from raychan.tracing.tubes import Tubes
+from raychan.world.geometry import Surface
 
 N = 300
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from echoes import SMALL, WIDE, echoes, sensor
 
-from raychan.process.angle import azimuth
-from raychan.process.cfar import Grid, bias, factor, level, training
-from raychan.process.detect import detect
-from raychan.process.spectrum import range_doppler
+from raychan.processing.cfar import Grid, bias, factor, level, training
+from raychan.processing.detection import detect
+from raychan.processing.doa import azimuth
+from raychan.processing.range_doppler import range_doppler
 from raychan.radar.waveform import Waveform
-from raychan.signal.cube import synthesize
-from raychan.tables import Cube
+from raychan.records import Cube
+from raychan.signal.baseband import synthesize
 from raychan.units import db
 
 

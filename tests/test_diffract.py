@@ -7,12 +7,12 @@ import pytest
 from helpers import box, facets, quad
 from test_solve import point, radar
 
-from raychan.channel.diffract import ways
-from raychan.channel.solve import refinement, solve
-from raychan.channel.surface import Surface
 from raychan.frames import theta_phi
-from raychan.tables import DIFFRACT
+from raychan.records import DIFFRACT
+from raychan.run.solver import refinement, solve
+from raychan.tracing.edge_diffraction import ways
 from raychan.units import C0
+from raychan.world.geometry import Surface
 
 F = 77e9
 K = 2 * np.pi * F / C0

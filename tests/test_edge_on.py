@@ -8,7 +8,7 @@ import trimesh
 from helpers import box, facets, quad
 
 import raychan as rc
-from raychan.world.embree import Tracer
+from raychan.world.ray_caster import Tracer
 
 F = 77e9
 NONE = np.int32(-1)

@@ -9,13 +9,13 @@ import pytest
 from records import WAVE, paths, receiver, result
 
 from raychan.channel.error import stated_error
-from raychan.process.spectrum import range_doppler
+from raychan.processing.range_doppler import range_doppler
 from raychan.radar.antenna import Isotropic
-from raychan.radar.sensor import Sensor
+from raychan.radar.radar import Sensor
+from raychan.records import REFLECT, SCATTER, TRANSMIT, take
 from raychan.run.explain import explain
-from raychan.run.provenance import chains, explain_cell, response_of
-from raychan.signal.cube import synthesize
-from raychan.tables import REFLECT, SCATTER, TRANSMIT, take
+from raychan.run.labels import chains, explain_cell, response_of
+from raychan.signal.baseband import synthesize
 from raychan.units import C0
 
 GROUND, SUV, TRUCK, WALKER = range(4)

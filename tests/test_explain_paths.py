@@ -9,9 +9,9 @@ from texts import ISOTROPIC, upright, walker
 
 import raychan as rc
 from raychan.cli import invoke
+from raychan.records import REFLECT, SCATTER
 from raychan.run.explain import explain
-from raychan.run.store import load_result
-from raychan.tables import REFLECT, SCATTER
+from raychan.run.storage import load_result
 
 TAIL, GHOST = [(1, SCATTER)], [(2, REFLECT), (3, SCATTER)]
 CELL = 0.149896  # of records.WAVE

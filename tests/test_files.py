@@ -13,9 +13,9 @@ import pytest
 from records import paths, result
 from texts import PLATE
 
-from raychan.run import files, swap
-from raychan.run.files import Contents, StoreError, staging, write_together, write_whole
-from raychan.run.store import CONTENTS, save_result
+from raychan.run import atomic_swap, output_files
+from raychan.run.output_files import Contents, StoreError, staging, write_together, write_whole
+from raychan.run.storage import CONTENTS, save_result
 
 KIND = Contents(("data", "*.png", "part_*/"), signs=("data", "part_*/data"))
 NOT_WINDOWS = pytest.mark.skipif(sys.platform == "win32", reason="needs locks that die with their process")
@@ -37,9 +37,9 @@ def tree(folder):
 def way(request, monkeypatch):
     """Each way in which a folder may come to its place."""
     if request.param != "exchanged at once":
-        monkeypatch.setattr(swap, "_exchange_at_once", lambda new, old: False)
+        monkeypatch.setattr(atomic_swap, "_exchange_at_once", lambda new, old: False)
     if request.param == "file by file":
-        monkeypatch.setattr(files, "exchange", lambda new, old: False)
+        monkeypatch.setattr(output_files, "exchange", lambda new, old: False)
     return request.param
 
 
@@ -93,26 +93,26 @@ def test_what_stands_in_the_way_is_told_and_stays(tmp_path):
 _KILLED = """
 import os, signal, sys
 sys.path.insert(0, {tests!r})
-from raychan.run import files
+from raychan.run import output_files
 from test_files import KIND, put
 def die(*a, **k):
     os.kill(os.getpid(), signal.SIGKILL)
 at = {at!r}
 if at == "inside":
-    with files.staging({out!r}, KIND) as stage:
+    with output_files.staging({out!r}, KIND) as stage:
         (stage / "data").write_text("half")
         (stage / "half.png").write_text("half")
         die()
 elif at == "between renames":
-    from raychan.run import swap
-    swap._exchange_at_once = lambda new, old: False
+    from raychan.run import atomic_swap
+    atomic_swap._exchange_at_once = lambda new, old: False
     rename, calls = os.rename, []
     def once(a, b):
         calls.append(a)
         rename(a, b) if len(calls) == 1 else die()
     os.rename = once
 else:
-    setattr(files, at, die)
+    setattr(output_files, at, die)
 put({out!r}, data="new", b_png="new")
 """
 
@@ -197,7 +197,7 @@ _FULL = """
 import resource, sys
 sys.path.insert(0, {tests!r})
 import numpy as np
-import raychan.cli, raychan.run.chain as chain
+import raychan.cli, raychan.run.simulate as chain
 from records import paths, result
 n = 20_000
 big = result(paths(np.full(n, 5.0), np.zeros(n), np.ones(n), [[(1, 3)]] * n), [])

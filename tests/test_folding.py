@@ -13,15 +13,15 @@ from records import paths, receiver, result
 from texts import ISOTROPIC, upright, walker
 
 from raychan.cli import invoke
-from raychan.process.detect import detect
-from raychan.process.spectrum import range_doppler
+from raychan.processing.detection import detect
+from raychan.processing.range_doppler import range_doppler
+from raychan.records import SCATTER
 from raychan.run.explain import explain
 from raychan.run.folding import aliased
-from raychan.run.provenance import chains, explain_cell, provenance, response_of
+from raychan.run.labels import chains, explain_cell, provenance, response_of
+from raychan.run.messages import warned
 from raychan.run.result import ExplainedDetections
-from raychan.run.tell import warned
-from raychan.signal.cube import synthesize
-from raychan.tables import SCATTER
+from raychan.signal.baseband import synthesize
 from raychan.units import C0
 
 SUV, WALKER = 1, 3

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.run import gather
+from raychan.run import path_stream
 
 RADAR = {"waveform": {"bandwidth_mhz": 500.0, "chirp_us": 30.0, "chirps": 32, "samples": 64}}
 
@@ -20,8 +20,8 @@ def scene():
 @pytest.fixture
 def both(monkeypatch):
     every = rc.simulate(scene())
-    monkeypatch.setattr(gather, "_MOST", 100)
-    monkeypatch.setattr(gather, "_KEPT", 40)
+    monkeypatch.setattr(path_stream, "_MOST", 100)
+    monkeypatch.setattr(path_stream, "_KEPT", 40)
     return every, rc.simulate(scene())
 
 
@@ -47,7 +47,7 @@ def test_the_strongest_paths_are_kept_and_it_is_told(both):
 
 def test_all_corners_of_the_ways_that_carry_most_are_kept():
     paths = rc.simulate(scene()).paths
-    kept = gather.strongest(paths, 20)
+    kept = path_stream.strongest(paths, 20)
     power = np.bincount(paths.way, np.abs(paths.amplitude) ** 2)
     least = np.sort(power)[-20]
     rows = power[paths.way] >= least

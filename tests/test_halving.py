@@ -7,15 +7,15 @@ import pytest
 import trimesh
 from truth import shapes
 
-from raychan.channel.mesh_doubt import doubt_of
-from raychan.channel.rcs import rcs
-from raychan.channel.surface import Surface
-from raychan.channel.target import facets_of
-from raychan.kernels.facets import bulges
+from raychan.channel.mesh_error import doubt_of
+from raychan.geometry.triangles import bulges
+from raychan.run.rcs import rcs
+from raychan.run.single_body import facets_of
+from raychan.world.creases import readings
+from raychan.world.geometry import Surface
 from raychan.world.halving import cubic_off, halved
-from raychan.world.joints import places
 from raychan.world.mesh import make_mesh
-from raychan.world.readings import readings
+from raychan.world.topology import places
 
 
 def ellipsoid(axes, subdivisions=2):

@@ -12,12 +12,12 @@ from test_solve import nothing
 from truth import slab
 
 import raychan as rc
-from raychan.channel.solve import refinement, solve
-from raychan.channel.specular import jones, specular_routes
-from raychan.channel.surface import Surface, surface_of
-from raychan.tables import HALF_SPACE, LAYER, PEC, Facets
+from raychan.records import HALF_SPACE, LAYER, PEC, Facets
+from raychan.run.solver import refinement, solve
+from raychan.run.specular_paths import jones, specular_routes
 from raychan.units import C0
-from raychan.world.backed import backed
+from raychan.world.backed_layers import backed
+from raychan.world.geometry import Surface, surface_of
 
 F = 77e9
 K = 2 * np.pi * F / C0

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 _CALLEE = """
-from raychan.kernels.jit import njit
+from raychan.compile.jit import njit
 {constant}
 @njit(cache=True)
 def part(x):
@@ -16,7 +16,7 @@ def part(x):
 """
 _MIDDLE = """
 from callee import part
-from raychan.kernels.jit import njit
+from raychan.compile.jit import njit
 
 @njit(cache=True)
 def whole(x):
@@ -25,7 +25,7 @@ def whole(x):
 _CALLER = """
 from callee import OFTEN
 from middle import whole
-from raychan.kernels.jit import njit
+from raychan.compile.jit import njit
 
 @njit(cache=True)
 def all_of_it(x):

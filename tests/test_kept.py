@@ -17,12 +17,12 @@ from helpers import facets, quad
 from test_sequence import same
 
 import raychan as rc
-from raychan.channel.beam import beam_of
-from raychan.channel.legs import Leg
-from raychan.channel.seeds import seeds
-from raychan.channel.surface import Surface, surface_of
+from raychan.radar.beam_table import beam_of
 from raychan.run.sequence import frames
-from raychan.world.embree import Tracer
+from raychan.tracing.culling import seeds
+from raychan.tracing.legs import Leg
+from raychan.world.geometry import Surface, surface_of
+from raychan.world.ray_caster import Tracer
 
 SCENES = Path(__file__).parents[1] / "scenes"
 RADAR = {

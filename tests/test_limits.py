@@ -11,8 +11,8 @@ from texts import PLATE
 
 import raychan as rc
 from raychan.cli import invoke
-from raychan.process.cfar import fitting_guard
-from raychan.run import demand
+from raychan.processing.cfar import fitting_guard
+from raychan.run import resources
 from raychan.world import limits, schema
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit
@@ -165,7 +165,7 @@ def test_the_memory_foreseen_holds_what_a_run_takes_and_not_three_times_it(scene
     rc.simulate(large)
     taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert taken < demand.demand(large).memory < 3.0 * taken
+    assert taken < resources.demand(large).memory < 3.0 * taken
 
 
 @pytest.mark.parametrize(
@@ -178,15 +178,15 @@ def test_the_memory_foreseen_holds_what_a_run_takes_and_not_three_times_it(scene
     ],
 )
 def test_what_needs_too_much_memory_is_refused_by_the_key_that_mends_it(scene, monkeypatch, changes, key):
-    monkeypatch.setattr(demand, "allowed_memory", lambda: 2.7e6)
+    monkeypatch.setattr(resources, "allowed_memory", lambda: 2.7e6)
     with pytest.raises(SceneError) as caught:
-        demand.check_demand(rc.Scene.load(scene).override(changes))
+        resources.check_demand(rc.Scene.load(scene).override(changes))
     assert caught.value.key == key and "at most" in caught.value.allowed
 
 
 def test_a_long_run_is_told_and_a_short_one_is_not(scene):
     short = rc.Scene.load(scene)
-    assert demand.long_run(short) == []
-    (said,) = demand.long_run(short, frames=100_000)
+    assert resources.long_run(short) == []
+    (said,) = resources.long_run(short, frames=100_000)
     assert "min" in said and "memory" in said
-    assert replace(demand.demand(short), seconds=5.0).text.startswith("roughly 5 s")
+    assert replace(resources.demand(short), seconds=5.0).text.startswith("roughly 5 s")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from raychan.tables import HALF_SPACE, LAYER
-from raychan.tables import PEC as KIND_PEC
+from raychan.records import HALF_SPACE, LAYER
+from raychan.records import PEC as KIND_PEC
 from raychan.units import EPS0
 from raychan.world.errors import SceneError
 from raychan.world.material import PEC, Material, material, names, resolve, validity

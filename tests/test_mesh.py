@@ -8,7 +8,7 @@ import trimesh
 
 from raychan.world.errors import SceneError
 from raychan.world.mesh import make_mesh, smooth_normals
-from raychan.world.meshfile import from_trimesh, load
+from raychan.world.mesh_io import from_trimesh, load
 
 
 def test_smoothed_normals_of_a_sphere_are_radial():

@@ -8,14 +8,14 @@ import trimesh
 from scipy.special import h2vp, hankel2, jv, jvp
 from truth import mie, shapes
 
-from raychan.channel.mesh_doubt import creeping
-from raychan.channel.rcs import rcs
-from raychan.channel.surface import Surface
-from raychan.channel.target import facets_of
+from raychan.channel.mesh_error import creeping
+from raychan.run.rcs import rcs
+from raychan.run.single_body import facets_of
 from raychan.units import C0
+from raychan.world.creases import readings
+from raychan.world.geometry import Surface
 from raychan.world.mesh import make_mesh
-from raychan.world.meshfile import from_trimesh
-from raychan.world.readings import readings
+from raychan.world.mesh_io import from_trimesh
 
 F = 77e9
 K = 2.0 * np.pi * F / C0

@@ -9,13 +9,13 @@ import pytest
 import trimesh
 
 import raychan as rc
-from raychan.channel.solve import refinement, solve
-from raychan.process.spectrum import range_doppler
-from raychan.run.chain import simulate
-from raychan.run.microdoppler import bend, needed, retraced
+from raychan.processing.range_doppler import range_doppler
+from raychan.records import Cube
+from raychan.run.micro_doppler import bend, needed, retraced
 from raychan.run.sequence import frames
-from raychan.signal.cube import synthesize
-from raychan.tables import Cube
+from raychan.run.simulate import simulate
+from raychan.run.solver import refinement, solve
+from raychan.signal.baseband import synthesize
 from raychan.units import C0
 
 WAVE = {"bandwidth_mhz": 300.0, "chirp_us": 30.0, "chirps": 64, "samples": 64}

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from printed import table
 
-from raychan.channel.surface import Surface
-from raychan.run.chain import simulate
+from raychan.run.simulate import simulate
+from raychan.world.geometry import Surface
 from raychan.world.scene import Scene
 
 SCENE = Path(__file__).parents[1] / "scenes" / "occluded_pedestrian.toml"

@@ -10,8 +10,8 @@ import pytest
 from helpers import box, facets, ground, quad
 from test_solve import point
 
-from raychan.channel.occlusion import occlusion
-from raychan.tables import LAYER, Points
+from raychan.records import LAYER, Points
+from raychan.tracing.occlusion import occlusion
 from raychan.world.scene import Scene
 
 EYE = np.zeros(3)

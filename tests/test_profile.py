@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from echoes import SMALL, WIDE, echoes
 
-from raychan.channel.profile import profile
 from raychan.radar.windows import NAMES
+from raychan.signal.delay_profile import profile
 from raychan.units import C0, db
 
 

@@ -11,7 +11,7 @@ from helpers import box, quad
 
 import raychan as rc
 from raychan.world.errors import SceneError
-from raychan.world.inside import Place, in_plane_of, place_of
+from raychan.world.point_in_body import Place, in_plane_of, place_of
 
 F = 77e9
 SCENE = """

@@ -12,15 +12,15 @@ import trimesh
 from helpers import quad
 from truth import corner, mie, po, slab
 
-from raychan.channel.fields import transfer
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of, rcs, refinements, scattering
-from raychan.channel.shoot import tube_routes
-from raychan.channel.surface import Surface
+from raychan.channel.transfer import transfer
+from raychan.em.fresnel import coefficients_array
 from raychan.frames import theta_phi
-from raychan.kernels.fresnel import coefficients_array
-from raychan.tables import HALF_SPACE, LAYER
+from raychan.records import HALF_SPACE, LAYER
+from raychan.run.rcs import facets_of, rcs, refinements, scattering
+from raychan.tracing.legs import Leg
+from raychan.tracing.shooting import tube_routes
 from raychan.units import C0
+from raychan.world.geometry import Surface
 from raychan.world.material import Material
 from raychan.world.mesh import make_mesh
 from raychan.world.shapes.vehicle import car
@@ -386,7 +386,7 @@ def test_the_true_error_lies_within_the_stated_one_and_not_far_within(monkeypatc
         mesh, material, az, el, d, exact = random_case(rng, i)
         with monkeypatch.context() as m:
             if i % 7 != 1:
-                m.setattr("raychan.channel.rcs.creeping", lambda *_: (0.0, 0.0))
+                m.setattr("raychan.run.rcs.creeping", lambda *_: (0.0, 0.0))
             got = rcs(mesh, F, az, el, distance=d, material=material)
         true.append(abs(float(db(got.sigma / exact))))
         stated.append(float(got.error_db))

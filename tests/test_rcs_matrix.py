@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from truth import corner, mie
 
-from raychan.channel.rcs import rcs
+from raychan.run.rcs import rcs
 from raychan.units import C0
 
 F = 77e9

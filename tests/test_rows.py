@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from raychan.kernels.rows import Stopped, at_once, in_two
+from raychan.parallel import Stopped, at_once, in_two
 
 
 def threads_of(n: int) -> set[int]:

@@ -10,8 +10,8 @@ import trimesh
 from printed import table
 
 import raychan as rc
-from raychan.tables import BLOCKER, LAYER, MIRROR, PEC, SCATTERER
-from raychan.world.check import folded_range, nearest_point
+from raychan.records import BLOCKER, LAYER, MIRROR, PEC, SCATTERER
+from raychan.world.checks import folded_range, nearest_point
 from raychan.world.scene import Body, Scene, SceneError
 
 URBAN = Path(__file__).parents[1] / "scenes" / "urban.toml"

@@ -15,7 +15,7 @@ from texts import PLATE
 import raychan as rc
 from raychan.cli import invoke
 from raychan.run.sequence import Store, carried, frames
-from raychan.run.store import load_result
+from raychan.run.storage import load_result
 
 SCENE = f"""{PLATE}
 [[bodies]]
@@ -162,7 +162,7 @@ import os, sys
 allowed, os.access = os.access, lambda path, mode: False
 import raychan
 os.access = allowed
-from raychan.kernels.beat import beat_sum
+from raychan.signal.dechirp import beat_sum
 import numpy as np
 one = np.ones(1)
 beat_sum(one + 0j, 1e-7 * one, 0.0 * one, 77e9, 1e13, 1e-5, 1e-7, 1, 4)

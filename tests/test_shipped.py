@@ -14,7 +14,7 @@ from texts import PLATE
 
 import raychan as rc
 from raychan.cli import invoke
-from raychan.world import shipped
+from raychan.world import bundled
 
 ROOT = Path(__file__).parents[1]
 
@@ -26,8 +26,8 @@ def elsewhere(tmp_path, monkeypatch):
 
 
 def test_every_scene_that_comes_along_is_found_by_name_from_anywhere(elsewhere):
-    assert shipped.names() == sorted(f.stem for f in (ROOT / "scenes").glob("*.toml"))
-    for name in shipped.names():
+    assert bundled.names() == sorted(f.stem for f in (ROOT / "scenes").glob("*.toml"))
+    for name in bundled.names():
         assert rc.Scene.load(name).title == rc.Scene.load(ROOT / "scenes" / f"{name}.toml").title
 
 
@@ -65,7 +65,7 @@ def test_what_is_nowhere_is_told_with_what_there_is(name, elsewhere, capsys):
 def test_run_without_a_scene_lists_those_that_come_along(elsewhere, capsys):
     assert invoke(["run"]) == 0
     said = capsys.readouterr().out
-    assert all(name in said for name in shipped.names())
+    assert all(name in said for name in bundled.names())
     assert invoke(["run", "urban"]) == 2
     assert "--out" in capsys.readouterr().err
 
@@ -75,10 +75,10 @@ def test_the_wheel_holds_the_scenes_beside_the_code_and_the_code_finds_them_ther
     assert project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {"scenes": "raychan/scenes"}
     (tmp_path / "raychan" / "scenes").mkdir(parents=True)
     (tmp_path / "raychan" / "scenes" / "only.toml").write_text(PLATE)
-    monkeypatch.setattr(shipped, "_CODE", tmp_path / "raychan")
-    assert shipped.names() == ["only"] and rc.Scene.load("only").title == "A plate ahead"
-    monkeypatch.setattr(shipped, "_CODE", tmp_path / "elsewhere" / "raychan")
-    assert shipped.folder() is None and shipped.names() == []
+    monkeypatch.setattr(bundled, "_CODE", tmp_path / "raychan")
+    assert bundled.names() == ["only"] and rc.Scene.load("only").title == "A plate ahead"
+    monkeypatch.setattr(bundled, "_CODE", tmp_path / "elsewhere" / "raychan")
+    assert bundled.folder() is None and bundled.names() == []
 
 
 def test_the_readme_of_a_package_index_has_no_address_that_leads_nowhere(monkeypatch):

@@ -7,12 +7,12 @@ import pytest
 import trimesh
 from helpers import facets, ground, quad
 
-from raychan.channel.launch import sight
-from raychan.channel.legs import Leg, Mirror
-from raychan.channel.shadows import shadows_of
-from raychan.channel.surface import Surface
-from raychan.channel.tubes import Refinement, stand
-from raychan.kernels.lit import lit_parts
+from raychan.geometry.lit_parts import lit_parts
+from raychan.tracing.launch import sight
+from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.shadow_edges import shadows_of
+from raychan.tracing.tubes import Refinement, stand
+from raychan.world.geometry import Surface
 
 LOW, HIGH = np.array([-0.3, -0.2]), np.array([0.4, 0.5])  # m: a rectangle in the plane x = 4, seen from the origin
 RULE = Refinement(wavenumber=1600.0)

@@ -10,9 +10,9 @@ import trimesh
 from helpers import box, facets, ground, quad
 from truth import slab, tworay
 
-from raychan.channel.solve import refinement, solve
 from raychan.frames import theta_phi
-from raychan.tables import HALF_SPACE, PEC, Points
+from raychan.records import HALF_SPACE, PEC, Points
+from raychan.run.solver import refinement, solve
 from raychan.units import C0
 
 F = 77e9

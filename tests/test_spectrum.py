@@ -5,11 +5,11 @@ import pytest
 from echoes import SMALL, WIDE, echoes, sensor
 from printed import figures
 
-from raychan.process.detect import detect
-from raychan.process.spectrum import range_doppler
+from raychan.processing.detection import detect
+from raychan.processing.range_doppler import range_doppler
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import NAMES
-from raychan.signal.cube import synthesize
+from raychan.signal.baseband import synthesize
 from raychan.units import db
 
 

@@ -8,11 +8,11 @@ from helpers import box, facets, ground, quad
 from truth import paths as brute
 from truth import slab, tworay
 
-from raychan.channel.fields import rates
-from raychan.channel.specular import jones, specular_routes
-from raychan.channel.surface import Surface
-from raychan.tables import HALF_SPACE, LAYER, PEC
+from raychan.channel.transfer import rates
+from raychan.records import HALF_SPACE, LAYER, PEC
+from raychan.run.specular_paths import jones, specular_routes
 from raychan.units import C0
+from raychan.world.geometry import Surface
 
 F = 77e9
 K = 2 * np.pi * F / C0

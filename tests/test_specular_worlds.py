@@ -9,10 +9,10 @@ from truth import paths as brute
 from truth import slab
 
 import raychan as rc
-from raychan.channel.specular import jones, specular_routes
-from raychan.channel.surface import Surface
-from raychan.tables import LAYER, PEC
+from raychan.records import LAYER, PEC
+from raychan.run.specular_paths import jones, specular_routes
 from raychan.units import C0
+from raychan.world.geometry import Surface
 
 F = 77e9
 K = 2 * np.pi * F / C0

@@ -8,9 +8,9 @@ import pytest
 
 import raychan as rc
 from raychan.channel.error import stated_error
-from raychan.channel.solve import refinement, solve
-from raychan.run.chain import Clock, drowned, noise_of_cell, quiet_map, result_of, trace
-from raychan.signal.cube import synthesize
+from raychan.run.simulate import Clock, drowned, noise_of_cell, quiet_map, result_of, trace
+from raychan.run.solver import refinement, solve
+from raychan.signal.baseband import synthesize
 from raychan.units import C0
 
 SCENES = Path(__file__).parents[1] / "scenes"

@@ -12,10 +12,10 @@ from test_kept import ball
 from test_sequence import same
 
 import raychan as rc
-from raychan.channel.surface import Surface, surface_at
 from raychan.run.sequence import frames
-from raychan.world import still
-from raychan.world.sheet import Sheet
+from raychan.world import static_geometry
+from raychan.world.geometry import Surface, surface_at
+from raychan.world.shared_rows import Sheet
 
 RADAR = {
     "position": [0.0, 0.0, 1.0],
@@ -44,7 +44,7 @@ def bodies():
 @pytest.fixture(params=["still", "rigid", "both"])
 def scene(request, monkeypatch):
     """A scene of which the truck is kept, or the drum in its own frame, or both."""
-    monkeypatch.setattr(still, "MANY", 2000)
+    monkeypatch.setattr(static_geometry, "MANY", 2000)
     all_ = bodies()
     picked = {"still": [0, 1, 3, 4], "rigid": [0, 2, 3, 4], "both": [0, 1, 2, 3, 4]}[request.param]
     scene = rc.Scene(bodies=[all_[i] for i in picked], radar=RADAR, model={"max_bounces": 2, "tolerance_db": 3.0})
@@ -124,7 +124,7 @@ def test_frames_do_not_depend_on_those_before_them(scene):
 def test_a_result_does_not_hold_on_to_what_is_kept(scene):
     family = scene.bare()
     result = rc.simulate(family.at(0.1))
-    gone = weakref.ref(family._still[still.Still])
+    gone = weakref.ref(family._still[static_geometry.Still])
     del family
     gc.collect()
     assert gone() is None

@@ -11,9 +11,9 @@ import pytest
 import xarray as xr
 from records import paths, result
 
-from raychan.run.files import StoreError
-from raychan.run.store import COLUMNS, load_result, save_result
-from raychan.tables import REFLECT, SCATTER
+from raychan.records import REFLECT, SCATTER
+from raychan.run.output_files import StoreError
+from raychan.run.storage import COLUMNS, load_result, save_result
 
 CHAIN = [(2, REFLECT), (3, SCATTER), (2, REFLECT)]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from printed import table
 
-from raychan.run.chain import simulate
+from raychan.run.simulate import simulate
 from raychan.world.scene import Scene
 
 SCENE = Path(__file__).parents[1] / "scenes" / "living_street.toml"

@@ -13,7 +13,7 @@ from truth import tworay
 
 from raychan.cli import invoke
 from raychan.report.sweep_figures import sweep_picture
-from raychan.run.chain import simulate
+from raychan.run.simulate import simulate
 from raychan.study.sweep import Axis, sweep, write_csv
 from raychan.study.visibility import visibility
 from raychan.units import C0, K_BOLTZMANN

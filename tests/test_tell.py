@@ -14,19 +14,19 @@ from records import paths, result
 from texts import ISOTROPIC, walker
 
 from raychan.channel.error import LARGEST, LARGEST_DB, SCATTER, stated_error
-from raychan.channel.occlusion import Occlusion
 from raychan.cli import invoke, show
+from raychan.records import REFLECT
+from raychan.records import SCATTER as SCATTERS
 from raychan.report.canvas import figure as drawing
 from raychan.report.figures import _mark_detections, rdmap_picture
-from raychan.run.converged import figure
-from raychan.run.ledger import UNKNOWN, Entry
-from raychan.run.store import load_result, save_result, summary
-from raychan.run.tell import counts, marks, noted, warned
+from raychan.run.convergence import figure
+from raychan.run.messages import counts, marks, noted, warned
+from raychan.run.storage import load_result, save_result, summary
+from raychan.run.unmodelled import UNKNOWN, Entry
 from raychan.study.sweep import Seen, Step, cells
 from raychan.study.validation.sections import Echo
 from raychan.study.visibility import Visibility
-from raychan.tables import REFLECT
-from raychan.tables import SCATTER as SCATTERS
+from raychan.tracing.occlusion import Occlusion
 
 TAIL, GHOST = [(1, SCATTERS)], [(2, REFLECT), (3, SCATTERS)]
 

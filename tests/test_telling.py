@@ -12,8 +12,8 @@ from records import paths, result
 from texts import PLATE
 
 import raychan as rc
-from raychan.tables import REFLECT, SCATTER
-from raychan.telling import Facts
+from raychan.records import REFLECT, SCATTER
+from raychan.reprs import Facts
 
 CHAIN = [(2, REFLECT), (3, SCATTER), (2, REFLECT)]
 

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from truth import po, shapes
 
-from raychan.channel.rcs import rcs
+from raychan.run.rcs import rcs
+from raychan.world.creases import folds_told, readings
 from raychan.world.mesh import make_mesh
-from raychan.world.meshfile import from_trimesh
-from raychan.world.readings import folds_told, readings
+from raychan.world.mesh_io import from_trimesh
 
 make = trimesh.creation
 

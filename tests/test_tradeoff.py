@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from truth import po
 
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of
 from raychan.cli import invoke
+from raychan.run.rcs import facets_of
 from raychan.study import cases, methods
-from raychan.study.lattice import Window, echoes
-from raychan.study.specular import glints
+from raychan.study.ray_lattice import Window, echoes
+from raychan.study.specular_points import glints
 from raychan.study.tradeoff import Row, beaten_by, marked, read_csv, write_csv
 from raychan.study.verdicts import verdicts
-from raychan.world.embree import Tracer
+from raychan.tracing.legs import Leg
+from raychan.world.ray_caster import Tracer
 from raychan.world.shapes import build
 
 

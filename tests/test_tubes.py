@@ -11,13 +11,13 @@ from helpers import facets, quad
 from truth import corner, po
 
 import raychan
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of, refinements
-from raychan.channel.shoot import tube_routes
-from raychan.channel.surface import Surface
-from raychan.kernels.footprint import element_of
-from raychan.kernels.po import triangle_terms
-from raychan.kernels.quadrature import mean_parts, points_for
+from raychan.em.gauss_quadrature import mean_parts, points_for
+from raychan.em.phase_integral import triangle_terms
+from raychan.run.rcs import facets_of, refinements
+from raychan.tracing.footprints import element_of
+from raychan.tracing.legs import Leg
+from raychan.tracing.shooting import tube_routes
+from raychan.world.geometry import Surface
 from raychan.world.shapes import build
 
 F = 77e9
@@ -317,7 +317,7 @@ def test_flat_facets_stay_flat():
 def test_tubes_launched_in_batches_carry_what_those_launched_at_once_do(monkeypatch):
     found = []
     for batch in (1 << 17, 50):
-        monkeypatch.setattr("raychan.channel.launch._BATCH", batch)
+        monkeypatch.setattr("raychan.tracing.launch._BATCH", batch)
         plate = raychan.rcs(build("plate", {"width": 0.5, "height": 0.4}), F, 20.0, distance=3.0)
         ball = raychan.rcs(trimesh.creation.icosphere(subdivisions=4, radius=0.2), F, 20.0, max_bounces=1)
         found.append((*plate.sigma.ravel(), *ball.sigma.ravel()))

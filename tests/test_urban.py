@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from printed import table
 
-from raychan.run.chain import background, received, simulate
-from raychan.run.provenance import provenance
-from raychan.signal.cube import synthesize
+from raychan.run.labels import provenance
+from raychan.run.simulate import background, received, simulate
+from raychan.signal.baseband import synthesize
 from raychan.units import C0, EPS0
 from raychan.world.scene import Scene
 

@@ -12,10 +12,10 @@ from printed import figures
 
 from raychan.frames import rotation
 from raychan.radar.antenna import CosinePattern, Isotropic, UniformArray
-from raychan.radar.sensor import Sensor
+from raychan.radar.radar import Sensor
 from raychan.radar.waveform import Waveform
 from raychan.units import watt
-from raychan.world.mount import antenna_of
+from raychan.world.radar_mount import antenna_of
 
 SCENES = Path(__file__).parents[1] / "scenes"
 _TABLE_2 = figures(2)

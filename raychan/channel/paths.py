@@ -9,9 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.advance import APART, corner_rates
-from raychan.channel.fields import departures, rates, transfer
-from raychan.tables import SCATTER, Facets, Paths, Routes, Ways
+from raychan.channel.slow_time import APART, corner_rates
+from raychan.channel.transfer import departures, rates, transfer
+from raychan.records import SCATTER, Facets, Paths, Routes, Ways
 from raychan.units import C0
 
 Floats = NDArray[np.float64]

@@ -131,7 +131,7 @@ def invoke(argv: list[str]) -> int:
         if hasattr(error, "format_message"):  # typer's own, of options and arguments
             text = error.format_message()
             return _fail(text) if text else 2
-        from raychan.kernels.rows import was_interrupted
+        from raychan.parallel import was_interrupted
         from raychan.world.errors import SceneError
 
         if was_interrupted(error):

@@ -58,7 +58,7 @@ def explain(
     where all paths add up as waves. Angles are azimuth and elevation in world axes.
     """
     from raychan.run.explain import explain as explain_result
-    from raychan.run.files import StoreError
+    from raychan.run.output_files import StoreError
 
     try:
         why = explain_result(directory, range, speed, detection=detection, cell=cell)

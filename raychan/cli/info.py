@@ -54,8 +54,8 @@ def info(
     Of a scene: bodies, parts, materials, link budget, resolutions, and the figures of its antennas; of an antenna its
     figures, computed from its pattern, beside the published ones if its file has them; of a mesh its health.
     """
-    from raychan.world.meshfile import SUFFIXES, load
-    from raychan.world.shipped import found
+    from raychan.world.bundled import found
+    from raychan.world.mesh_io import SUFFIXES, load
 
     source = found(source)
     if source.suffix.lower() in SUFFIXES:
@@ -64,7 +64,7 @@ def info(
     for option, value in (("--unit", unit), ("--up", up)):
         if value is not None:
             raise typer.BadParameter(f"{source} is no mesh file ({', '.join(SUFFIXES)})", param_hint=option)
-    from raychan.world.mount import antenna_of, antenna_table, is_antenna
+    from raychan.world.radar_mount import antenna_of, antenna_table, is_antenna
 
     if is_antenna(source):
         table, _ = antenna_table(source.name, source.parent, "")
@@ -79,8 +79,8 @@ def info(
 def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
     import numpy as np
 
-    from raychan.world.meshfile import oddities
-    from raychan.world.readings import folds_told
+    from raychan.world.creases import folds_told
+    from raychan.world.mesh_io import oddities
 
     low, high = mesh.bounds
     areas = np.bincount(mesh.part, mesh.areas, minlength=len(mesh.part_names))
@@ -190,7 +190,7 @@ def _chirp(w: Any) -> list[tuple[str, str]]:
 
 def _antennas(scene: Any) -> list[Table]:
     """Return the figures of the antennas: of one if transmitter and receiver share it, else of each."""
-    from raychan.world.mount import antenna_table, mounted
+    from raychan.world.radar_mount import antenna_table, mounted
 
     (key, sent), (other, gathered) = mounted(scene.radar)
     uses = [("transmit and receive", key, sent, scene.sensor.tx)]

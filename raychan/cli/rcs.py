@@ -16,7 +16,7 @@ from raychan.world import limits
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from raychan.channel.rcs import Rcs
+    from raychan.run.rcs import Rcs
     from raychan.world.mesh import Mesh
 
 _MOST_ANGLES = 1_000_000
@@ -122,13 +122,13 @@ def rcs(
         dbsm = np.array([r[3] for r in rows]).reshape(grid[0].shape)
         error = found.error_db.reshape(grid[0].shape)
         files[plot] = rcs_picture(az, el, dbsm, error, title, plot.suffix, polar)
-    from raychan.run.files import write_together
+    from raychan.run.output_files import write_together
 
     write_together(files)
     screen = show.console()
     screen.print(_table(title, rows))
     if shape is None and source:
-        from raychan.world.meshfile import oddities
+        from raychan.world.mesh_io import oddities
 
         show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
     _bounces(found, max_bounces, tolerance)
@@ -186,7 +186,7 @@ def _target(
     """Return the mesh of a file, or of a built-in shape with its parameters, and what to call it."""
     if shape is None:
         from raychan.world.mesh import CREASE_DEG
-        from raychan.world.meshfile import load
+        from raychan.world.mesh_io import load
 
         if len(source) != 1:
             raise typer.BadParameter("one mesh file is wanted, or --shape NAME with its parameters")
@@ -213,8 +213,8 @@ def _sweep(mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, A
     """Return the RCS at all angles, a chunk at a time so that progress can be told."""
     import numpy as np
 
-    from raychan.channel.rcs import Rcs
-    from raychan.channel.rcs import rcs as compute
+    from raychan.run.rcs import Rcs
+    from raychan.run.rcs import rcs as compute
 
     parts: list[Rcs] = []
     done = 0
@@ -278,7 +278,7 @@ def _bounces(found: Rcs, most: int, tolerance: float) -> None:
 
 def _warn(mesh: Mesh, found: Rcs, tolerance: float) -> None:
     """Tell in a line each how the mesh was read, if it may mean something else, and what missed the tolerance."""
-    from raychan.world.readings import folds_told
+    from raychan.world.creases import folds_told
 
     said = [text for text in [folds_told(mesh, "--crease")] if text]
     known, count = found.converged, found.error_db.size

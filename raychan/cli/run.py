@@ -64,7 +64,7 @@ def run(
     With --frames, DIR holds frame_0000, frame_0001, ..., each such a directory and written as soon as it is ready, and
     detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 is what a run without --frames gives.
     """
-    from raychan.run.demand import check_demand, long_run
+    from raychan.run.resources import check_demand, long_run
     from raychan.world.scene import Scene
 
     if frame_interval is not None and frames is None:
@@ -86,20 +86,20 @@ def run(
 
 def _list() -> None:
     """Print the scenes that come with raychan."""
-    from raychan.world import shipped
+    from raychan.world import bundled
     from raychan.world.scene import Scene
 
-    rows = [(name, Scene.load(name).title) for name in shipped.names()]
+    rows = [(name, Scene.load(name).title) for name in bundled.names()]
     screen = show.console()
     screen.print(show.table("Scenes that come with raychan", ("name", ""), rows, left=(0, 1)))
     screen.print("raychan run NAME --out DIR")
 
 
 def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:
-    from raychan.run.chain import simulate
-    from raychan.run.files import staging
-    from raychan.run.store import CONTENTS, PICTURES, save_result
-    from raychan.run.tell import notes as result_notes
+    from raychan.run.messages import notes as result_notes
+    from raychan.run.output_files import staging
+    from raychan.run.simulate import simulate
+    from raychan.run.storage import CONTENTS, PICTURES, save_result
 
     with staging(out, CONTENTS) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
@@ -124,8 +124,8 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
 def _sequence(
     scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
 ) -> None:
+    from raychan.run.messages import findings, marks
     from raychan.run.sequence import Store, frames
-    from raychan.run.tell import findings, marks
 
     store, told, screen = Store(out), set(), show.console()
     start = perf_counter()

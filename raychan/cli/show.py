@@ -108,8 +108,8 @@ def _known(value: float, digits: str) -> str:
 def progress(quiet: bool = False, kernels: str = "run") -> Iterator[Callable[[str, float], None]]:
     """Give a function to tell the progress to: bars on a terminal; elsewhere nothing, but a line where compiled code
     must be made first. `kernels` names the list of what is compiled ahead."""
-    from raychan.kernels.ahead import helped
-    from raychan.kernels.compiling import lost, missing
+    from raychan.compile.ahead import helped
+    from raychan.compile.progress import lost, missing
 
     with helped(kernels, len(missing())), _told(quiet) as tell:
         yield tell
@@ -118,7 +118,7 @@ def progress(quiet: bool = False, kernels: str = "run") -> Iterator[Callable[[st
 
 @contextmanager
 def _told(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    from raychan.kernels.compiling import watched
+    from raychan.compile.progress import watched
 
     if quiet or not sys.stderr.isatty():
         with watched(_line() if not quiet else lambda done, ahead, seconds: None):

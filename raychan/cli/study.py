@@ -49,7 +49,7 @@ def tradeoff(
     Writes tradeoff.csv, tradeoff_CASE.png for each case and tradeoff.png with the settings that none beats.
     """
     from raychan.report.tradeoff_figures import case_picture, summary_picture
-    from raychan.run.files import Contents, staging
+    from raychan.run.output_files import Contents, staging
     from raychan.study.tradeoff import read_csv, tradeoff, write_csv
     from raychan.study.verdicts import verdicts
 

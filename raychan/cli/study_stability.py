@@ -26,7 +26,7 @@ def stability(
     Writes stability.md, stability.csv and figures. What fails is told as failing; the exit code is 0 all the same.
     """
     from raychan.report.stability_figures import FIGURES, pictures
-    from raychan.run.files import Contents, staging
+    from raychan.run.output_files import Contents, staging
     from raychan.study.stability import cells, summary, write_csv, write_markdown
     from raychan.study.stability import stability as study
 

@@ -49,7 +49,7 @@ def sweep(
     return of the body stand against the weakest that the radar reports. Writes sweep.csv and sweep.png.
     """
     from raychan.report.sweep_figures import sweep_picture
-    from raychan.run.files import Contents, staging
+    from raychan.run.output_files import Contents, staging
     from raychan.study import sweep as study
     from raychan.world.errors import SceneError
     from raychan.world.scene import Scene

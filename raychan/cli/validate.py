@@ -54,7 +54,7 @@ def validate(
     """
     from raychan.report.validation_page import page
     from raychan.report.validation_report import markdown
-    from raychan.run.files import Contents, staging, write_whole
+    from raychan.run.output_files import Contents, staging, write_whole
     from raychan.study.validation.sections import ablations, budgets, ghosts, turns
     from raychan.study.validation.validate import validate as run
 

@@ -47,8 +47,8 @@ def view(
     bodies that they do not meet are seen through. Rays of a detection that is not converged are dashed.
     """
     from raychan.run.explain import explain
-    from raychan.run.files import StoreError
-    from raychan.run.store import load_result
+    from raychan.run.output_files import StoreError
+    from raychan.run.storage import load_result
     from raychan.view.scene import drawing_of, scene_picture
     from raychan.world.scene import Scene
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
-from raychan.kernels.patterns import cosine_power
+from raychan.radar.spherical_vectors import cosine_power
 from raychan.radar.windows import window
 from raychan.units import undb
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.run.files import write_whole
+from raychan.run.output_files import write_whole
 
 Floats = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.records import RangeDoppler
 from raychan.report.canvas import MARKS, Placer, on, outlined, save, style
-from raychan.run.provenance import chains, explain_cell, response_of
+from raychan.run.labels import chains, explain_cell, response_of
 from raychan.run.result import Explanation, Result
-from raychan.tables import RangeDoppler
 from raychan.units import dbm, watt
 
 Floats = NDArray[np.float64]

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from raychan.records import Profile, RangeDoppler
 from raychan.report.canvas import show_figure, style
 from raychan.report.figures import levels, profile_picture, rdmap_picture
 from raychan.run.result import Result
-from raychan.tables import Profile, RangeDoppler
 from raychan.units import dbm, watt
 
 

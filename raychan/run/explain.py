@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.frames import angles
-from raychan.run.provenance import Chains, chains, explain_cell, response_of, waves_in
+from raychan.records import KIND_WORDS, NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler, Record, column
+from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result
-from raychan.tables import KIND_WORDS, NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler, Record, column
 
 _SAME = 0.1  # cells: places that are so alike are the same to who typed one of them
 
@@ -69,7 +69,7 @@ def explain(
     if detection is not None and (speed is not None or cell):
         raise ValueError("the number of a detection stands alone, without a speed or the cell")
     if not isinstance(result, Result):
-        from raychan.run.store import load_result
+        from raychan.run.storage import load_result
 
         result = load_result(result)
     near: list[int] = []

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.run.response import Response
-from raychan.tables import Complexes, Paths
+from raychan.records import Complexes, Paths
+from raychan.run.point_spread import Response
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler, Ways
 from raychan.run.result import ExplainedDetections, Result
-from raychan.tables import Cube, MapError, Paths, Profile, RangeDoppler, Ways
 from raychan.units import dbm
 
 CONVENTIONS = "CF-1.11"

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.waveform import Waveform
-from raychan.tables import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler, column
-from raychan.telling import Drawn, Told
+from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler, column
+from raychan.reprs import Drawn, Told
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from raychan.channel.surface import surface_of
-from raychan.run.chain import Channel, Clock, Progress, result_of, trace
-from raychan.run.files import StoreError, csv_bytes, staging
+from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
-from raychan.run.store import COLUMNS, CONTENTS, rows, save_result
+from raychan.run.simulate import Channel, Clock, Progress, result_of, trace
+from raychan.run.storage import COLUMNS, CONTENTS, rows, save_result
+from raychan.world.geometry import surface_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
 

@@ -24,8 +24,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from raychan.kernels.beat import sources, stretched
-from raychan.kernels.gridding import (
+from raychan.radar.waveform import Waveform
+from raychan.signal.dechirp import sources, stretched
+from raychan.signal.nufft import (
     OVER,
     exchange,
     fold,
@@ -37,7 +38,6 @@ from raychan.kernels.gridding import (
     transform,
     weigh,
 )
-from raychan.radar.waveform import Waveform
 from raychan.units import C0
 
 Floats = NDArray[np.float64]

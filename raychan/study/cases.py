@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of, refinements, scattering
-from raychan.channel.surface import Surface
 from raychan.frames import direction, theta_phi
-from raychan.study.lattice import Window, echoes
-from raychan.tables import Facets
+from raychan.records import Facets
+from raychan.run.rcs import facets_of, refinements, scattering
+from raychan.study.ray_lattice import Window, echoes
+from raychan.tracing.legs import Leg
 from raychan.units import C0
-from raychan.world.embree import Tracer
+from raychan.world.geometry import Surface
 from raychan.world.mesh import Mesh
+from raychan.world.ray_caster import Tracer
 from raychan.world.shapes import build
 
 Floats = NDArray[np.float64]

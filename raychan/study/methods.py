@@ -12,15 +12,15 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of, rcs, refinements, scattering
-from raychan.channel.surface import Surface
 from raychan.frames import direction
+from raychan.run.rcs import facets_of, rcs, refinements, scattering
 from raychan.study.cases import FREQUENCY, WAVENUMBER, Target, vertical
-from raychan.study.lattice import Window, echoes
-from raychan.study.specular import glints
-from raychan.world.embree import Tracer
+from raychan.study.ray_lattice import Window, echoes
+from raychan.study.specular_points import glints
+from raychan.tracing.legs import Leg
+from raychan.world.geometry import Surface
 from raychan.world.mesh import Mesh
+from raychan.world.ray_caster import Tracer
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import facets_of, refinements, scattering
-from raychan.channel.surface import Surface
 from raychan.frames import direction
-from raychan.tables import Facets
+from raychan.records import Facets
+from raychan.run.rcs import facets_of, refinements, scattering
+from raychan.tracing.legs import Leg
 from raychan.units import C0
+from raychan.world.geometry import Surface
 from raychan.world.mesh import Mesh, make_mesh
 
 Floats = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raychan.channel.rcs import rcs
+from raychan.run.rcs import rcs
 from raychan.study.regimes_base import FREQUENCY, LAMBDA, Outcome, Regime, Row, same_db
 from raychan.world.shapes import build
 

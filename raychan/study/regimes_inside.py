@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.rcs import stated_error
-from raychan.channel.solve import refinement, solve
+from raychan.em.fresnel import coefficients
 from raychan.frames import rotation
-from raychan.kernels.fresnel import coefficients
+from raychan.records import LAYER, PEC, Facets, Materials, Paths, Points
+from raychan.run.rcs import stated_error
+from raychan.run.solver import refinement, solve
 from raychan.study.regimes_base import FREQUENCY, Complexes, Floats, K, Outcome, Regime, Row, rectangle, same_db
-from raychan.tables import LAYER, PEC, Facets, Materials, Paths, Points
 from raychan.units import C0
 
 _GLASS, _THICK = 6.27 - 0.35j, 4e-3

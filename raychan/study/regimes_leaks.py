@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.study.regimes_base import Floats, Outcome, Regime, Row, surface_of
-from raychan.world.embree import Tracer
 from raychan.world.mesh import Mesh
+from raychan.world.ray_caster import Tracer
 from raychan.world.shapes import SHAPES, build
 
 Ints = NDArray[np.int64]

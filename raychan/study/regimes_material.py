@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from raychan.channel.rcs import rcs
-from raychan.channel.specular import specular_paths
-from raychan.kernels.fresnel import HALF_SPACE, LAYER, coefficients, coefficients_array
+from raychan.em.fresnel import HALF_SPACE, LAYER, coefficients, coefficients_array
+from raychan.run.rcs import rcs
+from raychan.run.specular_paths import specular_paths
 from raychan.study.regimes_base import FREQUENCY, LAMBDA, Complexes, Floats, K, Outcome, Regime, Row, at_most, same_db
 from raychan.world.body import Body
 from raychan.world.material import Material

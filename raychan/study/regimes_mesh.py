@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 
 from raychan.channel.error import stated_error
-from raychan.channel.legs import Leg
-from raychan.channel.rcs import rcs
-from raychan.channel.surface import Surface
 from raychan.frames import rotation
+from raychan.run.rcs import rcs
 from raychan.study.regimes_base import (
     FREQUENCY,
     LAMBDA,
@@ -28,7 +26,9 @@ from raychan.study.regimes_base import (
     sheet,
     surface_of,
 )
+from raychan.tracing.legs import Leg
 from raychan.world.body import Body
+from raychan.world.geometry import Surface
 from raychan.world.mesh import Mesh, make_mesh
 from raychan.world.scene import Scene
 from raychan.world.shapes import build

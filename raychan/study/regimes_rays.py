@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from raychan.channel.rcs import rcs
-from raychan.channel.specular import specular_paths
+from raychan.run.rcs import rcs
+from raychan.run.specular_paths import specular_paths
 from raychan.study.regimes_base import (
     FREQUENCY,
     LAMBDA,

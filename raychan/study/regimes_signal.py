@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from raychan.process.spectrum import range_doppler
+from raychan.processing.range_doppler import range_doppler
 from raychan.radar.antenna import Isotropic
-from raychan.radar.sensor import Sensor
+from raychan.radar.radar import Sensor
 from raychan.radar.waveform import Waveform
-from raychan.signal.cube import synthesize
+from raychan.records import Paths, RangeDoppler, take
+from raychan.signal.baseband import synthesize
 from raychan.study.regimes_base import FREQUENCY, LAMBDA, K, Outcome, Regime, Row, at_most
-from raychan.tables import Paths, RangeDoppler, take
 from raychan.units import C0
 
 _WAVE = Waveform(FREQUENCY, 1e9, 25.6e-6, 40e-6, 128, 512)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from raychan.channel.rcs import Rcs, rcs
 from raychan.frames import rotation
-from raychan.run.chain import simulate
+from raychan.run.rcs import Rcs, rcs
+from raychan.run.simulate import simulate
 from raychan.study.regimes_base import FREQUENCY, Floats, Outcome, Regime, Row, at_most, plate_far, same_db, sheet
 from raychan.study.regimes_mesh import rectangle
 from raychan.world.body import Body

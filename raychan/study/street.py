@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.legs import Leg, Mirror
-from raychan.channel.solve import refinement, solve
-from raychan.channel.surface import Surface
-from raychan.process.spectrum import range_doppler
-from raychan.run.chain import drowned
-from raychan.signal.cube import synthesize
+from raychan.processing.range_doppler import range_doppler
+from raychan.records import MIRROR, SCATTERER, Facets, Paths
+from raychan.run.simulate import drowned
+from raychan.run.solver import refinement, solve
+from raychan.signal.baseband import synthesize
 from raychan.study.cases import Street
-from raychan.study.lattice import Echo, Window, echoes
 from raychan.study.methods import ADAPTIVE, MIRRORS, POINT, POINTS, UNIFORM, Run, mean_rcs
-from raychan.study.specular import glints
-from raychan.tables import MIRROR, SCATTERER, Facets, Paths
+from raychan.study.ray_lattice import Echo, Window, echoes
+from raychan.study.specular_points import glints
+from raychan.tracing.legs import Leg, Mirror
 from raychan.units import C0
-from raychan.world.embree import Tracer
+from raychan.world.geometry import Surface
+from raychan.world.ray_caster import Tracer
 from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from raychan.run.chain import STAGES, simulate
-from raychan.run.files import csv_bytes, write_whole
+from raychan.run.output_files import csv_bytes, write_whole
 from raychan.run.result import Result
+from raychan.run.simulate import STAGES, simulate
 from raychan.study.visibility import WAYS, Visibility, check_target, visibility
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene

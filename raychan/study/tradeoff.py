@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from raychan.run.files import csv_bytes, write_whole
+from raychan.run.output_files import csv_bytes, write_whole
 from raychan.study import cases, methods, street
 from raychan.study.cases import TARGETS, Street, Target
 

@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from raychan.channel.diffract import diffracted_paths
-from raychan.channel.legs import Leg
-from raychan.channel.occlusion import Occlusion, occlusion
 from raychan.channel.paths import join
-from raychan.channel.surface import Surface
-from raychan.process.spectrum import range_doppler
-from raychan.radar.sensor import Sensor
-from raychan.run.chain import noise_of_cell
-from raychan.run.provenance import Chains, chains, label_of
+from raychan.processing.range_doppler import range_doppler
+from raychan.radar.radar import Sensor
+from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points, take
+from raychan.run.labels import Chains, chains, label_of
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
-from raychan.signal.cube import synthesize
-from raychan.tables import DIFFRACT, MIRROR, Facets, Paths, Points, take
+from raychan.run.simulate import noise_of_cell
+from raychan.signal.baseband import synthesize
+from raychan.tracing.edge_diffraction import diffracted_paths
+from raychan.tracing.legs import Leg
+from raychan.tracing.occlusion import Occlusion, occlusion
 from raychan.units import db, undb
+from raychan.world.geometry import Surface
 
 DIFFRACTED = "diffracted"
 WAYS = (DIRECT, MULTIPATH, DIFFRACTED)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.records import LAYER, MIRROR, Facets, Paths, Points
 from raychan.report.canvas import PALETTE
-from raychan.run.provenance import chains, response_of, waves_in
+from raychan.run.labels import chains, response_of, waves_in
 from raychan.run.result import Explanation, Result
-from raychan.tables import LAYER, MIRROR, Facets, Paths, Points
 from raychan.units import dbm, undb
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from raychan.run.files import write_whole
+from raychan.run.output_files import write_whole
 from raychan.run.result import Explanation, Result
 from raychan.view import plain
 from raychan.view.drawing import Drawing, draw

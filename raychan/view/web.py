@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.run.files import write_whole
+from raychan.run.output_files import write_whole
 from raychan.view.drawing import Drawing, Ray
 
 _DASH = 0.008  # of the scene's diagonal

@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from raychan.tables import BLOCKER, MIRROR, SCATTERER
+from raychan.records import BLOCKER, MIRROR, SCATTERER
 from raychan.units import undb
 from raychan.world import limits, shapes
+from raychan.world.creases import folds_told
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
-from raychan.world.meshfile import from_trimesh, load, oddities
+from raychan.world.mesh_io import from_trimesh, load, oddities
 from raychan.world.motion import Motion
-from raychan.world.readings import folds_told
 
 ROLES = {"scatterer": SCATTERER, "mirror": MIRROR, "blocker": BLOCKER}
 

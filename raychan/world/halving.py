@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.world.joints import places
+from raychan.world.topology import places
 
 Floats = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from raychan.tables import HALF_SPACE, LAYER, Materials
-from raychan.tables import PEC as KIND_PEC
+from raychan.records import HALF_SPACE, LAYER, Materials
+from raychan.records import PEC as KIND_PEC
 from raychan.units import EPS0
 from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import EPS_R, ROUGHNESS_MM, SIGMA, THICKNESS_MM

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from raychan.world import raw
-from raychan.world.cores import closed_pieces, cores_of
+from raychan.world import degenerate_faces
 from raychan.world.errors import SceneError
-from raychan.world.flatten import merge_flat
-from raychan.world.joints import Joints, joined, places
-from raychan.world.smoothing import folds, smoothed
+from raychan.world.inner_spheres import closed_pieces, cores_of
+from raychan.world.merge_coplanar import merge_flat
+from raychan.world.topology import Joints, joined, places
+from raychan.world.vertex_normals import folds, smoothed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
@@ -144,10 +144,10 @@ def make_mesh(
     that radar can see.
     """
     v, f = np.asarray(vertices, float).reshape(-1, 3), np.asarray(faces, np.int64).reshape(-1, 3)
-    v, f = raw.used(v, f)
+    v, f = degenerate_faces.used(v, f)
     kind = np.zeros(len(f), np.int32) if part is None else np.asarray(part, np.int32)
-    v, f = raw.weld(v, f)
-    keep, zero, twins = raw.alive(v, f)
+    v, f = degenerate_faces.weld(v, f)
+    keep, zero, twins = degenerate_faces.alive(v, f)
     if not keep.any():
         raise SceneError("mesh is empty: no face with an area", value=len(f), allowed="at least one triangle")
     f, kind = f[keep], kind[keep]

@@ -12,22 +12,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.tables import LAYER, MIRROR, Facets, Points
-from raychan.telling import Told
-from raychan.world import check, edit, encounters, shipped
+from raychan.records import LAYER, MIRROR, Facets, Points
+from raychan.reprs import Told
+from raychan.world import bundled, checks, overlaps, overrides
 from raychan.world.body import Body
-from raychan.world.checked import checked
+from raychan.world.build import body_of, material_of
 from raychan.world.errors import SceneError, nearest
-from raychan.world.joints import Joints
 from raychan.world.limits import FREQUENCY
-from raychan.world.made import body_of, material_of
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
-from raychan.world.mount import sensor_of
-from raychan.world.placed import placed, stack
+from raychan.world.posed import placed, stack
+from raychan.world.radar_mount import sensor_of
 from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile
+from raychan.world.schema_errors import checked
 from raychan.world.seams import over_seams
-from raychan.world.still import Still
+from raychan.world.static_geometry import Still
+from raychan.world.topology import Joints
 
 __all__ = ["Body", "Scene", "SceneError"]
 
@@ -85,12 +85,12 @@ class Scene(Told):
 
         Raises: SceneError where file, syntax, key or value is wrong.
         """
-        file = shipped.found(path)
-        edit.refuse_mesh(file)
+        file = bundled.found(path)
+        overrides.refuse_mesh(file)
         try:
             text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
-            more = f", or {nearest(file.stem, shipped.names())}" if shipped.names() else ""
+            more = f", or {nearest(file.stem, bundled.names())}" if bundled.names() else ""
             raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
         except (OSError, UnicodeDecodeError) as e:
             reason = getattr(e, "strerror", None) or e
@@ -100,7 +100,7 @@ class Scene(Told):
     @classmethod
     def from_text(cls, text: str, path: str | Path | None = None) -> Scene:
         """Return the scene of TOML text; `path` is where it came from."""
-        return cls.from_dict(edit.parsed(text, path), path, text)
+        return cls.from_dict(overrides.parsed(text, path), path, text)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], path: str | Path | None = None, text: str = "") -> Scene:
@@ -142,7 +142,7 @@ class Scene(Told):
         if self._data is None:
             raise ValueError("only a scene from a file or from tables has keys to change")
         text = self.text + "".join(f"\n# changed: {c}" for c in changes)
-        return self._of(edit.changed(self._data, changes, self.path), self.path, text, self)
+        return self._of(overrides.changed(self._data, changes, self.path), self.path, text, self)
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy, perhaps in another process, makes its own.
@@ -168,7 +168,7 @@ class Scene(Told):
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.bodies = over_seams(self.bodies)
-        check.radar_outside(self.bodies, self.radar)
+        checks.radar_outside(self.bodies, self.radar)
         if self.radar is not None:
             _ = self.sensor
 
@@ -195,9 +195,9 @@ class Scene(Told):
             moved.radar = self.radar.model_copy(update={"position": there.tolist()})
             moved.__dict__["sensor"] = self.sensor_at(time)
         moved.__dict__.pop("warnings", None)
-        moved.text, moved._data = f"{self.text}\n{edit.LATER}{time!r}" if self.text else "", None
+        moved.text, moved._data = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
         try:
-            check.radar_outside(moved.bodies, moved.radar)
+            checks.radar_outside(moved.bodies, moved.radar)
         except SceneError as e:
             late = f"{e.problem} {time:g} s on"
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
@@ -220,12 +220,12 @@ class Scene(Told):
         }
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
         opaque = [all(m.kind != LAYER for m in self._chosen(b)) for b in self.bodies]
-        said += encounters.overlaps(self.bodies, opaque)
+        said += overlaps.overlaps(self.bodies, opaque)
         if self.radar is None:
             return said
-        said += check.edge_on(self.bodies, self.radar)
-        said += encounters.unseen(self.bodies, self.sensor)
-        return said + check.aliases(self.bodies, self.radar, self.sensor.waveform)
+        said += checks.edge_on(self.bodies, self.radar)
+        said += overlaps.unseen(self.bodies, self.sensor)
+        return said + checks.aliases(self.bodies, self.radar, self.sensor.waveform)
 
     def _chosen(self, body: Body) -> list[Material]:
         """Return the materials of a body's parts: the scene's own first, then the built-in ones."""

@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from raychan.world.figures import (
+from raychan.world.limits import ROW_WAVELENGTHS
+from raychan.world.quantities import (
     Angle,
     Bandwidth,
     Beam,
@@ -44,7 +45,6 @@ from raychan.world.figures import (
     Turn,
     Window,
 )
-from raychan.world.limits import ROW_WAVELENGTHS
 
 
 class Table(BaseModel):

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from raychan.tables import MIRROR
-from raychan.world import raw
+from raychan.records import MIRROR
+from raychan.world import degenerate_faces
 from raychan.world.body import Body
 from raychan.world.mesh import Floats, Ints, opposed_pairs, smooth_normals
 
@@ -56,7 +56,7 @@ def _together(bodies: Sequence[Body]) -> tuple[Ints, Floats, Ints]:
     faces = np.concatenate([m.faces + b for m, b in zip(meshes, begin, strict=False)]).astype(np.int64)
     vertices = np.concatenate([b.motion.to_world(b.geometry.vertices) for b in bodies])
     owner = np.repeat(np.arange(len(meshes)), [len(m.faces) for m in meshes])
-    return owner, *raw.weld(vertices, faces)
+    return owner, *degenerate_faces.weld(vertices, faces)
 
 
 def _with(body: Body, normals: Floats) -> Body:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.world.joints import Joints
-from raychan.world.smoothing import components
+from raychan.world.topology import Joints
+from raychan.world.vertex_normals import components
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]

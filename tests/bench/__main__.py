@@ -23,8 +23,8 @@ from bench.rays import rays
 from bench.size import size
 from bench.synthesis import scaling, synthesis
 from bench.turbine import turbine
-from raychan.run.files import write_whole
-from raychan.run.store import versions
+from raychan.run.output_files import write_whole
+from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {f.__name__: f for f in (rays, synthesis, scaling, frame, turbine, size, memory)}

@@ -13,7 +13,7 @@ _PIECE = 128  # samples after which the recurrence starts anew from the exact ph
 
 @njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
 def recurrent_sum(amplitude, delay, growth, carrier, slope, repetition, step, chirps, samples):
-    """Return samples (chirps, samples) of echoes (n,): the sum of `kernels.beat.beat_sum`, same arguments.
+    """Return samples (chirps, samples) of echoes (n,): the sum of `signal.dechirp.beat_sum`, same arguments.
 
     Along a ramp the phase is quadratic in the sample number, so that each sample follows from the one before by two
     complex products.

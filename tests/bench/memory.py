@@ -24,7 +24,7 @@ except OSError:
 print(json.dumps([peak, tubes, took]))
 """
 _NOTHING = """
-import raychan as rc, raychan.run.chain, finufft, scipy.fft
+import raychan as rc, raychan.run.simulate, finufft, scipy.fft
 start, tubes = time.perf_counter(), 0
 """
 _FRAME = """
@@ -36,8 +36,8 @@ tubes = rc.simulate(scene, tolerance_db={tolerance!r}).stats["tubes"]
 _TUBES = """
 import dataclasses
 import raychan as rc
-from raychan.channel.solve import refinement, solve_into
-from raychan.run.gather import Gather
+from raychan.run.solver import refinement, solve_into
+from raychan.run.path_stream import Gather
 scene = rc.Scene(
     bodies=[rc.Body("wall", shape="plate", params=dict(width=10.0, height=10.0), position=(8, 0, 0), yaw_deg=180.0)],
     radar=dict(position=[0.0, 0.0, 0.0], waveform=dict(bandwidth_mhz=500.0, chirp_us=30.0, chirps=64, samples=128)),

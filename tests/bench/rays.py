@@ -10,7 +10,7 @@ import numpy as np
 from bench.bare import recorded, replay
 from bench.measure import Row, against
 from raychan.frames import direction
-from raychan.world.embree import Tracer
+from raychan.world.ray_caster import Tracer
 from raychan.world.scene import Scene
 
 

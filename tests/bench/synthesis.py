@@ -12,10 +12,10 @@ from echoes import echoes, sensor
 
 from bench.direct import recurrent_sum
 from bench.measure import Row, against, barred, rounds
-from raychan.kernels.beat import beat_sum
 from raychan.radar.waveform import Waveform
-from raychan.signal.cube import synthesize
-from raychan.tables import Paths, take
+from raychan.records import Paths, take
+from raychan.signal.baseband import synthesize
+from raychan.signal.dechirp import beat_sum
 from raychan.units import C0, db
 
 WAVE = Waveform(77e9, 4e9, 60e-6, 60e-6, 128, 1024)

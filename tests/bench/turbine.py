@@ -11,9 +11,9 @@ import numpy as np
 
 import raychan as rc
 from bench.measure import Row, barred, paired, seconds
-from raychan.channel.solve import refinement, solve
-from raychan.run.microdoppler import retraced
-from raychan.signal.cube import synthesize
+from raychan.run.micro_doppler import retraced
+from raychan.run.solver import refinement, solve
+from raychan.signal.baseband import synthesize
 
 _CHIRPS = 256
 

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import trimesh
 
-from raychan.channel.rcs import rcs
+from raychan.run.rcs import rcs
 from raychan.world.mesh import make_mesh
 from truth import po
 

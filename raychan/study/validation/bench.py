@@ -11,12 +11,12 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from raychan.process.spectrum import range_doppler
-from raychan.run.chain import STAGES, background, noise_of_cell, simulate
+from raychan.processing.range_doppler import range_doppler
+from raychan.records import TRANSMIT, Paths, take
 from raychan.run.result import MULTIPATH, Result
-from raychan.signal.cube import synthesize
+from raychan.run.simulate import STAGES, background, noise_of_cell, simulate
+from raychan.signal.baseband import synthesize
 from raychan.study.validation.data import POINT, Study, Target
-from raychan.tables import TRANSMIT, Paths, take
 from raychan.units import C0, db
 from raychan.world.errors import SceneError, nearest
 from raychan.world.scene import Scene

@@ -12,10 +12,10 @@ from typing import Any, Literal
 from pydantic import Field
 
 import raychan
-from raychan.world import edit
-from raychan.world.checked import checked
+from raychan.world import overrides
 from raychan.world.errors import SceneError
 from raychan.world.schema import Table
+from raychan.world.schema_errors import checked
 
 HERE = Path(raychan.__file__).parents[1] / "validation"
 """Where the data stand in a checkout."""
@@ -172,7 +172,7 @@ def _read(kind: type[Table], file: Path) -> Any:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"cannot be read ({error})", file=file, allowed="a text file in TOML") from None
-    return checked(kind, edit.parsed(text, file), file)
+    return checked(kind, overrides.parsed(text, file), file)
 
 
 def _item(sheet: Sheet, study: _Study, file: Path) -> Item:

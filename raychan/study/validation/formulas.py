@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.frames import angles, direction
-from raychan.process.cfar import factor
-from raychan.process.spectrum import range_doppler
+from raychan.processing.cfar import factor
+from raychan.processing.range_doppler import range_doppler
 from raychan.radar.pattern import gain_dbi
-from raychan.run.chain import noise_of_cell
-from raychan.signal.cube import synthesize
+from raychan.records import Paths, RangeDoppler
+from raychan.run.simulate import noise_of_cell
+from raychan.signal.baseband import synthesize
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure
-from raychan.tables import Paths, RangeDoppler
 from raychan.units import C0, db, dbm
 
 Floats = NDArray[np.float64]

@@ -1,0 +1,223 @@
+"""Advance: what routes carry once their bodies have moved on; no ray is traced.
+
+A footprint goes with its body, so that the lengths through its corners and the phase integral over it are found anew
+for every instant. Over plane mirrors a length is that to the images of both ends in the planes where they are by then:
+exact for any turn, as long as the same surfaces are met and seen; on a curved mirror the plane at the vertex stands in
+for the surface. Obliquity and spreading stay as they were.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.transfer import transfer
+from raychan.compile.jit import njit
+from raychan.em.phase_integral import triangle_terms
+from raychan.parallel import in_two
+from raychan.records import REFLECT, SCATTER, Facets, Routes
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+_LINEAR = 1e-4  # rad: how far the phase of a piece of the footprint may bend in the integral
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where bodies and radar are at instants t: points x of body b have gone to turn[t, b] @ (x - origin[b]) +
+    place[t, b]."""
+
+    origin: Floats
+    """(b, 3) [m] when traced."""
+    turn: Floats
+    """(t, b, 3, 3)."""
+    place: Floats
+    """(t, b, 3) [m]."""
+    radar: Floats
+    """(t, 3) [m]."""
+
+
+_SOON = 1e-4  # s: over which a rate is a difference; its error is far below a rate cell for any turn
+
+
+def corner_rates(routes: Routes, rows: NDArray[np.int64], facets: Facets, velocity: Floats) -> Floats:
+    """Return range rates (r, 3) [m/s] of the ways over the corners of some footprints: half the rate of their length.
+
+    Args: rows (r,) of the routes; velocity (3,) [m/s] of the radar. Rates differ over a body that turns or crosses, and
+    what neighbouring tubes have at the corner they share cancels only if it keeps moving alike.
+    """
+    late = _SOON * np.array([-0.5, 0.5])[:, None, None]
+    poses = Poses(
+        origin=facets.origin,
+        turn=np.array([[_turned(s) for s in t * facets.spin] for t in late]).reshape(2, -1, 3, 3),
+        place=facets.origin + late * facets.velocity,
+        radar=routes.tx + late[:, 0] * np.asarray(velocity, float),
+    )
+    out = np.empty((len(rows), 3))
+
+    def some(at: slice) -> None:
+        _corner_rates(
+            rows[at], routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points,
+            poses.origin, poses.turn, poses.place, poses.radar, out[at],
+        )  # fmt: skip
+
+    in_two(len(rows), some)
+    return out
+
+
+def _turned(turn: Floats) -> Floats:
+    """Return the matrix (3, 3) of a small turn [rad] about a vector, to second order."""
+    x, y, z = turn
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + cross + 0.5 * cross @ cross
+
+
+def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> Complexes:
+    """Return what routes (n,) carry but for their phase and the integral over their footprint."""
+    n = len(routes.kind)
+    bare: Routes = routes.replace(lengths=np.zeros((n, 6)), length=np.zeros(n), taper=np.ones((n, 3)))
+    ends: list[Any] = [lambda d, f=f: np.asarray(f(d))[:, None] for f in (radar.tx_field, radar.rx_field)]
+    return transfer(bare, facets, frequency, *ends)[:, 0, 0]
+
+
+def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:
+    """Return lengths [m] and amplitudes (t, n, 3) of the parts of routes that belong to each corner of their footprint.
+
+    Without a footprint, or where the integral is one part, the second and third are empty: amplitude 0.
+    """
+    shape = (len(poses.radar), len(routes.kind), 3)
+    lengths, amplitudes = np.empty(shape), np.empty(shape, np.complex128)
+    columns = (
+        routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points, routes.lengths,
+        routes.length, routes.taper, strength,
+    )  # fmt: skip
+    when = poses.origin, poses.turn, poses.place, poses.radar, 2.0 * np.pi * frequency / C0
+
+    def some(rows: slice) -> None:
+        _carry(*(routes.tx, *(c[rows] for c in columns), *when, lengths[:, rows], amplitudes[:, rows]))
+
+    in_two(shape[1], some)
+    return lengths, amplitudes
+
+
+@njit(cache=True, forceinline=True)
+def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
+    u, v, w = x[0] - origin[b, 0], x[1] - origin[b, 1], x[2] - origin[b, 2]
+    return (
+        turn[b, 0, 0] * u + turn[b, 0, 1] * v + turn[b, 0, 2] * w + place[b, 0],
+        turn[b, 1, 0] * u + turn[b, 1, 1] * v + turn[b, 1, 2] * w + place[b, 1],
+        turn[b, 2, 0] * u + turn[b, 2, 1] * v + turn[b, 2, 2] * w + place[b, 2],
+    )
+
+
+@njit(cache=True, forceinline=True)
+def _image(source, vertex, normal, b, turn, origin, place):  # type: ignore[no-untyped-def]
+    """Mirror a point in the plane of a vertex where body b has carried it."""
+    p = _moved(vertex, b, turn, origin, place)
+    x = turn[b, 0, 0] * normal[0] + turn[b, 0, 1] * normal[1] + turn[b, 0, 2] * normal[2]
+    y = turn[b, 1, 0] * normal[0] + turn[b, 1, 1] * normal[1] + turn[b, 1, 2] * normal[2]
+    z = turn[b, 2, 0] * normal[0] + turn[b, 2, 1] * normal[1] + turn[b, 2, 2] * normal[2]
+    h = 2.0 * ((source[0] - p[0]) * x + (source[1] - p[1]) * y + (source[2] - p[2]) * z)
+    return source[0] - h * x, source[1] - h * y, source[2] - h * z
+
+
+@njit(cache=True, forceinline=True)
+def _apart(a, b):  # type: ignore[no-untyped-def]
+    return ((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2) ** 0.5
+
+
+@njit(cache=True)
+def _ways(vertices, normals, kind, body, at, used, points, turn, origin, place, end, out):  # type: ignore[no-untyped-def]
+    """Write the lengths (p + 1,) of one route through p points of its footprint and its vertex at one instant."""
+    forth = (end[0], end[1], end[2])
+    back = forth
+    for j in range(at):
+        if kind[j] == REFLECT:
+            forth = _image(forth, vertices[j], normals[j], body[j], turn, origin, place)
+    if at == used:
+        for c in range(len(out)):
+            out[c] = _apart(forth, back)
+        return
+    for j in range(used - 1, at, -1):
+        if kind[j] == REFLECT:
+            back = _image(back, vertices[j], normals[j], body[j], turn, origin, place)
+    b = body[at]
+    centre = _moved(vertices[at], b, turn, origin, place)
+    last = len(points)
+    out[last] = _apart(forth, centre) + _apart(back, centre)
+    if kind[at] != SCATTER:
+        for c in range(last):
+            out[c] = out[last]
+        return
+    for c in range(last):
+        p = _moved(points[c], b, turn, origin, place)
+        out[c] = _apart(forth, p) + _apart(back, p)
+
+
+@njit(cache=True, nogil=True)
+def _corner_rates(  # type: ignore[no-untyped-def]
+    rows, vertices, normals, kind, body, scatter, points, origin, turn, place, radar, out
+):
+    d = kind.shape[1]
+    now, then = np.empty(4), np.empty(4)
+    for r in range(len(rows)):
+        i = rows[r]
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        at = scatter[i]
+        corners = points[i, :3]
+        _ways(vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[0], origin, place[0], radar[0], then)
+        _ways(vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[1], origin, place[1], radar[1], now)
+        for c in range(3):
+            out[r, c] = 0.5 * (now[c] - then[c]) / _SOON
+
+
+APART = 3e-4  # m of path: footprints longer than this in range give each corner its own delay
+
+
+@njit(cache=True, nogil=True)
+def _carry(  # type: ignore[no-untyped-def]
+    tx, vertices, normals, kind, body, scatter, points, lengths, length, taper, strength, origin, turn, place, radar,
+    k, out_lengths, out,
+):  # fmt: skip
+    n, d = kind.shape
+    still = np.zeros((origin.shape[0], 3, 3))
+    for b in range(origin.shape[0]):
+        still[b, 0, 0] = still[b, 1, 1] = still[b, 2, 2] = 1.0
+    now, then, phases, terms = np.empty(7), np.empty(7), np.empty(6), np.empty(3, np.complex128)
+    for i in range(n):
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        at = scatter[i] if scatter[i] >= 0 else used
+        _ways(vertices[i], normals[i], kind[i], body[i], at, used, points[i], still, origin, origin, tx, then)
+        for t in range(radar.shape[0]):
+            _ways(
+                vertices[i], normals[i], kind[i], body[i], at, used, points[i], turn[t], origin, place[t], radar[t], now
+            )
+            centre = length[i] + now[6] - then[6]
+            out_lengths[t, i, :] = centre
+            out[t, i, :] = 0.0
+            if at == used or kind[i, at] != SCATTER:
+                out[t, i, 0] = strength[i] * np.exp(-1j * k * centre)
+                continue
+            low, high = np.inf, -np.inf
+            for c in range(6):
+                way = lengths[i, c] + now[c] - then[c]
+                phases[c] = k * way
+                if c < 3:
+                    out_lengths[t, i, c] = way
+                    low, high = min(low, way), max(high, way)
+            triangle_terms(phases, _LINEAR, terms)
+            if high - low > APART:
+                for c in range(3):
+                    out[t, i, c] = strength[i] * taper[i, c] * terms[c]
+            else:
+                out_lengths[t, i, :] = centre
+                for c in range(3):
+                    out[t, i, 0] += strength[i] * taper[i, c] * terms[c]

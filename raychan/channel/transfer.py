@@ -1,0 +1,241 @@
+"""Fields: the replay of routes through the kernels. Materials, antennas and polarisations change here, never the
+routes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.compile.jit import njit
+from raychan.em.fresnel import coefficients
+from raychan.em.phase_integral import triangle_terms
+from raychan.em.physical_optics import huygens, reflected_wave, shadow_wave
+from raychan.em.polarization import dot, reflect, transmit
+from raychan.geometry.curved_patches import copy_to
+from raychan.parallel import in_two
+from raychan.records import POINT, TRANSMIT, Facets, Materials, Routes
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+HUYGENS, REFLECTED, SHADOW = 0, 1, 2
+"""Which currents radiate: the reflected wave's, the mean of both ways; the reflected wave's; the shadow's."""
+
+_LINEAR = 1e-4  # rad: how far the phase of a piece of the footprint may bend in the integral
+
+FieldOf = Callable[[Floats], Complexes]
+"""Directions (n, 3) that an antenna looks to -> its vector fields (n, p, 3), one for each of p polarisations."""
+
+
+def departures(routes: Routes) -> tuple[Floats, Floats]:
+    """Return unit directions (n, 3) in which the transmitter sends and to which the receiver looks."""
+    away, look = np.empty((2, len(routes.kind), 3))
+    _departures(routes.tx, routes.rx, routes.far, routes.vertices, routes.kind, away, look)
+    return away, look
+
+
+def transfer(
+    routes: Routes,
+    facets: Facets,
+    frequency: float,
+    tx_field: FieldOf,
+    rx_field: FieldOf,
+    corners: bool = False,
+    wave: int = HUYGENS,
+    elements: Floats | None = None,
+) -> Complexes:
+    """Return what each route carries (n, q, p): received over transmitted wave, lambda/4 pi and carrier phase in.
+
+    Args: tx_field, rx_field vector fields of p and q polarisations; corners: give (n, q, p, 3), the parts
+    belonging to the three footprint corners, whose sum is the whole; wave which currents radiate, and, unless HUYGENS,
+    the vector elements (n, 3, 3) [m^2] of their area at the corners, in place of taper and area.
+    """
+    away, look = departures(routes)
+    e_tx = np.ascontiguousarray(tx_field(away), dtype=np.complex128)
+    e_rx = np.ascontiguousarray(rx_field(look), dtype=np.complex128)
+    m: Materials = facets.materials
+    material = facets.material[np.maximum(routes.facet, 0)].astype(np.int64) if len(facets.material) else routes.facet
+    k = 2.0 * np.pi * frequency / C0
+    out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3 if corners else 1), np.complex128)
+    columns = (
+        routes.vertices, routes.normals, routes.kind, material, routes.scatter, routes.lengths, routes.length,
+        routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma, e_tx, e_rx,
+        np.zeros((len(out), 0, 3)) if elements is None else elements, out,
+    )  # fmt: skip
+
+    def some(at: slice) -> None:
+        _transfer(
+            routes.tx, routes.rx, routes.far, m.kind, m.eps, m.thickness, m.roughness, k, wave,
+            *(c[at] for c in columns),
+        )  # fmt: skip
+
+    in_two(len(out), some)
+    return out if corners else out[..., 0]
+
+
+@njit(cache=True)
+def _vec(a):  # type: ignore[no-untyped-def]
+    return a[0], a[1], a[2]
+
+
+@njit(cache=True)
+def _heading(a, b):  # type: ignore[no-untyped-def]
+    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    s = (x * x + y * y + z * z) ** 0.5
+    if s == 0.0:
+        return 1.0, 0.0, 0.0
+    return x / s, y / s, z / s
+
+
+@njit(cache=True)
+def _cosine(k, n):  # type: ignore[no-untyped-def]
+    return abs(k[0] * n[0] + k[1] * n[1] + k[2] * n[2])
+
+
+@njit(cache=True, nogil=True)
+def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-untyped-def]
+    n, d = kind.shape
+    for i in range(n):
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        if far:
+            out, back = (-tx[0], -tx[1], -tx[2]), (-rx[0], -rx[1], -rx[2])
+        elif used > 0:
+            out, back = _heading(tx, vertices[i, 0]), _heading(rx, vertices[i, used - 1])
+        else:
+            out, back = _heading(tx, rx), _heading(rx, tx)
+        for c in range(3):
+            away[i, c], look[i, c] = out[c], back[c]
+
+
+@njit(cache=True, nogil=True)
+def _transfer(  # type: ignore[no-untyped-def]
+    tx, rx, far, m_kind, m_eps, m_thickness, m_rough, k, wave, vertices, normals, kind, material, scatter, lengths,
+    length, taper, area, spread_in, spread_out, caustics, sigma, e_tx, e_rx, elements, out,
+):  # fmt: skip
+    n, d = kind.shape
+    ins, outs, apart = e_tx.shape[1], e_rx.shape[1], out.shape[3] == 3
+    terms, phases = np.empty(3, np.complex128), np.empty(6)
+    arriving, leaving = np.empty((ins, 3), np.complex128), np.empty((outs, 3), np.complex128)
+    wavelength_4pi = 0.5 / k
+    for i in range(n):
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        at = scatter[i] if scatter[i] >= 0 else used
+        # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
+        k_in = (-tx[0], -tx[1], -tx[2])
+        if not far:
+            k_in = _heading(tx, vertices[i, 0]) if used > 0 else _heading(tx, rx)
+        for p in range(ins):
+            copy_to(arriving[p], e_tx[i, p])
+        for j in range(at):
+            mat = material[i, j]
+            c = coefficients(
+                m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normals[i, j]), k
+            )  # fmt: skip
+            _passed(arriving, k_in, _vec(normals[i, j]), c, kind[i, j] == TRANSMIT)
+            k_in = _heading(vertices[i, j], vertices[i, j + 1] if j + 1 < used else rx)
+        if at == used or kind[i, at] == POINT:
+            whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
+        if at == used:
+            for p in range(ins):
+                for q in range(outs):
+                    out[i, q, p, 0] = whole * dot(_vec(e_rx[i, q]), _vec(arriving[p]))
+            continue
+        # Out: the receiver's field by reciprocity, over the rest of the chain backwards.
+        k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
+        for q in range(outs):
+            copy_to(leaving[q], e_rx[i, q])
+        for j in range(used - 1, at, -1):
+            mat = material[i, j]
+            c = coefficients(
+                m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normals[i, j]), k
+            )  # fmt: skip
+            _passed(leaving, k_out, _vec(normals[i, j]), c, kind[i, j] == TRANSMIT)
+            k_out = _heading(vertices[i, j], vertices[i, j - 1])
+        if kind[i, at] == POINT:
+            whole *= (sigma[i] / (4.0 * np.pi)) ** 0.5 * spread_out[i]
+            for p in range(ins):
+                for q in range(outs):
+                    out[i, q, p, 0] = whole * dot(_vec(leaving[q]), _vec(arriving[p]))
+            continue
+        normal = _vec(normals[i, at])
+        mat = material[i, at]
+        ci = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k)
+        co = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k)
+        scale = wavelength_4pi * (-0.25j * k / np.pi) * spread_in[i] * spread_out[i]
+        for _ in range(caustics[i]):
+            scale *= 1j
+        for c6 in range(6):
+            phases[c6] = k * lengths[i, c6]
+        triangle_terms(phases, _LINEAR, terms)
+        to, mean = (-k_out[0], -k_out[1], -k_out[2]), 0j
+        for p in range(ins):
+            for q in range(outs):
+                e, g = _vec(arriving[p]), _vec(leaving[q])
+                if wave == HUYGENS:
+                    mean = area[i] * huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
+                for c3 in range(3):
+                    if wave == HUYGENS:
+                        couple = mean * taper[i, c3]
+                    elif wave == REFLECTED:
+                        couple = reflected_wave(e, k_in, to, _vec(elements[i, c3]), ci[0], ci[1], g)
+                    else:
+                        couple = shadow_wave(e, k_in, to, _vec(elements[i, c3]), ci[2], ci[3], g)
+                    out[i, q, p, c3 if apart else 0] += scale * couple * terms[c3]
+
+
+@njit(cache=True)
+def _passed(e, k, normal, c, through):  # type: ignore[no-untyped-def]
+    """Send fields e (p, 3) that travel along k through a layer or off a mirror, in place."""
+    for p in range(len(e)):
+        after = transmit(_vec(e[p]), k, normal, c[2], c[3]) if through else reflect(_vec(e[p]), k, normal, c[0], c[1])
+        e[p, 0], e[p, 1], e[p, 2] = after
+
+
+def rates(routes: Routes, facets: Facets, tx_velocity: Floats, rx_velocity: Floats) -> Floats:
+    """Return range rates (n,) [m/s]: half the rate of each route's length, from the velocities of all its vertices.
+
+    Mirrors may slide in their plane without effect: the length is stationary there (Fermat).
+    """
+    return _rates(
+        routes.tx, routes.rx, routes.vertices, routes.kind, routes.body, facets.velocity, facets.spin,
+        facets.origin, np.asarray(tx_velocity, float), np.asarray(rx_velocity, float),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _rates(  # type: ignore[no-untyped-def]
+    tx, rx, vertices, kind, body, velocity, spin, origin, tx_velocity, rx_velocity
+):
+    n, d = kind.shape
+    out = np.empty(n)
+    x, v, y, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(n):
+        copy_to(x, tx)
+        copy_to(v, tx_velocity)
+        total = 0.0
+        for j in range(d + 1):
+            last = j == d or kind[i, j] == 0
+            if last:
+                copy_to(y, rx)
+                copy_to(w, rx_velocity)
+            else:
+                copy_to(y, vertices[i, j])
+                b = max(body[i, j], 0)
+                s, o = spin[b], origin[b]
+                w[0] = velocity[b, 0] + s[1] * (y[2] - o[2]) - s[2] * (y[1] - o[1])
+                w[1] = velocity[b, 1] + s[2] * (y[0] - o[0]) - s[0] * (y[2] - o[2])
+                w[2] = velocity[b, 2] + s[0] * (y[1] - o[1]) - s[1] * (y[0] - o[0])
+            k = _heading(x, y)
+            total += (w[0] - v[0]) * k[0] + (w[1] - v[1]) * k[1] + (w[2] - v[2]) * k[2]
+            if last:
+                break
+            copy_to(x, y)
+            copy_to(v, w)
+        out[i] = 0.5 * total
+    return out

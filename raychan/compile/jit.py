@@ -1,0 +1,99 @@
+"""Compiling: numba, with code kept on disk until something that it was made of changes.
+
+Numba keeps compiled code by the text of the file in which a function stands. What that function calls from other files,
+and the constants it takes from them, are compiled into it all the same: left to itself, numba would go on using them
+as they were. What is kept, and how processes share it, stands in `compile.code_cache`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core import config
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
+
+from raychan.compile.code_cache import Kept
+
+_CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
+_CONSTANTS = int, float, complex, str, tuple
+
+KERNELS: list[Kernel] = []  # all that are kept on disk, as their modules are imported
+
+
+class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
+    """A compiled function. Called from Python, it takes frozen arrays as if they could be written to: numba would
+    compile it once more for every mixture of both.
+
+    With bounds checked (NUMBA_BOUNDSCHECK=1) frozen arrays stay frozen, and a kernel that writes to one does not
+    compile.
+    """
+
+    kept: Kept
+    stamp: bytes
+
+    def __call__(self, *args: Any) -> Any:
+        return super().__call__(*args) if _CHECKED else super().__call__(*map(_open, args))
+
+    def compile(self, sig: Any) -> Any:
+        with global_compiler_lock, self.kept.held():
+            return super().compile(sig)
+
+
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return numba's `njit` with these options; with `cache`, code is kept as long as no file has changed of the
+    compiled functions within reach of this one, nor a constant it may have taken from elsewhere."""
+    keep = options.pop("cache", False)
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        made: Any = numba.njit(**options)(function)
+        if keep and not _UNCOMPILED:
+            made.__class__ = Kernel
+            made._cache = made.kept = Kept(function)
+            made.stamp = made.kept.stamped(hashlib.sha256(_within_reach(function, made.kept.source)).digest())
+            KERNELS.append(made)
+        return made
+
+    return compiled
+
+
+def _open(value: Any) -> Any:
+    """Return an argument whose arrays, in tuples or alone, can all be written to, on the same memory."""
+    if type(value) is tuple:
+        return tuple(map(_open, value))
+    if type(value) is not np.ndarray or value.flags.writeable:
+        return value
+    seen = value.view()
+    try:
+        seen.flags.writeable = True
+    except ValueError:  # the memory's owner is frozen itself
+        return np.asarray(_Memory(value))
+    return seen
+
+
+class _Memory:
+    """The memory of an array, without its note that it is frozen."""
+
+    def __init__(self, held: np.ndarray[Any, Any]) -> None:
+        self.held = held
+        how = held.__array_interface__
+        self.__array_interface__ = how | {"data": (how["data"][0], False)}
+
+
+def _within_reach(function: Callable[..., Any], own: Any) -> bytes:
+    """Return the stamp of a function's own file, and all that its module has brought in before it was compiled."""
+    seen = [repr(own)]
+    for name, value in sorted(function.__globals__.items()):
+        if name.startswith("__"):
+            continue
+        if isinstance(value, _CONSTANTS):
+            seen.append(f"{name}={value!r}")
+        elif isinstance(value, np.ndarray):
+            seen.append(f"{name}={value.dtype}{value.shape}{value.tobytes()!r}")
+        elif getattr(value, "__module__", None) != function.__module__:
+            seen.append(f"{name}:{getattr(value, 'stamp', b'')!r}" if callable(value) else name)
+    return "\n".join(seen).encode()

@@ -1,0 +1,269 @@
+"""The phase integral: the mean of exp(-j phase) over a flat triangle, the phase quadratic across it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from raychan.compile.jit import njit
+from raychan.em.gauss_quadrature import mean_parts, points_for
+from raychan.em.phasor import unit_phasor
+
+_TURN = 0.5 / math.pi
+
+
+@njit(cache=True, forceinline=True)
+def _turned(phase: float) -> complex:
+    """Return exp(-j phase)."""
+    cosine, sine = unit_phasor(_TURN * phase)
+    return complex(cosine, sine)
+
+
+@njit(cache=True)
+def _edge(a: float, b: float, ea: complex, eb: complex) -> complex:
+    """Mean of exp(-j phi) along a line on which phi runs from a to b, given exp(-j a) and exp(-j b)."""
+    gap = b - a
+    if abs(gap) < 1e-3:
+        return ea * complex(1.0 - gap * gap / 6.0, gap * (gap * gap / 24.0 - 0.5))
+    return 1j * (eb - ea) / gap
+
+
+@njit(cache=True, forceinline=True)
+def _mended(
+    p0: float, p1: float, p2: float, t0: complex, t1: complex, t2: complex, lost: complex
+) -> tuple[complex, complex, complex]:
+    """Return corner terms of the same sum that also keep the first moment of the phase, off by j `lost`.
+
+    Terms of stationary phase fall with frequency, t ~ 1/phase; given fixed amplitudes they would keep the mean at the
+    carrier only, and beside it neighbours made by another rule would not match them.
+    """
+    mean = (p0 + p1 + p2) / 3.0
+    a, b, c = p0 - mean, p1 - mean, p2 - mean
+    shift = -1j * lost / (a * a + b * b + c * c)
+    return t0 + shift * a, t1 + shift * b, t2 + shift * c
+
+
+@njit(cache=True)
+def _corner_terms(
+    p0: float, p1: float, p2: float, e0: complex, e1: complex, e2: complex
+) -> tuple[complex, complex, complex]:
+    """Return the parts of the mean of exp(-j phi) over a triangle that belong to each corner, given e = exp(-j p).
+
+    The mean is the second divided difference of exp at the corner phases (Hermite-Genocchi), times two: Gordon
+    (1975) for a triangle, without his singular cases. Where the phase runs, it is a sum of corner terms; what
+    corners within 2 rad have in common is shared equally.
+    """
+    # Sorted, low to high, with the place each came from.
+    i0, i1, i2 = 0, 1, 2
+    if p0 > p1:
+        p0, p1, e0, e1, i0, i1 = p1, p0, e1, e0, i1, i0
+    if p1 > p2:
+        p1, p2, e1, e2, i1, i2 = p2, p1, e2, e1, i2, i1
+    if p0 > p1:
+        p0, p1, e0, e1, i0, i1 = p1, p0, e1, e0, i1, i0
+    span, x = p2 - p0, p1 - p0
+    if span < 2.0:
+        if span < 0.05:
+            # Complete homogeneous sums of (0, x, span): the divided difference as a series.
+            xx, yy, xy = x * x, span * span, x * span
+            real = 1.0 - (xx + xy + yy) / 12.0 + (xx * xx + xx * xy + xx * yy + xy * yy + yy * yy) / 360.0
+            whole = e0 * complex(real, -(x + span) / 3.0 + (x + span) * (xx + yy) / 60.0)
+        else:
+            whole = 2j * (_edge(p1, p2, e1, e2) - _edge(p0, p1, e0, e1)) / span
+        # First order in the phase: the mean of l_i phi over a triangle is (phi_i - mean) / 12.
+        mean = (x + span) / 3.0
+        t0 = whole * complex(1.0 / 3.0, mean / 12.0)
+        t1 = whole * complex(1.0 / 3.0, (mean - x) / 12.0)
+        t2 = whole * complex(1.0 / 3.0, (mean - span) / 12.0)
+    else:
+        scale = 2j / span
+        gap = p2 - p1
+        # Each division by a phase leaves out of the first moment what _mended puts back.
+        if gap < 2.0:
+            upper = scale * _edge(p1, p2, e1, e2)
+            t1, t2 = upper * complex(0.5, gap / 12.0), upper * complex(0.5, -gap / 12.0)
+            lost = upper
+        else:
+            t1, t2 = scale * e1 / (1j * gap), -scale * e2 / (1j * gap)
+            lost = 2.0 * (t1 + t2)
+        if x < 2.0:
+            lower = scale * _edge(p0, p1, e0, e1)
+            t0 = -lower * complex(0.5, x / 12.0)
+            t1 -= lower * complex(0.5, -x / 12.0)
+            lost -= lower
+        else:
+            first, last = -scale * e0 / (1j * x), scale * e1 / (1j * x)
+            t0 = first
+            t1 += last
+            lost += 2.0 * (first + last)
+        t0, t1, t2 = _mended(p0, p1, p2, t0, t1, t2, lost)
+    r0 = t0 if i0 == 0 else (t1 if i1 == 0 else t2)
+    r1 = t0 if i0 == 1 else (t1 if i1 == 1 else t2)
+    r2 = t0 if i0 == 2 else (t1 if i1 == 2 else t2)
+    return r0, r1, r2
+
+
+_MOST = 20  # pieces along an edge: enough for the most that a tube which counts may bend
+_FINE = 1e-5  # of the mean over a triangle in phase: what may be left out
+_PANEL = 6.0  # rad that the Gauss rule along an edge follows to 1e-6
+_NEAR = 18.0  # rad up to which nothing is cut in pieces
+_PER_PIECE = 16  # points of a Gauss rule in the time of a piece
+_SIX = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
+
+
+@njit(cache=True, forceinline=True)
+def _inner(w: float, c: float) -> complex:
+    """Return one end's share in the integral of exp(-j phi) along a line, over exp(-j phi): phi' = w, phi'' = c."""
+    x = c / (w * w)
+    return 1j / w * complex(1.0 - 3.0 * x * x, x)
+
+
+@njit(cache=True)
+def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
+    """Integrate `_inner` exp(-j phi) along an edge; return the parts of its two ends, and by how many phases they were
+    divided in all.
+
+    Args: pa, pm, pb phases [rad] at ends and middle; wa, wb, c slopes at the ends and bend across the edge.
+    """
+    s, d = pb - pa, pm - 0.5 * (pa + pb)
+    sa, sb = s + 4.0 * d, s - 4.0 * d
+    if sa * sb > 0.0 and min(abs(sa), abs(sb)) > 4.0:
+        # The phase runs: the ends alone count (stationary phase), here to second order.
+        ga, gb, turn = _inner(wa, c), _inner(wb, c), wb - wa
+        xa, xb = -turn / (wa * sa) + 8.0 * d / (sa * sa), -turn / (wb * sb) + 8.0 * d / (sb * sb)
+        worst = max(abs(turn / (wa * sa)), abs(turn / (wb * sb))) + 8.0 * abs(d) / min(sa * sa, sb * sb)
+        if 12.0 * worst * worst < _FINE * min(abs(sa * wa), abs(sb * wb)):
+            first = -1j * ga / sa * complex(1.0, -xa) * _turned(pa)
+            last = 1j * gb / sb * complex(1.0, -xb) * _turned(pb)
+            return first, last, 2.0
+    panels = 1 + int((abs(s) + 4.0 * abs(d)) / _PANEL)
+    first, last = 0j, 0j
+    for i in range(panels):
+        for q in range(6):
+            t = (i + _SIX[0, q]) / panels
+            g = _SIX[1, q] * _inner(wa + t * (wb - wa), c) * _turned(pa + t * s + 4.0 * d * t * (1.0 - t))
+            first += (1.0 - t) * g
+            last += t * g
+    return first / panels, last / panels, 1.0
+
+
+@njit(cache=True)
+def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
+    """Fill in the mean's parts where the phase runs along lines parallel to one edge: the ends of these, which lie on
+    the two other edges, alone count. Return False where it runs in no such direction.
+
+    Source: Wong, Asymptotic Approximations of Integrals, 2001, secs. II.3 and VIII.
+    """
+    best, edge = 0.0, -1
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        wi = phases[j] - phases[i] + 4.0 * d[i]
+        wj = wi - 8.0 * d[i]
+        wk = wi + 4.0 * (d[j] - d[i] - d[k])
+        if wi * wj > 0.0 and wi * wk > 0.0:
+            least = min(abs(wi), abs(wj), abs(wk))
+            if 60.0 * abs(8.0 * d[i] / (least * least)) ** 3 < _FINE * least and least > max(best, 4.0):
+                best, edge = least, i
+    if edge < 0:
+        return False
+    i, j, k = edge, (edge + 1) % 3, (edge + 2) % 3
+    wi = phases[j] - phases[i] + 4.0 * d[i]
+    wj, c = wi - 8.0 * d[i], -8.0 * d[i]
+    wk = wi + 4.0 * (d[j] - d[i] - d[k])
+    j_part, k_part, ahead = _along_edge(phases[j], phases[3 + j], phases[k], wj, wk, c)
+    i_part, other, behind = _along_edge(phases[i], phases[3 + k], phases[k], wi, wk, c)
+    lost = 2.0 * (ahead * (j_part + k_part) - behind * (i_part + other))
+    out[i], out[j], out[k] = _mended(
+        phases[i], phases[j], phases[k], -2.0 * i_part, 2.0 * j_part, 2.0 * (k_part - other), lost
+    )
+    return True
+
+
+@njit(cache=True, forceinline=True)
+def _quadratic(phases, d01, d12, d20, v, w):  # type: ignore[no-untyped-def]
+    u = 1.0 - v - w
+    return u * phases[0] + v * phases[1] + w * phases[2] + 4.0 * (d01 * u * v + d12 * v * w + d20 * w * u)
+
+
+@njit(cache=True)
+def _pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped-def]
+    """Fill in the mean's parts by m^2 equal pieces, linear on each, with the mean bend of a piece put in its phase."""
+    h = 1.0 / m
+    # The mean of a piece's own bend: a third of the sum of its edges' bends, alike for all pieces.
+    shift = _turned((d01 + d12 + d20) * h * h / 3.0) * h * h
+    p, e = np.empty((2, m + 1)), np.empty((2, m + 1), np.complex128)
+    total, s1, s2 = 0j, 0j, 0j
+    # Along a row the phase is a parabola, so its exponential follows from two running factors.
+    curve = -8.0 * d20 * h * h
+    turn = _turned(curve)
+    for i in range(m + 1):
+        row = i & 1
+        v = i * h
+        first = _quadratic(phases, d01, d12, d20, v, 0.0)
+        step = _quadratic(phases, d01, d12, d20, v, h) - first
+        value, factor = _turned(first), _turned(step)
+        for j in range(m - i + 1):
+            p[row, j], e[row, j] = first, value
+            first += step
+            step += curve
+            value *= factor
+            factor *= turn
+        if i == 0:
+            continue
+        # Pieces between rows i - 1 and i: upright ones, then their neighbours (flipped).
+        low = 1 - row
+        for j in range(m - i + 1):
+            p0, p1, p2 = p[low, j], p[row, j], p[low, j + 1]
+            t0, t1, t2 = _corner_terms(p0, p1, p2, e[low, j], e[row, j], e[low, j + 1])
+            total += t0 + t1 + t2
+            s1 += t0 * (i - 1) + t1 * i + t2 * (i - 1)
+            s2 += t0 * j + t1 * j + t2 * (j + 1)
+            if j < m - i:
+                p0, p1, p2 = p[row, j + 1], p[low, j + 1], p[row, j]
+                t0, t1, t2 = _corner_terms(p0, p1, p2, e[row, j + 1], e[low, j + 1], e[row, j])
+                total += t0 + t1 + t2
+                s1 += t0 * i + t1 * (i - 1) + t2 * i
+                s2 += t0 * (j + 1) + t1 * (j + 1) + t2 * j
+    out[0], out[1], out[2] = shift * (total - (s1 + s2) * h), shift * s1 * h, shift * s2 * h
+    return m * m
+
+
+@njit(cache=True)
+def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untyped-def]
+    """Integrate exp(-j phi) over a triangle on which phi is quadratic; return how many points or pieces it took.
+
+    Args: phases (6,) [rad] at the corners 0, 1, 2 and the middles of edges 01, 12, 20; linear [rad] how far a phase may
+    bend that counts as linear. out (3,) receives the mean's parts that belong to each corner (their sum is the mean),
+    so that each may be given its own delay.
+    """
+    d01 = phases[3] - 0.5 * (phases[0] + phases[1])
+    d12 = phases[4] - 0.5 * (phases[1] + phases[2])
+    d20 = phases[5] - 0.5 * (phases[2] + phases[0])
+    bend = max(abs(d01), abs(d12), abs(d20))
+    if bend <= linear:
+        e0, e1, e2 = _turned(phases[0]), _turned(phases[1]), _turned(phases[2])
+        t0, t1, t2 = _corner_terms(phases[0], phases[1], phases[2], e0, e1, e2)
+        shift = _turned((d01 + d12 + d20) / 3.0)
+        out[0], out[1], out[2] = shift * t0, shift * t1, shift * t2
+        return 1
+    span = max(phases[0], phases[1], phases[2]) - min(phases[0], phases[1], phases[2])
+    if span > _PANEL and _running(phases, (d01, d12, d20), out):
+        return 1
+    reach = span + 4.0 * bend
+    points, pieces = points_for(reach), min(math.ceil(math.sqrt(bend / linear)), _MOST)
+    if points > 0 and (reach <= _NEAR or points * points <= _PER_PIECE * pieces * pieces):
+        mean_parts(phases, d01, d12, d20, points, out)
+        return points * points
+    return _pieces(phases, d01, d12, d20, pieces, out)
+
+
+@njit(cache=True, nogil=True)
+def quadratic_means(phases, linear):  # type: ignore[no-untyped-def]
+    """Return the mean of exp(-j phi) over each triangle of (n, 6) corner and mid-edge phases."""
+    out = np.empty(phases.shape[0], np.complex128)
+    part = np.empty(3, np.complex128)
+    for i in range(phases.shape[0]):
+        triangle_terms(phases[i], linear, part)
+        out[i] = part[0] + part[1] + part[2]
+    return out

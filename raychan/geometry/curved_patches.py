@@ -1,0 +1,209 @@
+"""Patches: triangles of a true surface behind flat facets, seen from a point or a direction (numba loops).
+
+Everywhere: v, n, b (m, 3, 3) corners, corner normals and edge bulges of the facets; image (3,) the source's mirror
+image [m], or the unit direction towards it when far; bary (n, 3, 3) corners of patches on their facets.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from raychan.compile.jit import njit
+
+_ALIKE = 1.0 + 1e-9  # sizes nearer than this are one: rounding must not choose between them
+
+
+@njit(cache=True, forceinline=True)
+def dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, forceinline=True)
+def copy_to(out, a):  # type: ignore[no-untyped-def]
+    """Write a into out, one axis; numba compiles a page of Python's strings, for its message, into `out[:] = a`."""
+    for c in range(len(out)):
+        out[c] = a[c]
+
+
+@njit(cache=True, forceinline=True)
+def copy_corners(out, w):  # type: ignore[no-untyped-def]
+    """Write the corners w (3, 3) into out."""
+    for c in range(3):
+        out[c, 0], out[c, 1], out[c, 2] = w[c, 0], w[c, 1], w[c, 2]
+
+
+@njit(cache=True, forceinline=True)
+def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
+    """Write into p the point of the true surface at barycentric (x, y, z)."""
+    xy, yz, zx = x * y, y * z, z * x
+    for c in range(3):
+        p[c] = x * v[0, c] + y * v[1, c] + z * v[2, c] - xy * b[0, c] - yz * b[1, c] - zx * b[2, c]
+
+
+@njit(cache=True, forceinline=True)
+def middle(w):  # type: ignore[no-untyped-def]
+    """Return the barycentric coordinates of a patch's centre."""
+    return (
+        (w[0, 0] + w[1, 0] + w[2, 0]) / 3.0,
+        (w[0, 1] + w[1, 1] + w[2, 1]) / 3.0,
+        (w[0, 2] + w[1, 2] + w[2, 2]) / 3.0,
+    )
+
+
+@njit(cache=True, forceinline=True)
+def _face(n, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Write into out the unit normal of the true surface at barycentric (x, y, z)."""
+    for c in range(3):
+        out[c] = x * n[0, c] + y * n[1, c] + z * n[2, c]
+    size = math.sqrt(dot(out, out))
+    for c in range(3):
+        out[c] /= size
+
+
+@njit(cache=True, forceinline=True)
+def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
+    """Write into k the direction in which a ray of the source travels at p; return its length."""
+    if far:
+        k[0], k[1], k[2] = -image[0], -image[1], -image[2]
+        return -dot(p, image)
+    k[0], k[1], k[2] = p[0] - image[0], p[1] - image[1], p[2] - image[2]
+    length = math.sqrt(dot(k, k))
+    k[0] /= length
+    k[1] /= length
+    k[2] /= length
+    return length
+
+
+@njit(cache=True, forceinline=True)
+def length_to(p, image, far):  # type: ignore[no-untyped-def]
+    if far:
+        return -dot(p, image)
+    return math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
+
+
+@njit(cache=True, forceinline=True)
+def largest(a, b, c):  # type: ignore[no-untyped-def]
+    if a * _ALIKE >= b and a * _ALIKE >= c:
+        return 0
+    return 1 if b * _ALIKE >= c else 2
+
+
+@njit(cache=True, forceinline=True)
+def distance(p, q):  # type: ignore[no-untyped-def]
+    return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
+
+
+@njit(cache=True, forceinline=True)
+def _seen(p, q, image, far):  # type: ignore[no-untyped-def]
+    """Return how long pq looks from the end of a way [m]."""
+    whole, along, size = 0.0, 0.0, 0.0
+    for c in range(3):
+        d = q[c] - p[c]
+        k = image[c] if far else 0.5 * (p[c] + q[c]) - image[c]
+        whole += d * d
+        along += d * k
+        size += k * k
+    return math.sqrt(max(whole - along * along / max(size, 1e-300), 0.0))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def edge_to_cut(  # type: ignore[no-untyped-def]
+    facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend, across
+):  # fmt: skip
+    """Return which edge (n,) of each patch to halve so that its two-way phase comes nearer to a quadratic; -1: none.
+
+    Args: phase [rad] that the quadratic through corners and mid-edges may miss the centre by; turn [rad] of the
+    normal; max_edge [m], as seen from the end of the first way if `across`; most_bend [rad] that an edge may bend.
+    """
+    out = np.empty(len(facet), np.int8)
+    p, normal, total = np.empty((7, 3)), np.empty((4, 3)), np.empty(7)
+    for i in range(len(facet)):
+        f, w = facet[i], bary[i]
+        for c in range(3):
+            d = (c + 1) % 3
+            place_on(v[f], b[f], w[c, 0], w[c, 1], w[c, 2], p[c])
+            _face(n[f], w[c, 0], w[c, 1], w[c, 2], normal[c])
+            place_on(
+                v[f], b[f], 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2]), p[3 + c]
+            )
+        x, y, z = middle(w)
+        place_on(v[f], b[f], x, y, z, p[6])
+        _face(n[f], x, y, z, normal[3])
+        low, high = np.inf, -np.inf
+        for q in range(7):
+            total[q] = wavenumber * (length_to(p[q], image, far) + length_to(p[q], out_image, out_far))
+            if q < 6:
+                low, high = min(low, total[q]), max(high, total[q])
+        bend0 = total[3] - 0.5 * (total[0] + total[1])
+        bend1 = total[4] - 0.5 * (total[1] + total[2])
+        bend2 = total[5] - 0.5 * (total[2] + total[0])
+        miss = total[6] - (total[0] + total[1] + total[2]) / 3.0 - (bend0 + bend1 + bend2) * (4.0 / 9.0)
+        bend0, bend1, bend2 = abs(bend0), abs(bend1), abs(bend2)
+        off = max(abs(miss) / phase, max(bend0, bend1, bend2) / most_bend)
+        turned = 0.0
+        for c in range(3):
+            turned = max(turned, distance(normal[c], normal[3]) / turn)
+        if across:
+            e0, e1, e2 = _seen(p[0], p[1], image, far), _seen(p[1], p[2], image, far), _seen(p[2], p[0], image, far)
+        else:
+            e0, e1, e2 = distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0])
+        limit = 1.0 + 0.5 * (high - low)
+        if off > limit:
+            out[i] = largest(bend0, bend1, bend2)
+        elif turned > limit:
+            # Where the phase bends no more, only a cut across the turn brings it down.
+            n0, n1 = distance(normal[0], normal[1]), distance(normal[1], normal[2])
+            out[i] = largest(n0, n1, distance(normal[2], normal[0]))
+        elif max(e0, e1, e2) > max_edge:
+            out[i] = largest(e0, e1, e2)
+        else:
+            out[i] = -1
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def halved(facet, bary, edge, jitter, level):  # type: ignore[no-untyped-def]
+    """Return (facet, bary) of both halves of patches cut from a point of `edge` to the corner opposite.
+
+    The point is the middle, or `jitter` of the edge off it, this way and that.
+    """
+    m = len(facet)
+    facets, barys = np.empty(2 * m, facet.dtype), np.empty((2 * m, 3, 3))
+    for i in range(m):
+        a, c = edge[i], (edge[i] + 1) % 3
+        # Which way is drawn by lot, the same lot in every run.
+        share = 0.5 + (jitter if ((facet[i] * 40503 >> 7) + level) & 1 else -jitter)
+        facets[2 * i], facets[2 * i + 1] = facet[i], facet[i]
+        copy_corners(barys[2 * i], bary[i])
+        copy_corners(barys[2 * i + 1], bary[i])
+        for x in range(3):
+            cut = share * bary[i, a, x] + (1.0 - share) * bary[i, c, x]
+            barys[2 * i, c, x], barys[2 * i + 1, a, x] = cut, cut
+    return facets, barys
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyped-def]
+    """Return points (n, 4, 3) [m], directions (n, 4, 3), lengths (n, 4) [m] and normals (n, 4, 3) of four rays.
+
+    They are those of the source to corners and centre of each patch; normals face the source on open sheets.
+    """
+    m = len(facet)
+    p, k, length, normal = np.empty((m, 4, 3)), np.empty((m, 4, 3)), np.empty((m, 4)), np.empty((m, 4, 3))
+    for i in range(m):
+        f, w = facet[i], bary[i]
+        for q in range(4):
+            if q == 3:
+                x, y, z = middle(w)
+            else:
+                x, y, z = w[q, 0], w[q, 1], w[q, 2]
+            place_on(v[f], b[f], x, y, z, p[i, q])
+            _face(n[f], x, y, z, normal[i, q])
+            length[i, q] = _ray(p[i, q], image, far, k[i, q])
+        if is_open[f] and dot(normal[i, 3], k[i, 3]) > 0.0:
+            for q in range(4):
+                for c in range(3):
+                    normal[i, q, c] = -normal[i, q, c]
+    return p, k, length, normal

@@ -1,0 +1,164 @@
+"""CFAR: what a cell must exceed so that noise alone does it with a stated probability.
+
+Training cells lie around the cell under test, beyond a guard, every second resolution cell, where windowed noise is
+nearly independent however much the transforms were padded; what correlation is left lowers the number of cells that
+the factor counts with. Rates wrap. Near an end of the range axis the cells that fall outside are taken from farther
+out on the other side, so that their number is the same everywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import beta, f, gamma
+
+from raychan.radar.side_lobes import correlation
+from raychan.records import RangeDoppler
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+METHODS = ("ca", "os")
+GUARD, TRAIN = (2, 2), (3, 3)
+"""Guard and training cells (rate, range) where none are asked for."""
+RANK = 0.5
+"""Share of the training cells below the ordered statistic: up to half of them may hold targets."""
+_STRIDE = 2  # resolution cells
+_GATHER = 1 << 22  # values gathered at a time
+_TINY = 1e-300
+_FLAT = 8  # power of the substitution that crowds the knots of integration where low probabilities arise
+
+
+@dataclass(frozen=True)
+class Grid:
+    """How a map's cells relate to its resolution."""
+
+    pad: tuple[int, int]
+    """Map cells per resolution cell (rate, range)."""
+    count: tuple[int, int]
+    """Resolution cells (rate, range)."""
+
+    @classmethod
+    def of(cls, rdmap: RangeDoppler) -> Grid:
+        """Return the grid of a map from its axes and resolutions."""
+        axes = ((rdmap.rate, rdmap.rate_resolution), (rdmap.range, rdmap.range_resolution))
+        pads = [max(1, round(res / (axis[1] - axis[0]))) if len(axis) > 1 else 1 for axis, res in axes]
+        counts = [max(1, len(axis) // pad) for (axis, _), pad in zip(axes, pads, strict=True)]
+        return cls((pads[0], pads[1]), (counts[0], counts[1]))
+
+
+@dataclass(frozen=True)
+class Training:
+    """Where the training cells lie and how many independent ones they are worth."""
+
+    offsets: Ints
+    """Map cells (t, 2) from the cell under test (rate, range)."""
+    reach: int
+    """Map cells by which an offset outside the range axis is moved outwards on the other side."""
+    worth: float
+    """Number of independent cells."""
+
+
+def _offsets(count: tuple[int, int], guard: tuple[int, int], train: tuple[int, int]) -> tuple[Ints, list[int]]:
+    """Return the training cells (t, 2) in resolution cells, and how many strides they reach along each axis."""
+    steps = []
+    for axis in (0, 1):
+        # On half the axis at most, so that no cell is taken twice, neither wrapped nor moved to the other side.
+        room = (count[axis] // (2 + 2 * axis) - 1) // _STRIDE
+        steps.append(max(0, min(guard[axis] // _STRIDE + train[axis], room)))
+    v, r = np.meshgrid(*(_STRIDE * np.arange(-n, n + 1) for n in steps), indexing="ij")
+    outside = (np.abs(v) > guard[0]) | (np.abs(r) > guard[1])
+    return np.stack([v[outside], r[outside]], axis=1), steps
+
+
+def fitting_guard(
+    count: tuple[int, int], guard: tuple[int, int] | None = None, train: tuple[int, int] | None = None
+) -> tuple[int, int] | None:
+    """Return the guard (rate, range) nearest to the wanted one that leaves training cells on a map of so many
+    resolution cells, or None if none does; guard and train as for `training`, None for those of `detect`."""
+    wanted, cells = guard or GUARD, train or TRAIN
+    for less in range(max(wanted) + 1):
+        some = max(0, wanted[0] - less), max(0, wanted[1] - less)
+        if len(_offsets(count, some, cells)[0]):
+            return some
+    return None
+
+
+def training(
+    grid: Grid, guard: tuple[int, int], train: tuple[int, int], windows: tuple[str, str] = ("hann", "hann")
+) -> Training:
+    """Return the training cells: guard in resolution cells, `train` cells on each side beyond it, both (rate, range).
+
+    Args: windows (rate, range) of the map. On a small map there are fewer. Raises: ValueError if there is none.
+    """
+    if min(*guard, *train) < 0:
+        raise ValueError(f"guard = {guard}, train = {train}: must not be negative")
+    cells, steps = _offsets(grid.count, guard, train)
+    if not len(cells):
+        raise ValueError(
+            f"guard = {guard}, train = {train}: no training cells on a map of {grid.count} resolution cells"
+        )
+    alike = np.ones((len(cells), len(cells)))
+    for axis in (0, 1):
+        apart = np.arange(2.0 * _STRIDE * steps[axis] + 1.0)
+        known = correlation(windows[axis], grid.count[axis], apart)
+        alike *= known[np.abs(cells[:, None, axis] - cells[None, :, axis])] ** 2
+    return Training(cells * np.array(grid.pad), _STRIDE * steps[1] * grid.pad[1], float(len(cells) ** 2 / alike.sum()))
+
+
+def factor(pfa: float, count: float, method: str = "ca", looks: int = 1) -> float:
+    """Return the threshold over the mean (ca) or the ordered statistic (os) of `count` independent training cells.
+
+    Args: looks, antennas whose powers are averaged in a cell. For one look ca is count (pfa^(-1/count) - 1), and os
+    solves pfa = prod_i (count - i) / (count - i + factor), i < RANK count.
+    Raises: ValueError on an unknown method or a pfa not between 0 and 1. Source: Finn & Johnson 1968; Rohling 1983.
+    """
+    if not 0.0 < pfa < 1.0:
+        raise ValueError(f"pfa = {pfa!r}: must lie between 0 and 1")
+    if method not in METHODS:
+        raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
+    if method == "ca":
+        return float(f.isf(pfa, 2 * looks, 2.0 * looks * count))
+    quantiles, weights = _ordered(count, looks)
+
+    def excess(log_factor: float) -> float:
+        return float(np.log(max(weights @ gamma.sf(np.exp(log_factor) * quantiles, looks), _TINY) / pfa))
+
+    return float(np.exp(brentq(excess, np.log(1e-6), np.log(1e12))))
+
+
+def bias(count: float, method: str, looks: int = 1) -> float:
+    """Return the mean of the statistic over the noise's mean power: 1 for ca."""
+    quantiles, weights = _ordered(count, looks)
+    return 1.0 if method == "ca" else float(weights @ quantiles) / looks
+
+
+def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Floats:
+    """Return the mean or ordered statistic (c,) of the training cells around map cells (c, 2)."""
+    rates, ranges = power.shape
+    out = np.empty(len(cells))
+    rank = max(1, round(RANK * len(ring.offsets))) - 1
+    for start in range(0, len(cells), max(1, _GATHER // len(ring.offsets))):
+        part = cells[start : start + max(1, _GATHER // len(ring.offsets))]
+        v = (part[:, :1] + ring.offsets[:, 0]) % rates
+        off = ring.offsets[:, 1]
+        r = part[:, 1:] + off
+        # Mirrored and moved on: beyond all cells that are there already.
+        r = np.where((r >= 0) & (r < ranges), r, part[:, 1:] - off - np.sign(off) * ring.reach) % ranges
+        values = power[v, r]
+        out[start : start + len(part)] = (
+            values.mean(axis=1) if method == "ca" else np.partition(values, rank, axis=1)[:, rank]
+        )
+    return out
+
+
+def _ordered(count: float, looks: int) -> tuple[Floats, Floats]:
+    """Return quantiles and weights to average over the ordered statistic of `count` sums of `looks` exponentials."""
+    knots, weights = np.polynomial.legendre.leggauss(200)
+    x = 0.5 * (knots + 1.0)
+    rank = max(1.0, RANK * count)
+    quantiles = gamma.ppf(beta.ppf(x**_FLAT, rank, count - rank + 1.0), looks)
+    return np.asarray(quantiles), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))

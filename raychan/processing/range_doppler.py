@@ -1,0 +1,69 @@
+"""Spectrum: dechirped samples become a range-Doppler map."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from raychan.radar.waveform import Waveform
+from raychan.radar.windows import window
+from raychan.records import Cube, RangeDoppler
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+
+
+def range_doppler(
+    cube: Cube,
+    waveform: Waveform,
+    range_window: str = "hann",
+    rate_window: str = "hann",
+    pad: tuple[int, int] = (2, 2),
+) -> RangeDoppler:
+    """Return the map of a frame, scaled so that the peak of a lone path reads its received power.
+
+    Ranges and rates are those at the middle of the frame (Waveform.centre): a beat holds slope * delay plus the
+    Doppler shift, and the latter is taken out row by row (folded rates keep their alias's shift). With real sampling
+    the axis ends at half the range, and the spectrum is doubled for its lost image; noise per cell is then 3 dB higher.
+    Args: windows by name (radar.windows); pad, how many times longer the (range, rate) transforms are made.
+    Raises: ValueError if the cube does not fit the waveform, or on an unknown window or a bad pad.
+    """
+    _, chirps, samples = cube.samples.shape
+    if (chirps, samples) != (waveform.n_chirps, waveform.n_samples):
+        wanted = f"{waveform.n_chirps} by {waveform.n_samples}"
+        raise ValueError(f"cube of {chirps} chirps by {samples} samples; the waveform has {wanted}")
+    if min(pad) < 1 or any(int(p) != p for p in pad):
+        raise ValueError(f"pad = {pad}: whole numbers from 1 on wanted")
+    taper_r, taper_v = window(range_window, samples), window(rate_window, chirps)
+    cells_r, cells_v = int(pad[0]) * samples, int(pad[1]) * chirps
+    image = 1.0 if waveform.complex_sampling else 2.0
+    workers = os.cpu_count() or 1
+
+    weight = (image * taper_v / taper_v.sum()).astype(np.float32)
+    weighted = cube.samples * weight[:, None]
+    rows = scipy.fft.ifft(weighted, cells_v, axis=1, norm="forward", workers=workers, overwrite_x=True)
+    rows = scipy.fft.fftshift(rows, axes=1)
+    doppler = (np.arange(cells_v) - cells_v // 2) / (cells_v * waveform.repetition)
+    t = (np.arange(samples) - 0.5 * (samples - 1)) * waveform.chirp_duration / samples
+    # exp(-j2 pi f_d t) in a sample is undone, row by row, so that what remains is the beat of the delay alone.
+    undone = np.exp(2j * np.pi * doppler[:, None] * t) * (taper_r / taper_r.sum())
+    rows *= undone.astype(np.complex64)
+    spectrum = scipy.fft.ifft(rows, cells_r, axis=2, norm="forward", workers=workers, overwrite_x=True)
+    spectrum = spectrum[..., : cells_r if waveform.complex_sampling else cells_r // 2]
+
+    gain = float((taper_r**2).sum() / taper_r.sum() ** 2 * (taper_v**2).sum() / taper_v.sum() ** 2)
+    metre_per_hertz = 0.5 * C0 / waveform.middle
+    return RangeDoppler(
+        range=np.arange(spectrum.shape[2]) * waveform.range_resolution / pad[0],
+        rate=doppler * metre_per_hertz,
+        spectrum=spectrum,
+        power=(spectrum.real.astype(np.float64) ** 2 + spectrum.imag.astype(np.float64) ** 2).mean(axis=0),
+        noise=cube.noise_power * gain * (1.0 if waveform.complex_sampling else 2.0),
+        range_resolution=waveform.range_resolution,
+        rate_resolution=metre_per_hertz / (chirps * waveform.repetition),
+        unambiguous_range=waveform.unambiguous_range,
+        unambiguous_rate=0.5 * metre_per_hertz / waveform.repetition,
+    )

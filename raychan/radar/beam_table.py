@@ -1,0 +1,62 @@
+"""Beam: how strong a radar is in each direction, so that tubes go where its antennas look."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from raychan.frames import direction
+from raychan.radar.beam_kernels import fields_towards
+
+Floats = NDArray[np.float64]
+
+_NARROW = 0.5  # rad: what is seen under a larger angle is not looked at
+_CELL = 1.5 * np.pi / 180.0  # rad: no farther off are the corners of a direction's cell of the table
+_STEPS = 180  # of elevation, and half of those of azimuth: no beam of use is narrower than a few of them
+
+
+class Beam:
+    """The field of the stronger of a radar's two antennas in each direction, relative to its strongest."""
+
+    def __init__(self, radar: Any) -> None:
+        azimuth = np.linspace(-np.pi, np.pi, 2 * _STEPS + 1)
+        elevation = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _STEPS + 1)
+        look = direction(*(x.ravel() for x in np.meshgrid(azimuth, elevation)))
+        shape = len(elevation), len(azimuth)
+        sizes = [np.linalg.norm(f(look), axis=1).reshape(shape) for f in (radar.tx_field, radar.rx_field)]
+        self.table = np.maximum.reduce([s / max(s.max(), 1e-300) for s in sizes])
+        self._look = look
+
+    def __call__(self, look: Floats) -> Floats:
+        """Return the relative field (n,) in unit directions (n, 3), world axes, away from the radar."""
+        found: Floats = fields_towards(np.ascontiguousarray(look), self.table)
+        return found
+
+    def dark(self, look: Floats, around: Floats) -> NDArray[np.bool_]:
+        """Tell about which unit directions (n, 3) the field is zero everywhere within angles (n,) [rad]."""
+        out = around < _NARROW
+        rows = np.flatnonzero(out)
+        if self._lit is None or not len(rows):
+            return np.zeros(len(look), bool)
+        reach = 2.0 * np.sin(0.5 * (around[rows] + _CELL))
+        # Without a bound the tree is searched through and through for what lies opposite.
+        out[rows] = self._lit.query(look[rows], distance_upper_bound=reach.max() + 1e-6)[0] > reach
+        return np.asarray(out)
+
+    @cached_property
+    def _lit(self) -> Any:
+        """The directions of the table in which there is some field, as a tree; None where that is all of them."""
+        some = self.table.ravel() > 0.0
+        return None if some.all() else cKDTree(self._look[some])
+
+
+def beam_of(radar: Any) -> Beam:
+    """Return the beam of a radar, made once and kept with it if it has a place `kept` for that."""
+    kept: dict[Any, Beam] = getattr(radar, "kept", {})
+    if Beam not in kept:
+        kept[Beam] = Beam(radar)
+    return kept[Beam]

@@ -1,0 +1,148 @@
+"""Cells: what each of many echoes brings to one cell of a range-Doppler map, and their sums."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from raychan.compile.jit import njit
+from raychan.em.phasor import unit_phasor
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _place(n, fine, cell):  # type: ignore[no-untyped-def]
+    """Return the point of a table below `cell`, the share of the next one, and the sign."""
+    period = math.floor(cell / n)
+    at = (cell - period * n) * fine
+    low = min(int(at), n * fine - 1)
+    # One period on, a response counted from the middle of an even window has turned its sign.
+    return low, at - low, 1.0 - 2.0 * ((int(period) * (n - 1)) & 1)
+
+
+@njit(cache=True, nogil=True)
+def periodic(table, n, fine, cells):  # type: ignore[no-untyped-def]
+    """Return a window's response at `cells` (m,) cells from its peak, linear between `fine` points a cell.
+
+    Args: table (n fine + 1,) one period of the response of n samples, its phase counted from their middle.
+    """
+    out = np.empty(len(cells), np.complex128)
+    for i in range(len(cells)):
+        low, share, sign = _place(n, fine, cells[i])
+        out[i] = sign * (table[low] + share * (table[low + 1] - table[low]))
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
+    """Return the range [m] at which an echo stands mid frame, and its phase there."""
+    carrier, slope, centre, swept, _, _, _, light = ramp
+    then = delay + 2.0 * rate * centre / light
+    cosine, sine = unit_phasor(carrier * (then - delay) + swept * then - 0.5 * slope * then**2)
+    return 0.5 * light * then, complex(cosine, sine)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
+    """Return the response of both windows to an echo that stands at a range [m] mid frame."""
+    _, slope, _, _, middle, repetition, resolution, light = ramp
+    samples, chirps, fine = sizes
+    tables, middles = along
+    off = rate - cell_rate
+    # Doppler is measured at the middle sample of the sweep.
+    apart = 2.0 * middle / light * off * chirps * repetition
+    # Each row of the map is freed of its own Doppler within the ramp, not of that of others.
+    away = (at_range - cell_range + off * middle / slope) / resolution
+    moved = rate * repetition / resolution
+    total = 0j
+    low, share, sign = _place(chirps, fine, apart)
+    for k in range(len(middles)):
+        # Within a piece the range response runs along a straight line.
+        at, part, turned = _place(samples, fine, away + moved * (middles[k] - 0.5 * (chirps - 1)))
+        held = tables[k, low, 0] + share * (tables[k, low + 1, 0] - tables[k, low, 0])
+        late = tables[k, low, 1] + share * (tables[k, low + 1, 1] - tables[k, low, 1])
+        level = across[at, 0] + part * (across[at + 1, 0] - across[at, 0])
+        lean = across[at, 1] + part * (across[at + 1, 1] - across[at, 1])
+        total += turned * (level * held + moved * lean * late)
+    return sign * total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
+    """Return what echoes (n,) bring to a cell, and the ranges (n,) [m] at which they stand.
+
+    Args: cell range [m] and rate [m/s]; ramp carrier, slope, time of the frame's middle, swept half [Hz], middle
+    frequency [Hz], repetition, range resolution [m], speed of light; sizes samples, chirps, fine; across (., 2) the
+    range response and its slope by cells; along (pieces, ., 2) the rate response of each piece of the frame and that
+    of its chirps' numbers, counted from its middle chirp, and these middles (pieces,).
+    """
+    waves, ranges = np.empty(delay.size, np.complex128), np.empty(delay.size)
+    for i in range(delay.size):
+        ranges[i], turn = _stands(delay[i], rate[i], ramp)
+        waves[i] = amplitude[i] * turn * _answer(ranges[i], rate[i], cell[0], cell[1], ramp, sizes, across, along)
+    return waves, ranges
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type: ignore[no-untyped-def]
+    weight = wave.real * wave.real + wave.imag * wave.imag
+    total[c, g] += wave
+    size[c, 1, g] += weight
+    size[c, 2, g] += weight * at_range
+    size[c, 3, g] += weight * rate
+    if weight > most[c, g]:
+        strongest[c, g], most[c, g] = i, weight
+
+
+@njit(cache=True, forceinline=True)
+def _apart(cells, n):  # type: ignore[no-untyped-def]
+    """Return how far a response over n cells is from its peak, or that of a period on."""
+    if cells > n:
+        cells -= n * math.floor(cells / n)
+    return min(cells, n - cells)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sums_in_cells(  # type: ignore[no-untyped-def]
+    group, amplitude, delay, rate, cells, least, beyond, total, size, strongest, ramp, sizes, across, along
+):
+    """Write the `cell_sums` (c, ...) of what echoes (n,) bring to each of several cells (c, 2).
+
+    Args: least (c,) that an echo brings to a cell and counts; beyond (s,) and (2, m) the largest that range and rate
+    responses are so many cells from the peak and farther; else as for `cell_waves` and `cell_sums`.
+    """
+    samples, chirps, _ = sizes
+    _, slope, _, _, middle, repetition, resolution, light = ramp
+    over_ranges, over_rates = beyond
+    per_rate = 2.0 * middle / light * chirps * repetition
+    most = np.full(strongest.shape, -1.0)
+    total[:], size[:], strongest[:] = 0.0, 0.0, -1
+    for i in range(delay.size):
+        at_range, turn = _stands(delay[i], rate[i], ramp)
+        turn *= amplitude[i]
+        moved, weight = abs(rate[i]) * repetition / resolution, abs(amplitude[i])
+        for c in range(len(cells)):
+            size[c, 0, group[i]] += 1.0
+            off = rate[i] - cells[c, 1]
+            near = _apart(abs(at_range - cells[c, 0] + off * middle / slope) / resolution, samples)
+            near, slow = max(near - 0.5 * moved * chirps, 0.0), _apart(abs(off) * per_rate, chirps)
+            held, late = over_rates[0, int(slow)], over_rates[1, int(slow)]
+            if weight * over_ranges[int(near)] * (held + moved * late) < least[c]:
+                continue
+            wave = turn * _answer(at_range, rate[i], cells[c, 0], cells[c, 1], ramp, sizes, across, along)
+            _count(c, group[i], i, wave, at_range, rate[i], total, size, strongest, most)
+
+
+@njit(cache=True, nogil=True)
+def cell_sums(group, count, waves, ranges, rates):  # type: ignore[no-untyped-def]
+    """Return sums of waves (1, g), sizes (1, 4, g): how many, their powers |wave|^2, and these times range and rate,
+    and which is the strongest (1, g) of each group, -1 if there is none.
+
+    Args: group (n,) of each echo, below `count`.
+    """
+    total, size = np.zeros((1, count), np.complex128), np.zeros((1, 4, count))
+    strongest, most = np.full((1, count), -1), np.full((1, count), -1.0)
+    for i in range(group.size):
+        size[0, 0, group[i]] += 1.0
+        _count(0, group[i], i, waves[i], ranges[i], rates[i], total, size, strongest, most)
+    return total, size, strongest

@@ -1,0 +1,84 @@
+"""`model.mode = "auto"`: which mechanisms a tolerance needs, found with a coarse launch of all of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.processing.range_doppler import range_doppler
+from raychan.radar.radar import Sensor
+from raychan.records import DIFFRACT, TRANSMIT, Paths, take
+from raychan.signal.baseband import synthesize
+from raychan.units import db, undb
+
+_LEVEL = 1e-4  # of the sum of all amplitudes: what levels of whole mechanisms are told to
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the model shall hold, and why."""
+
+    bounces: int
+    transmissions: int
+    diffraction: bool
+    why: tuple[str, ...]
+
+
+def interactions(paths: Paths) -> NDArray[np.int64]:
+    """Return the number of interactions (n,) of each path, thin layers passed not counted."""
+    kind = paths.ways.kind
+    return np.asarray(((kind > 0) & (kind != TRANSMIT)).sum(axis=1))[paths.way]
+
+
+def layers(paths: Paths) -> NDArray[np.int64]:
+    """Return the number of thin layers (n,) that each path passes."""
+    return np.asarray((paths.ways.kind == TRANSMIT).sum(axis=1))[paths.way]
+
+
+def peak(paths: Paths, rows: NDArray[np.bool_], sensor: Sensor, settings: Any) -> float:
+    """Return the strongest cell [W] of the noise-free map of some of the paths."""
+    if not rows.any():
+        return 0.0
+    cube = synthesize(take(paths, rows), dataclasses.replace(sensor, noise=False), tolerance=_LEVEL)
+    rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
+    return float(rdmap.power.max())
+
+
+def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_db: float) -> Choice:
+    """Return the fewest bounces and layers that keep every detectable return within the tolerance.
+
+    Args: paths of a launch with all mechanisms; noise [W] of a cell of the map (0: 80 dB under the strongest cell
+    counts). A mechanism counts where its strongest cell could change the weakest detectable return by the tolerance
+    [dB].
+    """
+    everything = np.ones(len(paths.delay), bool)
+    weakest = noise * undb(settings.min_snr_db) if noise > 0.0 else peak(paths, everything, sensor, settings) * 1e-8
+    limit = float(weakest) * (10.0 ** (tolerance_db / 20.0) - 1.0) ** 2
+    why, chosen = [], []
+    if limit == 0.0:
+        return Choice(1, 0, False, ("nothing returns, and no noise is there to measure it by: nothing is needed",))
+    for name, count, least in (
+        ("interactions", interactions(paths), 1),
+        ("thin layers passed", layers(paths), 0),
+    ):
+        keep = least
+        for n in range(least, int(count.max(initial=least)) + 1):
+            level = peak(paths, count == n, sensor, settings)
+            needed = level > limit
+            keep = n if needed else keep
+            if level > 0.0:
+                say = "needed" if needed else "not needed"
+                why.append(
+                    f"{n} {name}: strongest cell {db(level / limit):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
+                )
+        chosen.append(keep)
+    level = peak(paths, (paths.ways.kind == DIFFRACT).any(axis=1)[paths.way], sensor, settings)
+    say = "needed" if level > limit else "not needed"
+    why.append(
+        f"diffraction: strongest cell {db(max(level / limit, 1e-30)):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
+    )
+    return Choice(chosen[0], chosen[1], level > limit, tuple(why))

@@ -1,0 +1,134 @@
+"""Tell: what a run says, a line each, of detections that are not converged or folded, and of what it left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from raychan.records import RangeDoppler
+from raychan.run.result import ExplainedDetections, Result
+from raychan.run.solver import Stats
+from raychan.run.unmodelled import Entry
+from raychan.world.geometry import Surface
+
+_NAMED = 5  # detections that a line names by their numbers
+_LEAST_DB = 0.5  # above the weakest detection: what a whole number of dB shows as more than 0
+
+
+def counts(found: ExplainedDetections, tolerance_db: float) -> dict[str, Any]:
+    """Return the counts of summary.json; `reached_db` is the worst error that is a figure."""
+    known = found.error_db[found.converged]
+    return {
+        "reached_db": float(known.max(initial=0.0)),
+        "over_tolerance": int((known > tolerance_db).sum()),
+        "not_converged": int((~found.converged).sum()),
+        "folded": int(found.folded.sum()),
+    }
+
+
+def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler) -> list[str]:
+    """Return a line if detections are not converged, and one if some are folded."""
+    said = []
+    if (~found.converged).any():
+        verb = _verb(~found.converged)
+        said.append(
+            f"{_of(~found.converged)} {verb} not converged ({_numbers(~found.converged)}): two launches differ there "
+            f"by about as much as they find, so the error is unknown; a smaller tolerance than {tolerance_db:g} dB "
+            "(--tolerance, model.tolerance_db) may help"
+        )
+    if found.folded.any():
+        first = int(np.flatnonzero(found.folded)[0])
+        shown, true = (
+            _place(found.range[first], found.rate[first]),
+            _place(found.true_range[first], found.true_rate[first]),
+        )
+        said.append(
+            f"{_of(found.folded)} {_verb(found.folded)} folded ({_numbers(found.folded)}): beyond "
+            f"{rdmap.unambiguous_range:.4g} m or {rdmap.unambiguous_rate:.4g} m/s an echo shows elsewhere; "
+            f"number {first + 1} is at {true}, shown at {shown}"
+        )
+    return said
+
+
+def noted(found: ExplainedDetections, tolerance_db: float, ledger: dict[str, Any]) -> list[str]:
+    """Return the lines that stand below the table of detections: on the tolerance, and on what was left out."""
+    said = []
+    stated = counts(found, tolerance_db)
+    n, over = len(found.range), stated["over_tolerance"]
+    if over or stated["not_converged"]:
+        within = n - over - stated["not_converged"]
+        worst = f"; the largest error stated is {stated['reached_db']:.1f} dB" if over else ""
+        said.append(f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{worst}")
+    above = sorted(_above(ledger), reverse=True)
+    if above:
+        listed = ", ".join(f"{name} {bound}{level:+.0f} dB" for level, name, bound in above)
+        said.append(f"left out, above the weakest detection: {listed} (see summary.json)")
+    return said
+
+
+def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: dict[str, Any]) -> list[str]:
+    """Return all lines on detections."""
+    return [*warned(found, tolerance_db, rdmap), *noted(found, tolerance_db, ledger)]
+
+
+def uncut(surface: Surface, *launches: Stats) -> tuple[str, ...]:
+    """Return a line if launches had more tubes on some bodies than may be cut."""
+    left = np.zeros(len(surface.facets.role), np.int64)
+    for stats in launches:
+        left[: len(stats.uncut)] += stats.uncut
+    if not left.any():
+        return ()
+    worst, facets = int(np.argmax(left)), surface.facets
+    area = float(surface.area[facets.body == worst].sum())
+    body = f"body '{facets.body_names[worst]}': {int(left[worst]):,} tubes on its {area:.3g} m2"
+    return (
+        f"{body} were left coarser than asked for, too many hide parts of each other or are too large: errors may "
+        "exceed those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit",
+    )
+
+
+def notes(result: Result) -> list[str]:
+    """Return the lines of a result that stand below its table; its warnings hold them too."""
+    return noted(result.detections, float(result.stats.get("tolerance_db", math.inf)), result.ledger)
+
+
+def findings(result: Result) -> list[str]:
+    """Return all lines that are told of a result's detections."""
+    tolerance = float(result.stats.get("tolerance_db", math.inf))
+    return told(result.detections, tolerance, result.rdmap, result.ledger)
+
+
+def marks(found: ExplainedDetections) -> str:
+    """Return how many detections are marked, as ', 2 not converged, 1 folded'; nothing where none is."""
+    counted = {"not converged": int((~found.converged).sum()), "folded": int(found.folded.sum())}
+    return "".join(f", {n} {word}" for word, n in counted.items() if n)
+
+
+def _above(ledger: dict[str, Any]) -> Iterable[tuple[float, str, str]]:
+    """Give the level [dB] and name of each mechanism that the ledger puts above the weakest detection."""
+    for name, entry in ledger.items():
+        if isinstance(entry, Entry) and isinstance(entry.level_db, float) and entry.level_db >= _LEAST_DB:
+            yield entry.level_db, name, "at most " if entry.kind == "bound" else ""
+
+
+def _of(chosen: Any) -> str:
+    return f"{int(chosen.sum())} of {len(chosen)} detection{'' if len(chosen) == 1 else 's'}"
+
+
+def _verb(chosen: Any) -> str:
+    return "is" if chosen.sum() == 1 else "are"
+
+
+def _numbers(chosen: Any) -> str:
+    """Return the numbers of detections, counted from 1 as the table does."""
+    rows = np.flatnonzero(chosen) + 1
+    more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
+    return f"number{'' if len(rows) == 1 else 's'} {', '.join(map(str, rows[:_NAMED]))}{more}"
+
+
+def _place(range: float, rate: float) -> str:
+    speed = "an unknown rate" if np.isnan(rate) else f"{rate:+.2f} m/s"
+    return f"{range:.2f} m, {speed}"

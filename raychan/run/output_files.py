@@ -1,0 +1,282 @@
+"""Writing files and folders so that either all of it is there or nothing changed.
+
+All is built beside its place and renamed into it at once. What a killed process left beside is put away by the next
+writer of the same place: everything under construction is locked by its process, so what is not locked is stale.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+from raychan.run.atomic_swap import MARK, UNFINISHED, exchange, held, is_dead, is_mark, let_go, locked, stale_of
+
+
+class StoreError(OSError):
+    """A result could not be written or read; says which and why."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a command writes into a folder of its own, as patterns of names.
+
+    names: all that it may write; an earlier run's go away when a new one's come. signs: those of which at least one
+    stands in every such folder; in a folder without any, files of these names are someone else's and are not touched.
+    A pattern 'a_*/' is a folder that holds the same.
+    """
+
+    names: tuple[str, ...]
+    signs: tuple[str, ...]
+
+    def owns(self, entry: Path) -> bool:
+        """Tell whether a file, or a folder with all that it holds, has the name of something of ours."""
+        if is_mark(entry):
+            return is_dead(entry)
+        if entry.is_dir() and not entry.is_symlink():
+            return self.nests(entry) and all(map(self.owns, entry.iterdir()))
+        return any(fnmatch(entry.name, name) for name in self.names)
+
+    def nests(self, entry: Path) -> bool:
+        """Tell whether a folder within is one that holds the same."""
+        return any(name.endswith("/") and fnmatch(entry.name, name[:-1]) for name in self.names)
+
+    def signed(self, folder: Path) -> bool:
+        """Tell whether a folder is one that the command wrote."""
+        return any(any(folder.glob(sign)) for sign in self.signs)
+
+
+@contextmanager
+def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
+    """Give a temporary directory; when the block ends well it becomes `out`, all at once.
+
+    Whatever goes wrong inside, Ctrl-C included, the temporary directory goes away and `out` is as it was. Files in an
+    old `out` that are not ours stay there. Where `out` cannot be renamed (a mount, the current directory), the files
+    come into it one by one. Raises: StoreError where the disk refuses, or where a file of another's is in the way.
+    """
+    out = Path(out).resolve()
+    made = _make_parents(out.parent)
+    try:
+        with _told(out):
+            _clear_stale(out, contents)
+            _check(out, contents)
+            room, stage, lock = _stage(out)
+        try:
+            with _told(out, stage):
+                yield stage
+            with _told(out), locked(room):
+                _check(out, contents)
+                _come_in(stage, out, contents)
+            made = []
+        finally:
+            let_go(lock)
+            with locked(room):
+                _put_away(stage, out, contents)
+    finally:
+        for directory in made:
+            if directory.is_dir() and not any(directory.iterdir()):
+                directory.rmdir()
+
+
+def write_whole(path: str | Path, content: bytes | memoryview) -> Path:
+    """Write a file so that it is there whole or as it was before. Raises: StoreError where the disk refuses."""
+    write_together({Path(path): content})
+    return Path(path)
+
+
+def write_together(files: Mapping[Path, bytes | memoryview]) -> None:
+    """Write several files whole, and none where the disk has no room for all. Raises: StoreError."""
+    with ExitStack() as ready:
+        parts = [(ready.enter_context(_part(path.resolve(), content)), path) for path, content in files.items()]
+        for part, path in parts:
+            with _told(path):
+                if part is not None:
+                    os.replace(part, path.resolve())
+
+
+@contextmanager
+def _part(path: Path, content: bytes | memoryview) -> Iterator[str | None]:
+    """Give a file's content beside it; None for a device or a pipe, which takes the bytes and is not replaced."""
+    part, lock = None, None
+    try:
+        with _told(path):
+            if path.is_dir():
+                raise StoreError(f"{path}: is a directory; a file is wanted")
+            if path.exists() and not path.is_file():
+                path.write_bytes(content)
+            else:
+                with locked(path.parent):
+                    _sweep(path.parent, path.name)
+                    handle, part = tempfile.mkstemp(prefix=f".{path.name}{MARK}", dir=path.parent)
+                    lock = held(part)
+                with os.fdopen(handle, "wb") as file:
+                    file.write(content)
+                os.chmod(part, 0o666 & ~_umask())
+        yield part
+    finally:
+        let_go(lock)
+        if part is not None:
+            Path(part).unlink(missing_ok=True)
+
+
+def csv_bytes(rows: Iterable[Iterable[Any]]) -> bytes:
+    """Return rows, the heads among them, as the bytes of a CSV file."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()
+
+
+@contextmanager
+def _told(path: Path, stage: Path | None = None) -> Iterator[None]:
+    """Turn what the disk says into a sentence that names the path, not the stage that is built in its stead."""
+    try:
+        yield
+    except StoreError as error:
+        if stage is None:
+            raise
+        raise StoreError(str(error).replace(str(stage), str(path))) from error
+    except OSError as error:
+        raise StoreError(f"{path}: cannot write: {error.strerror or error}") from error
+
+
+def _check(out: Path, what: Contents) -> None:
+    """Refuse to touch what someone else put where our files would stand."""
+    if not out.is_dir():
+        if out.exists():
+            raise StoreError(f"{out}: is a file; a directory is wanted")
+        return
+    signed = what.signed(out)
+    for entry in (e for e in out.iterdir() if not is_mark(e)):
+        plain = entry.is_symlink() or not entry.is_dir()
+        if not plain and any(fnmatch(entry.name, n) for n in what.names if not n.endswith("/")):
+            raise StoreError(f"{entry}: is a directory where a file is to be; move it away or name another folder")
+        if plain and not signed and what.owns(entry):
+            raise StoreError(
+                f"{entry}: stands there, and {out} is no folder of results; move it away or name another folder"
+            )
+
+
+def _stage(out: Path) -> tuple[Path, Path, int | None]:
+    """Make a folder to build in, beside `out` or, where that cannot be, within; return where, the folder, its lock."""
+    within = out.is_dir() and (os.path.ismount(out) or not os.access(out.parent, os.W_OK))
+    room = out if within else out.parent
+    with locked(room):
+        stage = Path(tempfile.mkdtemp(prefix=f".{out.name}{MARK}", dir=room))
+        stage.chmod(0o777 & ~_umask())
+        (stage / UNFINISHED).touch()
+        return room, stage, held(stage / UNFINISHED)
+
+
+def _come_in(stage: Path, out: Path, what: Contents) -> None:
+    """Put a finished stage in the place of `out`; what was there is then in the stage's place."""
+    if not out.exists():
+        (stage / UNFINISHED).unlink()
+        os.rename(stage, out)
+    elif stage.parent == out or out == Path.cwd() or not exchange(stage, out):
+        _file_by_file(stage, out, what)
+    else:
+        (out / UNFINISHED).unlink()
+
+
+def _file_by_file(stage: Path, out: Path, what: Contents) -> None:
+    """Move the files of a stage into a folder that cannot be renamed; ours of an earlier run go first."""
+    _strip(out, what)
+    _move(stage, out)
+
+
+def _strip(folder: Path, what: Contents) -> None:
+    """Remove what is ours from a folder, the signs first: without them it is no result."""
+    for old in sorted(folder.iterdir(), key=lambda e: not any(fnmatch(e.name, s) for s in what.signs)):
+        if what.owns(old):
+            _remove(old)
+        elif old.is_dir() and what.nests(old):
+            _strip(old, what)
+
+
+def _move(stage: Path, out: Path) -> None:
+    for file in stage.iterdir():
+        there = out / file.name
+        if file.is_dir() and there.is_dir():
+            _move(file, there)
+        elif file.name != UNFINISHED:
+            os.replace(file, there)
+
+
+def _put_away(stage: Path, out: Path, what: Contents) -> None:
+    """Remove what is in a stage's place: one that came to nothing, or the folder that it replaced, whose foreign files
+    go on into the new one."""
+    if not stage.is_dir():
+        return
+    if not (stage / UNFINISHED).exists():
+        if not out.exists() and any(stage.iterdir()):
+            os.rename(stage, out)  # a process was killed while it replaced the folder
+            return
+        _carry(stage, out, what)
+    # The mark goes last: whoever is killed on the way leaves a folder that still says what it is.
+    for entry in sorted(stage.iterdir(), key=lambda e: e.name == UNFINISHED):
+        _remove(entry)
+    stage.rmdir()
+
+
+def _carry(old: Path, new: Path, what: Contents) -> None:
+    """Move what is not ours from a folder that was replaced into the new one; mark what is left as worth nothing."""
+    for entry in old.iterdir():
+        there = new / entry.name
+        if what.owns(entry):
+            continue
+        if entry.is_dir() and not entry.is_symlink() and what.nests(entry):
+            there.mkdir(exist_ok=True)
+            _carry(entry, there, what)
+            continue
+        while os.path.lexists(there):
+            there = there.with_name(f"{there.name}.kept")
+        os.rename(entry, there)
+    (old / UNFINISHED).touch()
+
+
+def _clear_stale(out: Path, what: Contents) -> None:
+    """Put away what killed processes left of building `out`; a folder that one was about to replace comes back."""
+    with locked(out.parent):
+        for stale in stale_of(out.parent, out.name):
+            if stale.is_dir():
+                _put_away(stale, out, what)
+    if out.is_dir():
+        (out / UNFINISHED).unlink(missing_ok=True)
+        _sweep(out, out.name)
+
+
+def _sweep(folder: Path, name: str) -> None:
+    """Remove what killed processes left in a folder of building `name`."""
+    for stale in stale_of(folder, name):
+        _remove(stale)
+
+
+def _remove(entry: Path) -> None:
+    if entry.is_dir() and not entry.is_symlink():
+        shutil.rmtree(entry, ignore_errors=True)
+    else:
+        entry.unlink(missing_ok=True)
+
+
+def _make_parents(directory: Path) -> list[Path]:
+    """Make a directory and return those that were missing, innermost first."""
+    missing = [d for d in (directory, *directory.parents) if not d.exists()]
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{directory}: cannot be made: {error.strerror or error}") from error
+    return missing
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,177 @@
+"""What a range-Doppler processor answers to a path, at any distance from its cell."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.parallel import in_two
+from raychan.radar.waveform import Waveform
+from raychan.radar.windows import window
+from raychan.run.cell_sums import cell_waves, periodic, sums_in_cells
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complexfloating[Any, Any]]
+Sums = tuple[Complexes, Floats, NDArray[np.int64]]
+
+_FINE = 64  # points of the tabulated window response per resolution cell
+_LEAST = 1e-3  # of a cell's amplitude: what all paths that are left out may bring to it
+_STEP = 0.25  # range cells that a path may move within one piece of the frame
+
+
+class Response:
+    """Response of both windows, side lobes and aliases included, 1 at the peak; migration by pieces of the frame.
+
+    With real sampling each echo has a mirror image, its conjugate at minus its range and minus its rate, which shows
+    where the range is folded.
+    """
+
+    def __init__(self, waveform: Waveform, range_window: str, rate_window: str) -> None:
+        self.waveform = waveform
+        self._range = window(range_window, waveform.n_samples)
+        self._rate = window(rate_window, waveform.n_chirps)
+        self._pieces: dict[int, tuple[Complexes, Floats]] = {}
+
+    @cached_property
+    def _range_tables(self) -> Complexes:
+        """The range response and its slope by range cells."""
+        table = _table(self._range / self._range.sum())
+        return np.stack([table, np.gradient(table, 1.0 / _FINE)], axis=1)
+
+    def in_profile(self, delay: Floats, range: float) -> tuple[Complexes, Floats]:
+        """Return the response (n,) of the range window to paths of delays (n,) [s] at a range [m], their phase at mid
+        sweep of the frame's first ramp in, and the ranges (n,) [m] at which they stand."""
+        wave, at = self.waveform, 0.5 * C0 * delay
+        turn = wave.swept * delay - 0.5 * wave.slope * delay**2
+        cells = np.ascontiguousarray((at - range) / wave.range_resolution)
+        return periodic(self._range_tables[:, 0], len(self._range), _FINE, cells) * np.exp(-2j * np.pi * turn), at
+
+    def in_cell(
+        self, amplitude: Complexes, delay: Floats, rate: Floats, range: float, cell_rate: float
+    ) -> tuple[Complexes, Floats]:
+        """Return what paths (n,) bring to a cell of the map, and the ranges (n,) [m] at which they stand mid frame.
+
+        Args: amplitude, delay [s] at the frame's start and rate [m/s] of paths; range [m] and rate [m/s] of the cell.
+        """
+        wave, at = self.image_in_cell(amplitude, delay, rate, range, cell_rate)
+        if self.mirrors:
+            wave = wave + self.image_in_cell(amplitude, delay, rate, -range, -cell_rate)[0].conj()
+        return wave, at
+
+    def image_in_cell(
+        self, amplitude: Complexes, delay: Floats, rate: Floats, range: float, cell_rate: float
+    ) -> tuple[Complexes, Floats]:
+        """Return what `in_cell` does, of the paths without their mirror images; the mirror images bring to a cell the
+        conjugate of what the paths bring to the cell at minus its range and minus its rate."""
+        found: tuple[Complexes, Floats] = cell_waves(amplitude, delay, rate, (range, cell_rate), *self._tables(rate))
+        return found
+
+    def in_cells(
+        self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
+    ) -> Sums:
+        """Return the sums by groups of what paths (n,) bring to cells of the map: see run.cell_sums.cell_sums.
+
+        Args: group (n,) of each path, below `count`; cells (c, 3), each range [m], rate [m/s] and amplitude: what all
+        paths together bring is known to 1e-3 of that at least; else as for `in_cell`.
+        """
+        found = self._images_in_cells(group, count, amplitude, delay, rate, cells)
+        if not self.mirrors:
+            return found
+        mirrored = self._images_in_cells(group, count, amplitude, delay, rate, cells * (-1.0, -1.0, 1.0))
+        strongest = np.where(mirrored[1][:, 1] > found[1][:, 1], mirrored[2], found[2])
+        size = found[1] + mirrored[1] * [[0.0], [1.0], [1.0], [1.0]]  # each path is counted once
+        return found[0] + mirrored[0].conj(), size, strongest
+
+    def _images_in_cells(
+        self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
+    ) -> Sums:
+        shape = len(cells), count
+        total, size, strongest = np.empty(shape, complex), np.empty((shape[0], 4, count)), np.empty(shape, np.int64)
+        least = _LEAST * cells[:, 2] / max(len(rate), 1)
+        tables = self._tables(rate)
+        in_range = np.abs(self._range_tables).max(axis=1)
+        beyond = _beyond(in_range), np.stack([_beyond(x) for x in np.abs(tables[3][0]).sum(axis=0).T])
+
+        def some(at: slice) -> None:
+            sums_in_cells(
+                group, amplitude, delay, rate, cells[at], least[at], beyond, total[at], size[at], strongest[at],
+                *tables,
+            )  # fmt: skip
+
+        in_two(len(cells), some, least=2)
+        return total, size, strongest
+
+    def _tables(self, rate: Floats) -> tuple[Any, ...]:
+        """Return ramp, sizes and tables for `cell_waves`, in as many pieces of the frame as the fastest path needs."""
+        wave, count = self.waveform, len(self._rate)
+        moved = float(np.abs(rate).max(initial=0.0)) * wave.repetition / wave.range_resolution * count
+        pieces = max(1, min(count, int(np.ceil(moved / _STEP))))
+        if pieces not in self._pieces:
+            self._pieces[pieces] = self._rate_tables(pieces)
+        ramp = (
+            wave.carrier,
+            wave.slope,
+            wave.centre,
+            wave.swept,
+            wave.middle,
+            wave.repetition,
+            wave.range_resolution,
+            C0,
+        )
+        return ramp, (len(self._range), count, _FINE), self._range_tables, self._pieces[pieces]
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether echoes have mirror images."""
+        return not self.waveform.complex_sampling
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Ranges [m] and rates [m/s] after which the map repeats; with real sampling it shows half of the former."""
+        wave = self.waveform
+        return wave.range_resolution * wave.n_samples, 0.5 * C0 / (wave.middle * wave.repetition)
+
+    @property
+    def resolutions(self) -> tuple[float, float]:
+        """Resolution cells of range [m] and rate [m/s]."""
+        return self.waveform.range_resolution, self.periods[1] / self.waveform.n_chirps
+
+    @property
+    def drift(self) -> float:
+        """Range by which a path shows too far for each m/s that it recedes faster than its cell [s]."""
+        return self.waveform.middle / self.waveform.slope
+
+    def stands(self, delay: Floats, rate: Floats, mid_frame: bool) -> tuple[Floats, Floats]:
+        """Return the ranges (n,) [m] at which paths stand, mid frame or at its start, and their rates (n,) [m/s]."""
+        return 0.5 * C0 * delay + (rate * self.waveform.centre if mid_frame else 0.0), rate
+
+    def _rate_tables(self, pieces: int) -> tuple[Complexes, Floats]:
+        """Return the rate response of each piece of the frame and that of its chirps' numbers, counted from its middle
+        (pieces, ., 2), and the middles (pieces,)."""
+        chirps, tables, middles = np.arange(len(self._rate)), [], []
+        for part in np.array_split(chirps, pieces):
+            held = np.zeros(len(chirps))
+            held[part] = self._rate[part] / self._rate.sum()
+            tables.append(np.stack([_table(held), _table(held * (chirps - part.mean()))], axis=1))
+            middles.append(part.mean())
+        return np.array(tables), np.array(middles)
+
+
+def _table(weights: Floats) -> Complexes:
+    """Return the response of weights over its period of len(weights) cells, _FINE points a cell."""
+    n = len(weights)
+    raw = np.fft.fft(weights, n * _FINE)
+    # The phase is counted from the middle of the samples, where a symmetric window is real.
+    return np.append(raw, raw[0]) * np.exp(1j * np.pi * (n - 1) / n * np.arange(n * _FINE + 1) / _FINE)
+
+
+def _beyond(size: Floats) -> Floats:
+    """Return the largest that a response, given as a table of its sizes, is (s,) cells from the peak and farther."""
+    n = len(size) // _FINE
+    by_cell = np.maximum.reduceat(size, np.arange(0, n * _FINE, _FINE))
+    by_cell = np.maximum(by_cell, by_cell[::-1])[: n // 2 + 1]
+    return np.asarray(np.maximum.accumulate(by_cell[::-1])[::-1])

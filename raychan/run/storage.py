@@ -1,0 +1,207 @@
+"""Results on disk: result.nc (netCDF-4), detections.csv, summary.json."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.radar.waveform import Waveform
+from raychan.run.netcdf import GROUPS, as_netcdf, read_record
+from raychan.run.output_files import Contents, StoreError, csv_bytes
+from raychan.run.result import Contribution, Explanation, Receiver, Result
+from raychan.units import dbm
+
+FORMAT = 2
+PICTURES = ("scene.png", "profile.png", "rdmap.png")
+CONTENTS = Contents(
+    names=("result.nc", "detections.csv", "summary.json", *PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
+    signs=("result.nc", "summary.json", "frame_[0-9][0-9][0-9][0-9]*/result.nc"),
+)
+"""What `raychan run` writes into its folder; a sequence has a folder of the same for each frame."""
+_CHANGED = "# changed: "  # how a scene notes overridden keys below its text
+COLUMNS = (
+    "range_m",
+    "range_rate_mps",
+    "speed_mps",
+    "azimuth_deg",
+    "snr_db",
+    "power_dbm",
+    "error_db",
+    "converged",
+    "folded",
+    "true_range_m",
+    "true_range_rate_mps",
+    "label",
+    "bodies",
+)
+_JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
+
+
+def save_result(result: Result, directory: str | Path) -> None:
+    """Write result.nc, detections.csv and summary.json into an existing directory.
+
+    Use inside `files.staging`, which makes the whole appear at once. Raises: StoreError where the disk refuses.
+    """
+    directory = Path(directory)
+    try:
+        (directory / "result.nc").write_bytes(as_netcdf(result, _attrs(result)))
+        (directory / "detections.csv").write_bytes(csv_bytes([COLUMNS, *rows(result)]))
+        (directory / "summary.json").write_text(json.dumps(summary(result), indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{directory}: cannot write the result: {error.strerror or error}") from error
+
+
+def load_result(path: str | Path) -> Result:
+    """Return the Result stored in a directory or a result.nc; its scene is read again from the text if that can be.
+
+    Raises: StoreError if there is no such file or it is not one of ours.
+    """
+    import xarray as xr
+
+    path = Path(path)
+    file = path / "result.nc" if path.is_dir() else path
+    if not file.is_file():
+        raise StoreError(f"{file}: no such file; `raychan run` writes it")
+    try:
+        with xr.open_dataset(file, engine="h5netcdf") as root:
+            attrs = dict(root.attrs)
+        if int(attrs.get("format", 0)) != FORMAT:
+            raise StoreError(f"{file}: not a result of this version of raychan")
+        records = {name: read_record(file, name, kind) for name, kind in GROUPS.items()}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        if isinstance(error, StoreError):
+            raise
+        raise StoreError(f"{file}: cannot be read as a raychan result: {error}") from error
+    held = {name: json.loads(attrs[name]) for name in _JSON}
+    receiver = held["receiver"] | {"waveform": Waveform(**held["receiver"]["waveform"])}
+    receiver["background"] = tuple(receiver["background"])
+    text, where = str(attrs["scene"]), str(attrs["scene_path"])
+    return Result(
+        **records,
+        provenance=tuple(_explanation(e) for e in held["provenance"]),
+        receiver=Receiver(**receiver),
+        seed=int(attrs["seed"]),
+        timings=held["timings"],
+        ledger=held["ledger"],
+        stats=held["stats"],
+        warnings=tuple(held["warnings"]),
+        scene=_scene(text, where),
+        text=text,
+        path=where,
+    )
+
+
+def rows(result: Result) -> list[tuple[str, ...]]:
+    """Return the detections as text, a tuple of COLUMNS each; what is unknown is empty: an azimuth that no array gives,
+    the error of a detection that is not converged, the true place of noise."""
+    d = result.detections
+    return [
+        (
+            f"{d.range[i]:.4f}",
+            f"{d.rate[i]:.4f}",
+            f"{d.speed[i]:.4f}",
+            _known(math.degrees(d.azimuth[i]), 3),
+            f"{d.snr[i]:.2f}",
+            f"{dbm(d.power[i]):.2f}",
+            _known(d.error_db[i], 2),
+            _word(d.converged[i]),
+            _word(d.folded[i]),
+            _known(d.true_range[i], 4),
+            _known(d.true_rate[i], 4),
+            why.label,
+            why.bodies,
+        )
+        for i, why in enumerate(result.provenance)
+    ]
+
+
+def _known(value: float, digits: int) -> str:
+    return "" if math.isnan(value) else f"{value:.{digits}f}"
+
+
+def _word(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """Return what summary.json holds: counts, timings, tolerance reached, warnings, what was left out."""
+    return {
+        "scene": result.path,
+        "seed": result.seed,
+        "paths": len(result.paths.delay),
+        "detections": len(result.detections.range),
+        "labels": {x: sum(e.label == x for e in result.provenance) for x in ("direct", "multipath", "clutter")},
+        **_plain(result.stats),
+        "timings_s": {k: round(v, 4) for k, v in result.timings.items()},
+        "warnings": list(result.warnings),
+        "left_out": _plain(result.ledger),
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that shape a result."""
+    found = {"python": platform.python_version()}
+    for name in ("raychan", "numpy", "scipy", "numba", "embreex", "finufft", "trimesh"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+def _attrs(result: Result) -> dict[str, Any]:
+    """Return what goes beside the records: the scene, how it was run and what was told."""
+    attrs = {
+        "format": FORMAT,
+        "source": f"raychan {versions()['raychan']}, ray-traced radar channel simulation",
+        "comment": "SI; x forward, y left, z up; exp(+jwt); range rate positive = receding; NAME_re + j NAME_im",
+        "seed": result.seed,
+        "scene": result.text,
+        "scene_path": result.path,
+        "versions": json.dumps(versions()),
+    }
+    return attrs | {name: json.dumps(_plain(getattr(result, name))) for name in _JSON}
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON can hold it."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else ("inf" if value > 0 else "-inf")
+    return value if isinstance(value, bool | int | float | str) or value is None else str(value)
+
+
+def _explanation(held: dict[str, Any]) -> Explanation:
+    parts = tuple(Contribution(**(c | {"chain": tuple(c["chain"])})) for c in held["contributions"])
+    numbers = {name: math.nan for name, value in held.items() if value is None}  # as JSON has it
+    return Explanation(**(held | numbers | {"contributions": parts}))
+
+
+def _scene(text: str, where: str) -> Any:
+    if not text:
+        return None
+    from raychan.world.errors import SceneError
+    from raychan.world.overrides import LATER
+    from raychan.world.scene import Scene
+
+    try:
+        changes = [line.removeprefix(_CHANGED) for line in text.splitlines() if line.startswith(_CHANGED)]
+        later = sum(float(line.removeprefix(LATER)) for line in text.splitlines() if line.startswith(LATER))
+        return Scene.from_text(text, where or None).override(changes).at(later)
+    except (SceneError, OSError):
+        return None

@@ -1,0 +1,83 @@
+"""Profile: power against delay, as one ramp of the waveform resolves it at the start of a frame."""
+
+from __future__ import annotations
+
+import finufft
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from raychan.radar import windows
+from raychan.radar.side_lobes import Envelope
+from raychan.radar.waveform import Waveform
+from raychan.records import Paths, Profile
+
+_PAD = 4
+_ABOVE_DB = 10.0
+_SIDE_LOBES_DB = 60.0
+_EPS = 1e-7
+
+
+def profile(
+    paths: Paths,
+    waveform: Waveform,
+    power: float = 1.0,
+    noise_power: float = 0.0,
+    window: str = "hann",
+) -> Profile:
+    """Return the power-delay profile of a channel in the waveform's band.
+
+    The channel's response to one ramp, transformed, without motion and without noise samples; scaled so that a lone
+    path reads its received power. Ranges c tau/2 reach to n_samples range cells; later paths fold as they do in the
+    radar. Args: power [W] transmitted; noise_power [W] a sample, gives Profile.noise, the noise a cell of a single ramp
+    would hold. Peaks: local maxima over one range cell, 10 dB above that noise and within 60 dB of the strongest, that
+    are no side lobes of stronger ones.
+    """
+    return profile_of(response(paths, waveform, power, window), waveform, noise_power, window)
+
+
+def response(paths: Paths, waveform: Waveform, power: float = 1.0, window: str = "hann") -> NDArray[np.complex128]:
+    """Return the windowed response (n_samples,) [sqrt(W)] of a channel at the frequencies of one ramp; those of several
+    sets of paths add up. Args as for `profile`."""
+    n = waveform.n_samples
+    taper = windows.window(window, n)
+    weight = np.sqrt(power) * paths.amplitude / taper.sum()
+    # The response at f_c + B s/n, s = 0..n-1; type 1 counts from the middle, s = n // 2.
+    turns = paths.delay * waveform.bandwidth / n
+    weight = weight * np.exp(-2j * np.pi * turns * (n // 2))
+    at = 2.0 * np.pi * (turns - np.floor(turns + 0.5))
+    if not len(at):
+        return np.zeros(n, np.complex128)
+    return np.asarray(finufft.nufft1d1(at, weight, n, eps=_EPS, isign=-1, nthreads=1) * taper)
+
+
+def profile_of(told: NDArray[np.complex128], waveform: Waveform, noise_power: float, window: str) -> Profile:
+    """Return the power-delay profile of a channel's response (see `response`); args as for `profile`."""
+    n = waveform.n_samples
+    taper = windows.window(window, n)
+    length = _PAD * n
+    received = np.abs(scipy.fft.ifft(told, length, norm="forward")) ** 2
+    noise = noise_power / windows.processing_gain(taper)
+    around = np.stack([np.roll(received, s) for s in range(-_PAD, _PAD + 1)])
+    floor = max(noise * 10.0 ** (0.1 * _ABOVE_DB), received.max() * 10.0 ** (-0.1 * _SIDE_LOBES_DB))
+    peaks = np.flatnonzero((received == around.max(axis=0)) & (received > floor))
+    peaks = _own(peaks[np.argsort(-received[peaks], kind="stable")], received, Envelope(window, n))
+    return Profile(
+        range=np.arange(length, dtype=np.float64) * (waveform.range_resolution / _PAD),
+        power=received,
+        noise=noise,
+        peaks=peaks,
+    )
+
+
+def _own(peaks: NDArray[np.int64], power: NDArray[np.float64], envelope: Envelope) -> NDArray[np.int64]:
+    """Return the peaks, strongest first, that are more than side lobes of stronger ones."""
+    lobes = np.zeros(len(peaks))
+    kept = np.zeros(len(peaks), bool)
+    for i, peak in enumerate(peaks):
+        # Side lobes of two equal echoes add in voltage: twice the sum of their powers.
+        kept[i] = power[peak] > 2.0 * lobes[i]
+        if kept[i]:
+            away = np.abs(peaks - peak)
+            lobes += power[peak] * envelope(np.minimum(away, len(power) - away) / _PAD)
+    return peaks[kept]

@@ -1,0 +1,109 @@
+"""Found: how much field a launch has found so far, by length of way; what is let go is weighed against it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.em.phase_integral import quadratic_means
+from raychan.parallel import in_two
+from raychan.tracing.tubes import Phases, Refinement
+from raychan.world.geometry import Surface
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+_MANY = 4096  # tubes under which letting some go saves nothing
+_THREADS = 1000  # tubes from which on a second thread pays
+_NOTHING = 1e-100  # 1/m
+_DEPTH = 1e-2  # of the strongest cell: weaker ones are no finer than such a one, should there be no noise
+_SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
+
+
+class Found:
+    """The scattered field [1/m] found within each stretch of two-way length, `rule.cell` long."""
+
+    def __init__(self, rule: Refinement) -> None:
+        self.rule = rule
+        self._level = np.zeros(1)
+        self._tubes, self._cuts, self._rays = 0, 0.0, -1
+        self.uncut = np.zeros(0, np.int64)
+        """Tubes (bodies,) that budgets kept from being cut."""
+
+    def affords_phase(self, surface: Surface, facet: Ints, wanted: Bools) -> Bools:
+        """Return which tubes (n,) on facets (n,) may be cut for their phase: none once there are `rule.max_tubes`."""
+        self._tubes += len(wanted)
+        return self._within(surface, facet, wanted, self._tubes > self.rule.max_tubes)
+
+    def affords(self, surface: Surface, facet: Ints, wanted: Bools, weight: float = 1.0) -> Bools:
+        """Return which tubes (n,) may be cut for what hides parts of them: none once `rule.max_cuts` are made, each
+        counted by its weight, or `rule.max_rays` cast by this launch."""
+        rest = 0.0 if self.spent(surface) else (self.rule.max_cuts - self._cuts) / weight
+        self._cuts += weight * np.count_nonzero(wanted)
+        within = wanted & (np.cumsum(wanted) <= rest)
+        return within | self._within(surface, facet, wanted & ~within, True)
+
+    def spent(self, surface: Surface) -> bool:
+        """Tell whether nothing may be cut any more for what hides it."""
+        if self._rays < 0:
+            self._rays = surface.rays
+        return self._cuts > self.rule.max_cuts or surface.rays - self._rays > self.rule.max_rays
+
+    def _within(self, surface: Surface, facet: Ints, wanted: Bools, spent: bool) -> Bools:
+        if not spent or not wanted.any():
+            return wanted
+        bodies = surface.facets.body[facet[wanted]]
+        count = np.bincount(bodies, minlength=max(len(surface.facets.role), len(self.uncut)))
+        self.uncut = count + np.pad(self.uncut, (0, len(count) - len(self.uncut)))
+        surface.uncut += int(np.count_nonzero(wanted))
+        return np.zeros_like(wanted)
+
+    def _cell(self, length: Floats) -> NDArray[np.int64]:
+        return np.asarray(np.maximum(length / self.rule.cell, 0.0), np.int64)
+
+    def doubt(self, length: Floats) -> Floats:
+        """Return the bound [1/m] under which doubtful tubes of two-way lengths (n,) [m] are left as they are; about a
+        hundred such add up to `rule.relative` of what was found there."""
+        at = np.minimum(self._cell(length), len(self._level) - 1)
+        level = np.maximum(self._level[at], _DEPTH * self._level.max())
+        return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * level)
+
+    def add(self, ph: Phases) -> None:
+        """Count tubes that are seen: in each cell the scalar sum of all, or their rms sum where that cancels."""
+        if not len(ph.six):
+            return
+        each = np.empty(len(ph.six), complex)
+
+        def some(rows: slice) -> None:
+            each[rows] = ph.area[rows] * quadratic_means(ph.six[rows], 0.5)
+
+        in_two(len(each), some, _THREADS)
+        cell = self._cell(ph.length)
+        # A cell more at the end, which stays empty, for all that is longer.
+        n = max(len(self._level), int(cell.max()) + 3)
+        whole = np.hypot(np.bincount(cell, each.real, n), np.bincount(cell, each.imag, n))
+        size = np.maximum(whole, np.sqrt(np.bincount(cell, np.abs(each) ** 2, n)))
+        if np.isfinite(self.rule.cell):
+            # A window spreads each return over its neighbours.
+            size = np.maximum(size, np.maximum(np.append(size[1:], 0.0), np.append(0.0, size[:-1])))
+        self._level = np.maximum(size, np.pad(self._level, (0, n - len(self._level))))
+        if not np.isfinite(self.rule.cell):
+            self._level = self._level[:1]
+
+    def that_count(self, bound: Floats, length: Floats, many: int = _MANY) -> NDArray[np.intp]:
+        """Return the tubes to keep: of `many` or more, the weakest of each cell are let go while all these in phase
+        stay under 0.3 of the doubt."""
+        if len(bound) < many:
+            return np.arange(len(bound))
+        share = bound / self.doubt(length)
+        # The weakest few are enough: none that alone exceeds the sum is looked at.
+        weak = np.flatnonzero(share < _SHARE)
+        cell = self._cell(length[weak])
+        order = np.lexsort((share[weak], cell))
+        cell, running = cell[order], np.cumsum(share[weak[order]])
+        first = np.searchsorted(cell, cell)
+        running -= np.where(first > 0, running[first - 1], 0.0)
+        keep = np.ones(len(bound), bool)
+        keep[weak[order[running <= _SHARE]]] = False
+        return np.flatnonzero(keep)

@@ -1,0 +1,223 @@
+"""Edges: which edge of the surfaces runs through a tube, so that the tube can be cut exactly there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from raychan.compile.jit import njit
+from raychan.geometry.curved_patches import copy_to
+
+_MANY = 64  # edges around a plane beyond which halving is cheaper than looking at each
+_INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
+
+
+@njit(cache=True, forceinline=True)
+def dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, forceinline=True)
+def _normal(a, b, image, k, far):  # type: ignore[no-untyped-def]
+    """Return a vector normal to the plane through segment ab and the image."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    if far:
+        wx, wy, wz = k[0], k[1], k[2]
+    else:
+        wx, wy, wz = image[0] - a[0], image[1] - a[1], image[2] - a[2]
+    return dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
+
+
+@njit(cache=True, forceinline=True)
+def pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
+    """Write the normals of the planes through the image and a tube's sides, one over the centre's height long, inward;
+    return how far the centre lies ahead along k [m]."""
+    for e in range(3):
+        p, q = corners[e], corners[(e + 1) % 3]
+        x, y, z = _normal(p, q, image, k, far)
+        whole = (corners[3, 0] - p[0]) * x + (corners[3, 1] - p[1]) * y + (corners[3, 2] - p[2]) * z
+        # A tube without width has no inside.
+        over = 1.0 / whole if whole != 0.0 else np.nan
+        planes[e, 0], planes[e, 1], planes[e, 2] = x * over, y * over, z * over
+    return (corners[3, 0] - image[0]) * k[0] + (corners[3, 1] - image[1]) * k[1] + (corners[3, 2] - image[2]) * k[2]
+
+
+@njit(cache=True, forceinline=True)
+def scale_at(a, b, image, k, far, here):  # type: ignore[no-untyped-def]
+    """Return the tube's width at the middle of segment ab over that at its footprint, `here` [m] ahead of the image."""
+    if far:
+        return 1.0
+    edge = 0.0
+    for c in range(3):
+        edge += (0.5 * (a[c] + b[c]) - image[c]) * k[c]
+    return min(max(edge / here, 0.01), 100.0)
+
+
+@njit(cache=True, forceinline=True)
+def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped-def]
+    """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays."""
+    for e in range(3):
+        fa, fb = -_INSIDE * scale, -_INSIDE * scale
+        for c in range(3):
+            fa += (a[c] - corners[e, c]) * planes[e, c]
+            fb += (b[c] - corners[e, c]) * planes[e, c]
+        if not (fa >= 0.0 or fb >= 0.0):
+            return 0.0, 0.0
+        if fa < 0.0:
+            begin = max(begin, fa / (fa - fb))
+        elif fb < 0.0:
+            end = min(end, fa / (fa - fb))
+    return begin, max(end, begin)
+
+
+@njit(cache=True, forceinline=True)
+def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances from the plane through the image and segment ab; return whether that
+    parts them."""
+    x, y, z = _normal(a, b, image, k, far)
+    size = math.sqrt(x * x + y * y + z * z)
+    if size == 0.0:
+        return False
+    low, high = np.inf, -np.inf
+    for q in range(3):
+        side[q] = ((corners[q, 0] - a[0]) * x + (corners[q, 1] - a[1]) * y + (corners[q, 2] - a[2]) * z) / size
+        low, high = min(low, side[q]), max(high, side[q])
+    return low < 0.0 < high
+
+
+@njit(cache=True, forceinline=True)
+def size_of(a, b):  # type: ignore[no-untyped-def]
+    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+
+
+@njit(cache=True, forceinline=True)
+def above(ha, hb):  # type: ignore[no-untyped-def]
+    """Return the part (0 to 1) of a segment whose ends have heights ha, hb that lies above zero; equal: none."""
+    if ha <= 0.0 and hb <= 0.0:
+        return 0.0, 0.0
+    if ha <= 0.0:
+        return ha / (ha - hb), 1.0
+    return 0.0, 1.0 if hb > 0.0 else ha / (ha - hb)
+
+
+@njit(cache=True, forceinline=True)
+def _height(a, p, n):  # type: ignore[no-untyped-def]
+    """Return how far a lies before the plane through p of normal n [m]."""
+    return (a[0] - p[0]) * n[0] + (a[1] - p[1]) * n[1] + (a[2] - p[2]) * n[2]
+
+
+@njit(cache=True)
+def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances from the plane through the source and the line where two planes meet.
+
+    Returns whether it parts the rays that land on plane a from those that land on plane b (bodies that
+    run into each other have no edge there).
+    """
+    c1 = dot(k, n1) if far else _height(source, p1, n1)
+    c2 = dot(k, n2) if far else _height(source, p2, n2)
+    m = c2 * n1[0] - c1 * n2[0], c2 * n1[1] - c1 * n2[1], c2 * n1[2] - c1 * n2[2]
+    size = math.sqrt(dot(m, m))
+    if size < 1e-12:
+        return False
+    offset = c2 * dot(p1, n1) - c1 * dot(p2, n2)
+    sign = 0.0
+    for q in range(4):
+        f = (dot(points[q], m) - offset) / size
+        if q < 3:
+            side[q] = f
+        if plane[q] == a or plane[q] == b:
+            wanted = f if plane[q] == a else -f
+            if sign == 0.0:
+                sign = wanted
+            elif sign * wanted <= 0.0:
+                return False
+    return min(side[0], side[1], side[2]) < 0.0 and max(side[0], side[1], side[2]) > 0.0
+
+
+@njit(cache=True)
+def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side, work):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances from a line where two of the planes that the rays met meet."""
+    for r in range(3):
+        a, b = plane[r], plane[r + 1]
+        if a < 0 or b < 0 or a == b:
+            continue
+        fa, fb = facet[r], facet[r + 1]
+        pa, na = (first[fa], normal[fa]) if fa >= 0 else (points[3], own)
+        pb, nb = (first[fb], normal[fb]) if fb >= 0 else (points[3], own)
+        if _between(points, source, k, far, plane, pa, na, pb, nb, a, b, work):
+            copy_to(side, work)
+            break
+
+
+@njit(cache=True, nogil=True)
+def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side):  # type: ignore[no-untyped-def]
+    """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into
+    each other.
+
+    Args: points (n, 4, 3) [m] corners and centre; source (n, 3) [m] where the rays come from, or k (n, 3) their
+    direction when far; plane (n, 4) where each ray lands (-1: nowhere); facet (n, 4) met by each ray, -1 for the tube's
+    own plane, of normal own (n, 3); first, normal (m, 3): a point and the normal of each facet.
+    """
+    work = np.empty(3)
+    for i in range(points.shape[0]):
+        if side[i, 0] == 0.0 and side[i, 1] == 0.0 and side[i, 2] == 0.0:
+            _meeting_line(points[i], source[i], k[i], far, plane[i], facet[i], first, normal, own[i], side[i], work)
+
+
+@njit(cache=True, forceinline=True)
+def _longest(corners, source, k, far, plane, first_edge, outline, planes, side, work):  # type: ignore[no-untyped-def]
+    """Write into side (3,), if there is one, the distances of the corners from the edge of which the longest part lies
+    inside a tube; return whether there is."""
+    here = pyramid(corners, source, k, far, planes)
+    best = 0.0
+    for r in range(4):
+        g = plane[r]
+        if g < 0 or (r > 0 and g == plane[r - 1]) or first_edge[g + 1] - first_edge[g] > _MANY:
+            continue
+        for e in range(first_edge[g], first_edge[g + 1]):
+            a, b = outline[e, 0], outline[e, 1]
+            da, db = 0.0, 0.0
+            for c in range(3):
+                da += (a[c] - corners[3, c]) * k[c]
+                db += (b[c] - corners[3, c]) * k[c]
+            begin, end = above(da, db)
+            if begin == end:
+                continue
+            begin, end = within(a, b, corners, planes, scale_at(a, b, source, k, far, here), begin, end)
+            if begin == end or (end - begin) * size_of(a, b) <= best:
+                continue
+            if apart(a, b, corners, source, k, far, work):
+                best = (end - begin) * size_of(a, b)
+                copy_to(side, work)
+    return best > 0.0
+
+
+@njit(cache=True, nogil=True)
+def edges_within(  # type: ignore[no-untyped-def]
+    rows, points, ways, length, flat, far, hit, reach, extent, plane, first_edge, outline, first, normal, side
+):  # fmt: skip
+    """Write into rows of side (n, 3) signed distances [m] of a tube's corners from the plane through its source and an
+    edge inside it: of those around the planes that were hit the one of which the longest part lies inside, or else the
+    line where two of these planes meet.
+
+    Args: rows (m,) of the tubes to look at; points, ways (n, 4, 3) corners and centre [m], and directions; length
+    (n, 4) [m] so far; flat (n,) whether rays come from one point, or one direction if far; hit, reach (n, 4) facet on
+    which each ray lands, -1 for none (so far as `extent` [m]), and after how far; plane, first, normal of facets.
+    """
+    at, source, landed = np.empty((4, 3)), np.empty(3), np.empty(4, np.int32)
+    planes, work = np.empty((3, 3)), np.empty(3)
+    for i in rows:
+        k = ways[i, 3]
+        t = reach[i, 3] if hit[i, 3] >= 0 else extent
+        parallel = far or not flat[i]
+        for c in range(3):
+            source[c] = points[i, 3, c] - length[i, 3] * k[c]
+        for q in range(4):
+            landed[q] = plane[hit[i, q]] if hit[i, q] >= 0 else -1
+            for c in range(3):
+                # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the
+                # section that the tube has where it lands.
+                at[q, c] = points[i, q, c] + (0.0 if flat[i] else t * (ways[i, q, c] - k[c]))
+        if not _longest(at, source, k, parallel, landed, first_edge, outline, planes, side[i], work):
+            _meeting_line(at, source, k, parallel, landed, hit[i], first, normal, k, side[i], work)

@@ -1,0 +1,156 @@
+"""How a tube's footprint weighs from corner to corner: obliquity, spreading, and the area of the true surface."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from raychan.compile.jit import njit
+
+
+@njit(cache=True, forceinline=True)
+def element_of(v, b, w, out):  # type: ignore[no-untyped-def]
+    """Write the vector [m^2] normal to the true surface at w (3,): its area for a unit of the last two coordinates.
+
+    Args: v (3, 3) [m] corners, b (3, 3) [m] bulges of the edges (Nagata 2005, eq. 10).
+    """
+    for c in range(3):
+        d, e = (c + 1) % 3, (c + 2) % 3
+        along_d = v[1, d] - v[0, d] - (w[0] - w[1]) * b[0, d] - w[2] * (b[1, d] - b[2, d])
+        along_e = v[1, e] - v[0, e] - (w[0] - w[1]) * b[0, e] - w[2] * (b[1, e] - b[2, e])
+        aside_d = v[2, d] - v[0, d] + w[1] * (b[0, d] - b[1, d]) - (w[0] - w[2]) * b[2, d]
+        aside_e = v[2, e] - v[0, e] + w[1] * (b[0, e] - b[1, e]) - (w[0] - w[2]) * b[2, e]
+        out[c] = along_d * aside_e - along_e * aside_d
+
+
+@njit(cache=True, forceinline=True)
+def _mean_cosine(normal, k, back):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for c in range(3):
+        total -= 0.5 * normal[c] * (k[c] + back[c])
+    return total
+
+
+@njit(cache=True, forceinline=True)
+def _back(p, image, far, k):  # type: ignore[no-untyped-def]
+    """Write the unit direction in which a wave from the end travels at p (3,), and return its length [m]."""
+    if far:
+        along = 0.0
+        for c in range(3):
+            k[c] = -image[c]
+            along -= p[c] * image[c]
+        return along
+    size = 0.0
+    for c in range(3):
+        k[c] = p[c] - image[c]
+        size += k[c] * k[c]
+    size = math.sqrt(size)
+    for c in range(3):
+        k[c] /= size
+    return size
+
+
+@njit(cache=True, forceinline=True)
+def _share(w):  # type: ignore[no-untyped-def]
+    """Return the share of its facet that a patch of corners w (3, 3) takes, below 0 where it runs the other way."""
+    share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
+    share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
+    return share + w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
+
+
+@njit(cache=True, nogil=True)
+def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignore[no-untyped-def]
+    """Write how tubes stand on their footprints.
+
+    Args: tubes: points, k, normals (n, 4, 3), length (n, 4), facet (n,), bary (n, 3, 3),
+    or (n, 0, 3) once they left their first facet and all are flat; middle (n, 3, 3) [m] of the
+    edges and length there half_way (n, 3) [m]; facets: normal (f, 3),
+    vertices and bulge (f, 3, 3), curved (f,); image of the way out's end, or the direction to it when far; out: points
+    (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): the mean obliquity times spreading
+    at corners over that at the centre, for areas of the flat footprints, zero beyond the terminator; area (n,) and
+    length (n,) of the way out.
+    """
+    points, k, normals, length, facet, bary = tubes
+    facing, vertices, bulge, curved = facets
+    six, lengths, whole, taper, area, way_out = out
+    bent = bary.shape[1] == 3
+    flat, element = np.empty(3), np.empty(3)
+    back_k, back = np.empty((4, 3)), np.empty(4)
+    for i in range(len(facet)):
+        for j in range(4):
+            back[j] = _back(points[i, j], image, far, back_k[j])
+        for j in range(3):
+            lengths[i, j] = length[i, j] + back[j]
+            lengths[i, 3 + j] = half_way[i, j] + _back(middle[i, j], image, far, element)
+            for c in range(3):
+                six[i, j, c], six[i, 3 + j, c] = points[i, j, c], middle[i, j, c]
+        whole[i], way_out[i] = length[i, 3] + back[3], back[3]
+        p, q, r = points[i, 0], points[i, 1], points[i, 2]
+        size = 0.0
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            flat[c] = 0.5 * ((q[d] - p[d]) * (r[e] - p[e]) - (q[e] - p[e]) * (r[d] - p[d]))
+            size += flat[c] * flat[c]
+        area[i] = math.sqrt(size)
+        least = max(area[i], 1e-300)
+        f = facet[i]
+        side, share = 0.0, _share(bary[i]) if bent else 0.0
+        for c in range(3):
+            side += facing[f, c] * normals[i, 3, c]
+        centre = max(_mean_cosine(normals[i, 3], k[i, 3], back_k[3]), 0.0)
+        if not far:
+            centre /= length[i, 3] * back[3]
+        for j in range(3):
+            if bent and curved[f]:
+                element_of(vertices[f], bulge[f], bary[i, j], element)
+                strength = _mean_cosine(element, k[i, j], back_k[j]) * (0.5 * abs(share) / least)
+                if side < 0.0:
+                    strength = -strength
+            else:
+                # Where the true surface turns away from the flat one there is more of it.
+                turned = 0.0
+                for c in range(3):
+                    turned += normals[i, j, c] * flat[c] / least
+                strength = _mean_cosine(normals[i, j], k[i, j], back_k[j]) / max(abs(turned), 0.5)
+            strength = max(strength, 0.0)
+            if not far:
+                strength /= length[i, j] * back[j]
+            taper[i, j] = min(strength / centre, 4.0) if centre > 0.0 else 0.0
+
+
+@njit(cache=True, forceinline=True)
+def _toward(p, image, far):  # type: ignore[no-untyped-def]
+    return 1.0 if far else math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def elements(points, normals, facet, bary, vertices, bulge, curved, image, out_image, far, out):  # type: ignore[no-untyped-def]
+    """Write the vector elements of area (n, 3, 3) [m^2] of first tubes at their corners, on the lit side: the mean of
+    the three is the tube's, weighed by both ends' spreading there over that at the centre.
+
+    Args: points, normals (n, 4, 3), facet (n,), bary (n, 3, 3) of the tubes; vertices, bulge (f, 3, 3), curved (f,) of
+    facets; images of both ends [m], or directions to them when far.
+    """
+    one = np.empty(3)
+    for i in range(len(facet)):
+        f, w = facet[i], bary[i]
+        share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
+        share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
+        share += w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
+        centre = _toward(points[i, 3], image, far) * _toward(points[i, 3], out_image, far)
+        p, q, r = points[i, 0], points[i, 1], points[i, 2]
+        for j in range(3):
+            size = 0.5 * centre / (_toward(points[i, j], image, far) * _toward(points[i, j], out_image, far))
+            if curved[f]:
+                element_of(vertices[f], bulge[f], w[j], one)
+                size *= share
+            else:
+                for c in range(3):
+                    d, e = (c + 1) % 3, (c + 2) % 3
+                    one[c] = (q[d] - p[d]) * (r[e] - p[e]) - (q[e] - p[e]) * (r[d] - p[d])
+            side = one[0] * normals[i, 3, 0] + one[1] * normals[i, 3, 1] + one[2] * normals[i, 3, 2]
+            if side < 0.0:
+                size = -size
+            for c in range(3):
+                out[i, j, c] = size * one[c]

@@ -1,0 +1,179 @@
+"""Legs: from an end of the link to points of a surface, straight or over plane mirrors (image method)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.radar.beam_table import Beam
+from raychan.tracing.horizon import radiating
+from raychan.tracing.image_paths import bounces, may_leave, possible, rays_from, stretch, weights
+from raychan.world.geometry import Surface
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """A plane that reflects: a point on it, its unit normal towards the lit side, one of its facets, its body, and the
+    circle (centre [m], radius [m]) that holds all of it."""
+
+    point: Floats
+    normal: Floats
+    facet: int
+    body: int
+    centre: Floats
+    radius: float
+
+    @staticmethod
+    def of(surface: Surface, facet: int, side: float) -> Mirror:
+        """Return the mirror of the plane of a facet, lit on its outward side (+1) or from behind (-1)."""
+        v = surface.facets.vertices[surface.plane == surface.plane[facet]].reshape(-1, 3)
+        centre = 0.5 * (v.min(axis=0) + v.max(axis=0))
+        radius = float(np.linalg.norm(v - centre, axis=1).max())
+        body = int(surface.facets.body[facet])
+        return Mirror(surface.first[facet], side * surface.normal[facet], facet, body, centre, radius)
+
+    def turned(self) -> Mirror:
+        """Return the same plane lit from its other side."""
+        return Mirror(self.point, -self.normal, self.facet, self.body, self.centre, self.radius)
+
+    def image(self, x: Floats) -> Floats:
+        """Return x mirrored at the plane."""
+        return x - 2.0 * np.dot(x - self.point, self.normal) * self.normal
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """How points are seen over a leg: `seen` (n,), mirror points `corners` (n, m, 3) [m], `passed` (n, l) layers on the
+    last stretch, end's side first, and the facet that blocks it (n,), -1 for none."""
+
+    seen: Bools
+    corners: Floats
+    passed: Ints
+    blocker: Ints
+
+    def take(self, index: NDArray[np.generic] | slice) -> View:
+        """Return how the points at `index` (mask, numbers or slice) are seen."""
+        return View(self.seen[index], self.corners[index], self.passed[index], self.blocker[index])
+
+    @staticmethod
+    def join(parts: list[View]) -> View:
+        """Return how the points of several views are seen as one."""
+        return View(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(View)))
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """The way between an end (a point, or a direction when `far`) and the surface over mirrors, end's side first."""
+
+    end: Floats
+    far: bool = False
+    mirrors: tuple[Mirror, ...] = ()
+    beam: Beam | None = None
+    image: Floats = field(init=False)
+    _chain: tuple[Floats, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        images = [np.asarray(self.end, float)]
+        for m in self.mirrors:
+            images.append(m.image(images[-1]))
+        object.__setattr__(self, "image", images[-1])
+        sheets = [np.array([getattr(m, name) for m in self.mirrors]) for name in ("point", "normal", "centre")]
+        radius = np.array([m.radius for m in self.mirrors])
+        object.__setattr__(self, "_chain", (np.array(images), *(s.reshape(-1, 3) for s in sheets), radius))
+
+    def pieces(self, surface: Surface) -> Ints:
+        """Return the pieces (m,) of the mirrors."""
+        return surface.piece[[m.facet for m in self.mirrors]]
+
+    def rays(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return unit directions (..., 3) at the points, travelling from the end, and lengths [m]."""
+        k, length = rays_from(np.ascontiguousarray(points).reshape(-1, 3), self.image, self.far)
+        return k.reshape(points.shape), length.reshape(points.shape[:-1])
+
+    def spread(self, length: Floats) -> Floats:
+        """Return the field's spreading [1/m] (1 for a plane wave)."""
+        return np.ones_like(length) if self.far else 1.0 / length
+
+    def weight(self, points: Floats) -> Floats:
+        """Return the field (n,) that the end's antenna sends to points over this leg, relative to its strongest."""
+        found: Floats = weights(np.ascontiguousarray(points), *self.antenna)
+        return found
+
+    @property
+    def antenna(self) -> tuple[Any, ...]:
+        """What the kernels ask of the end's antenna: images, far, normals of the mirrors, table of its beam (empty:
+        alike everywhere)."""
+        images, _, normals = self._chain[:3]
+        return images, self.far, normals, np.zeros((0, 0)) if self.beam is None else self.beam.table
+
+    def dark(self, points: Floats, radius: Floats) -> Bools:
+        """Tell to which balls (n,), about points (n, 3) [m], the end's antenna sends nothing at all over this leg."""
+        if self.beam is None or self.far:
+            return np.zeros(len(points), bool)
+        look, length = self._look(points)
+        return self.beam.dark(look, np.where(radius < length, np.arcsin(np.minimum(radius / length, 1.0)), np.pi))
+
+    def _look(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return the unit directions (n, 3) in which the end looks at points, and their distances (n,) [m]."""
+        look, length = self.rays(points)
+        for m in reversed(self.mirrors):
+            look = look - 2.0 * np.outer(look @ m.normal, m.normal)
+        return look, length
+
+    def bounces(self, points: Floats) -> Floats:
+        """Return the mirror points (n, m, 3) [m] of the way to each point, end's side first."""
+        found: Floats = bounces(points, *self._chain[:3])
+        return found
+
+    def may_reach(self, points: Floats, size: Floats) -> Bools:
+        """Tell which balls about points (n, 3) of radius `size` (n,) [m] could be met: in front of the last mirror,
+        and by way of each mirror's circle."""
+        ok: Bools = possible(points, size, *self._chain)
+        return ok
+
+    def may_leave(self, points: Floats) -> Bools:
+        """Tell from which tubes (n, 4, 3) [m] something could come to the end by way of each mirror's circle."""
+        ok: Bools = may_leave(points, *self._chain)
+        return ok
+
+    def radiating(self, points: Floats, k: Floats, normals: Floats, which: int) -> tuple[Floats, Bools]:
+        """Tell which tubes radiate towards the end, and which face it (see `tracing.horizon.radiating`)."""
+        share, facing = radiating(points, k, normals, self.image, self.far, which)
+        return share, facing
+
+    def visible(
+        self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None
+    ) -> View:
+        """Tell which points the end sees by this leg, through which layers.
+
+        Args: points (n, 3) [m] on facets (n,), slack (n,) [m] by which the true surface may lie behind its facet;
+        inside (n,) bodies that the points stand in, which do not hide them.
+        """
+        n = len(points)
+        corners = self.bounces(points)
+        chain = *self._chain[:3], self.far, 2.0 * surface.extent + 1.0
+        rows, skip = np.arange(n), np.full(n, -1, np.int32)
+        for i, m in enumerate(self.mirrors):
+            rows, start, d, _ = stretch(i, rows, points, corners, *chain)
+            hit, _ = surface.cast(start, d, skip[rows])
+            # The mirror itself is hit first.
+            ok = (hit >= 0) & (surface.plane[hit] == surface.plane[m.facet])
+            rows = rows[ok]
+            skip[rows] = hit[ok]
+        rows, start, d, length = stretch(len(self.mirrors), rows, points, corners, *chain)
+        aims: Any = start, d, length, slack, skip, facet, layers, inside
+        if len(rows) < n:
+            aims = *aims[:3], slack[rows], skip[rows], facet[rows], layers, None if inside is None else inside[rows]
+        reached, passed, in_way = surface.walk(*aims)
+        if len(rows) == n:
+            return View(reached, corners, passed, in_way)
+        view = View(np.zeros(n, bool), corners, np.full((n, layers), -1, np.int32), np.full(n, -1, np.int32))
+        view.seen[rows], view.passed[rows], view.blocker[rows] = reached, passed, in_way
+        return view

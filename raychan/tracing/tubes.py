@@ -1,0 +1,225 @@
+"""Tubes of rays: their state between bounces, how they are cut in two, and how much they can matter.
+
+A tube is a triangle of three corner rays about a centre ray. Lengths and directions are known at all four, so a
+tube may be cut without tracing it again from the start: between corners the length follows from its values and
+gradients (the directions) by a Hermite rule that is exact to third order; on the first surface it is computed anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.frames import sizes
+from raychan.geometry.curved_patches import rays_on
+from raychan.parallel import in_two
+from raychan.records import REFLECT
+from raychan.tracing.history import History
+from raychan.tracing.legs import Leg
+from raychan.tracing.tube_phases import phases
+from raychan.world.geometry import Surface
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+CENTRE = 3
+MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
+_MOST_SLOTS = 120  # of a history: their number is kept in a byte
+_MANY = 4096  # tubes from which on a second thread pays
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How finely tubes are cut.
+
+    `wavenumber` [rad/m]; `phase` [rad] deviation from quadratic that a tube may have where its phase stands still;
+    `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the
+    same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
+    [m] of first tubes; `levels` of cutting for sight and bounces; `slots` of history; `layers` that a stretch may
+    pass; `max_tubes` that cuts for phase may come by, `max_cuts` for sight and `max_rays` cast after which a launch
+    cuts no more (see `Found.affords`); `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
+    """
+
+    wavenumber: float
+    phase: float = 0.05
+    turn: float = 0.15
+    floor: float = 0.0
+    relative: float = 0.01
+    cell: float = np.inf
+    max_edge: float = 0.3
+    levels: int = 12
+    slots: int = 8
+    layers: int = 2
+    max_tubes: int = 100_000_000
+    max_cuts: float = np.inf
+    max_rays: float = np.inf
+    jitter: float = 0.0
+
+    def for_depth(self, bounces: int) -> Refinement:
+        """Return the same rule with history enough for so many bounces, and layers on every stretch between them."""
+        return replace(self, slots=min(max(self.slots, bounces + self.layers * (bounces + 1) + 3), _MOST_SLOTS))
+
+
+@dataclass
+class Tubes:
+    """Tubes standing on their present footprint; n tubes, 4 rays each (corners, centre), d slots of history.
+
+    `strength` left of the field by mirrors and layers; `points` [m], `k` unit directions of arrival, `length` [m]
+    from the transmitter, `normals` of the true surface on the lit side, `spread` [1/m] field at the footprint, `flat`
+    all mirrors so far were planes, `bary` (n, 3, 3) corners on the first facet, (n, 0, 3) once they left it, `slots` of
+    history in use, `bounces` counted with this one, `caustics` passed, `last` row of the `history` that tubes of one
+    launch share.
+    """
+
+    points: Floats
+    k: Floats
+    length: Floats
+    normals: Floats
+    facet: Ints
+    spread: Floats
+    strength: Floats
+    flat: Bools
+    bary: Floats
+    slots: Ints
+    bounces: Ints
+    caustics: Ints
+    last: Ints
+    history: History
+
+    def __len__(self) -> int:
+        return len(self.facet)
+
+    def take(self, index: NDArray[np.generic]) -> Tubes:
+        """Return the tubes at `index` (mask or numbers)."""
+        rows = numbers(index)
+        return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _ROWS}, history=self.history)
+
+    @staticmethod
+    def join(parts: list[Tubes], kept: NDArray[np.intp] | None = None) -> Tubes:
+        """Return all tubes of several sets of one launch as one, or of all these those `kept`, in order."""
+        some = [p for p in parts if len(p)] or parts[:1]
+        bounds = np.cumsum([0, *(len(p) for p in some)])
+        if kept is None or len(kept) == bounds[-1]:
+            if len(some) == 1:
+                return some[0]
+            rows = {name: np.concatenate([getattr(p, name) for p in some]) for name in _ROWS}
+            return Tubes(**rows, history=parts[0].history)
+        at = np.searchsorted(kept, bounds)
+        rows = {}
+        for name in _ROWS:
+            columns = [getattr(p, name) for p in some]
+            rows[name] = np.empty((len(kept), *columns[0].shape[1:]), columns[0].dtype)
+            for column, before, i, j in zip(columns, bounds, at, at[1:], strict=False):
+                # What is in range may go straight to its place.
+                column.take(kept[i:j] - before, axis=0, out=rows[name][i:j], mode="clip")
+        return Tubes(**rows, history=parts[0].history)
+
+    def append(self, rows: NDArray[np.generic], vertex: Floats, normal: Floats, facet: Ints, kind: int) -> None:
+        """Write one more vertex into the history of the tubes `rows`."""
+        self.last[rows] = self.history.append(self.last[rows], vertex, normal, facet, kind)
+        self.slots[rows] += 1
+
+    def came_from(self) -> Ints:
+        """Return the facets (n,) of the last reflection before the surface that the tubes stand on; -1: none."""
+        return self.history.newest(self.last, REFLECT)
+
+
+_ROWS = tuple(f.name for f in fields(Tubes) if f.name != "history")
+
+
+def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> Tubes:
+    """Return first-bounce tubes on the true surface at barycentric corners (n, 3, 3), seen from the end of `leg`."""
+    n = len(facet)
+    points, k, length, normals = first_rays(surface, leg, facet, bary)
+    return Tubes(
+        points=points,
+        k=k,
+        length=length,
+        normals=normals,
+        facet=facet,
+        spread=leg.spread(length[:, CENTRE]),
+        strength=leg.weight(points[:, CENTRE]),
+        flat=np.ones(n, bool),
+        bary=bary,
+        slots=np.zeros(n, np.int8),
+        bounces=np.full(n, len(leg.mirrors) + 1, np.int8),
+        caustics=np.zeros(n, np.int8),
+        last=np.full(n, -1, np.int32),
+        history=History(),
+    )
+
+
+def first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return points, directions, lengths and normals of the rays of a leg to barycentric corners (n, 3, 3) and their
+    centres."""
+    f = surface.facets
+    return rays_on(facet, bary, f.vertices, f.normals, surface.bulge, surface.both_sides, leg.image, leg.far)
+
+
+def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
+    """Return the middles of the three edges (n, 3, 3) [m] and the lengths there (n, 3) [m]."""
+    if first:
+        points, _, length, _ = first_rays(
+            surface, leg, tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1))
+        )
+        return points[:, :3].copy(), length[:, :3].copy()
+    p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
+    d = np.roll(p, -1, axis=1) - p
+    bend = np.einsum("nij,nij->ni", k - np.roll(k, -1, axis=1), d)
+    return p + 0.5 * d, 0.5 * (length + np.roll(length, -1, axis=1)) + 0.125 * bend
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Phases of tubes over a way out [rad]: `six` (n, 6) at corners and edge middles, `bend` (n, 3) of the edges from
+    straight, `bound` (n,) [1/m] on what a tube can scatter, `area` the same were it in phase, `rough` (n,) above 1
+    where a tube bends more than a quadratic phase and one direction of the surface can follow, `length` (n,) [m] of
+    the whole way."""
+
+    six: Floats
+    bend: Floats
+    bound: Floats
+    area: Floats
+    rough: Floats
+    length: Floats
+
+    def take(self, index: NDArray[np.generic]) -> Phases:
+        """Return the phases of the tubes at `index` (mask or numbers)."""
+        rows = numbers(index)
+        return Phases(**{f.name: getattr(self, f.name).take(rows, axis=0) for f in fields(self)})
+
+    @staticmethod
+    def join(parts: list[Phases]) -> Phases:
+        """Return the phases of several sets of tubes as one."""
+        return Phases(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Phases)})
+
+
+def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
+    """Return the phases of tubes over the way out, and what each can scatter back at most."""
+    n, f = len(tubes), surface.facets
+    six, bend, (bound, area, rough, way) = np.empty((n, 6)), np.empty((n, 3)), np.empty((4, n))
+    rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary
+    held = tubes.strength, tubes.spread
+    written = six, bend, bound, area, rough, way
+    shape = f.vertices, surface.bulge, leg.image, leg.far, out.antenna, rule.wavenumber
+
+    def some(rows: slice) -> None:
+        here, of, to = ([x[rows] for x in arrays] for arrays in (rays, held, written))
+        phases(*(*here, *shape, *of, (rule.phase, rule.turn, MOST_BEND), surface.dull, *surface.matter, *to))
+
+    in_two(n, some, _MANY)
+    return Phases(six, bend, bound, area, rough, way)
+
+
+def numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:
+    """Return the numbers of the rows at `index` (mask or numbers): to take rows by these is up to ten times faster."""
+    return np.flatnonzero(index) if index.dtype == np.bool_ else np.asarray(index, np.intp)
+
+
+def unit(v: Floats) -> Floats:
+    """Return vectors (..., 3) scaled to length one; a vector of none stays as it is."""
+    size = sizes(v)[..., None]
+    return v / np.where(size > 0.0, size, 1.0)

@@ -1,0 +1,105 @@
+"""What only the whole scene shows: a radar inside a body, targets that fold in range or range rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from raychan.radar.waveform import Waveform
+from raychan.records import MIRROR
+from raychan.world.body import Body
+from raychan.world.errors import SceneError
+from raychan.world.mesh import Floats
+from raychan.world.point_in_body import Place, in_plane_of, place_of
+from raychan.world.schema import RadarTable
+
+
+def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
+    """Raise SceneError where the radar is inside a body, on its surface, or below a mirror."""
+    if radar is None:
+        return
+    at = np.array(radar.position)
+    for body in bodies:
+        local, mesh = body.motion.to_body(at), body.geometry
+        if body.kind == MIRROR:
+            c = mesh.corners[0]
+            n = np.cross(c[1] - c[0], c[2] - c[0])
+            if n @ (local - c[0]) <= 0.0:
+                where = "a place on its lit side"
+                raise SceneError(
+                    f"radar is behind '{body.name}'", key="radar.position", value=at.tolist(), allowed=where
+                )
+            continue
+        place = place_of(mesh.corners, local)
+        if place != Place.OUTSIDE:
+            where = "inside" if place == Place.INSIDE else "on the surface of"
+            # A mesh in the wrong unit swallows the radar.
+            allowed = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
+            problem = f"radar is {where} '{body.name}'"
+            raise SceneError(problem, key="radar.position", value=at.tolist(), allowed=allowed)
+
+
+def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:
+    """Return a warning for each body that has facets in whose plane the radar lies."""
+    said = []
+    for body in bodies:
+        count = in_plane_of(body.geometry.corners, body.motion.to_body(np.array(radar.position)))
+        if count:
+            said.append(f"radar lies in the plane of {count} facets of '{body.name}': edge-on, they return nothing")
+    return said
+
+
+def nearest_point(body: Body, at: Floats) -> Floats:
+    """Return the corner or face centre of a body (world, (3,)) that is nearest to a point (3,)."""
+    mesh = body.geometry
+    points = np.concatenate([mesh.vertices, mesh.corners.mean(axis=1)])
+    local = body.motion.to_body(at)
+    return np.asarray(body.motion.to_world(points[np.argmin(np.linalg.norm(points - local, axis=1))]))
+
+
+def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> list[str]:
+    """Return a warning for each body whose nearest point reads a folded range or range rate, and what it will read."""
+    said = []
+    at, own = np.array(radar.position), np.array(radar.velocity_mps)
+    limit, top = waveform.unambiguous_range, waveform.unambiguous_rate * waveform.carrier / waveform.middle
+    for body in bodies:
+        if body.kind == MIRROR or _near_and_slow(body, at, own, limit, top):
+            continue
+        place = nearest_point(body, at) if body.rcs is None else body.motion.to_world(body.target_point())
+        way = place - at
+        far = float(np.linalg.norm(way))
+        rate = float((body.motion.velocity_at(place) - own) @ way / far) if far > 0.0 else 0.0
+        if far > limit:
+            seen = folded_range(far, limit, waveform.complex_sampling)
+            said.append(
+                f"body '{body.name}' at {far:.2f} m is beyond the unambiguous range {limit:.2f} m: "
+                f"it appears near {seen:.0f} m"
+            )
+        if abs(rate) > top:
+            seen = (rate + top) % (2.0 * top) - top
+            said.append(
+                f"body '{body.name}' at {rate:.2f} m/s is beyond the unambiguous range rate {top:.2f} m/s: "
+                f"it appears near {seen:.1f} m/s"
+            )
+    return said
+
+
+def _near_and_slow(body: Body, at: Floats, own: Floats, limit: float, top: float) -> bool:
+    """Tell whether no point of a body is farther than `limit` [m] from a radar, or faster than `top` [m/s] to it."""
+    low, high = body.geometry.bounds
+    places = [low, high] if body.rcs is None else [low, high, body.target_point()]
+    middle = 0.5 * (low + high)
+    radius = max(float(np.linalg.norm(p - middle)) for p in places)
+    way = body.motion.to_world(middle) - at
+    arm = float(np.linalg.norm(middle)) + radius
+    speed = float(np.linalg.norm(np.asarray(body.motion.velocity) - own) + np.linalg.norm(body.motion.spin()) * arm)
+    return float(np.linalg.norm(way)) + radius < limit and speed < top
+
+
+def folded_range(distance: float, limit: float, complex_sampling: bool) -> float:
+    """Return the range [m] at which a target beyond the unambiguous range `limit` [m] appears."""
+    if complex_sampling:
+        return distance % limit
+    rest = distance % (2.0 * limit)
+    return min(rest, 2.0 * limit - rest)

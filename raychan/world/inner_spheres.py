@@ -1,0 +1,80 @@
+"""Cores: balls wholly inside a closed body; whatever lies in the shadow of one is hidden by the body."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, label
+
+from raychan.geometry.closed_surfaces import clearance, crossed, winding
+from raychan.world.topology import Joints
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+LEAST = 0.28  # m: radius under which a ball hides too little to be looked for
+_MOST = 8  # balls of one body
+_SHARE = 0.3  # of the largest ball's radius, the smallest
+_CELLS = 24  # along the longest side of the grid in which balls are looked for
+_TRIES = 3 * _MOST  # places looked at for them
+_WHOLE = 0.01  # how far a winding number may be from a whole one: facets that do not agree on outside have none
+_INNER = 0.999  # of the way to the nearest facet: rounding of a ray must not pass between
+
+
+def closed_pieces(joints: Joints, opaque: Bools) -> Bools:
+    """Tell which facets (n,) are of pieces that hang together, close about an inside, and are opaque (n,) all over."""
+    piece = joints.piece
+    # Two sheets upon each other share every edge twice, yet have no inside.
+    closed = np.zeros(len(opaque), bool)
+    one_plane = np.empty(len(opaque), joints.plane.dtype)
+    one_plane[piece] = joints.plane
+    closed[piece[joints.plane != one_plane[piece]]] = True
+    closed[piece[~opaque]] = False
+    closed[piece[joints.rim // 3]] = False
+    return np.asarray(closed[piece])
+
+
+def cores_of(v: Floats) -> tuple[Floats, Floats]:
+    """Return centres (k, 3) [m] and radii (k,) [m] of balls inside a closed surface, the largest first.
+
+    Args: v (n, 3, 3) corners [m] of facets that close: every edge is of two. A ball holds
+    no facet, and the surface winds about it: what goes from outside into it meets a facet.
+    """
+    none = np.zeros((0, 3)), np.zeros(0)
+    if not len(v):
+        return none
+    low, high = v.min(axis=(0, 1)), v.max(axis=(0, 1))
+    if float((high - low).min()) < 2.0 * LEAST:
+        return none
+    cell = float((high - low).max()) / _CELLS
+    # A layer of cells all around, so that the outside is one piece.
+    low = low - 1.5 * cell
+    shape = np.ceil((high - low) / cell).astype(np.int64) + 2
+    free = ~crossed(v, low, cell, shape)
+    piece = label(free)[0]
+    free &= piece != piece[0, 0, 0]
+    # From a cell's centre to the nearest crossed cell's is at most this much more than to the facet in it.
+    room = cell * (distance_transform_edt(free) - 0.5 * math.sqrt(3.0))
+    centres, radii, inside, tries = list[Floats](), list[float](), dict[int, bool](), 0
+    for at in np.argsort(-room, axis=None, kind="stable"):
+        i, j, k = np.unravel_index(at, room.shape)
+        if len(radii) == _MOST or tries == _TRIES or room[i, j, k] < max(0.5 * LEAST, _SHARE * max(radii, default=0.0)):
+            break
+        centre = low + cell * (np.array([i, j, k]) + 0.5)
+        if any(np.linalg.norm(centre - c) < r for c, r in zip(centres, radii, strict=True)):
+            continue
+        number = int(piece[i, j, k])
+        if number not in inside:
+            turns = winding(v, centre)
+            inside[number] = abs(turns) > 0.5 and abs(turns - round(turns)) < _WHOLE
+        tries += 1
+        radius = _INNER * float(clearance(v, centre)) if inside[number] else 0.0
+        if radius >= LEAST:
+            centres.append(centre)
+            radii.append(radius)
+    if not radii:
+        return none
+    order = np.argsort(-np.array(radii), kind="stable")
+    return np.array(centres)[order], np.array(radii)[order]

@@ -1,0 +1,117 @@
+"""How bodies stand to each other and to the radar: which overlap, and whether any is in view. Told, not mended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from raychan.records import MIRROR
+from raychan.world.body import Body
+from raychan.world.mesh import Floats
+
+_SAMPLES = 400  # places on a body's surface
+_TESTS = 48  # of these, asked whether they lie inside another body
+_WORK = 1_000_000  # facets times places
+_DEPTH = 1e-3  # m: bodies that only touch, or are rounded into each other, do not overlap
+_INSIDE = 0.75  # of a turn: 1 inside a closed body, 1/2 on its surface, 0 outside
+_BEAM = 1e-6  # of the peak, both ways: -60 dB
+
+
+def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Floats:
+    """Return places (count, 3) [m], world axes, spread over a body's surface, `depth` [m] below it; always the same."""
+    mesh, rng = body.geometry, np.random.default_rng(0)
+    share = np.cumsum(mesh.areas)
+    face = np.minimum(np.searchsorted(share, rng.random(count) * share[-1]), len(share) - 1)
+    u, v = rng.random((2, count, 1))
+    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    a, b, c = np.moveaxis(mesh.corners[face], 1, 0)
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.asarray(body.motion.to_world(a + u * (b - a) + v * (c - a) - depth * normal))
+
+
+def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
+    """Return a line for each pair of bodies that reach into each other, and each body hidden inside another.
+
+    Args: opaque: which bodies let nothing through. A body that is wholly inside one that lets waves in is meant so.
+    """
+    said = []
+    solid = [i for i, body in enumerate(bodies) if body.kind != MIRROR]
+    boxes = {i: _box(bodies[i]) for i in solid}
+    for i, k in combinations(solid, 2):
+        low, high = np.maximum(boxes[i][0], boxes[k][0]), np.minimum(boxes[i][1], boxes[k][1])
+        if (high - low > _DEPTH).all():
+            said += _told(bodies[i], bodies[k], opaque[i], opaque[k])
+    return said
+
+
+def _told(one: Body, other: Body, one_opaque: bool, other_opaque: bool) -> list[str]:
+    shares = _inside(one, other), _inside(other, one)
+    if max(shares) == 0.0:
+        return []
+    inner, outer, share = (one, other, shares[0]) if shares[0] >= shares[1] else (other, one, shares[1])
+    key = f"(bodies.{inner.name}.position)"
+    if share == 1.0:
+        hidden = other_opaque if outer is other else one_opaque
+        text = f"body '{inner.name}' is wholly inside '{outer.name}', which lets nothing through {key}"
+        return [text] if hidden else []
+    percent = max(1, round(100.0 * share))
+    return [
+        f"bodies '{inner.name}' and '{outer.name}' overlap: about {percent} % of the surface of '{inner.name}' is "
+        f"inside '{outer.name}' {key}"
+    ]
+
+
+def _box(body: Body) -> Floats:
+    at = body.motion.to_world(body.geometry.vertices)
+    return np.array([at.min(axis=0), at.max(axis=0)])
+
+
+def _inside(body: Body, other: Body) -> float:
+    """Return about what share of a body's surface lies inside another one."""
+    size = min(max(body.geometry.report.size), max(other.geometry.report.size))
+    places = other.motion.to_body(surface_sample(body, depth=min(_DEPTH, 0.01 * size)))
+    low, high = other.geometry.bounds
+    near = places[((places > low) & (places < high)).all(axis=1)]
+    asked = near[: max(8, min(_TESTS, _WORK // len(other.geometry.faces)))]
+    if not len(asked):
+        return 0.0
+    return float(np.mean([other.geometry.winding(p) > _INSIDE for p in asked])) * len(near) / len(places)
+
+
+def unseen(bodies: Sequence[Body], sensor: Any) -> list[str]:
+    """Return a line where no body is in view of the radar, in its beam, or within its unambiguous range."""
+    things = [b for b in bodies if b.kind != MIRROR and not b.name.startswith("ego")]
+    if not things:
+        return ["no body is in view: the scene has none but ground and the radar's own car (bodies)"]
+    spread = [surface_sample(b) for b in things]
+    spread += [b.motion.to_world(b.target_point())[None] for b in things if b.rcs is not None]
+    way = np.concatenate(spread) - sensor.position
+    far = np.linalg.norm(way, axis=1)
+    gain = _two_way(sensor, way[far > 0.0] / far[far > 0.0, None])
+    peak = float(np.max(_two_way(sensor, _around() @ sensor.axes.T)))
+    if not (gain > 0.0).any() and not (way @ sensor.boresight > 0.0).any():
+        return ["no body is in view: all are behind the antenna (radar.yaw_deg, radar.position, bodies.*.position)"]
+    if not (gain > _BEAM * peak).any():
+        return ["no body is in the beam: all are 60 dB or more under its peak (radar.yaw_deg, radar.antenna)"]
+    limit = sensor.waveform.unambiguous_range
+    if far.min() > limit:
+        return [f"no body is within the unambiguous range of {limit:.4g} m (radar.waveform.samples, bandwidth_mhz)"]
+    return []
+
+
+def _two_way(sensor: Any, look: Floats) -> Floats:
+    ends = (np.linalg.norm(f(look), axis=1) ** 2 for f in (sensor.tx_field, sensor.rx_field))
+    return np.asarray(np.prod(list(ends), axis=0))
+
+
+def _around() -> Floats:
+    """Return directions (n, 3) ahead, finer than any beam of use."""
+    azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 91.0, 2.0)), np.radians(np.arange(-60.0, 61.0, 2.0)))
+    level = np.cos(elevation.ravel())
+    return np.stack(
+        [level * np.cos(azimuth.ravel()), level * np.sin(azimuth.ravel()), np.sin(elevation.ravel())], axis=1
+    )

@@ -1,0 +1,93 @@
+"""TOML text to tables, and single keys of tables changed from outside."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from raychan.world.errors import SceneError, nearest
+from raychan.world.mesh_io import SUFFIXES
+
+LATER = "# later by [s]: "
+"""Begins the line with which the text of a scene says that it is taken at another time than that of its poses."""
+
+_XYZ = ("x", "y", "z")
+_VECTORS = ("position", "velocity_mps", "rcs_point")
+
+
+def refuse_mesh(file: Path) -> None:
+    """Raise SceneError for the name of a mesh where a scene is wanted."""
+    if file.suffix.lower() in SUFFIXES:
+        takes = "a scene file (.toml), in which a body names the mesh; `info` and `rcs` take meshes themselves"
+        raise SceneError("is a mesh, not a scene", file=file, allowed=takes)
+
+
+def parsed(text: str, file: Any = None) -> dict[str, Any]:
+    """Return the tables of TOML text; SceneError with the line where it is broken."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as e:
+        found = re.search(r"line (\d+)", str(e))
+        line = int(found[1]) if found else len(text.splitlines())
+        raise SceneError(f"not valid TOML: {e}", file=file, line=line, allowed="TOML 1.0") from None
+    except ValueError as e:  # a number of too many digits, a date that is none
+        raise SceneError(f"not valid TOML: {e}", file=file, allowed="TOML 1.0") from None
+    except RecursionError:
+        raise SceneError("tables or lists nested too deep", file=file, allowed="a few levels") from None
+
+
+def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -> dict[str, Any]:
+    """Return a copy of a scene's tables with keys set, each change written 'dotted.key=value'; bodies go by name, the
+    numbers of a vector by x, y, z."""
+    out = deepcopy(dict(data))
+    for change in changes:
+        key, found, value = change.partition("=")
+        words = key.strip().split(".")
+        if not found or not all(words):
+            raise SceneError(f"'{change}' is no change", file=file, key=key, allowed="key=value, as radar.power_dbm=10")
+        at: Any = out
+        for i, word in enumerate(words[:-1]):
+            at = _step(at, word, ".".join(words[: i + 1]), file)
+        if _is_vector(at):
+            if words[-1] not in _XYZ:
+                raise SceneError(f"no number '{words[-1]}'", file=file, key=key, value=at, allowed="one of x, y, z")
+            at[_XYZ.index(words[-1])] = _value(value.strip())
+            continue
+        if words[-2:-1] and words[-2] in _VECTORS:
+            where, allowed = ".".join(words[:-1]), "all three numbers, as [0, 0, 0.5]; then each by its letter"
+            raise SceneError("is not set", file=file, key=where, allowed=allowed)
+        if not isinstance(at, dict):
+            raise SceneError("holds no keys", file=file, key=".".join(words[:-1]), value=at, allowed="a table")
+        at[words[-1]] = _value(value.strip())
+    return out
+
+
+def _is_vector(at: Any) -> bool:
+    return isinstance(at, list) and len(at) == 3 and not any(isinstance(x, dict | list) for x in at)
+
+
+def _step(at: Any, word: str, key: str, file: Any) -> Any:
+    if isinstance(at, list) and not _is_vector(at):
+        names = [b.get("name") for b in at if isinstance(b, dict)]
+        if word not in names:
+            raise SceneError(
+                f"no body '{word}'", file=file, key=key, value=word, allowed=nearest(word, map(str, names))
+            )
+        return at[names.index(word)]
+    if isinstance(at, dict):
+        if isinstance(at.get(word), str):
+            raise SceneError("holds no keys", file=file, key=key, value=at[word], allowed="a table")
+        return at.setdefault(word, {})
+    raise SceneError("holds no keys", file=file, key=key, value=at, allowed="a table")
+
+
+def _value(text: str) -> Any:
+    """Return a TOML value; what is none is text."""
+    try:
+        return tomllib.loads(f"x = {text}")["x"]
+    except (ValueError, RecursionError):
+        return text

@@ -1,0 +1,123 @@
+"""From the radar table of a scene file to a radar.Sensor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from raychan.units import watt
+from raychan.world import bundled, overrides
+from raychan.world.errors import SceneError, nearest
+from raychan.world.schema import AntennaTable, RadarTable
+from raychan.world.schema_errors import checked
+
+
+def sensor_of(table: RadarTable, folder: Path, file: Any = None) -> Any:
+    """Return the radar.Sensor of a radar table; antenna files are looked up in `folder`."""
+    from raychan.radar.radar import Sensor
+    from raychan.radar.waveform import Waveform
+
+    w = table.waveform
+    tx, rx = (antenna_of(given, table.polarization, folder, f"radar.{key}", file) for key, given in mounted(table))
+    waveform = Waveform(
+        carrier=w.carrier_ghz * 1e9,
+        bandwidth=w.bandwidth_mhz * 1e6,
+        chirp_duration=w.chirp_us * 1e-6,
+        repetition=(w.repetition_us or w.chirp_us) * 1e-6,
+        n_chirps=w.chirps,
+        n_samples=w.samples,
+        complex_sampling=w.iq,
+    )
+    yaw, pitch, roll = (float(x) for x in np.radians([table.yaw_deg, table.pitch_deg, table.roll_deg]))
+    return Sensor(
+        position=np.array(table.position),
+        yaw=yaw,
+        pitch=pitch,
+        roll=roll,
+        velocity=np.array(table.velocity_mps),
+        tx=tx,
+        rx=rx,
+        elements=1e-3 * np.array(table.elements_mm),
+        waveform=waveform,
+        power=float(watt(table.power_dbm)),
+        noise_figure_db=table.noise_figure_db,
+        noise=table.noise,
+    )
+
+
+def mounted(table: RadarTable) -> list[tuple[str, str | AntennaTable]]:
+    """Return for transmitter and receiver the key of the radar table that gives the antenna, and what stands there."""
+    own = (("tx_antenna", table.tx_antenna), ("rx_antenna", table.rx_antenna))
+    return [("antenna", table.antenna) if given is None else (key, given) for key, given in own]
+
+
+def antenna_table(given: str | AntennaTable, folder: Path, key: str, file: Any = None) -> tuple[AntennaTable, Any]:
+    """Return an antenna's table and the file it stands in: `file`, or one of its own in `folder` if `given` is a name.
+
+    Raises: SceneError where there is no such file, or where it is wrong.
+    """
+    if isinstance(given, AntennaTable):
+        return given, file
+    path = bundled.found(given, folder)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+        # Beside a scene lie scenes; by custom the antennas have a folder of their own.
+        beside = (folder / "antennas" if path.parent == folder else path.parent).glob("*.toml")
+        found = [p.relative_to(folder).as_posix() for p in beside]
+        allowed = nearest(given, found) if found else "a table, or a TOML file by its path from the scene file"
+        raise SceneError(f"no antenna file {path}", file=file, key=key, value=given, allowed=allowed) from None
+    except (OSError, UnicodeDecodeError) as e:
+        reason = getattr(e, "strerror", None) or e
+        raise SceneError(f"{path} cannot be read ({reason})", file=file, key=key, value=given) from None
+    return checked(AntennaTable, overrides.parsed(text, path), path), path
+
+
+def is_antenna(file: Path) -> bool:
+    """Say whether a file is an antenna's: TOML whose tables have the antenna's key `kind` at the top."""
+    try:
+        return "kind" in overrides.parsed(file.read_text(encoding="utf-8"), file)
+    except (OSError, UnicodeDecodeError, SceneError):
+        return False
+
+
+def antenna_of(given: str | AntennaTable, polarization: str, folder: Path, key: str, file: Any = None) -> Any:
+    """Return the antenna that a table or an antenna file describes."""
+    from raychan.radar.pattern import gain_dbi
+
+    table, own = antenna_table(given, folder, key, file)
+    if isinstance(given, str):
+        folder, file, key = own.parent, own, ""
+    try:
+        if table.gain_dbi is None:
+            return _made(table, table.loss_db or 0.0, polarization, folder, key, file)
+        ahead = gain_dbi(_made(table, 0.0, polarization, folder, key, file))
+        if not np.isfinite(ahead):
+            raise ValueError("gain_dbi for an antenna that has no gain at boresight")
+        return _made(table, ahead - table.gain_dbi, polarization, folder, key, file)
+    except SceneError:
+        raise
+    except (ValueError, OSError) as e:
+        raise SceneError(str(e), file=file, key=key, value=given) from e
+
+
+def _made(table: AntennaTable, loss_db: float, polarization: str, folder: Path, key: str, file: Any) -> Any:
+    from raychan.radar import antenna as kinds
+    from raychan.radar.pattern import MeasuredPattern
+
+    if table.kind == "isotropic":
+        return kinds.Isotropic(polarization, table.front, loss_db)
+    if table.kind == "cosine":
+        return kinds.CosinePattern(table.hpbw_h_deg, table.hpbw_v_deg, polarization, loss_db)  # type: ignore[arg-type]
+    if table.kind == "measured":
+        pattern = MeasuredPattern.load(folder / str(table.file), polarization)
+        return replace(pattern, gain_db=pattern.gain_db - loss_db)
+    element = kinds.Isotropic(polarization, front=True)
+    if table.element is not None:
+        element = antenna_of(table.element, polarization, folder, f"{key}.element".removeprefix("."), file)
+    return kinds.UniformArray(
+        table.ny, table.nz, table.spacing_y, table.spacing_z, table.taper_y, table.taper_z, element, loss_db
+    )
