@@ -13,7 +13,7 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 
-class once(cached_property):  # type: ignore[type-arg]
+class cached(cached_property):  # type: ignore[type-arg]
     """A property of an object made once, by one thread: the object's lock `making` is held meanwhile."""
 
     def __get__(self, instance: Any, owner: Any = None) -> Any:
@@ -44,9 +44,9 @@ def _helper() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(1, "raychan-rows")
 
 
-def in_two(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
+def parallel_for(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
     """Do the work on rows 0 to n, on this thread and another when there are many: it must release the interpreter's
-    lock, and may not call this again. Beside another work (`at_once`) this thread does it alone."""
+    lock, and may not call this again. Beside another work (`run_pair`) this thread does it alone."""
     if _own.stop is not None and _own.stop.is_set():
         raise Stopped
     if n < least or (_own.beside is not None and not _own.beside.is_set()):
@@ -69,7 +69,7 @@ def was_interrupted(failure: BaseException | None) -> bool:
     return failure is not None
 
 
-def at_once(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
+def run_pair(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
     """Return what two works return, one done by this thread and one by another; neither may call this again.
 
     Where the first fails or is interrupted the other is stopped at its next rows. Raises: what they raise, the first's

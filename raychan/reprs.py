@@ -171,7 +171,7 @@ def _detections(d: Any) -> Facts:
 
 
 def _scene(scene: Any) -> Facts:
-    radar = scene.radar
+    radar = scene.radar_table
     lines = [] if radar is None else [
         (
             "radar",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from raychan.radar.antenna import Isotropic
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.records import Paths
 from raychan.units import C0
@@ -15,9 +15,9 @@ WIDE = Waveform(77e9, 4e9, 25.6e-6, 40e-6, 128, 1024)
 SMALL = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128)
 
 
-def sensor(waveform: Waveform, **changes) -> Sensor:
+def make_radar(waveform: Waveform, **changes) -> Radar:
     given = {"position": np.zeros(3), "power": 1.0, "noise_figure_db": 15.0, "noise": False} | changes
-    return Sensor(tx=Isotropic(), rx=Isotropic(), waveform=waveform, **given)
+    return Radar(tx=Isotropic(), rx=Isotropic(), waveform=waveform, **given)
 
 
 def echoes(ranges, rates=0.0, amplitudes=1.0, azimuth=0.0) -> Paths:

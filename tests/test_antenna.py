@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from raychan.frames import direction, theta_phi
 from raychan.radar.antenna import Antenna, CosinePattern, Isotropic, UniformArray
 from raychan.radar.pattern import MeasuredPattern, PatternError, characteristics, gain_dbi
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.world.radar_mount import antenna_of
@@ -35,12 +35,12 @@ EVERY = {
 def test_a_sensor_turns_theta_and_phi_parts_into_world_axes():
     looks = np.concatenate([fibonacci_sphere(200), np.eye(3), -np.eye(3)])
     for antenna in (*EVERY.values(), CosinePattern(86.0, 60.0, "H")):
-        sensor = Sensor(np.zeros(3), antenna, antenna, WAVE, 1.0, 10.0, yaw=0.7, pitch=-0.3, roll=1.1)
-        local = looks @ sensor.axes
+        radar = Radar(np.zeros(3), antenna, antenna, WAVE, 1.0, 10.0, yaw=0.7, pitch=-0.3, roll=1.1)
+        local = looks @ radar.axes
         theta, phi = theta_phi(local)
         parts = antenna.field(local)
-        wanted = (parts[:, :1] * theta + parts[:, 1:] * phi) @ sensor.axes.T
-        np.testing.assert_allclose(sensor.tx_field(looks), wanted, atol=1e-12)
+        wanted = (parts[:, :1] * theta + parts[:, 1:] * phi) @ radar.axes.T
+        np.testing.assert_allclose(radar.tx_field(looks), wanted, atol=1e-12)
 
 
 def gain(antenna, directions):

@@ -15,7 +15,7 @@ from raychan.tracing.beyond_horizon import outlets
 from raychan.tracing.legs import Leg, Mirror
 from raychan.tracing.shooting import tube_routes
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.material import Material
 
 F = 77e9
@@ -120,9 +120,9 @@ def test_plate_in_its_near_field_straight_through_and_aside_is_its_sum_over_poin
 
 def forward(mesh, look, material="pec"):
     """S (2, 2) straight through, in units of that of 1 m^2 of shadow."""
-    surface = Surface(facets_of(mesh, material, F))
-    rule = list(refinements(surface, F))[2]
-    s = scattering(surface, Leg(end=look, far=True), Leg(end=-look, far=True), F, 1, rule)[0]
+    geometry = Geometry(facets_of(mesh, material, F))
+    rule = list(refinements(geometry, F))[2]
+    s = scattering(geometry, Leg(end=look, far=True), Leg(end=-look, far=True), F, 1, rule)[0]
     return s / (K / (2.0 * np.pi))
 
 
@@ -220,14 +220,14 @@ def test_reflected_wave_is_blocked_by_what_stands_in_its_way():
 def test_rays_of_currents_leave_their_own_body_where_it_ends_and_no_further():
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
     other = trimesh.creation.box([0.2, 0.2, 0.2], trimesh.transformations.translation_matrix([-2.0, 0.0, 0.0]))
-    surface = Surface(facets([ball, other]))
+    geometry = Geometry(facets([ball, other]))
     leg = Leg(end=np.array([-1.0, 0.0, 0.0]), far=True)
-    facet = np.flatnonzero(surface.normal[: len(ball.faces), 0] > 0.3).astype(np.int32)
-    points = surface.facets.vertices[facet].mean(axis=1)
-    moved, there = outlets(surface, leg, points, facet)
+    facet = np.flatnonzero(geometry.normal[: len(ball.faces), 0] > 0.3).astype(np.int32)
+    points = geometry.facets.vertices[facet].mean(axis=1)
+    moved, there = outlets(geometry, leg, points, facet)
     assert (there < len(ball.faces)).all() and (moved[:, 0] < 0.0).all()
     np.testing.assert_allclose(moved[:, 1:], points[:, 1:], atol=1e-9)
-    seen = leg.visible(surface, moved, there, np.full(len(facet), 1e-4), 1).seen
+    seen = leg.visible(geometry, moved, there, np.full(len(facet), 1e-4), 1).seen
     hidden = (np.abs(points[:, 1:]) < 0.1).all(axis=1)
     np.testing.assert_array_equal(seen, ~hidden)
     assert hidden.any() and seen.any()
@@ -241,13 +241,13 @@ def test_ends_must_both_be_near_or_both_far():
 # --- in scenes ----------------------------------------------------------------------------------------------------
 
 
-def in_a_scene(surface, azimuth_deg, step=2):
+def in_a_scene(geometry, azimuth_deg, step=2):
     """S (2, 2) [m] of what comes by one leg and goes by another, as in a scene: without the shadow's wave."""
     leg, out = (Leg(end=e[0], far=True) for e in ends(*azimuth_deg))
-    rule = list(refinements(surface, F))[step]
+    rule = list(refinements(geometry, F))[step]
     total = np.zeros((2, 2), complex)
-    for routes in tube_routes(surface, leg, [out], np.ones(1, bool), rule, 1):
-        total += transfer(routes, surface.facets, F, _basis, _basis).sum(axis=0)
+    for routes in tube_routes(geometry, leg, [out], np.ones(1, bool), rule, 1):
+        total += transfer(routes, geometry.facets, F, _basis, _basis).sum(axis=0)
     return total * 2.0 * K
 
 
@@ -259,11 +259,11 @@ def test_sphere_that_comes_by_one_leg_and_goes_by_another_has_no_false_terminato
     """Within 0.75 dB of a mirror ball to 120 deg, 0.5 dB in the mean; with an end of light at the receiver's horizon
     too it is 1.2 dB off."""
     radius = 0.037
-    surface = Surface(facets_of(trimesh.creation.icosphere(subdivisions=4, radius=radius), "pec", F))
+    geometry = Geometry(facets_of(trimesh.creation.icosphere(subdivisions=4, radius=radius), "pec", F))
     off = []
     for angle in (20.0, 40.0, 60.0, 75.0, 90.0, 105.0, 120.0):
-        s = in_a_scene(surface, (0.0, angle))
-        back = in_a_scene(surface, (angle, 0.0))
+        s = in_a_scene(geometry, (0.0, angle))
+        back = in_a_scene(geometry, (angle, 0.0))
         off += list(db(np.abs(np.diag(s)) ** 2 * 4.0 / radius**2))
         assert db(np.linalg.norm(s) / np.linalg.norm(back)) == pytest.approx(0.0, abs=0.02)
     assert np.abs(off).max() < 0.75
@@ -275,7 +275,7 @@ def test_sphere_that_comes_by_one_leg_and_goes_by_another_has_no_false_terminato
 )
 def test_nothing_comes_straight_through_a_body_that_blocks_the_ray(mesh):
     """A blocked ray stands for the incident wave and the shadow's; the wave that hides a body is not added to it."""
-    s = in_a_scene(Surface(facets_of(mesh, "pec", F)), (0.0, 180.0))
+    s = in_a_scene(Geometry(facets_of(mesh, "pec", F)), (0.0, 180.0))
     assert np.abs(s).max() < 1e-3 * K / (2 * np.pi) * 0.02
 
 
@@ -289,14 +289,14 @@ def test_side_that_only_a_mirror_shows_returns_by_the_mirror():
     wall = quad([[8.0, 5.0, -5.0], [8.0, 5.0, 5.0], [8.0, -5.0, 5.0], [8.0, -5.0, -5.0]])
     if wall.face_normals[0, 0] > 0.0:
         wall.invert()
-    surface = Surface(facets([turned, wall]))
-    plane = int(np.flatnonzero(surface.facets.body == 1)[0])
-    over = Leg(end=radar, mirrors=(Mirror.of(surface, plane, 1.0),))
-    rule = list(refinements(surface, F))[1]
+    geometry = Geometry(facets([turned, wall]))
+    plane = int(np.flatnonzero(geometry.facets.body == 1)[0])
+    over = Leg(end=radar, mirrors=(Mirror.of(geometry, plane, 1.0),))
+    rule = list(refinements(geometry, F))[1]
     total = 0j
-    for routes in tube_routes(surface, over, [Leg(end=radar), over], np.array([True, False]), rule, 3):
+    for routes in tube_routes(geometry, over, [Leg(end=radar), over], np.array([True, False]), rule, 3):
         if (routes.kind[0] != 0).sum() == 3:
-            total += transfer(routes, surface.facets, F, _basis, _basis)[:, 0, 0].sum()
+            total += transfer(routes, geometry.facets, F, _basis, _basis)[:, 0, 0].sum()
     distance = float(np.linalg.norm(image - [5.0, 0.0, 0.0]))
     true = rcs(block, F, 0.0, distance=distance).sigma
     got = 4 * np.pi * np.abs(total * 2.0 * K * distance**2) ** 2

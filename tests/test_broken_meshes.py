@@ -16,11 +16,11 @@ from raychan.cli import app
 from raychan.geometry.edge_grid import most_within
 from raychan.run.rcs import facets_of, scattering
 from raychan.tracing.legs import Leg
-from raychan.tracing.shadow_edges import Shadows
+from raychan.tracing.shadow_edges import ShadowEdges
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
 from raychan.world.errors import SceneError
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.mesh import make_mesh, smooth_normals
 from raychan.world.mesh_io import from_trimesh
 
@@ -104,9 +104,9 @@ def test_shadows_across_a_body_are_those_of_the_body_without_its_spike():
     look = np.array([1.0, 0.0, 0.0])
     found = []
     for parts in (bodies, [*bodies, speck]):
-        surface = Surface(facets_of(trimesh.util.concatenate(parts), "pec", F))
-        facet = np.full(400, int(np.argmax(surface.normal[: len(bodies[0].faces)] @ look)), np.int32)
-        found.append(Shadows(surface, Leg(end=look, far=True)).across(points, facet, np.zeros(400)))
+        geometry = Geometry(facets_of(trimesh.util.concatenate(parts), "pec", F))
+        facet = np.full(400, int(np.argmax(geometry.normal[: len(bodies[0].faces)] @ look)), np.int32)
+        found.append(ShadowEdges(geometry, Leg(end=look, far=True)).across(points, facet, np.zeros(400)))
     assert (found[0] != 0.0).any()
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
 
@@ -132,10 +132,10 @@ def test_a_mesh_where_a_scene_is_wanted_is_told(argv, tmp_path, monkeypatch):
 
 
 def test_a_launch_that_its_budget_cut_short_says_so():
-    surface = Surface(facets_of(trimesh.creation.icosphere(subdivisions=2, radius=0.5), "pec", F))
+    geometry = Geometry(facets_of(trimesh.creation.icosphere(subdivisions=2, radius=0.5), "pec", F))
     leg = Leg(end=np.array([1.0, 0.0, 0.0]), far=True)
     fine = Refinement(wavenumber=2.0 * np.pi * F / C0, max_edge=0.02)
-    scattering(surface, leg, leg, F, 1, replace(fine, max_tubes=10_000_000))
-    assert surface.uncut == 0
-    scattering(surface, leg, leg, F, 1, replace(fine, max_tubes=1000))
-    assert surface.uncut > 0
+    scattering(geometry, leg, leg, F, 1, replace(fine, max_tubes=10_000_000))
+    assert geometry.uncut == 0
+    scattering(geometry, leg, leg, F, 1, replace(fine, max_tubes=1000))
+    assert geometry.uncut > 0

@@ -16,9 +16,9 @@ from raychan.cli import app
 from raychan.run import solver
 from raychan.run.resources import demand
 from raychan.run.single_body import facets_of
-from raychan.tracing.contributions import Found
+from raychan.tracing.contributions import Contributions
 from raychan.tracing.tubes import Refinement
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 
 def tangle(count: int, seed: int) -> trimesh.Trimesh:
@@ -28,14 +28,14 @@ def tangle(count: int, seed: int) -> trimesh.Trimesh:
 
 
 def test_a_launch_cuts_as_often_as_it_may_and_counts_the_rest():
-    surface = Surface(facets_of(trimesh.creation.box(), "pec", 77e9))
+    geometry = Geometry(facets_of(trimesh.creation.box(), "pec", 77e9))
     facet = np.zeros(10, np.int32)
-    found = Found(Refinement(wavenumber=1.0, max_cuts=7))
+    found = Contributions(Refinement(wavenumber=1.0, max_cuts=7))
     every = np.ones(10, bool)
-    assert found.affords(surface, facet[:4], every[:4]).all()
-    assert found.affords(surface, facet, every).sum() == 3
-    assert found.spent(surface)
-    assert not found.affords(surface, facet, every).any()
+    assert found.affords(geometry, facet[:4], every[:4]).all()
+    assert found.affords(geometry, facet, every).sum() == 3
+    assert found.spent(geometry)
+    assert not found.affords(geometry, facet, every).any()
     assert found.uncut.tolist() == [17]
 
 

@@ -75,7 +75,7 @@ def test_bodies_without_a_part_in_the_cell_are_seen_through(ran, tmp_path):
     assert "3 interactions, 17.0" in drawing.caption and "multipath" in drawing.title
     drawing.save(tmp_path / "d.npz")
     assert Drawing.load(tmp_path / "d.npz").caption == drawing.caption
-    whole = draw("", r.scene.facets(), r.scene.points(), r.scene.sensor.position, r.scene.sensor.boresight, r)
+    whole = draw("", r.scene.facets(), r.scene.points(), r.scene.radar.position, r.scene.radar.boresight, r)
     assert {s.opacity for s in whole.shapes} == {1.0} and len(whole.rays) > 2 and not whole.caption
 
 

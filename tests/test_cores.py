@@ -11,11 +11,11 @@ from test_kept import ball, wanted
 import raychan as rc
 from raychan.geometry.closed_surfaces import clearance, winding
 from raychan.records import LAYER
-from raychan.tracing.contributions import Found
-from raychan.tracing.culling import seeds
+from raychan.tracing.contributions import Contributions
+from raychan.tracing.culling import seed_facets
 from raychan.tracing.legs import Leg, Mirror
-from raychan.tracing.occluders import Screens
-from raychan.world.geometry import Surface, surface_of
+from raychan.tracing.occluders import Occluders
+from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.shapes import build
 
 NOTHING = np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32)
@@ -27,7 +27,7 @@ STEEL = (0, 1.0 + 0j, 0.0, 0.0)
 def test_a_core_lies_inside_and_no_facet_in_it(name):
     mesh = build(name, {"radius": 1.3} if name == "sphere" else {})
     v = mesh.corners
-    centres, radii = mesh.cores((True,) * len(mesh.part_names))
+    centres, radii = mesh.inner_spheres((True,) * len(mesh.part_names))
     assert len(radii)
     rng = np.random.default_rng(0)
     for centre, radius in zip(centres, radii, strict=True):
@@ -53,9 +53,9 @@ def test_what_is_open_or_lets_through_has_no_core():
     half = ball((0.0, 0.0, 0.0), 1.0)
     half.update_faces(half.triangles_center[:, 2] < 0.8)
     shell = facets([half, ball((9.0, 0.0, 0.0), 1.0)], [STEEL, PANE])
-    assert not len(Surface(shell).cores[1])
+    assert not len(Geometry(shell).inner_spheres[1])
     mended = facets([half, ball((9.0, 0.0, 0.0), 1.0)])
-    np.testing.assert_array_equal(Surface(mended).cores[2], [1])
+    np.testing.assert_array_equal(Geometry(mended).inner_spheres[2], [1])
 
 
 def test_the_cores_of_a_scene_are_those_of_its_facets():
@@ -65,9 +65,9 @@ def test_the_cores_of_a_scene_are_those_of_its_facets():
         rc.Body(name="ball", shape="sphere", params={"radius": 2.0}, position=(9.0, -6.0, 2.0)),
     ]
     scene = rc.Scene(bodies=bodies)
-    centre, radius, body = surface_of(scene).cores
+    centre, radius, body = geometry_of(scene).inner_spheres
     assert set(body) == {0, 2}
-    v = surface_of(scene).facets
+    v = geometry_of(scene).facets
     for c, r, b in zip(centre, radius, body, strict=True):
         assert r < clearance(v.vertices[v.body == b], c) < 1.01 * r
 
@@ -87,25 +87,25 @@ LEGS = {
 def test_what_a_solid_body_hides_is_what_no_ray_finds(leg, aside):
     front = trimesh.creation.capsule(height=1.5, radius=1.2, count=[24, 24])
     front.apply_translation((6.0, 0.0, -0.75))
-    surface = Surface(facets([front, ball((12.0, aside, 0.3)), ground(height=-2.0)], smooth=True))
-    way, bodies = LEGS[leg](surface), np.array([True, True, False])
-    found = seeds(surface, way, bodies)
+    geometry = Geometry(facets([front, ball((12.0, aside, 0.3)), ground(height=-2.0)], smooth=True))
+    way, bodies = LEGS[leg](geometry), np.array([True, True, False])
+    found = seed_facets(geometry, way, bodies)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Screens, "within", lambda self, leg: NOTHING)
-        left = np.setdiff1d(seeds(surface, way, bodies), found)
-    middle = surface.facets.vertices[left].mean(axis=1)
+        patch.setattr(Occluders, "within", lambda self, leg: NOTHING)
+        left = np.setdiff1d(seed_facets(geometry, way, bodies), found)
+    middle = geometry.facets.vertices[left].mean(axis=1)
     slack = np.full(len(left), 1e-3)
-    assert not way.visible(surface, middle, left.astype(np.int32), slack, 0).seen.any()
-    assert np.isin(found, wanted(surface, way, bodies)).all()
+    assert not way.visible(geometry, middle, left.astype(np.int32), slack, 0).seen.any()
+    assert np.isin(found, wanted(geometry, way, bodies)).all()
     if leg in ("straight", "over the ground") and aside == 0.0:
         assert len(left) > 500
 
 
 def test_what_stands_before_a_solid_body_or_about_it_stays():
     inner, outer = ball((6.0, 0.0, 0.0), 1.0), ball((6.0, 0.0, 0.0), 2.0)
-    surface = Surface(facets([inner, outer, ball((3.0, 0.0, 0.0))], smooth=True))
+    geometry = Geometry(facets([inner, outer, ball((3.0, 0.0, 0.0))], smooth=True))
     leg, bodies = Leg(end=np.zeros(3)), np.array([False, True, True])
-    np.testing.assert_array_equal(seeds(surface, leg, bodies), wanted(surface, leg, bodies))
+    np.testing.assert_array_equal(seed_facets(geometry, leg, bodies), wanted(geometry, leg, bodies))
 
 
 def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_at(monkeypatch):
@@ -124,18 +124,18 @@ def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_
         }
         return rc.simulate(rc.Scene(bodies=bodies, radar=radar, model={"max_bounces": 3, "tolerance_db": 3.0})).paths
 
-    calls, within = [], Screens.within
+    calls, within = [], Occluders.within
 
     def counted(self, leg):
         calls.append(len(within(self, leg)[1]))
         return within(self, leg)
 
     # The weakest tubes are let go up to a sum, to which hidden ones would add.
-    monkeypatch.setattr(Found, "that_count", lambda self, bound, length, many=0: np.arange(len(bound)))
-    monkeypatch.setattr(Screens, "within", counted)
+    monkeypatch.setattr(Contributions, "that_count", lambda self, bound, length, many=0: np.arange(len(bound)))
+    monkeypatch.setattr(Occluders, "within", counted)
     ours = paths()
     assert max(calls) > 0
-    monkeypatch.setattr(Screens, "within", lambda self, leg: NOTHING)
+    monkeypatch.setattr(Occluders, "within", lambda self, leg: NOTHING)
     every = paths()
     for name in ("delay", "amplitude", "rate", "body", "kind", "vertices"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(every, name), err_msg=name)

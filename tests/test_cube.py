@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from echoes import SMALL, WIDE, echoes, sensor
+from echoes import SMALL, WIDE, echoes, make_radar
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -44,7 +44,7 @@ def random_paths(seed: int, n: int, wave: Waveform, fastest: float = 30.0):
 @pytest.mark.parametrize("method", ["direct", "nufft"])
 def test_samples_are_those_of_the_phase_formula(method):
     paths = random_paths(1, 12, WIDE)
-    assert worst_db(synthesize(paths, sensor(WIDE), method=method), formula(paths, WIDE)) < -100.0
+    assert worst_db(synthesize(paths, make_radar(WIDE), method=method), formula(paths, WIDE)) < -100.0
 
 
 @settings(max_examples=25, deadline=None)
@@ -63,8 +63,8 @@ def test_fast_sum_equals_direct_sum_over_random_paths_and_waveforms(
 ):
     wave = Waveform(carrier, bandwidth, duration, duration + idle, chirps, samples)
     paths = random_paths(seed, n, wave)
-    direct = synthesize(paths, sensor(wave), method="direct")
-    fast = synthesize(paths, sensor(wave), method="nufft", tolerance=1e-7)
+    direct = synthesize(paths, make_radar(wave), method="direct")
+    fast = synthesize(paths, make_radar(wave), method="nufft", tolerance=1e-7)
     # Peak of the sum, not of one path: paths that cancel must not be an excuse, nor a reason to fail.
     peak = max(np.abs(direct.samples).max(), np.abs(paths.amplitude).max())
     assert db((np.abs(fast.samples - direct.samples).max() / peak) ** 2) < -100.0
@@ -73,8 +73,8 @@ def test_fast_sum_equals_direct_sum_over_random_paths_and_waveforms(
 def test_movers_at_4_ghz_migrate_over_several_cells_and_stay_exact():
     paths = random_paths(2, 40, WIDE)
     assert 30.0 * WIDE.frame_duration > 4.0 * WIDE.range_resolution
-    direct = synthesize(paths, sensor(WIDE), method="direct")
-    assert worst_db(synthesize(paths, sensor(WIDE), method="nufft"), direct.samples[0]) < -100.0
+    direct = synthesize(paths, make_radar(WIDE), method="direct")
+    assert worst_db(synthesize(paths, make_radar(WIDE), method="nufft"), direct.samples[0]) < -100.0
 
 
 def test_migration_left_out_would_be_wrong():
@@ -84,13 +84,13 @@ def test_migration_left_out_would_be_wrong():
     tau = paths.delay[0]
     turn = WIDE.carrier * 60.0 * (m + t) / C0 + WIDE.slope * t * tau - 0.5 * WIDE.slope * tau**2
     still += np.exp(-2j * np.pi * turn)
-    assert worst_db(synthesize(paths, sensor(WIDE)), still) > -25.0
+    assert worst_db(synthesize(paths, make_radar(WIDE)), still) > -25.0
 
 
 def test_more_paths_than_one_chunk_add_up(monkeypatch):
     monkeypatch.setattr("raychan.signal.keystone._CHUNK", 7)
     paths = random_paths(3, 40, SMALL)
-    assert worst_db(synthesize(paths, sensor(SMALL), method="nufft"), formula(paths, SMALL)) < -100.0
+    assert worst_db(synthesize(paths, make_radar(SMALL), method="nufft"), formula(paths, SMALL)) < -100.0
 
 
 def test_grids_too_large_for_their_room_are_split_and_add_up(monkeypatch):
@@ -98,7 +98,7 @@ def test_grids_too_large_for_their_room_are_split_and_add_up(monkeypatch):
     assert len(grids(paths, WIDE)) == 1
     monkeypatch.setattr("raychan.signal.keystone._ROOM", 1 << 23)
     assert len(grids(paths, WIDE)) > 2
-    assert worst_db(synthesize(paths, sensor(WIDE), method="nufft"), formula(paths, WIDE)) < -100.0
+    assert worst_db(synthesize(paths, make_radar(WIDE), method="nufft"), formula(paths, WIDE)) < -100.0
 
 
 def test_movers_so_fast_that_the_small_terms_turn_by_more_than_a_radian_stay_exact():
@@ -107,7 +107,7 @@ def test_movers_so_fast_that_the_small_terms_turn_by_more_than_a_radian_stay_exa
     paths = random_paths(10, 30, wave, fastest=1500.0)
     parts = grids(paths, wave)
     assert len(parts) > 1 and max(max(grid.orders) for grid, _ in parts) > 3
-    assert worst_db(synthesize(paths, sensor(wave), method="nufft"), formula(paths, wave)) < -100.0
+    assert worst_db(synthesize(paths, make_radar(wave), method="nufft"), formula(paths, wave)) < -100.0
 
 
 def test_a_frame_of_seconds_needs_few_grids_of_few_terms_and_stays_exact():
@@ -117,15 +117,15 @@ def test_a_frame_of_seconds_needs_few_grids_of_few_terms_and_stays_exact():
     parts = grids(paths, wave)
     assert max(sum(grid.rest_turn) for grid, _ in parts) > 0.3
     assert all(grid.planes < (grid.orders[0] + 1) * (grid.orders[1] + 1) for grid, _ in parts if min(grid.orders) > 1)
-    assert worst_db(synthesize(paths, sensor(wave), method="nufft"), formula(paths, wave)) < -100.0
+    assert worst_db(synthesize(paths, make_radar(wave), method="nufft"), formula(paths, wave)) < -100.0
 
 
 def test_crowds_of_echoes_in_one_cell_do_not_lose_digits():
     rng = np.random.default_rng(11)
     n = 20_000
     paths = echoes(9.0 + 0.01 * rng.random(n), 0.01 * rng.random(n), rng.normal(size=n) + 1j * rng.normal(size=n))
-    direct = synthesize(paths, sensor(SMALL), method="direct")
-    assert worst_db(synthesize(paths, sensor(SMALL), method="nufft"), direct.samples[0]) < -115.0
+    direct = synthesize(paths, make_radar(SMALL), method="direct")
+    assert worst_db(synthesize(paths, make_radar(SMALL), method="nufft"), direct.samples[0]) < -115.0
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-7])
@@ -133,25 +133,25 @@ def test_a_lone_echo_is_within_the_tolerance(tolerance):
     rng = np.random.default_rng(12)
     for r, v in zip(rng.uniform(0.1, 38.0, 20), rng.uniform(-30.0, 30.0, 20), strict=True):
         paths = echoes([r, 20.0], [v, -v], [1.0, 1e-6])
-        off = synthesize(paths, sensor(WIDE), method="nufft", tolerance=tolerance).samples[0] - formula(paths, WIDE)
+        off = synthesize(paths, make_radar(WIDE), method="nufft", tolerance=tolerance).samples[0] - formula(paths, WIDE)
         assert np.abs(off).max() < tolerance + 2e-7  # samples have single precision
 
 
 def test_equal_inputs_give_equal_bytes_and_noise_follows_the_seed():
-    radar, paths = sensor(SMALL, noise=True), random_paths(4, 100, SMALL)
+    radar, paths = make_radar(SMALL, noise=True), random_paths(4, 100, SMALL)
     a, b, c = (synthesize(paths, radar, np.random.default_rng(s), method="nufft").samples for s in (5, 5, 6))
     assert a.tobytes() == b.tobytes() != c.tobytes()
 
 
 def test_no_paths_give_silence():
-    cube = synthesize(echoes([]), sensor(SMALL))
+    cube = synthesize(echoes([]), make_radar(SMALL))
     assert cube.samples.shape == (1, 64, 128) and not cube.samples.any() and cube.noise_power == 0.0
 
 
 @pytest.mark.parametrize("complex_sampling", [True, False])
 def test_noise_alone_has_power_k_t_b_f(complex_sampling):
     wave = Waveform(77e9, 1e9, 20e-6, 40e-6, 128, 1024, complex_sampling)
-    cube = synthesize(echoes([]), sensor(wave, noise=True), np.random.default_rng(7))
+    cube = synthesize(echoes([]), make_radar(wave, noise=True), np.random.default_rng(7))
     expected = 1.380649e-23 * 290.0 * (1024 / 20e-6) * 10**1.5 * (1.0 if complex_sampling else 0.5)
     assert abs(db((np.abs(cube.samples) ** 2).mean() / expected)) < 0.1
 
@@ -159,28 +159,28 @@ def test_noise_alone_has_power_k_t_b_f(complex_sampling):
 def test_real_samples_are_the_real_part():
     real = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128, complex_sampling=False)
     paths = random_paths(8, 5, SMALL)
-    i, iq = synthesize(paths, sensor(real)).samples, synthesize(paths, sensor(SMALL)).samples
+    i, iq = synthesize(paths, make_radar(real)).samples, synthesize(paths, make_radar(SMALL)).samples
     assert np.array_equal(i.real, iq.real) and not i.imag.any()
 
 
 def test_power_is_amplitude_squared_times_transmitted_power():
-    cube = synthesize(echoes([10.0], amplitudes=1e-5j), sensor(SMALL, power=0.02))
+    cube = synthesize(echoes([10.0], amplitudes=1e-5j), make_radar(SMALL, power=0.02))
     assert np.allclose(np.abs(cube.samples) ** 2, 0.02e-10, rtol=1e-5)
 
 
 def test_a_receiver_set_aside_sees_the_paths_of_a_shifted_receiver():
     azimuth, aside = 0.4, 0.05
-    radar = sensor(SMALL, elements=np.array([[0, 0, 0], [0, aside, 0]]), yaw=0.3)
+    radar = make_radar(SMALL, elements=np.array([[0, 0, 0], [0, aside, 0]]), yaw=0.3)
     # In the antenna's frame the wave comes from azimuth 0.4; the path to the second receiver is shorter.
     paths = echoes([10.0], 3.0, 1.0, azimuth + 0.3)
     shorter = aside * np.sin(azimuth)
     moved = echoes([10.0 - 0.5 * shorter], 3.0, np.exp(2j * np.pi * SMALL.carrier * shorter / C0), azimuth + 0.3)
     both = synthesize(paths, radar).samples
-    assert np.allclose(both[1], synthesize(moved, sensor(SMALL)).samples[0], atol=1e-4)
-    assert np.allclose(both[0], synthesize(paths, sensor(SMALL)).samples[0], atol=1e-6)
+    assert np.allclose(both[1], synthesize(moved, make_radar(SMALL)).samples[0], atol=1e-4)
+    assert np.allclose(both[0], synthesize(paths, make_radar(SMALL)).samples[0], atol=1e-6)
 
 
 @pytest.mark.parametrize("bad", [{"method": "magic"}, {"tolerance": 0.0}])
 def test_bad_arguments_are_refused(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
-        synthesize(echoes([1.0]), sensor(SMALL), **bad)
+        synthesize(echoes([1.0]), make_radar(SMALL), **bad)

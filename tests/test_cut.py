@@ -13,7 +13,7 @@ from raychan.tracing.resolve_hits import put_down
 from raychan.tracing.silhouette_crossings import between
 from raychan.tracing.subdivide import divide, halves
 from raychan.tracing.tubes import Tubes
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 N = 300
 
@@ -48,14 +48,14 @@ def test_parts_have_the_area_of_the_whole_and_rays_of_its_source():
     rng = np.random.default_rng(1)
     source = np.array([1.0, -2.0, 4.0])
     tubes = tubes_from(source, triangles(rng, 0.05))
-    surface, leg = Surface(facets([trimesh.creation.box()])), Leg(source)
+    geometry, leg = Geometry(facets([trimesh.creation.box()])), Leg(source)
     line = rng.normal(size=(N, 2))
     side = np.einsum("nij,nj->ni", tubes.points[:, :3, :2] - tubes.points[:, 3:, :2], line)
     side /= np.linalg.norm(line, axis=1, keepdims=True)
     side[::3] = 0.0
     rows = rng.permutation(N)[: N // 2]
-    cut, parent = divide(surface, leg, tubes, rows, side, False, 0.1)
-    half = halves(surface, leg, tubes, rows, rng.integers(0, 3, len(rows)), False, 0.2)
+    cut, parent = divide(geometry, leg, tubes, rows, side, False, 0.1)
+    half = halves(geometry, leg, tubes, rows, rng.integers(0, 3, len(rows)), False, 0.2)
     for parts, of in ((cut, parent), (half, np.tile(rows, 2))):
         area = np.bincount(of, vector_area(parts.points)[:, 2], N)
         assert area[rows] == pytest.approx(vector_area(tubes.points)[rows, 2], rel=1e-9)
@@ -86,16 +86,16 @@ def test_outline_found_between_mirror_and_nowhere_is_that_of_which_most_lies_ins
     ball, box = trimesh.creation.icosphere(2, 0.8), trimesh.creation.box((0.5, 0.4, 1.0))
     ball.apply_translation([0.3, 0.2, 3.0])
     box.apply_translation([-0.8, 0.5, 2.0])
-    surface = Surface(facets([ball, box]))
+    geometry = Geometry(facets([ball, box]))
     source = np.array([0.1, 0.2, -3.0])
     # Narrow ones, which are followed all the way.
     tubes = tubes_from(source, triangles(rng, 0.05, 0.5)[:, ::-1])
     side = np.zeros((N, 3))
     rows = np.arange(0, N, 2)
     hit, reach = np.full((N, 4), -1, np.int32), np.full((N, 4), np.inf)
-    between(surface).across(rows, tubes.points, tubes.k, tubes.length, False, tubes.flat, hit, reach, side)
-    ends, faces = surface.edge_ends, surface.edge_faces
-    towards = np.einsum("fj,fj->f", surface.normal, source - surface.first) > 0.0
+    between(geometry).across(rows, tubes.points, tubes.k, tubes.length, False, tubes.flat, hit, reach, side)
+    ends, faces = geometry.edge_ends, geometry.edge_faces
+    towards = np.einsum("fj,fj->f", geometry.normal, source - geometry.first) > 0.0
     ends = ends[towards[faces[:, 0]] != towards[faces[:, 1]]]
     found = 0
     for i in rows:
@@ -119,21 +119,21 @@ def test_tubes_land_with_the_spreading_of_their_area_and_the_normals_between_the
     """Off a curved mirror the power of a tube stays; a point of a facet has the mean of its corners' normals."""
     rng = np.random.default_rng(3)
     mesh = trimesh.creation.icosphere(1, 2.0)
-    surface = Surface(facets([mesh], smooth=True))
-    f = surface.facets
+    geometry = Geometry(facets([mesh], smooth=True))
+    f = geometry.facets
     source = np.array([0.0, 0.0, 5.0])
     tubes = tubes_from(source, triangles(rng, 0.01, 0.2, 4.0))
-    facet, reach = surface.cast(tubes.points[:, 3], tubes.k[:, 3], np.full(N, -1, np.int32))
+    facet, reach = geometry.cast(tubes.points[:, 3], tubes.k[:, 3], np.full(N, -1, np.int32))
     assert (facet >= 0).all()
     hit = np.repeat(facet, 4).reshape(N, 4)
-    reach = surface.distance(hit.ravel(), tubes.points.reshape(-1, 3), tubes.k.reshape(-1, 3)).reshape(N, 4)
+    reach = geometry.distance(hit.ravel(), tubes.points.reshape(-1, 3), tubes.k.reshape(-1, 3)).reshape(N, 4)
     points, k, normals, length = np.empty((N, 4, 3)), np.empty((N, 4, 3)), np.empty((N, 4, 3)), np.empty((N, 4))
     (spread, strength), flat, caustics = np.empty((2, N)), np.empty(N, bool), np.empty(N, np.int8)
     start = np.full(N, 2.0)
     rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, start, tubes.strength
     put_down(
-        np.arange(N), hit, reach, *rays, np.zeros(N, bool), tubes.caustics, f.vertices, f.normals, surface.curved,
-        False, 1600.0, *surface.matter, points, k, length, normals, spread, strength, flat, caustics,
+        np.arange(N), hit, reach, *rays, np.zeros(N, bool), tubes.caustics, f.vertices, f.normals, geometry.curved,
+        False, 1600.0, *geometry.matter, points, k, length, normals, spread, strength, flat, caustics,
     )  # fmt: skip
     assert points == pytest.approx(tubes.points + reach[..., None] * tubes.k)
     thrown = [np.abs(np.einsum("ij,ij->i", vector_area(p), tubes.k[:, 3])) for p in (tubes.points, points)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from echoes import SMALL, WIDE, echoes, sensor
+from echoes import SMALL, WIDE, echoes, make_radar
 
 from raychan.processing.cfar import Grid, bias, factor, level, training
 from raychan.processing.detection import detect
@@ -15,7 +15,7 @@ from raychan.units import db
 
 
 def rdmap(paths, wave=SMALL, seed=0, window="hann", pad=(2, 2), **changes):
-    cube = synthesize(paths, sensor(wave, **changes), np.random.default_rng(seed))
+    cube = synthesize(paths, make_radar(wave, **changes), np.random.default_rng(seed))
     return range_doppler(cube, wave, window, window, pad)
 
 

@@ -12,7 +12,7 @@ from raychan.records import DIFFRACT
 from raychan.run.solver import refinement, solve
 from raychan.tracing.edge_diffraction import ways
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 F = 77e9
 K = 2 * np.pi * F / C0
@@ -26,21 +26,21 @@ def horizontal(look):
     return theta_phi(look)[1].astype(complex)
 
 
-def field(surface, y, x=20.0):
+def field(geometry, y, x=20.0):
     """Field of all ways at (x, y, 0) from the origin, over that of free space; the mean of V and H.
 
     The mean of soft and hard diffraction is what scalar theory gives.
     """
     at, scale = np.array([x, y, 0.0]), np.hypot(x, y) * np.exp(1j * K * np.hypot(x, y))
-    v = sum(w.field for w in ways(surface, np.zeros(3), at, -1, vertical, K))
-    h = sum(w.field for w in ways(surface, np.zeros(3), at, -1, horizontal, K))
+    v = sum(w.field for w in ways(geometry, np.zeros(3), at, -1, vertical, K))
+    h = sum(w.field for w in ways(geometry, np.zeros(3), at, -1, horizontal, K))
     straight = at / np.linalg.norm(at)
     return 0.5 * scale * (v @ theta_phi(straight[None])[0][0] + h @ theta_phi(straight[None])[1][0])
 
 
 @pytest.fixture(scope="module")
 def screen():
-    return Surface(facets([quad([[10, 0, -30], [10, 0, 30], [10, 40, 30], [10, 40, -30]])]))
+    return Geometry(facets([quad([[10, 0, -30], [10, 0, 30], [10, 40, 30], [10, 40, -30]])]))
 
 
 def test_field_behind_a_half_plane_is_half_at_the_shadow_boundary(screen):
@@ -61,7 +61,7 @@ def test_field_behind_a_half_plane_is_fresnels_integral(screen):
 
 def test_total_field_is_continuous_across_the_boundary_of_a_box():
     # The ray over the front edge at (8, 0.5) passes x = 20 at y = 1.25.
-    s = Surface(facets([box((8, 0.5, -20), (10, 12, 20))]))
+    s = Geometry(facets([box((8, 0.5, -20), (10, 12, 20))]))
     ys = 1.25 + np.linspace(-0.02, 0.02, 41)
     level = np.array([abs(field(s, y)) for y in ys])
     assert np.abs(np.diff(level)).max() < 0.02
@@ -71,10 +71,10 @@ def test_a_hidden_target_returns_over_the_edge_with_the_same_way_both_ways():
     wall = box((8, 0, -20), (8.5, 12, 20))
     f = facets([wall, box((19.9, 0.4, 0.0), (20.1, 0.6, 1.0))], role=[0, 2])
     hidden = point((20.0, 0.5, 0.5), 1.0, body=1)
-    dark, _ = solve(f, hidden, radar(), F, refinement(F, 0.5), 3)
+    outside_beam, _ = solve(f, hidden, radar(), F, refinement(F, 0.5), 3)
     lit, _ = solve(f, hidden, radar(), F, refinement(F, 0.5), 3, diffraction=True)
-    ranges = 0.5 * C0 * dark.delay
-    assert not ((ranges > 19) & (np.abs(dark.amplitude) > 0) & (dark.kind == 4).any(axis=1)).any()
+    ranges = 0.5 * C0 * outside_beam.delay
+    assert not ((ranges > 19) & (np.abs(outside_beam.amplitude) > 0) & (outside_beam.kind == 4).any(axis=1)).any()
     over = (lit.kind == DIFFRACT).any(axis=1)
     assert over.any()
     free = C0 / F / (4 * np.pi) ** 1.5 / (20.0**2 + 0.5**2)

@@ -8,7 +8,7 @@ import trimesh
 from helpers import box, facets, quad
 
 import raychan as rc
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 
 F = 77e9
 NONE = np.int32(-1)
@@ -33,7 +33,7 @@ def test_a_sheet_seen_edge_on_hides_nothing_behind_it(shift):
     wall = quad([[5, -9, -9], [5, 9, -9], [5, 9, 9], [5, -9, 9]])
     rng = np.random.default_rng(1)
     for turn in rotations(60, 2):
-        tracer = Tracer(facets([turned(m, turn, shift) for m in (sheet, wall)]))
+        tracer = RayCaster(facets([turned(m, turn, shift) for m in (sheet, wall)]))
         # Origins in the sheet's plane, ways along it.
         start = np.column_stack([np.zeros(40), rng.uniform(-0.9, 0.9, 40), np.zeros(40)])
         stop = np.column_stack([np.full(40, 5.0), rng.uniform(-0.9, 0.9, 40), np.zeros(40)])
@@ -48,7 +48,7 @@ def test_every_hit_lies_on_its_facet_however_a_body_is_turned():
     rng = np.random.default_rng(3)
     for turn in rotations(60, 4):
         f = facets([turned(body, turn)])
-        tracer = Tracer(f)
+        tracer = RayCaster(f)
         axis = np.zeros((300, 3))
         axis[np.arange(300), rng.integers(3, size=300)] = rng.choice([-1.0, 1.0], 300)
         # Places on the box's corners, edges and faces, seen along its faces.

@@ -11,7 +11,7 @@ from records import WAVE, paths, receiver, result
 from raychan.channel.error import stated_error
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.antenna import Isotropic
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.records import REFLECT, SCATTER, TRANSMIT, take
 from raychan.run.explain import explain
 from raychan.run.labels import chains, explain_cell, response_of
@@ -40,8 +40,8 @@ def test_prediction_is_the_map_itself(name, speed, bandwidth, iq, share):
     r = middle + rng.uniform(-2, 2, 8) * wave.range_resolution
     v = speed + rng.uniform(-2, 2, 8) * wave.rate_resolution
     p = paths(r, v, rng.normal(size=8) + 1j * rng.normal(size=8), [DIRECT_SUV] * 8)
-    sensor = Sensor(np.zeros(3), Isotropic(), Isotropic(), wave, 1.0, 10.0, noise=False)
-    rdmap = range_doppler(synthesize(p, sensor), wave, name, name)
+    radar = Radar(np.zeros(3), Isotropic(), Isotropic(), wave, 1.0, 10.0, noise=False)
+    rdmap = range_doppler(synthesize(p, radar), wave, name, name)
     rx = dataclasses.replace(receiver(name), waveform=wave)
     order = np.argsort(rdmap.power, axis=None)[::-1]
     known, response = chains(p, rx.background), response_of(rx)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from echoes import SMALL, sensor
+from echoes import SMALL, make_radar
 from records import paths, receiver, result
 from texts import ISOTROPIC, upright, walker
 
@@ -35,7 +35,7 @@ def seen(wave, ranges, rates, amplitudes=1e-5, window="hann"):
     """Detections, by the receiver and explained, of point echoes by their ranges at mid frame [m] and rates [m/s]."""
     r, v, a = np.broadcast_arrays(np.atleast_1d(np.asarray(ranges, float)), rates, amplitudes)
     p = paths(r - v * wave.centre, v, a, [[(SUV, SCATTER)]] * len(r))
-    rdmap = range_doppler(synthesize(p, sensor(wave)), wave, window, window)
+    rdmap = range_doppler(synthesize(p, make_radar(wave)), wave, window, window)
     found = detect(rdmap, min_snr_db=20.0, method="ca", waveform=wave, windows=(window, window))
     rx = dataclasses.replace(receiver(window), waveform=wave)
     return ExplainedDetections.of(found, provenance(p, rdmap, found, rx, 0.0 * rdmap.power))
@@ -168,7 +168,7 @@ def test_a_target_beyond_range_and_rate_is_told_by_the_run_its_table_and_its_fil
 
 
 def test_only_what_is_folded_is_warned_of():
-    rdmap = range_doppler(synthesize(paths([9.0], [0.0], [1.0], [[]]), sensor(SMALL)), SMALL)
+    rdmap = range_doppler(synthesize(paths([9.0], [0.0], [1.0], [[]]), make_radar(SMALL)), SMALL)
     d = seen(SMALL, [9.0, 15.0 + SMALL.unambiguous_range], 3.0, [2e-5, 1e-5])
     (line,) = warned(d, 0.5, rdmap)
     assert line.startswith("1 of 2 detections is folded (number 2): beyond 19.19 m or 24.18 m/s")

@@ -7,12 +7,12 @@ import pytest
 import trimesh
 from truth import shapes
 
-from raychan.channel.mesh_error import doubt_of
-from raychan.geometry.triangles import bulges
+from raychan.channel.mesh_error import mesh_error
+from raychan.geometry.triangles import edge_curvatures
 from raychan.run.rcs import rcs
 from raychan.run.single_body import facets_of
 from raychan.world.creases import readings
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
 from raychan.world.mesh import make_mesh
 from raychan.world.topology import places
@@ -56,11 +56,11 @@ def parabola(a):
 
 def test_what_is_a_quadratic_is_hardly_off_it():
     """Both curves meet a parabola across its axis; askew they part sideways, whose height goes with the turn cubed."""
-    off = [float(cubic_off(v, n, bulges(v, n)[0])[0]) for v, n in map(parabola, (1.0, 0.5, 0.25))]
+    off = [float(cubic_off(v, n, edge_curvatures(v, n)[0])[0]) for v, n in map(parabola, (1.0, 0.5, 0.25))]
     assert off[0] < 0.03 * 0.01
     assert off[1] < off[0] / 7.0 and off[2] < off[1] / 7.0
     flat = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], float), np.array([3 * [[0, 0, 1]]], float)
-    assert cubic_off(*flat, bulges(*flat)[0])[0] == 0.0
+    assert cubic_off(*flat, edge_curvatures(*flat)[0])[0] == 0.0
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["known normals", "estimated normals"])
@@ -85,5 +85,5 @@ def test_what_coarse_facets_miss_of_a_superquadric_is_in_the_stated_error(known)
 
 def test_a_fine_ball_and_a_box_are_not_halved():
     for mesh in (trimesh.creation.icosphere(5, 0.2), trimesh.creation.box((0.2, 0.3, 0.4))):
-        surface = Surface(facets_of(mesh, "pec", shapes.F))
-        assert doubt_of(surface, readings(make_mesh(mesh.vertices, mesh.faces)), shapes.K).halved is None
+        geometry = Geometry(facets_of(mesh, "pec", shapes.F))
+        assert mesh_error(geometry, readings(make_mesh(mesh.vertices, mesh.faces)), shapes.K).halved is None

@@ -17,7 +17,7 @@ from raychan.run.solver import refinement, solve
 from raychan.run.specular_paths import jones, specular_routes
 from raychan.units import C0
 from raychan.world.backed_layers import backed
-from raychan.world.geometry import Surface, surface_of
+from raychan.world.geometry import Geometry, geometry_of
 
 F = 77e9
 K = 2 * np.pi * F / C0
@@ -121,26 +121,26 @@ def test_random_things_of_panes_and_metal_are_the_same_joined_or_split(seed):
 def test_what_nothing_can_enter_keeps_one_side():
     shell, inner = walls((2.0, 2.0, 2.0)), box((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3))
     sheets = [(m, "glass" if i == 1 else "metal") for i, m in enumerate(shell)] + [(inner, "metal")]
-    surface = Surface(joined(split(sheets)))
-    np.testing.assert_array_equal(surface.both_sides, surface.facets.part < 6)
+    geometry = Geometry(joined(split(sheets)))
+    np.testing.assert_array_equal(geometry.both_sides, geometry.facets.part < 6)
     doubled = trimesh.util.concatenate([shell[0], trimesh.Trimesh(shell[0].vertices, shell[0].faces[:, ::-1])])
-    assert Surface(facets([doubled])).both_sides.all()
-    assert not Surface(facets([inner])).both_sides.any()
+    assert Geometry(facets([doubled])).both_sides.all()
+    assert not Geometry(facets([inner])).both_sides.any()
 
 
 def test_the_cabin_of_a_car_has_two_sides_and_its_sheet_metal_one():
-    surface = surface_of(rc.Scene(bodies=[rc.Body(name="car", shape="car")]))
-    f = surface.facets
-    of = {name: surface.both_sides[f.part == i] for i, name in enumerate(f.part_names)}
+    geometry = geometry_of(rc.Scene(bodies=[rc.Body(name="car", shape="car")]))
+    f = geometry.facets
+    of = {name: geometry.both_sides[f.part == i] for i, name in enumerate(f.part_names)}
     assert of["roof"].all() and of["windscreen"].all() and of["pillars"].all()
     assert not any(of[name].any() for name in ("tail", "hood", "floor", "seats", "plate", "rim_front_left"))
 
 
 def test_bodies_that_move_as_one_hang_together_where_they_touch():
     f = split([(m, "glass") for m in walls((1.0, 1.4, 1.2))])
-    assert set(Surface(f).piece) == {0}
+    assert set(Geometry(f).piece) == {0}
     moving = f.replace(velocity=f.velocity + np.where(np.arange(6)[:, None] == 3, [1.0, 0.0, 0.0], 0.0))
-    piece = Surface(moving).piece
+    piece = Geometry(moving).piece
     assert len(set(piece)) == 2
     assert set(moving.body[piece == piece[moving.body == 3][0]]) == {3}
 
@@ -164,7 +164,7 @@ def test_only_layers_that_lie_upon_something_opaque_are_backed():
     wall = quad([[5, -1, -1], [5, -1, 1], [5, 1, 1], [5, 1, -1]])
     panes = [quad(wall.vertices * s + d) for s, d in ((0.3, [3.5, 0, 0]), (1.0, [0.01, 0, 0]), (1.0, [0, 5, 0]))]
     f = split([(wall, "metal"), *((p, "glass") for p in panes)])
-    s = Surface(f)
+    s = Geometry(f)
     found = backed(f.vertices, s.normal, s.area, s.is_layer, s.touch)
     np.testing.assert_array_equal(found, f.body == 1)
 
@@ -174,7 +174,7 @@ def test_a_path_passes_a_pane_and_comes_back_from_inside_by_the_slab_formula(one
     f = split([(m, "glass") for m in walls((1.0, 1.4, 1.2), (5.0, 0.0, 0.0))])
     f = joined(f) if one else f
     tx, rx = np.array([0.0, 0.1, 0.0]), np.array([0.5, -0.2, 0.1])
-    routes = specular_routes(Surface(f), tx, rx, 1, 2)
+    routes = specular_routes(Geometry(f), tx, rx, 1, 2)
     gains = jones(routes, f, F)
     image = np.array([11.0 - rx[0], rx[1], rx[2]])
     length = float(np.linalg.norm(image - tx))

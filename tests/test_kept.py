@@ -19,10 +19,10 @@ from test_sequence import same
 import raychan as rc
 from raychan.radar.beam_table import beam_of
 from raychan.run.sequence import frames
-from raychan.tracing.culling import seeds
+from raychan.tracing.culling import seed_facets
 from raychan.tracing.legs import Leg
-from raychan.world.geometry import Surface, surface_of
-from raychan.world.ray_caster import Tracer
+from raychan.world.geometry import Geometry, geometry_of
+from raychan.world.ray_caster import RayCaster
 
 SCENES = Path(__file__).parents[1] / "scenes"
 RADAR = {
@@ -58,8 +58,8 @@ def scene():
 def builds(monkeypatch):
     """Counts how many tracers are made."""
     made = []
-    init = Tracer.__init__
-    monkeypatch.setattr(Tracer, "__init__", lambda self, f, *a: (made.append(len(f.body)), init(self, f, *a))[1])
+    init = RayCaster.__init__
+    monkeypatch.setattr(RayCaster, "__init__", lambda self, f, *a: (made.append(len(f.body)), init(self, f, *a))[1])
     return made
 
 
@@ -84,7 +84,7 @@ def test_a_moved_body_keeps_its_mesh_and_the_others_stay_what_they_are(scene, bu
     moved = scene.override(["bodies.box.position=[4.0, -2.0, 0.0]"])
     assert moved.bodies[0] is scene.bodies[0]
     assert moved.bodies[1].geometry is scene.bodies[1].geometry
-    assert surface_of(moved) is not surface_of(scene)
+    assert geometry_of(moved) is not geometry_of(scene)
     np.testing.assert_allclose(moved.facets().vertices[-1, :, 1], scene.facets().vertices[-1, :, 1] - 4.0, atol=1e-12)
 
 
@@ -92,12 +92,12 @@ def test_a_moved_body_keeps_its_mesh_and_the_others_stay_what_they_are(scene, bu
     "change", ["bodies.box.material='glass'", "bodies.box.params.length=3.0", "scene.frequency_ghz=24.0"]
 )
 def test_what_changes_a_surface_makes_a_new_one(scene, change):
-    assert surface_of(scene.override([change])) is not surface_of(scene)
+    assert geometry_of(scene.override([change])) is not geometry_of(scene)
 
 
 def test_joints_of_meshes_are_those_found_from_facets_alone(scene):
     turned = scene.override(["bodies.box.yaw_deg=33.0"])
-    own, blind = Surface(turned.facets(), turned.joints), Surface(turned.facets())
+    own, blind = Geometry(turned.facets(), turned.topology), Geometry(turned.facets())
     for name in ("plane", "smooth", "both_sides", "piece", "first_edge", "outline"):
         np.testing.assert_array_equal(getattr(own, name), getattr(blind, name), err_msg=name)
     for name in ("edge_ends", "wedge"):
@@ -108,7 +108,7 @@ def test_joints_of_meshes_are_those_found_from_facets_alone(scene):
 def test_what_is_kept_goes_with_the_scene():
     scene = rc.Scene.from_text(TEXT + BODIES)
     result = rc.simulate(scene)
-    gone = weakref.ref(surface_of(scene)), weakref.ref(scene.bodies[0].geometry.joints)
+    gone = weakref.ref(geometry_of(scene)), weakref.ref(scene.bodies[0].geometry.topology)
     del scene
     gc.collect()
     assert gone[0]() is None, "a result holds on to the surface"
@@ -121,7 +121,7 @@ def test_what_is_kept_goes_with_the_scene():
 def test_surfaces_go_without_the_garbage_collector_frame_by_frame():
     moving = rc.Scene.from_text(TEXT + BODIES + "velocity_mps = [0.0, -1.0, 0.0]\n")
     alive = weakref.WeakSet()
-    init = Surface.__init__
+    init = Geometry.__init__
 
     def noted(self, *args):
         init(self, *args)
@@ -131,7 +131,7 @@ def test_surfaces_go_without_the_garbage_collector_frame_by_frame():
     gc.disable()
     try:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Surface, "__init__", noted)
+            patch.setattr(Geometry, "__init__", noted)
             kept, most = [], 0
             for frame in frames(moving, 4, 0.05):
                 kept.append(frame.result)
@@ -143,17 +143,17 @@ def test_surfaces_go_without_the_garbage_collector_frame_by_frame():
 
 
 def test_a_moving_radar_has_one_beam(scene):
-    assert beam_of(scene.sensor) is beam_of(scene.sensor.at(0.3))
-    assert beam_of(scene.sensor) is not beam_of(dataclasses.replace(scene.sensor, yaw=0.1))
+    assert beam_of(scene.radar) is beam_of(scene.radar.at(0.3))
+    assert beam_of(scene.radar) is not beam_of(dataclasses.replace(scene.radar, yaw=0.1))
 
 
-def wanted(surface, leg, bodies):
+def wanted(geometry, leg, bodies):
     """The facets that could be met over a leg, each looked at by itself."""
-    f = surface.facets
+    f = geometry.facets
     rows = np.flatnonzero(bodies[f.body])
     k, _ = leg.rays(f.vertices[rows])
     lit = (np.einsum("nij,nij->ni", k, f.normals[rows]) < 0.0).any(axis=1)
-    return rows[lit | surface.both_sides[rows]]
+    return rows[lit | geometry.both_sides[rows]]
 
 
 def ball(at, radius=0.5):
@@ -164,10 +164,10 @@ def ball(at, radius=0.5):
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (0.3, 3.0, -1.0), (6.0, 0.2, 0.1), (30.0, -4.0, 9.0)])
 def test_clusters_pass_over_only_facets_that_turn_away(end):
-    surface = Surface(facets([ball((6.0, 0.0, 0.0), 1.5), ball((9.0, 4.5, 2.0))], smooth=True))
+    geometry = Geometry(facets([ball((6.0, 0.0, 0.0), 1.5), ball((9.0, 4.5, 2.0))], smooth=True))
     for leg in (Leg(end=np.array(end)), Leg(end=np.array([0.6, 0.0, 0.8]), far=True)):
         for bodies in (np.array([True, True]), np.array([False, True])):
-            np.testing.assert_array_equal(seeds(surface, leg, bodies), wanted(surface, leg, bodies))
+            np.testing.assert_array_equal(seed_facets(geometry, leg, bodies), wanted(geometry, leg, bodies))
 
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (6.0, 0.2, 0.1), (9.3, 1.1, 2.0), (30.0, -4.0, 9.0)])
@@ -175,13 +175,13 @@ def test_edges_turn_where_one_facet_looks_here_and_the_other_does_not(end):
     sheet = quad([[4, 3, -1], [4, 5, -1], [4, 5, 1], [4, 3, 1]])
     truck = rc.Body(name="truck", shape="truck", position=(20.0, 3.0, 0.0), yaw_deg=30.0)
     balls = facets([ball((6.0, 0.0, 0.0), 1.5), sheet, ball((9.0, 1.0, 2.0))], smooth=True)
-    for surface in (Surface(balls), surface_of(rc.Scene(bodies=[truck, rc.Body(name="bin", shape="trash_bin")]))):
-        half, faces = surface.fabric.silhouettes
+    for geometry in (Geometry(balls), geometry_of(rc.Scene(bodies=[truck, rc.Body(name="bin", shape="trash_bin")]))):
+        half, faces = geometry.scene_topology.silhouettes
         for image, far in ((np.array(end), False), (np.array([0.6, 0.0, 0.8]), True)):
-            towards = surface.normal @ image if far else ((image - surface.first) * surface.normal).sum(axis=1)
+            towards = geometry.normal @ image if far else ((image - geometry.first) * geometry.normal).sum(axis=1)
             front = towards > 0.0
             wanted = (faces[:, 1] < 0) | (front[faces[:, 0]] != front[faces[:, 1]])
-            found = surface.turning(image, far)
+            found = geometry.turning(image, far)
             assert 0 < len(found[0]) < len(half)
             np.testing.assert_array_equal(found[0], half[wanted])
             np.testing.assert_array_equal(found[1], faces[wanted])
@@ -191,25 +191,25 @@ def test_edges_turn_where_one_facet_looks_here_and_the_other_does_not(end):
 @pytest.mark.parametrize("aside", np.linspace(0.0, 4.0, 9))
 def test_what_a_wall_hides_is_what_no_ray_finds(aside, side):
     corners = np.array([[4, -1, -1], [4, 1, -1], [4, 1, 1], [4, -1, 1]], float)[:: int(side)]
-    surface = Surface(facets([quad(corners), ball((8.0, aside, 0.3))], smooth=True))
+    geometry = Geometry(facets([quad(corners), ball((8.0, aside, 0.3))], smooth=True))
     leg, bodies = Leg(end=np.zeros(3)), np.array([True, True])
-    found = seeds(surface, leg, bodies)
-    left = np.setdiff1d(wanted(surface, leg, bodies), found)
-    middle = surface.facets.vertices[left].mean(axis=1)
+    found = seed_facets(geometry, leg, bodies)
+    left = np.setdiff1d(wanted(geometry, leg, bodies), found)
+    middle = geometry.facets.vertices[left].mean(axis=1)
     slack = np.full(len(left), 1e-3)
-    assert not leg.visible(surface, middle, left.astype(np.int32), slack, 0).seen.any()
+    assert not leg.visible(geometry, middle, left.astype(np.int32), slack, 0).seen.any()
     assert (len(left) > 0) == (aside < 2.5)
 
 
 def test_where_the_antenna_sends_nothing_nothing_is_launched(scene):
-    surface = Surface(
+    geometry = Geometry(
         facets([ball((6.0, 1.0, 0.0), 1.5), ball((-6.0, 0.0, 0.5)), ball((0.0, 5.0, 1.0), 1.0)], smooth=True)
     )
-    leg, bodies = Leg(end=np.zeros(3), beam=beam_of(scene.sensor)), np.ones(3, bool)
-    found, every = seeds(surface, leg, bodies), wanted(surface, leg, bodies)
-    assert set(surface.facets.body[found]) == {0, 2}
+    leg, bodies = Leg(end=np.zeros(3), beam=beam_of(scene.radar)), np.ones(3, bool)
+    found, every = seed_facets(geometry, leg, bodies), wanted(geometry, leg, bodies)
+    assert set(geometry.facets.body[found]) == {0, 2}
     left = np.setdiff1d(every, found)
-    look = surface.facets.vertices[left].reshape(-1, 3)
+    look = geometry.facets.vertices[left].reshape(-1, 3)
     assert not leg.weight(look).any()
     assert len(np.intersect1d(found, every)) == len(found)
 

@@ -13,7 +13,7 @@ from raychan.run.rcs import rcs
 from raychan.run.single_body import facets_of
 from raychan.units import C0
 from raychan.world.creases import readings
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.mesh import make_mesh
 from raychan.world.mesh_io import from_trimesh
 
@@ -101,6 +101,6 @@ def test_thin_cylinders_lie_within_what_creeping_waves_may_change(radius_k):
     lit = np.sum(0.5 * np.pi * weight * np.cos(angle) * np.exp(2j * radius_k * np.cos(angle)))
     optics = abs(0.5 * radius_k * lit)
     mesh = trimesh.creation.cylinder(radius_k / K, 40.0 / K, sections=64)
-    share = creeping(Surface(facets_of(mesh, "pec", F)), K)[1]
+    share = creeping(Geometry(facets_of(mesh, "pec", F)), K)[1]
     for field in (jv(n, radius_k) / hankel2(n, radius_k), jvp(n, radius_k) / h2vp(n, radius_k)):
         assert abs(abs(np.sum(fold * field)) / optics - 1.0) < share

@@ -41,13 +41,13 @@ def scene(rpm=200.0, *more, model=None, **radar):
 
 def every_chirp(scene):
     """The truth, slow and obvious: the scene moved to each chirp, traced, and one ramp synthesised."""
-    wave = scene.sensor.waveform
+    wave = scene.radar.waveform
     rule = refinement(wave.carrier, scene.model.tolerance_db, 0.0, scene.model.max_transmissions)
     rows = []
     for m in range(wave.n_chirps):
         now = scene.at(m * wave.repetition)
-        paths, _ = solve(now.facets(), now.points(), now.sensor, wave.carrier, rule, scene.model.max_bounces)
-        one = dataclasses.replace(now.sensor, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
+        paths, _ = solve(now.facets(), now.points(), now.radar, wave.carrier, rule, scene.model.max_bounces)
+        one = dataclasses.replace(now.radar, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
         rows.append(synthesize(paths, one).samples)
     return np.concatenate(rows, axis=1), rule
 
@@ -76,7 +76,7 @@ def test_few_tracings_give_the_spectrum_of_tracing_every_chirp_within_the_stated
     truth, rule = every_chirp(turning)
     few = retraced(turning, rule, turning.model)
     assert len(few.times) <= 4 and few.reached
-    wave = turning.sensor.waveform
+    wave = turning.radar.waveform
     # The ground under the radar is not what this is about.
     true, wrong, told = (power(x, wave)[:, 14:] for x in (truth, few.samples - truth, few.error))
     off, stated = (10.0 * np.log10(x.sum() / true.sum()) for x in (wrong, told))
@@ -91,7 +91,7 @@ def test_few_tracings_give_the_spectrum_of_tracing_every_chirp_within_the_stated
 def test_one_tracing_with_rates_is_wrong_where_several_are_right():
     turning = scene(200.0)
     truth, rule = every_chirp(turning)
-    frozen = synthesize(simulate(turning, tolerance_db=0.5).paths, turning.sensor).samples
+    frozen = synthesize(simulate(turning, tolerance_db=0.5).paths, turning.radar).samples
     assert energy_db(frozen - truth, truth) > -15.0
     assert energy_db(retraced(turning, rule, turning.model).samples - truth, truth) < -40.0
 
@@ -112,11 +112,11 @@ def test_a_body_that_crosses_near_by_is_carried_on_if_asked_for():
     radar = {"position": [0, 0, 1], "noise": False, "antenna": {"kind": "isotropic"}}
     radar["waveform"] = {"bandwidth_mhz": 300.0, "chirp_us": 60.0, "chirps": 64, "samples": 64}
     body = rc.Body(name="door", velocity=(0, 15, 0), **plate)
-    once, thrice = (
+    cached, thrice = (
         rc.Scene(bodies=[body], radar=radar, model={"max_bounces": 1, "retrace": count}) for count in (1, 3)
     )
-    truth, _ = every_chirp(once)
-    off = [energy_db(simulate(s).cube.samples - truth, truth) for s in (once, thrice)]
+    truth, _ = every_chirp(cached)
+    off = [energy_db(simulate(s).cube.samples - truth, truth) for s in (cached, thrice)]
     assert off[0] > -25.0 and off[1] < -40.0, off
 
 
@@ -130,7 +130,7 @@ def test_a_point_like_corner_on_a_turning_arm_returns_at_the_range_of_every_inst
     turning = rc.Scene(bodies=[body], radar=radar, model={"max_bounces": 1})
     result = simulate(turning)
     assert result.stats["tracings"] >= 3
-    wave = turning.sensor.waveform
+    wave = turning.radar.waveform
     t = np.arange(wave.n_chirps) * wave.repetition
     middle = np.hypot(10.0 + np.cos(np.pi / 2 + rate * t), np.sin(np.pi / 2 + rate * t))
     first = result.cube.samples[0, :, 0].astype(complex)

@@ -13,7 +13,7 @@ import pytest
 from printed import table
 
 from raychan.run.simulate import simulate
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.scene import Scene
 
 SCENE = Path(__file__).parents[1] / "scenes" / "occluded_pedestrian.toml"
@@ -71,12 +71,12 @@ def test_parts_of_car_and_truck_are_detected_where_table_10_has_them(base, thing
 def test_car_hides_point_and_silhouette_of_the_pedestrian(base):
     scene = base.scene
     facets = scene.facets()
-    radar = np.asarray(scene.sensor.position)
+    place = np.asarray(scene.radar.position)
     person = facets.vertices[facets.body == facets.body_names.index("pedestrian")]
-    towards = np.concatenate([scene.points().position, person.mean(axis=1)]) - radar
+    towards = np.concatenate([scene.points().position, person.mean(axis=1)]) - place
     towards /= np.linalg.norm(towards, axis=1)[:, None]
     none = np.full(len(towards), -1, np.int32)
-    hit, _ = Surface(facets).cast(np.broadcast_to(radar, towards.shape), towards, none)
+    hit, _ = Geometry(facets).cast(np.broadcast_to(place, towards.shape), towards, none)
     parts = np.array([facets.part_names[p] for p in facets.part[hit]])
     assert parts[0] == "front_door_left"
     # Shares of the silhouette: triangles by the area that faces the radar. A foot shows under the car.

@@ -153,7 +153,7 @@ def test_bodies_that_are_not_there_or_have_no_outline_are_told():
 
 def test_the_studys_pedestrian_stands_behind_metal_but_for_head_and_foot():
     scene = Scene.load(Path(__file__).parents[1] / "scenes" / "occluded_pedestrian.toml")
-    found = occlusion(scene.facets(), scene.points(), scene.sensor.position, "pedestrian")
+    found = occlusion(scene.facets(), scene.points(), scene.radar.position, "pedestrian")
     # The scene's comment: 93 % behind metal and tyre, 3 % through a window, 4 % under the car.
     assert found.blocked == pytest.approx(0.93, abs=0.01)
     assert found.veiled == pytest.approx(0.03, abs=0.01)

@@ -20,7 +20,7 @@ from raychan.run.rcs import facets_of, rcs, refinements, scattering
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.material import Material
 from raychan.world.mesh import make_mesh
 from raychan.world.shapes.vehicle import car
@@ -52,10 +52,10 @@ def tube(radius, height, sections):
 
 def amplitudes(facets, look, distance=np.inf, step=1, move=0.0, **changes):
     """Scattering matrix (2, 2) [m] of one launch, the `step`-th refinement; seen from look * distance + move."""
-    surface = Surface(facets)
-    rule = dataclasses.replace(next(itertools.islice(refinements(surface, F), step, None)), **changes)
+    geometry = Geometry(facets)
+    rule = dataclasses.replace(next(itertools.islice(refinements(geometry, F), step, None)), **changes)
     leg = Leg(end=look, far=True) if np.isinf(distance) else Leg(end=look * distance + move)
-    return scattering(surface, leg, leg, F, 3, rule).sum(axis=0)
+    return scattering(geometry, leg, leg, F, 3, rule).sum(axis=0)
 
 
 def rms(x):
@@ -211,7 +211,7 @@ def test_dielectric_plate_is_fresnel_or_slab_times_physical_optics(material, dis
     corners = po.rectangle(0.1, 0.1)
     azimuth = np.array([0.0, 3.7, 20.0, 45.0])
     got = rcs(quad(corners), F, azimuth, 0.0, pol, distance=distance, material=material)
-    true = [sigma(po.polygon(corners, K, view(a, 0, distance), surface=slab_of(material)), pol) for a in azimuth]
+    true = [sigma(po.polygon(corners, K, view(a, 0, distance), geometry=slab_of(material)), pol) for a in azimuth]
     assert np.abs(db(got.sigma / true)).max() < 0.05
     assert got.rays.max() <= 16_384
 
@@ -341,12 +341,12 @@ def random_case(rng, i):
     az, el = rng.uniform(-40.0, 40.0, 2)
     kind, material = i % 7, "pec"
     if kind == 0:
-        corners, surface = po.rectangle(*rng.uniform(0.05, 0.12 if near else 0.3, 2)), None
+        corners, geometry = po.rectangle(*rng.uniform(0.05, 0.12 if near else 0.3, 2)), None
         if rng.random() < 0.5:
             eps_r, thickness = float(rng.uniform(2.0, 8.0)), (None, 0.004)[rng.integers(2)]
             material = Material(eps_r=eps_r, sigma=float(rng.uniform(0.0, 2.0)), thickness=thickness)
-            surface = slab_of(material)
-        mesh, s = quad(corners), po.polygon(corners, K, view(az, el, d), surface=surface)
+            geometry = slab_of(material)
+        mesh, s = quad(corners), po.polygon(corners, K, view(az, el, d), geometry=geometry)
     elif kind == 1:
         r = rng.uniform(0.03, 0.4)
         true = 4 * np.pi * abs(mie.backscatter_near(r, K, d)) ** 2 if near else mie.rcs(r, K)
@@ -403,11 +403,11 @@ def test_the_true_error_lies_within_the_stated_one_and_not_far_within(monkeypatc
 # --- a real car ---------------------------------------------------------------------------------------------------
 
 
-def range_profile(surface, leg, distance, rule, bandwidth=4e9, cells=512):
+def range_profile(geometry, leg, distance, rule, bandwidth=4e9, cells=512):
     """Hann-windowed profile (n,) about a body at `distance` [m], a cell of c/2B each, of one launch seen VV."""
     field = np.zeros(cells, complex)
-    for routes in tube_routes(surface, leg, [leg], np.ones(len(surface.piece_role), bool), rule, 3):
-        a = transfer(routes, surface.facets, F, theta_phi_of, theta_phi_of, corners=True)[:, 0, 0]
+    for routes in tube_routes(geometry, leg, [leg], np.ones(len(geometry.piece_role), bool), rule, 3):
+        a = transfer(routes, geometry.facets, F, theta_phi_of, theta_phi_of, corners=True)[:, 0, 0]
         delay = 2.0 * np.pi * (routes.lengths[:, :3] - 2.0 * distance) / C0
         f = (np.arange(cells) / cells - 0.5) * bandwidth
         field += finufft.nufft1d3(delay.ravel(), a.ravel().astype(complex), f, isign=-1, eps=1e-9)
@@ -422,11 +422,11 @@ def theta_phi_of(look):
 def test_range_profile_of_a_car_is_that_of_a_finer_launch_over_another_lattice(azimuth_deg, most):
     """Cells within 30 dB of the peak within 1 dB rms (2 dB where least returns), under a million rays, 15 m away, 3
     bounces."""
-    surface = Surface(facets_of(car(), "pec", F))
+    geometry = Geometry(facets_of(car(), "pec", F))
     leg = Leg(end=view(azimuth_deg)[0] * 15.0)
-    coarse, fine = itertools.islice(refinements(surface, F), 2)
-    got = range_profile(surface, leg, 15.0, coarse)
-    assert surface.rays <= 1_000_000
-    true = range_profile(surface, leg, 15.0, fine)
+    coarse, fine = itertools.islice(refinements(geometry, F), 2)
+    got = range_profile(geometry, leg, 15.0, coarse)
+    assert geometry.rays <= 1_000_000
+    true = range_profile(geometry, leg, 15.0, fine)
     seen = true > true.max() * 10.0 ** (-30.0 / 20.0)
     assert rms(db(got / true)[seen]) < most

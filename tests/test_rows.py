@@ -5,13 +5,13 @@ import time
 
 import pytest
 
-from raychan.parallel import Stopped, at_once, in_two
+from raychan.parallel import Stopped, parallel_for, run_pair
 
 
 def threads_of(n: int) -> set[int]:
     """The threads on which rows are worked on."""
     seen: set[int] = set()
-    in_two(n, lambda rows: seen.add(threading.get_ident()) if len(range(n)[rows]) else None, 2)
+    parallel_for(n, lambda rows: seen.add(threading.get_ident()) if len(range(n)[rows]) else None, 2)
     return seen
 
 
@@ -23,7 +23,7 @@ def test_each_row_is_worked_on_once():
             for i in range(rows.start, rows.stop):
                 count[i] += 1
 
-        in_two(n, some, 2)
+        parallel_for(n, some, 2)
         assert count == [1] * n
 
 
@@ -42,14 +42,14 @@ def test_alone_rows_are_shared_by_two_threads_and_beside_another_work_they_are_n
         go_on.wait(0.2)
         return found
 
-    one, other = at_once(here, there)
+    one, other = run_pair(here, there)
     assert one == {threading.get_ident()}
     assert len(other) == 1 and other != one
 
 
 def test_when_one_work_has_ended_the_other_has_both_threads():
     ended = threading.Event()
-    _, late = at_once(ended.set, lambda: (ended.wait(30.0), time.sleep(0.05), threads_of(100))[-1])
+    _, late = run_pair(ended.set, lambda: (ended.wait(30.0), time.sleep(0.05), threads_of(100))[-1])
     assert len(late) == 2
 
 
@@ -71,7 +71,7 @@ def test_a_work_stops_at_its_next_rows_when_the_first_fails(failure: type[BaseEx
             raise
 
     with pytest.raises(failure):
-        at_once(here, there)
+        run_pair(here, there)
     assert stopped.is_set()
     assert len(threads_of(100)) == 2
 
@@ -81,7 +81,7 @@ def test_what_the_second_raises_is_raised():
         raise ValueError("there")
 
     with pytest.raises(ValueError, match="there"):
-        at_once(lambda: 1, there)
+        run_pair(lambda: 1, there)
 
 
 def test_a_ctrl_c_that_compiled_code_handed_on_as_a_fault_is_one():
@@ -91,4 +91,4 @@ def test_a_ctrl_c_that_compiled_code_handed_on_as_a_fault_is_one():
         raise SystemError("returned a result with an exception set") from inner
 
     with pytest.raises(KeyboardInterrupt):
-        at_once(here, lambda: None)
+        run_pair(here, lambda: None)

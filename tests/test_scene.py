@@ -110,27 +110,27 @@ materials = { "tyre_*" = "paint", plate = "pec" }
 
 def test_urban_scene_stands_where_the_study_says():
     scene = Scene.load(URBAN)
-    radar, own = scene.sensor.position, np.array([7.0, 0.0, 0.0])
+    place_of_radar, own = scene.radar.position, np.array([7.0, 0.0, 0.0])
     printed = table(3)
     assert scene.warnings == []
     for body in scene.bodies:
         if body.name in printed:
             row = printed[body.name]
-            place = nearest_point(body, radar)
-            way = place - radar
+            place = nearest_point(body, place_of_radar)
+            way = place - place_of_radar
             far = np.linalg.norm(way)
             assert abs(far - row["sim_range"]) < 0.264 and abs(far - row["range"]) < 0.264
             assert (body.motion.velocity_at(place) - own) @ way / far == pytest.approx(row["rate"], abs=0.12)
 
 
 def test_sensor_of_a_file():
-    sensor = Scene.load(URBAN).sensor
-    w = sensor.waveform
+    radar = Scene.load(URBAN).radar
+    w = radar.waveform
     assert (w.carrier, w.n_chirps) == (77e9, 128)
     assert w.range_resolution == pytest.approx(0.2636, abs=1e-3)
     assert w.rate_resolution == pytest.approx(0.249, abs=0.0025)
-    assert sensor.power == pytest.approx(10**1.2 * 1e-3)
-    np.testing.assert_allclose(Scene.load(URBAN).sensor_at(2.0).position, [14.0, 0.0, 0.5])
+    assert radar.power == pytest.approx(10**1.2 * 1e-3)
+    np.testing.assert_allclose(Scene.load(URBAN).radar_at(2.0).position, [14.0, 0.0, 0.5])
 
 
 @pytest.mark.parametrize(
@@ -143,15 +143,15 @@ def test_sensor_of_a_file():
     ],
 )
 def test_antennas_of_a_file(antenna):
-    sensor = Scene.from_text(RADAR.replace("[radar]", f"[radar]\nantenna = {antenna}")).sensor
-    ahead, behind = sensor.tx_field(np.array([[1.0, 0, 0], [-1.0, 0, 0]]))
+    radar = Scene.from_text(RADAR.replace("[radar]", f"[radar]\nantenna = {antenna}")).radar
+    ahead, behind = radar.tx_field(np.array([[1.0, 0, 0], [-1.0, 0, 0]]))
     assert np.linalg.norm(ahead) >= 1.0 and np.linalg.norm(behind) < 1e-9
     assert abs(ahead[2]) == pytest.approx(np.linalg.norm(ahead))
 
 
 def test_a_radar_without_an_antenna_is_isotropic_ahead():
-    sensor = Scene.from_text(RADAR).sensor
-    ahead, behind = np.linalg.norm(sensor.tx_field(np.array([[1.0, 0, 0], [-1.0, 0, 0]])), axis=1)
+    radar = Scene.from_text(RADAR).radar
+    ahead, behind = np.linalg.norm(radar.tx_field(np.array([[1.0, 0, 0], [-1.0, 0, 0]])), axis=1)
     assert ahead**2 == pytest.approx(2.0) and behind == 0.0
 
 
@@ -162,8 +162,8 @@ def test_antenna_files_are_named_from_the_scene_file(tmp_path):
     file = tmp_path / "street.toml"
     file.write_text(RADAR.replace("[radar]", '[radar]\nantenna = "own/horn.toml"'))
     scene = Scene.load(file)
-    assert np.linalg.norm(scene.sensor.tx_field(np.array([[1.0, 0, 0]]))) == pytest.approx(10.0)
-    assert scene.override(["radar.tx_antenna={kind='isotropic', gain_dbi=6}"]).sensor.rx != scene.sensor.tx
+    assert np.linalg.norm(scene.radar.tx_field(np.array([[1.0, 0, 0]]))) == pytest.approx(10.0)
+    assert scene.override(["radar.tx_antenna={kind='isotropic', gain_dbi=6}"]).radar.rx != scene.radar.tx
 
 
 @pytest.mark.parametrize(
@@ -199,7 +199,7 @@ def test_override_changes_keys_and_keeps_the_file():
     new = scene.override(
         ["radar.power_dbm=10", "bodies.suv.position=[20, 0, 0]", "radar.antenna=antennas/patch.toml", "scene.title=x"]
     )
-    assert new.sensor.power == pytest.approx(0.01) and new.title == "x"
+    assert new.radar.power == pytest.approx(0.01) and new.title == "x"
     suv = next(b for b in new.bodies if b.name == "suv")
     assert list(suv.position) == [20, 0, 0]
     assert "# changed: radar.power_dbm=10" in new.text
@@ -319,7 +319,7 @@ def test_nan_and_empty_meshes_name_file_and_body(tmp_path, bad):
 def test_folding_targets_are_told_with_their_alias():
     text = RADAR + SPHERE.replace("10.0", "80.0") + "velocity_mps = [20.0, 0.0, 0.0]\n"
     said = [x for x in Scene.from_text(text).warnings if "appears" in x]
-    w = Scene.from_text(text).sensor.waveform
+    w = Scene.from_text(text).radar.waveform
     top = 299_792_458.0 / (4.0 * w.middle * w.repetition)
     assert f"appears near {79.5 - w.unambiguous_range:.0f} m" in said[0]
     assert f"appears near {20.0 - 2.0 * top:.1f} m/s" in said[1]

@@ -61,7 +61,7 @@ def test_a_scene_moved_in_python_is_the_scene_written_there(file):
     # Turned by 45 deg about the vertical, then by 15 deg about its own x.
     np.testing.assert_allclose(body.rotation() @ [1, 0, 0], np.array([1, 1, 0]) / np.sqrt(2), atol=1e-12)
     np.testing.assert_allclose((body.rotation() @ [0, 0, 1])[2], np.cos(np.radians(15.0)), atol=1e-12)
-    np.testing.assert_allclose(moved.sensor.position, written.sensor.position)
+    np.testing.assert_allclose(moved.radar.position, written.radar.position)
     np.testing.assert_allclose(moved.bodies[1].motion.origin(), written.bodies[1].motion.origin(), atol=1e-12)
     np.testing.assert_allclose(moved.facets().vertices, rc.Scene.load(file).facets(0.5).vertices, atol=1e-12)
     np.testing.assert_allclose(moved.facets().spin, rc.Scene.load(file).facets(0.5).spin, atol=1e-12)
@@ -116,7 +116,7 @@ def test_the_command_writes_a_directory_a_frame_and_one_list_of_detections(file,
     assert sign == pytest.approx([9.0, 8.5, 8.0], abs=0.1)
     # Each frame is a result of its own, at the poses of its time.
     later = load_result(out / "frame_0002")
-    assert later.scene.sensor.position[0] == pytest.approx(1.0)
+    assert later.scene.radar.position[0] == pytest.approx(1.0)
     assert invoke(["explain", str(out / "frame_0002"), "--range", "8"]) == 0
     # A shorter sequence leaves no frame of the longer one behind.
     assert invoke([*command, "--frames", "1"]) == 0

@@ -46,11 +46,11 @@ def test_an_antenna_that_comes_along_serves_any_scene_and_ones_own_goes_before(e
     (elsewhere / "mine.toml").write_text(PLATE)
     scene = rc.Scene.load("mine.toml").override(["radar.antenna=antennas/patch.toml"])
     known = rc.Scene.load("urban").override(["radar.antenna=antennas/patch.toml"])
-    assert scene.sensor.tx == known.sensor.tx
+    assert scene.radar.tx == known.radar.tx
     (elsewhere / "antennas").mkdir()
     (elsewhere / "antennas" / "patch.toml").write_text('kind = "isotropic"\n')
     own = rc.Scene.load("mine.toml").override(["radar.antenna=antennas/patch.toml"])
-    assert type(own.sensor.tx).__name__ == "Isotropic"
+    assert type(own.radar.tx).__name__ == "Isotropic"
     assert invoke(["info", "antennas/array_2x2"]) == 0
     assert "10.36" in capsys.readouterr().out
 

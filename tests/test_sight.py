@@ -10,9 +10,9 @@ from helpers import facets, ground, quad
 from raychan.geometry.lit_parts import lit_parts
 from raychan.tracing.launch import sight
 from raychan.tracing.legs import Leg, Mirror
-from raychan.tracing.shadow_edges import shadows_of
+from raychan.tracing.shadow_edges import shadow_edges_of
 from raychan.tracing.tubes import Refinement, stand
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 LOW, HIGH = np.array([-0.3, -0.2]), np.array([0.4, 0.5])  # m: a rectangle in the plane x = 4, seen from the origin
 RULE = Refinement(wavenumber=1600.0)
@@ -35,22 +35,22 @@ def hidden(points, end=(0.0, 0.0, 0.0)):
 def street(floor, least):
     """The rectangle, a plate behind it whose lower edge is at a height, and a floor."""
     plate = across(8.0, (-2.0, least), (2.0, 2.0))
-    return Surface(facets([across(4.0, LOW, HIGH), plate, ground(20.0, floor)]))
+    return Geometry(facets([across(4.0, LOW, HIGH), plate, ground(20.0, floor)]))
 
 
-def small_tubes(surface, leg, rng, n=600):
-    facet = rng.choice(np.flatnonzero(surface.facets.body == 1), n).astype(np.int32)
+def small_tubes(geometry, leg, rng, n=600):
+    facet = rng.choice(np.flatnonzero(geometry.facets.body == 1), n).astype(np.int32)
     centre = rng.dirichlet(np.ones(3), (n, 1))
-    return stand(surface, leg, facet, 0.9 * centre + 0.1 * rng.dirichlet(np.ones(3), (n, 3)))
+    return stand(geometry, leg, facet, 0.9 * centre + 0.1 * rng.dirichlet(np.ones(3), (n, 3)))
 
 
 def test_tubes_behind_a_rectangle_are_seen_as_its_shadow_says():
-    surface = street(-3.0, -2.0)
+    geometry = street(-3.0, -2.0)
     leg = Leg(end=np.zeros(3))
-    tubes = small_tubes(surface, leg, np.random.default_rng(1))
+    tubes = small_tubes(geometry, leg, np.random.default_rng(1))
     n = len(tubes)
     matters = np.arange(n) % 5 > 0
-    view = sight(surface, leg, tubes, matters, True, RULE)
+    view = sight(geometry, leg, tubes, matters, True, RULE)
     p = tubes.points
     drawn = np.concatenate([p[:, 3:] + 0.98 * (p[:, :3] - p[:, 3:]), p[:, 3:]], axis=1)
     seen = ~hidden(drawn)
@@ -78,13 +78,13 @@ def test_tubes_behind_a_rectangle_are_seen_as_its_shadow_says():
 
 
 def test_points_over_a_mirror_are_seen_where_neither_stretch_is_hidden():
-    surface = street(-0.6, -0.5)
-    floor = int(np.flatnonzero(surface.facets.body == 2)[0])
+    geometry = street(-0.6, -0.5)
+    floor = int(np.flatnonzero(geometry.facets.body == 2)[0])
     end = np.array([0.0, 0.0, 0.5])
-    leg = Leg(end=end, mirrors=(Mirror.of(surface, floor, 1.0),))
-    points = small_tubes(surface, leg, np.random.default_rng(2), 2000).points[:, 3]
-    facet = np.array([np.flatnonzero(surface.facets.body == 1)[0]], np.int32).repeat(len(points))
-    view = leg.visible(surface, points, facet, np.full(len(points), 1e-4), 2)
+    leg = Leg(end=end, mirrors=(Mirror.of(geometry, floor, 1.0),))
+    points = small_tubes(geometry, leg, np.random.default_rng(2), 2000).points[:, 3]
+    facet = np.array([np.flatnonzero(geometry.facets.body == 1)[0]], np.int32).repeat(len(points))
+    view = leg.visible(geometry, points, facet, np.full(len(points), 1e-4), 2)
     spot = view.corners[:, 0]
     np.testing.assert_allclose(spot[:, 2], -0.6, atol=1e-12)
     way = np.linalg.norm(spot - end, axis=1) + np.linalg.norm(points - spot, axis=1)
@@ -98,15 +98,15 @@ def test_points_over_a_mirror_are_seen_where_neither_stretch_is_hidden():
 def test_parts_that_are_lit_are_where_points_face_the_source(end):
     ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
     ball.apply_translation((6.0, 0.0, 0.0))
-    surface = Surface(facets([ball], smooth=True))
-    f, end = surface.facets, np.array(end)
+    geometry = Geometry(facets([ball], smooth=True))
+    f, end = geometry.facets, np.array(end)
     facet = np.arange(len(f.body), dtype=np.int32)
-    shape = f.vertices, f.normals, surface.bulge, surface.both_sides
+    shape = f.vertices, f.normals, geometry.edge_curvature, geometry.both_sides
     rows, bary = lit_parts(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), *shape, end, False)
     rng = np.random.default_rng(3)
     w = rng.dirichlet(np.ones(3), (len(facet), 40))
     xy, yz, zx = (np.roll(w, -i, axis=2)[..., :1] * np.roll(w, -i - 1, axis=2)[..., :1] for i in range(3))
-    b = surface.bulge[:, None]
+    b = geometry.edge_curvature[:, None]
     p = w @ f.vertices - xy * b[:, :, 0] - yz * b[:, :, 1] - zx * b[:, :, 2]
     normal = w @ f.normals
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
@@ -125,10 +125,10 @@ def test_a_tube_far_beside_all_silhouettes_has_no_shadow():
     crumb = trimesh.creation.box(extents=(1e-3, 1e-3, 1e-3))
     crumb.apply_translation((4.0, 0.0, 0.0))
     wide = across(6.0, (-30.0, -30.0), (30.0, 30.0))
-    surface = Surface(facets([crumb, wide], role=[0, 1]))
+    geometry = Geometry(facets([crumb, wide], role=[0, 1]))
     leg = Leg(end=np.zeros(3))
-    tubes = small_tubes(surface, leg, np.random.default_rng(3))
-    side = shadows_of(surface, leg).across(tubes.points, tubes.facet, np.full(len(tubes), 1e-5))
+    tubes = small_tubes(geometry, leg, np.random.default_rng(3))
+    side = shadow_edges_of(geometry, leg).across(tubes.points, tubes.facet, np.full(len(tubes), 1e-5))
     y, z = tubes.points[..., 1], tubes.points[..., 2]
     clear = (np.hypot(y, z) > 20.0).all(axis=1) & ((y > 1.0).all(axis=1) | (z > 1.0).all(axis=1))
     assert clear.sum() > 20

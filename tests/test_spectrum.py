@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from echoes import SMALL, WIDE, echoes, sensor
+from echoes import SMALL, WIDE, echoes, make_radar
 from printed import figures
 
 from raychan.processing.detection import detect
@@ -15,7 +15,7 @@ from raychan.units import db
 
 def rdmap(paths, wave, window="rect", pad=(2, 2), **changes):
     rng = np.random.default_rng(0)
-    return range_doppler(synthesize(paths, sensor(wave, **changes), rng), wave, window, window, pad)
+    return range_doppler(synthesize(paths, make_radar(wave, **changes), rng), wave, window, window, pad)
 
 
 def peak(m):
@@ -130,4 +130,4 @@ def test_bad_settings_are_refused(bad):
 
 def test_a_cube_of_another_waveform_is_refused():
     with pytest.raises(ValueError, match="128 by 1024"):
-        range_doppler(synthesize(echoes([]), sensor(SMALL)), WIDE)
+        range_doppler(synthesize(echoes([]), make_radar(SMALL)), WIDE)

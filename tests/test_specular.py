@@ -12,7 +12,7 @@ from raychan.channel.transfer import rates
 from raychan.records import HALF_SPACE, LAYER, PEC
 from raychan.run.specular_paths import jones, specular_routes
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 F = 77e9
 K = 2 * np.pi * F / C0
@@ -22,7 +22,7 @@ GLASS = 6.27 - 0.35j
 
 def both(meshes, faces, materials, tx, rx, bounces):
     f = facets(meshes, materials)
-    routes = specular_routes(Surface(f), tx, rx, bounces)
+    routes = specular_routes(Geometry(f), tx, rx, bounces)
     return routes, jones(routes, f, F), brute.specular_paths(np.array(tx), np.array(rx), faces, F, bounces)
 
 
@@ -33,7 +33,7 @@ def street():
     pane = [[8, -1, 0.2], [8, 2, 0.2], [8, 2, 2.2], [8, -1, 2.2]]
     low, high = (12, -4, 0.02), (16, -2, 1.5)
     meshes = [ground(), quad(wall), quad(pane), box(low, high)]
-    faces = [*brute.ground(500.0, surface=stone), brute.Face(wall, stone, "wall")]
+    faces = [*brute.ground(500.0, geometry=stone), brute.Face(wall, stone, "wall")]
     faces += [brute.Face(pane, glass, "pane", lets_through=True), *brute.box(low, high)]
     rows = [(HALF_SPACE, CONCRETE, 0.0, 0.0)] * 2 + [(LAYER, GLASS, 0.004, 0.0), (PEC, 1.0, 0.0, 0.0)]
     return meshes, faces, rows
@@ -55,7 +55,7 @@ def test_paths_equal_the_brute_force_enumeration(tx, rx):
 
 def test_line_of_sight_is_friis():
     f = facets([box((100, 100, 100), (101, 101, 101))])
-    routes = specular_routes(Surface(f), (0, 0, 1), (30, 4, 2), 1)
+    routes = specular_routes(Geometry(f), (0, 0, 1), (30, 4, 2), 1)
     gain = jones(routes, f, F)
     length = np.linalg.norm([30, 4, 1])
     expected = C0 / F / (4 * np.pi * length) * np.exp(-1j * K * length) * np.eye(2)
@@ -66,7 +66,7 @@ def test_line_of_sight_is_friis():
 def test_ground_reflection_is_the_two_ray_closed_form_through_brewster(distance):
     f = facets([ground(1000.0)], [(HALF_SPACE, CONCRETE, 0.0, 0.0)])
     h_tx, h_rx = 0.5, 1.7
-    routes = specular_routes(Surface(f), (0, 0, h_tx), (distance, 0, h_rx), 2)
+    routes = specular_routes(Geometry(f), (0, 0, h_tx), (distance, 0, h_rx), 2)
     total = jones(routes, f, F).sum(axis=0)
     truth = tworay.two_ray(distance, h_tx, h_rx, K, CONCRETE).sum(axis=1)
     ratio = np.diag(total) / truth
@@ -77,7 +77,7 @@ def test_ground_reflection_is_the_two_ray_closed_form_through_brewster(distance)
 def test_exchanging_the_ends_changes_nothing():
     meshes, _, rows = street()
     f = facets(meshes, rows)
-    s = Surface(f)
+    s = Geometry(f)
     there, back = (specular_routes(s, *ends, 3) for ends in (((0, 0, 0.5), (20, 1, 1.3)), ((20, 1, 1.3), (0, 0, 0.5))))
     flip = np.array([[1, -1], [-1, 1]])  # H turns over with the direction of travel
     a, b = jones(there, f, F), jones(back, f, F).transpose(0, 2, 1) * flip
@@ -97,11 +97,11 @@ def test_rates_are_those_of_the_moved_scene():
         moved = [m.copy() for m in meshes]
         for m, u in zip(moved, v, strict=True):
             m.apply_translation(u * t)
-        r = specular_routes(Surface(facets(moved, rows)), tx + v_tx * t, rx + v_rx * t, 3)
+        r = specular_routes(Geometry(facets(moved, rows)), tx + v_tx * t, rx + v_rx * t, 3)
         return {tuple(row): length for row, length in zip(r.facet.tolist(), r.length, strict=True)}
 
     f = facets(meshes, rows, velocity=v)
-    r = specular_routes(Surface(f), tx, rx, 3)
+    r = specular_routes(Geometry(f), tx, rx, 3)
     early, late = lengths(-1e-4), lengths(1e-4)
     mine = 2.0 * rates(r, f, v_tx, v_rx)
     assert len(mine) >= 4

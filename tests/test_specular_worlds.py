@@ -12,7 +12,7 @@ import raychan as rc
 from raychan.records import LAYER, PEC
 from raychan.run.specular_paths import jones, specular_routes
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 F = 77e9
 K = 2 * np.pi * F / C0
@@ -68,7 +68,7 @@ def same(routes, gain, truth):
 def test_paths_of_a_random_world_are_those_of_the_brute_force_enumeration(seed):
     meshes, rows, faces, tx, rx = world(seed)
     f = facets(meshes, rows)
-    routes = specular_routes(Surface(f), tx, rx, 2, layers=9)
+    routes = specular_routes(Geometry(f), tx, rx, 2, layers=9)
     same(routes, jones(routes, f, F), brute.specular_paths(tx, rx, faces, F, 2))
 
 
@@ -78,7 +78,7 @@ def test_paths_within_a_metal_room_are_those_of_the_brute_force_enumeration(seed
     room, thing = box((0, 0, 0), (4, 3, 2.5)), box((1.5, 1.2, 0.1), (2.1, 1.9, 1.1))
     f = facets([room, thing])
     tx, rx = rng.uniform((0.2, 0.2, 1.3), (3.8, 2.8, 2.3), (2, 3))
-    routes = specular_routes(Surface(f), tx, rx, 2)
+    routes = specular_routes(Geometry(f), tx, rx, 2)
     faces = [*brute.box(*room.bounds), *brute.box(*thing.bounds)]
     same(routes, jones(routes, f, F), brute.specular_paths(tx, rx, faces, F, 2))
 
@@ -101,7 +101,7 @@ def test_a_pane_just_before_a_mirror_leaves_its_path():
     glass = lambda c: slab.layer(c, GLASS, 0.004, K)  # noqa: E731
     f = facets([quad(mirror), quad(pane)], [(PEC, 1.0, 0.0, 0.0), (LAYER, GLASS, 0.004, 0.0)])
     tx, rx = np.array([0, 0, 0.1]), np.array([2.0, -0.5, 0.3])
-    routes = specular_routes(Surface(f), tx, rx, 1, layers=4)
+    routes = specular_routes(Geometry(f), tx, rx, 1, layers=4)
     faces = [brute.Face(mirror), brute.Face(pane, glass, lets_through=True)]
     same(routes, jones(routes, f, F), brute.specular_paths(tx, rx, faces, F, 1))
 
@@ -117,5 +117,5 @@ def test_coplanar_plates_at_one_place_return_once():
     here = [[-1, 2, -1], [1, 2, -1], [1, 2, 1], [-1, 2, 1]]
     there = [[-0.5, 2, -2], [2, 2, -2], [2, 2, 2], [-0.5, 2, 2]]
     f = facets([quad(here), quad(there)])
-    routes = specular_routes(Surface(f), np.array([0, 0, 0.1]), np.array([0.4, 0, 0.2]), 1)
+    routes = specular_routes(Geometry(f), np.array([0, 0, 0.1]), np.array([0.4, 0, 0.2]), 1)
     assert sorted((routes.kind > 0).sum(axis=1)) == [0, 1]

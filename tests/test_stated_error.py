@@ -8,7 +8,7 @@ import pytest
 
 import raychan as rc
 from raychan.channel.error import stated_error
-from raychan.run.simulate import Clock, drowned, noise_of_cell, quiet_map, result_of, trace
+from raychan.run.simulate import Clock, noise_equivalent_amplitude, noise_of_cell, quiet_map, result_of, trace
 from raychan.run.solver import refinement, solve
 from raychan.signal.baseband import synthesize
 from raychan.units import C0
@@ -19,16 +19,21 @@ SCENES = Path(__file__).parents[1] / "scenes"
 @pytest.mark.parametrize("name", ["living_street", "urban"])
 def test_a_maps_stated_error_covers_the_true_one_in_most_cells(name):
     scene = rc.Scene.load(SCENES / f"{name}.toml")
-    sensor, settings, wave = scene.sensor, scene.processing, scene.sensor.waveform
+    radar, settings, wave = scene.radar, scene.processing, scene.radar.waveform
     channel = trace(scene, 1.0, 2, Clock())
     fine = refinement(
-        wave.carrier, 0.25, drowned(sensor, settings), scene.model.max_transmissions, 0.07, C0 / wave.bandwidth
+        wave.carrier,
+        0.25,
+        noise_equivalent_amplitude(radar, settings),
+        scene.model.max_transmissions,
+        0.07,
+        C0 / wave.bandwidth,
     )
-    truth, _ = solve(channel.surface, channel.points, sensor, wave.carrier, fine, 2)
-    silent = replace(sensor, noise=False)
-    found, true = (quiet_map(synthesize(p, silent).samples, sensor, settings) for p in (channel.launched.paths, truth))
+    truth, _ = solve(channel.geometry, channel.points, radar, wave.carrier, fine, 2)
+    silent = replace(radar, noise=False)
+    found, true = (quiet_map(synthesize(p, silent).samples, radar, settings) for p in (channel.launched.paths, truth))
     difference = result_of(scene, channel, 0, Clock()).error.power
-    rows = found > 20.0 * noise_of_cell(sensor, settings)
+    rows = found > 20.0 * noise_of_cell(radar, settings)
     stated = np.array([stated_error(complex(a), b) for a, b in np.sqrt(np.stack([found, difference])[:, rows]).T])
     off = np.abs(10.0 * np.log10(found[rows] / true[rows]))
     assert rows.sum() > 100

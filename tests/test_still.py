@@ -14,8 +14,8 @@ from test_sequence import same
 import raychan as rc
 from raychan.run.sequence import frames
 from raychan.world import static_geometry
-from raychan.world.geometry import Surface, surface_at
-from raychan.world.shared_rows import Sheet
+from raychan.world.geometry import Geometry, surface_at
+from raychan.world.shared_rows import SharedRows
 
 RADAR = {
     "position": [0.0, 0.0, 1.0],
@@ -53,16 +53,16 @@ def scene(request, monkeypatch):
     return scene
 
 
-def rays(surface, n=20_000):
+def rays(geometry, n=20_000):
     rng = np.random.default_rng(3)
     low, high = np.array([-1.0, -8.0, 0.0]), np.array([26.0, 8.0, 4.0])
     origin, aim = (rng.uniform(low, high, (n, 3)) for _ in range(2))
     direction = aim - origin
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    skip = np.where(rng.uniform(size=n) < 0.2, rng.integers(0, len(surface.first), n), -1).astype(np.int32)
+    skip = np.where(rng.uniform(size=n) < 0.2, rng.integers(0, len(geometry.first), n), -1).astype(np.int32)
     # Of those that leave a facet, origins lie on it.
     leaves = skip >= 0
-    origin[leaves] = surface.facets.vertices[skip[leaves]].mean(axis=1)
+    origin[leaves] = geometry.facets.vertices[skip[leaves]].mean(axis=1)
     return origin, direction, skip, np.where(rng.uniform(size=n) < 0.5, rng.uniform(0.0, 9.0, n), 0.0)
 
 
@@ -70,10 +70,10 @@ def rays(surface, n=20_000):
 def test_rays_meet_the_facets_that_they_meet_in_one_scene(scene, time):
     scene.at(0.3).facets()
     now = scene.at(time)
-    surface, plain = surface_at(now), Surface(now.facets(), now.joints)
-    assert len(surface._groups) > 1
+    geometry, plain = surface_at(now), Geometry(now.facets(), now.topology)
+    assert len(geometry._groups) > 1
     assert len(plain._groups) == 1
-    (facet, t), (wanted, at) = (s.cast(*rays(plain)) for s in (surface, plain))
+    (facet, t), (wanted, at) = (s.cast(*rays(plain)) for s in (geometry, plain))
     hits = wanted >= 0
     assert hits.mean() > 0.5
     for body in range(len(scene.bodies)):
@@ -87,7 +87,7 @@ def test_rays_meet_the_facets_that_they_meet_in_one_scene(scene, time):
 
 def test_what_is_kept_is_what_is_made_anew(scene):
     for time in (0.4, 0.0, 1.1):
-        ours, fresh = surface_at(scene.at(time)), Surface(rebuilt(scene.at(time)).facets(), scene.joints)
+        ours, fresh = surface_at(scene.at(time)), Geometry(rebuilt(scene.at(time)).facets(), scene.topology)
         for name in ("vertices", "normals", "body", "part", "material", "origin", "velocity", "spin"):
             np.testing.assert_array_equal(getattr(ours.facets, name), getattr(fresh.facets, name), err_msg=name)
         own = (
@@ -124,7 +124,7 @@ def test_frames_do_not_depend_on_those_before_them(scene):
 def test_a_result_does_not_hold_on_to_what_is_kept(scene):
     family = scene.bare()
     result = rc.simulate(family.at(0.1))
-    gone = weakref.ref(family._still[static_geometry.Still])
+    gone = weakref.ref(family._still[static_geometry.StaticGeometry])
     del family
     gc.collect()
     assert gone() is None
@@ -142,11 +142,11 @@ def test_copies_of_a_sheet_are_each_others_alike_but_where_written(plain, monkey
     if plain:
         monkeypatch.delattr("os.memfd_create", raising=False)
     array = np.arange(300_000, dtype=float).reshape(-1, 3)
-    sheet = Sheet(array.copy())
+    sheet = SharedRows(array.copy())
     one, two = sheet.copy(), sheet.copy()
     one[5] = -1.0
     np.testing.assert_array_equal(two, array)
     del sheet
     np.testing.assert_array_equal(one[6:], array[6:])
     assert (one[5] == -1.0).all()
-    assert Sheet(np.zeros((0, 3))).copy().shape == (0, 3)
+    assert SharedRows(np.zeros((0, 3))).copy().shape == (0, 3)

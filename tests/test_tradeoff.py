@@ -14,7 +14,7 @@ from raychan.study.specular_points import glints
 from raychan.study.tradeoff import Row, beaten_by, marked, read_csv, write_csv
 from raychan.study.verdicts import verdicts
 from raychan.tracing.legs import Leg
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 from raychan.world.shapes import build
 
 
@@ -47,7 +47,7 @@ def test_uniform_tubes_meet_the_trihedral_closed_form():
 
 def test_glint_of_a_sphere_is_its_high_frequency_limit():
     end = np.array([12.0, 1.0, 2.0])
-    tracer = Tracer(facets_of(build("sphere", {"radius": 0.5}), "pec", cases.FREQUENCY))
+    tracer = RayCaster(facets_of(build("sphere", {"radius": 0.5}), "pec", cases.FREQUENCY))
     found = glints(tracer, end, cases.WAVENUMBER)
     reach = np.linalg.norm(end)
     sigma = 4 * np.pi * abs(found.field.sum() * reach**2) ** 2
@@ -68,7 +68,7 @@ def test_rate_of_a_lattice_echo_is_half_the_rate_of_its_length():
         def field(d):
             return cases.vertical(d)
 
-        return list(echoes(Tracer(facets), window, [Leg(end=end)], field, field, 77e9, 40_000, 2, True, own))
+        return list(echoes(RayCaster(facets), window, [Leg(end=end)], field, field, 77e9, 40_000, 2, True, own))
 
     # The shortest way of the double bounce, which a fixed lattice follows as the scene moves.
     step = 0.02

@@ -176,14 +176,14 @@ def test_cylinder_end_on_is_its_disc():
 def test_dielectric_plate_at_normal_incidence_is_weaker_by_its_reflection():
     plate, view = po.rectangle(0.05, 0.05), (HEAD_ON, np.inf)
     pec = po.polygon_far(plate, K, HEAD_ON)
-    glass = po.polygon(plate, K, view, view, surface=lambda c: slab.layer(c, 6.3 - 0.2j, 0.005, K)[:2])
+    glass = po.polygon(plate, K, view, view, geometry=lambda c: slab.layer(c, 6.3 - 0.2j, 0.005, K)[:2])
     r = slab.layer(1.0, 6.3 - 0.2j, 0.005, K)[0]
     assert np.allclose(glass, -r * pec, atol=1e-9)
 
 
 def test_conductor_by_its_coefficients_is_the_conductor():
     plate, a, b = po.rectangle(0.05, 0.03), (po.direction(0.4, 0.3), 4.0), (po.direction(-0.1, 0.6), 7.0)
-    assert np.allclose(po.polygon(plate, K, a, b, surface=slab.pec), po.polygon(plate, K, a, b), atol=1e-12)
+    assert np.allclose(po.polygon(plate, K, a, b, geometry=slab.pec), po.polygon(plate, K, a, b), atol=1e-12)
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.1, 0.1), (0.1, 0.25)])
@@ -293,10 +293,10 @@ def test_line_of_sight_is_friis_with_identity_jones():
 @pytest.mark.parametrize("eps", [None, 5.24 - 0.32j, 3.0])
 @pytest.mark.parametrize("yaw", [0.0, 0.7])
 def test_ground_by_images_is_the_two_ray_form(eps, yaw):
-    surface = slab.pec if eps is None else lambda c: slab.half_space(c, eps)
+    geometry = slab.pec if eps is None else lambda c: slab.half_space(c, eps)
     d, h1, h2 = 40.0, 0.6, 1.4
     rx = (d * np.cos(yaw), d * np.sin(yaw), h2)
-    direct, bounced = paths.specular_paths((0, 0, h1), rx, paths.ground(surface=surface), 77e9)
+    direct, bounced = paths.specular_paths((0, 0, h1), rx, paths.ground(geometry=geometry), 77e9)
     (va, vb), (ha, hb) = tworay.two_ray(d, h1, h2, K, eps)
     assert np.allclose(direct.gain, np.diag([va, ha]), atol=1e-12)
     assert np.allclose(bounced.gain, np.diag([vb, hb]), atol=1e-12)

@@ -17,7 +17,7 @@ from raychan.run.rcs import facets_of, refinements
 from raychan.tracing.footprints import element_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.shapes import build
 
 F = 77e9
@@ -156,21 +156,21 @@ def test_corner_terms_keep_the_change_of_the_mean_with_frequency(slope, bend):
     assert max(off) < 0.05
 
 
-def on_patch(surface, bary):
+def on_patch(geometry, bary):
     """Points (n, m, 3) of the true surface at barycentric coordinates (m, 3) of every facet."""
-    flat = np.einsum("mi,nij->nmj", bary, surface.facets.vertices)
-    return flat - np.einsum("me,nej->nmj", bary * np.roll(bary, -1, axis=1), surface.bulge)
+    flat = np.einsum("mi,nij->nmj", bary, geometry.facets.vertices)
+    return flat - np.einsum("me,nej->nmj", bary * np.roll(bary, -1, axis=1), geometry.edge_curvature)
 
 
 def test_elements_of_the_true_surface_add_up_to_its_area_and_point_along_its_normals():
-    surface = Surface(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
+    geometry = Geometry(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
     bary, weights = nodes(2, 4)
-    normal = np.empty((len(surface.area), len(bary), 3))
-    for of_facet, v, b in zip(normal, surface.facets.vertices, surface.bulge, strict=True):
+    normal = np.empty((len(geometry.area), len(bary), 3))
+    for of_facet, v, b in zip(normal, geometry.facets.vertices, geometry.edge_curvature, strict=True):
         for out, w in zip(of_facet, bary, strict=True):
             element_of(v, b, w, out)
     assert (0.5 * np.linalg.norm(normal, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
-    points = on_patch(surface, bary)
+    points = on_patch(geometry, bary)
     along = normal / np.linalg.norm(normal, axis=2, keepdims=True)
     assert np.einsum("nij,nij->ni", along, points / 0.5).min() > np.cos(0.02)
 
@@ -203,8 +203,8 @@ def fronts(normals, rng):
 def test_rays_aimed_at_shared_edges_and_vertices_never_pass(name):
     """Rays from outside at edges and vertices whose facets all face them must hit: 1e5 in all."""
     rng = np.random.default_rng(4)
-    surface = Surface(facets_of(build(name, CLOSED[name]), "pec", F))
-    tri = surface.facets.vertices
+    geometry = Geometry(facets_of(build(name, CLOSED[name]), "pec", F))
+    tri = geometry.facets.vertices
     count = 100_000 // len(CLOSED)
     mesh = trimesh.Trimesh(tri.reshape(-1, 3), np.arange(3 * len(tri)).reshape(-1, 3), process=False)
     mesh.merge_vertices()
@@ -212,13 +212,13 @@ def test_rays_aimed_at_shared_edges_and_vertices_never_pass(name):
     around = [np.flatnonzero((mesh.faces == v).any(axis=1)) for v in rng.integers(len(mesh.vertices), size=300)]
     aims, ways = [], []
     for i in rng.integers(len(pairs), size=700):
-        d = fronts(surface.normal[pairs[i]], rng)
+        d = fronts(geometry.normal[pairs[i]], rng)
         if d is not None:
             share = rng.random((count // 1000, 1))
             aims.append(mesh.vertices[ends[i, 0]] * share + mesh.vertices[ends[i, 1]] * (1 - share))
             ways.append(np.tile(d, (len(share), 1)))
     for rows in around:
-        d = fronts(surface.normal[rows], rng)
+        d = fronts(geometry.normal[rows], rng)
         if d is not None:
             corner_of = np.intersect1d(np.intersect1d(mesh.faces[rows[0]], mesh.faces[rows[1]]), mesh.faces[rows[-1]])
             aims.append(np.repeat(mesh.vertices[corner_of[:1]], count // 1000, axis=0))
@@ -228,19 +228,19 @@ def test_rays_aimed_at_shared_edges_and_vertices_never_pass(name):
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     assert len(d) > 0.5 * count
     # Away from the mesh's own distance too: float32 spacing grows with it.
-    back = surface.extent * 10.0 ** rng.uniform(0.2, 1.5, (len(d), 1))
-    hit, _ = surface.cast(aim - back * d, d, np.full(len(d), -1, np.int32))
+    back = geometry.extent * 10.0 ** rng.uniform(0.2, 1.5, (len(d), 1))
+    hit, _ = geometry.cast(aim - back * d, d, np.full(len(d), -1, np.int32))
     assert (hit < 0).sum() == 0
 
 
 def test_rays_over_a_sheet_of_two_triangles_never_slip_between_them():
     rng = np.random.default_rng(5)
-    surface = Surface(facets([quad(po.rectangle(1.0, 1.0))]))
+    geometry = Geometry(facets([quad(po.rectangle(1.0, 1.0))]))
     t = rng.uniform(0.001, 0.999, 20_000)[:, None]
     aim = (1 - t) * np.array([0, -0.5, -0.5]) + t * np.array([0, 0.5, 0.5])
     start = np.column_stack([rng.uniform(1, 100, len(t)), rng.uniform(-20, 20, (len(t), 2))])
     d = (aim - start) / np.linalg.norm(aim - start, axis=1, keepdims=True)
-    assert (surface.cast(start, d, np.full(len(d), -1, np.int32))[0] >= 0).all()
+    assert (geometry.cast(start, d, np.full(len(d), -1, np.int32))[0] >= 0).all()
 
 
 # --- tubes are cut along edges ------------------------------------------------------------------------------------
@@ -248,13 +248,13 @@ def test_rays_over_a_sheet_of_two_triangles_never_slip_between_them():
 
 def footprints(mesh, look, step=1, bounces=3):
     """Area of last footprints [m^2] by the facets' planes passed, in a far field."""
-    surface = Surface(facets_of(mesh, "pec", F))
+    geometry = Geometry(facets_of(mesh, "pec", F))
     leg = Leg(end=look, far=True)
-    rule = next(itertools.islice(refinements(surface, F), step, None))
+    rule = next(itertools.islice(refinements(geometry, F), step, None))
     areas: dict[tuple[int, ...], float] = {}
-    for routes in tube_routes(surface, leg, [leg], np.ones(len(surface.piece_role), bool), rule, bounces):
+    for routes in tube_routes(geometry, leg, [leg], np.ones(len(geometry.piece_role), bool), rule, bounces):
         for facet, area in zip(routes.facet, routes.area, strict=True):
-            chain = tuple(int(surface.plane[f]) for f in facet if f >= 0)
+            chain = tuple(int(geometry.plane[f]) for f in facet if f >= 0)
             areas[chain] = areas.get(chain, 0.0) + float(area)
     return areas
 
@@ -281,11 +281,11 @@ def test_first_tubes_of_an_open_corner_cover_it_once():
 
 def test_lit_half_of_a_sphere_projects_to_its_disc():
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
-    surface = Surface(facets_of(mesh, "pec", F))
+    geometry = Geometry(facets_of(mesh, "pec", F))
     leg = Leg(end=po.direction(0.3, 0.2), far=True)
-    rule = next(itertools.islice(refinements(surface, F), 2, None))
+    rule = next(itertools.islice(refinements(geometry, F), 2, None))
     shadow = 0.0
-    for routes in tube_routes(surface, leg, [leg], np.ones(len(surface.piece_role), bool), rule, 1):
+    for routes in tube_routes(geometry, leg, [leg], np.ones(len(geometry.piece_role), bool), rule, 1):
         shadow += float(routes.area @ np.einsum("nj,j->n", routes.normals[:, 0], leg.end))
     assert shadow == pytest.approx(np.pi * 0.1**2, rel=2e-3)
 
@@ -298,20 +298,20 @@ def test_patches_of_a_coarse_sphere_lie_on_the_sphere(subdivisions, share):
     """The distance from the true sphere is a small share of the facets' own sag."""
     radius = 0.5
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    surface = Surface(facets_of(mesh, "pec", F))
+    geometry = Geometry(facets_of(mesh, "pec", F))
     bary = np.random.default_rng(6).dirichlet(np.ones(3), 50)
-    flat = np.einsum("mi,nij->nmj", bary, surface.facets.vertices)
+    flat = np.einsum("mi,nij->nmj", bary, geometry.facets.vertices)
     sag = radius - np.linalg.norm(flat, axis=2).min()
-    curved = on_patch(surface, bary)
+    curved = on_patch(geometry, bary)
     assert np.abs(np.linalg.norm(curved, axis=2) - radius).max() < share * sag
-    normal = np.einsum("mi,nij->nmj", bary, surface.facets.normals)
+    normal = np.einsum("mi,nij->nmj", bary, geometry.facets.normals)
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     assert np.einsum("nmj,nmj->nm", normal, curved / radius).min() > 1 - 1e-4
 
 
 def test_flat_facets_stay_flat():
-    surface = Surface(facets_of(trimesh.creation.box((1, 2, 3)), "pec", F))
-    assert not surface.curved.any()
+    geometry = Geometry(facets_of(trimesh.creation.box((1, 2, 3)), "pec", F))
+    assert not geometry.curved.any()
 
 
 def test_tubes_launched_in_batches_carry_what_those_launched_at_once_do(monkeypatch):

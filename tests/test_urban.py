@@ -37,7 +37,7 @@ def detected(run, request):
         return run.detections, run.provenance
     scene = run.scene
     rng = np.random.default_rng(np.random.SeedSequence(request.param).spawn(1)[0])
-    rdmap, found = received(synthesize(run.paths, scene.sensor, rng), scene.sensor, scene.processing)
+    rdmap, found = received(synthesize(run.paths, scene.radar, rng), scene.radar, scene.processing)
     return found, provenance(run.paths, rdmap, found, run.receiver, run.error.power)
 
 
@@ -82,11 +82,11 @@ def test_ground_below_returns_what_its_image_sends_times_the_arrays_gain_down_sq
         "[materials.wet]\neps_r = 5.0\nsigma = 2.0\n"
     )
     scene = Scene.load(file)
-    sensor = scene.sensor
+    radar = scene.radar
     # A positive pitch looks down.
     off = math.radians(90.0 - pitch)
-    gain = float((np.abs(sensor.tx.field(np.array([[math.cos(off), 0.0, -math.sin(off)]]))) ** 2).sum())
-    carrier = sensor.waveform.carrier
+    gain = float((np.abs(radar.tx.field(np.array([[math.cos(off), 0.0, -math.sin(off)]]))) ** 2).sum())
+    carrier = radar.waveform.carrier
     root = np.sqrt(5.0 - 2.0j / (2.0 * math.pi * carrier * EPS0))
     reflected = abs((1.0 - root) / (1.0 + root))
     wanted = (gain * C0 / carrier / (4.0 * math.pi * 2.0 * height) * reflected) ** 2

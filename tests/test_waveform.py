@@ -12,7 +12,7 @@ from printed import figures
 
 from raychan.frames import rotation
 from raychan.radar.antenna import CosinePattern, Isotropic, UniformArray
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.units import watt
 from raychan.world.radar_mount import antenna_of
@@ -25,11 +25,11 @@ NARROW = Waveform(77e9, 1e9, 40e-6, 40e-6, 128, 1024)
 WIDE = Waveform(77e9, 4e9, 40e-6, 40e-6, 128, 1024)
 
 
-def sensor(**changes):
+def make_radar(**changes):
     given = dict(
         position=(1.0, 2.0, 0.5), tx=Isotropic(), rx=Isotropic("H"), waveform=NARROW, power=0.01, noise_figure_db=12.0
     )
-    return Sensor(**(given | changes))
+    return Radar(**(given | changes))
 
 
 def directions(n, seed=0):
@@ -69,7 +69,7 @@ def test_c008_unambiguous_rate():
 )
 def test_c009_eirp_and_greatest_path_loss(name, dbm, printed, of):
     tx = antenna_of(f"antennas/{name}.toml", "V", SCENES, "antenna")
-    budget = sensor(tx=tx, power=float(watt(dbm))).link_budget(sensitivity_dbm=-120.0)
+    budget = make_radar(tx=tx, power=float(watt(dbm))).link_budget(sensitivity_dbm=-120.0)
     theirs = figures(printed)
     assert budget["eirp_dbm"] == pytest.approx(theirs[f"{of}EIRP"], abs=0.01)
     assert budget["max_path_loss_db"] == pytest.approx(theirs[f"{of}greatest path loss at -120 dBm"], abs=0.01)
@@ -98,15 +98,17 @@ def test_impossible_waveforms_name_the_field(change):
 
 
 def test_noise_is_ktbf_of_the_sample_rate():
-    s = sensor(noise_figure_db=0.0, waveform=dataclasses.replace(NARROW, n_samples=40))  # 1 MS/s
+    s = make_radar(noise_figure_db=0.0, waveform=dataclasses.replace(NARROW, n_samples=40))  # 1 MS/s
     assert 10.0 * math.log10(s.noise_power) + 30.0 == pytest.approx(-113.975, abs=0.001)
-    assert sensor(noise_figure_db=12.0).noise_power / sensor(noise_figure_db=2.0).noise_power == pytest.approx(10.0)
-    assert sensor(noise=False).noise_power == sensor().noise_power
+    assert make_radar(noise_figure_db=12.0).noise_power / make_radar(noise_figure_db=2.0).noise_power == pytest.approx(
+        10.0
+    )
+    assert make_radar(noise=False).noise_power == make_radar().noise_power
 
 
 def test_fields_are_transverse_and_carry_the_gain():
     array = UniformArray(4, 2, 0.6, 0.5)
-    s = sensor(tx=array, yaw=0.7, pitch=-0.2, roll=0.4)
+    s = make_radar(tx=array, yaw=0.7, pitch=-0.2, roll=0.4)
     d = directions(500)
     field = s.tx_field(d)
     np.testing.assert_allclose((field * d).sum(axis=1), 0.0, atol=1e-12)
@@ -115,13 +117,13 @@ def test_fields_are_transverse_and_carry_the_gain():
 
 
 def test_level_radar_sends_vertical_and_gathers_horizontal_ahead():
-    s = sensor(yaw=0.5)
+    s = make_radar(yaw=0.5)
     np.testing.assert_allclose(s.tx_field(s.boresight[None])[0], [0.0, 0.0, -1.0], atol=1e-12)
     np.testing.assert_allclose(s.rx_field(s.boresight[None])[0], [-math.sin(0.5), math.cos(0.5), 0.0], atol=1e-12)
 
 
 def test_a_quarter_roll_turns_vertical_into_horizontal():
-    rolled, level = sensor(roll=np.pi / 2), sensor()
+    rolled, level = make_radar(roll=np.pi / 2), make_radar()
     ahead = level.boresight[None]
     crossed = abs(np.vdot(rolled.tx_field(ahead)[0], level.tx_field(ahead)[0]))
     aligned = abs(np.vdot(rolled.tx_field(ahead)[0], level.rx_field(ahead)[0]))
@@ -133,7 +135,7 @@ def test_turning_radar_and_world_together_changes_nothing():
     turn = rotation(1.1)
     d = directions(100, seed=3)
     patch = CosinePattern(86.0, 60.0)
-    still = sensor(tx=patch, yaw=0.3, pitch=0.1, elements=[[0.0, 0.002, 0.0], [0.0, -0.002, 0.001]])
+    still = make_radar(tx=patch, yaw=0.3, pitch=0.1, elements=[[0.0, 0.002, 0.0], [0.0, -0.002, 0.001]])
     moved = dataclasses.replace(still, yaw=0.3 + 1.1)
     np.testing.assert_allclose(moved.tx_field(d @ turn.T), still.tx_field(d) @ turn.T, atol=1e-12)
     np.testing.assert_allclose(moved.elements_world, still.elements_world @ turn.T, atol=1e-15)
@@ -149,11 +151,11 @@ def test_turning_radar_and_world_together_changes_nothing():
     ],
 )
 def test_ego_speed_is_signed_along_the_boresight(velocity, yaw, speed):
-    assert sensor(velocity=velocity, yaw=yaw).ego_speed == pytest.approx(speed)
+    assert make_radar(velocity=velocity, yaw=yaw).ego_speed == pytest.approx(speed)
 
 
 def test_sensors_are_frozen_and_default_to_one_receiver_at_rest():
-    s = sensor()
+    s = make_radar()
     assert s.elements.shape == (1, 3) and not s.elements.any() and not s.velocity.any()
     with pytest.raises(ValueError, match="read-only"):
         s.position[0] = 1.0
@@ -175,4 +177,4 @@ def test_sensors_are_frozen_and_default_to_one_receiver_at_rest():
 )
 def test_impossible_sensors_name_the_field(change):
     with pytest.raises(ValueError, match=next(iter(change))):
-        sensor(**change)
+        make_radar(**change)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.records import take
 from raychan.world.creases import Readings
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
 
 Floats = NDArray[np.float64]
@@ -27,21 +27,21 @@ _RESONANCE = 6.0  # k a under which that falls again, but not what physical opti
 
 
 @dataclass(frozen=True)
-class Doubt:
+class MeshError:
     """Surfaces that a mesh may stand for beside the one taken: by another fit of its normals, with edges for doubtful
     folds, with smooth folds for doubtful edges, and of facets halved along cubic edges."""
 
-    fitted: Surface | None
-    creased: Surface | None
-    rounded: Surface | None
-    halved: Surface | None
+    fitted: Geometry | None
+    creased: Geometry | None
+    rounded: Geometry | None
+    halved: Geometry | None
 
     @property
     def rays(self) -> int:
         """Rays cast on them so far."""
         return sum(s.rays for s in (self.fitted, self.creased, self.rounded, self.halved) if s is not None)
 
-    def facets(self, first: complex, value: complex, of: Callable[[Surface], complex]) -> float:
+    def facets(self, first: complex, value: complex, of: Callable[[Geometry], complex]) -> float:
         """Return how far off an amplitude may be, as a share of it, because normals are estimated and facets coarse.
 
         Args: first the amplitude of the surface taken, by the first launch, value by the last; of returns that of
@@ -53,49 +53,49 @@ class Doubt:
         # Facets of another size share no tubes with the first launch, so that the better one tells more.
         return off + (0.0 if self.halved is None else _HALVED * abs(of(self.halved) - value) / abs(value))
 
-    def edges_db(self, first: complex, value: complex, of: Callable[[Surface], complex]) -> float:
+    def edges_db(self, first: complex, value: complex, of: Callable[[Geometry], complex]) -> float:
         """Return how far off a level [dB] may be because doubtful folds are edges, or the other way round; value by the
         last launch."""
         if not (first and value):
             return 0.0
         said = [0.0]
-        for surface in (self.creased, self.rounded):
-            if surface is None:
+        for geometry in (self.creased, self.rounded):
+            if geometry is None:
                 continue
-            other = of(surface)
+            other = of(geometry)
             partly = 20.0 * np.log10(1.0 + _PARTLY * abs(other - first) / abs(first))
             apart = max(abs(20.0 * np.log10(max(abs(other), 1e-300) / abs(a))) for a in (first, value))
             said += [partly, _EDGES_DB * apart]
         return float(max(said))
 
 
-def doubt_of(surface: Surface, found: Readings, wavenumber: float) -> Doubt:
+def mesh_error(geometry: Geometry, found: Readings, wavenumber: float) -> MeshError:
     """Return the other surfaces of a body by itself, given the readings of its mesh."""
-    facets = surface.facets
+    facets = geometry.facets
     other = (found.fitted, found.creased, found.rounded)
-    fitted, creased, rounded = (None if n is None else Surface(facets.replace(normals=n)) for n in other)
-    return Doubt(fitted, creased, rounded, _halved(surface, found, wavenumber))
+    fitted, creased, rounded = (None if n is None else Geometry(facets.replace(normals=n)) for n in other)
+    return MeshError(fitted, creased, rounded, _halved(geometry, found, wavenumber))
 
 
-def _halved(surface: Surface, found: Readings, wavenumber: float) -> Surface | None:
+def _halved(geometry: Geometry, found: Readings, wavenumber: float) -> Geometry | None:
     """Return the surface of facets halved, None where that is the same; what is in doubt by its folds is left out."""
-    facets = surface.facets
-    certain = surface.curved.copy()
+    facets = geometry.facets
+    certain = geometry.curved.copy()
     for normals in (found.creased, found.rounded):
         if normals is not None:
             certain &= (normals == facets.normals).all(axis=(1, 2))
-    off = cubic_off(facets.vertices[certain], facets.normals[certain], surface.bulge[certain])
+    off = cubic_off(facets.vertices[certain], facets.normals[certain], geometry.edge_curvature[certain])
     if 2.0 * wavenumber * off.max(initial=0.0) < _CUBIC:
         return None
     v, n = halved(facets.vertices, facets.normals)
     every = np.tile(np.arange(len(facets.vertices)), 4)
-    finer = Surface(take(facets, every).replace(vertices=v, normals=n))
+    finer = Geometry(take(facets, every).replace(vertices=v, normals=n))
     # Middles of the edges of a saddle lie inside, by less than its facets are off.
-    finer.convex_alone, finer.hides_nothing = surface.convex_alone, surface.hides_nothing
+    finer.convex_alone, finer.hides_nothing = geometry.convex_alone, geometry.hides_nothing
     return finer
 
 
-def creeping(surface: Surface, wavenumber: float) -> tuple[float, float]:
+def creeping(geometry: Geometry, wavenumber: float) -> tuple[float, float]:
     """Return what waves creeping around a body change of its amplitude: at most [m] and at most as a share of it.
 
     Both are those of the PEC sphere as wide as the body is at its thinnest, Mie's series less physical optics over
@@ -103,19 +103,19 @@ def creeping(surface: Surface, wavenumber: float) -> tuple[float, float]:
     sides, which have no creeping wave, and of open sheets.
     Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
     """
-    if not surface.curved.any() or surface.both_sides.any():
+    if not geometry.curved.any() or geometry.both_sides.any():
         return 0.0, 0.0
-    size = wavenumber * 0.5 * _thinnest(surface)
+    size = wavenumber * 0.5 * _thinnest(geometry)
     x = max(size, _RESONANCE)
     wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-2.2 * np.cbrt(x))
     return float(wave / wavenumber), float(2.0 * wave / max(size, 1e-300))
 
 
-def _thinnest(surface: Surface) -> float:
+def _thinnest(geometry: Geometry) -> float:
     """Return the least extent [m] of a body along its principal axes."""
-    v = surface.facets.vertices
-    centre = np.average(v.mean(axis=1), axis=0, weights=surface.area)
+    v = geometry.facets.vertices
+    centre = np.average(v.mean(axis=1), axis=0, weights=geometry.area)
     off = (v - centre).reshape(-1, 3)
-    weight = np.repeat(surface.area, 3)
+    weight = np.repeat(geometry.area, 3)
     axes = np.linalg.eigh((off * weight[:, None]).T @ off)[1]
     return float(np.ptp(off @ axes, axis=0).min())

@@ -17,7 +17,7 @@ from raychan.units import C0
 Floats = NDArray[np.float64]
 
 
-class Radar(Protocol):
+class RadarEnds(Protocol):
     """What the solver asks of a radar (see radar.sensor.Sensor)."""
 
     @property
@@ -28,7 +28,7 @@ class Radar(Protocol):
     def rx_field(self, direction_world: Floats) -> Any: ...
 
 
-def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> Paths:
+def paths_of(routes: Routes, facets: Facets, radar: RadarEnds, frequency: float) -> Paths:
     """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
     a = transfer(
         routes,
@@ -67,7 +67,7 @@ def paths_of(routes: Routes, facets: Facets, radar: Radar, frequency: float) -> 
     )
 
 
-def nothing(facets: Facets, radar: Radar) -> Paths:
+def nothing(facets: Facets, radar: RadarEnds) -> Paths:
     """Return the empty record of a scene of which nothing is in view."""
     end, none = np.asarray(radar.position, float), np.zeros((0, 1), np.int8)
     return Paths.of(

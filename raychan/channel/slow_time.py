@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from raychan.channel.transfer import transfer
 from raychan.compile.jit import njit
 from raychan.em.phase_integral import triangle_terms
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.records import REFLECT, SCATTER, Facets, Routes
 from raychan.units import C0
 
@@ -65,7 +65,7 @@ def corner_rates(routes: Routes, rows: NDArray[np.int64], facets: Facets, veloci
             poses.origin, poses.turn, poses.place, poses.radar, out[at],
         )  # fmt: skip
 
-    in_two(len(rows), some)
+    parallel_for(len(rows), some)
     return out
 
 
@@ -100,7 +100,7 @@ def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float)
     def some(rows: slice) -> None:
         _carry(*(routes.tx, *(c[rows] for c in columns), *when, lengths[:, rows], amplitudes[:, rows]))
 
-    in_two(shape[1], some)
+    parallel_for(shape[1], some)
     return lengths, amplitudes
 
 

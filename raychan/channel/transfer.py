@@ -14,7 +14,7 @@ from raychan.em.phase_integral import triangle_terms
 from raychan.em.physical_optics import huygens, reflected_wave, shadow_wave
 from raychan.em.polarization import dot, reflect, transmit
 from raychan.geometry.curved_patches import copy_to
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.records import POINT, TRANSMIT, Facets, Materials, Routes
 from raychan.units import C0
 
@@ -71,7 +71,7 @@ def transfer(
             *(c[at] for c in columns),
         )  # fmt: skip
 
-    in_two(len(out), some)
+    parallel_for(len(out), some)
     return out if corners else out[..., 0]
 
 

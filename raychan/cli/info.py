@@ -104,7 +104,7 @@ def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
 def _scene(scene: Any) -> None:
     screen = show.console()
     screen.print(scene.title, style="bold", markup=False)
-    for made in (_bodies(scene), _parts(scene), *_radar(scene.sensor), *_antennas(scene)):
+    for made in (_bodies(scene), _parts(scene), *_radar(scene.radar), *_antennas(scene)):
         screen.print(made)
     show.warn(scene.warnings)
 
@@ -113,7 +113,7 @@ def _bodies(scene: Any) -> Table:
     import numpy as np
 
     facets, points = scene.facets(0.0), scene.points(0.0)
-    radar = scene.sensor.position
+    place = scene.radar.position
     rows = []
     for b, name in enumerate(facets.body_names):
         corners = facets.vertices[facets.body == b].reshape(-1, 3)
@@ -125,7 +125,7 @@ def _bodies(scene: Any) -> Table:
         size, near = "", ""
         if len(corners) and facets.role[b] != 1:
             size = " x ".join(f"{x:.2f}" for x in np.ptp(corners, axis=0))
-            near = f"{np.linalg.norm(corners - radar, axis=1).min():.2f}"
+            near = f"{np.linalg.norm(corners - place, axis=1).min():.2f}"
         place = ", ".join(f"{x:.2f}" for x in facets.origin[b])
         speed = ", ".join(f"{x:g}" for x in facets.velocity[b])
         rows.append((name, role, f"{len(corners) // 3}", size, place, speed, near))
@@ -158,11 +158,11 @@ def _parts(scene: Any) -> Table:
     return show.table("Materials", heads, rows, left=(0, 1, 2, 6))
 
 
-def _radar(sensor: Any) -> list[Table]:
-    w = sensor.waveform
+def _radar(radar: Any) -> list[Table]:
+    w = radar.waveform
     units = {"dbm": "dBm", "dbi": "dBi", "db": "dB", "m": "m"}
     budget = []
-    for key, value in sensor.link_budget().items():
+    for key, value in radar.link_budget().items():
         name, unit = key.rsplit("_", 1)
         figure = f"{1e3 * value:.4g} mm" if unit == "m" else f"{value:.2f} {units[unit]}"
         budget.append((_WORDS.get(name, name.replace("_", " ")), figure))
@@ -192,10 +192,10 @@ def _antennas(scene: Any) -> list[Table]:
     """Return the figures of the antennas: of one if transmitter and receiver share it, else of each."""
     from raychan.world.radar_mount import antenna_table, mounted
 
-    (key, sent), (other, gathered) = mounted(scene.radar)
-    uses = [("transmit and receive", key, sent, scene.sensor.tx)]
+    (key, sent), (other, gathered) = mounted(scene.radar_table)
+    uses = [("transmit and receive", key, sent, scene.radar.tx)]
     if other != key:
-        uses = [("transmit", key, sent, scene.sensor.tx), ("receive", other, gathered, scene.sensor.rx)]
+        uses = [("transmit", key, sent, scene.radar.tx), ("receive", other, gathered, scene.radar.rx)]
     made = []
     for use, where, given, antenna in uses:
         table, _ = antenna_table(given, scene.folder, where)

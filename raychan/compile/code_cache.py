@@ -43,7 +43,7 @@ def _digest(*parts: object) -> bytes:
     return hashlib.sha256("\n".join(map(repr, parts)).encode()).digest()
 
 
-class Kept(FunctionCache):  # type: ignore[no-any-unimported]
+class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
     """The compiled code of one function, a file a signature."""
 
     def __init__(self, function: Callable[..., Any]) -> None:

@@ -17,7 +17,7 @@ from numba.core import config
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
-from raychan.compile.code_cache import Kept
+from raychan.compile.code_cache import CodeCache
 
 _CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
 _CONSTANTS = int, float, complex, str, tuple
@@ -33,7 +33,7 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
     compile.
     """
 
-    kept: Kept
+    kept: CodeCache
     stamp: bytes
 
     def __call__(self, *args: Any) -> Any:
@@ -53,7 +53,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         made: Any = numba.njit(**options)(function)
         if keep and not _UNCOMPILED:
             made.__class__ = Kernel
-            made._cache = made.kept = Kept(function)
+            made._cache = made.kept = CodeCache(function)
             made.stamp = made.kept.stamped(hashlib.sha256(_within_reach(function, made.kept.source)).digest())
             KERNELS.append(made)
         return made

@@ -41,13 +41,13 @@ def layer(cos_i: float, eps: complex, thickness: float, k: float) -> tuple[compl
     """
     root = _root(cos_i, eps)
     r_s, r_p = half_space(cos_i, eps)
-    once = cmath.exp(-1j * k * thickness * root)
-    twice = once * once
+    cached = cmath.exp(-1j * k * thickness * root)
+    twice = cached * cached
     free = cmath.exp(1j * k * thickness * cos_i)
     d_s = 1.0 - r_s * r_s * twice
     d_p = 1.0 - r_p * r_p * twice
-    t_s = (1.0 - r_s * r_s) * once / d_s * free
-    t_p = (1.0 - r_p * r_p) * once / d_p * free
+    t_s = (1.0 - r_s * r_s) * cached / d_s * free
+    t_p = (1.0 - r_p * r_p) * cached / d_p * free
     return r_s * (1.0 - twice) / d_s, r_p * (1.0 - twice) / d_p, t_s, t_p
 
 

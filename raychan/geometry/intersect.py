@@ -74,8 +74,8 @@ def near_ball(origin, direction, most, centre, radius):  # type: ignore[no-untyp
 def set_out(origin, direction, skip, start, centre, radius, slack, size):  # type: ignore[no-untyped-def]
     """Return how far ahead (n,) [m] rays are cast, and their pace (n,) [m]: a few float32 spacings.
 
-    Args: skip, start (n,) as for `Tracer.cast`; centre (3,), radius [m] of a ball about all facets; slack, the pace in
-    parts of a coordinate; size [m] that a coordinate counts at least.
+    Args: skip, start (n,) as for `RayCaster.cast`; centre (3,), radius [m] of a ball about all facets; slack, the pace
+    in parts of a coordinate; size [m] that a coordinate counts at least.
     """
     n = len(origin)
     ahead, pace = np.empty(n), np.empty(n)

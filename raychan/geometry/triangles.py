@@ -59,7 +59,7 @@ def planes_of(v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def bulges(v, n):  # type: ignore[no-untyped-def]
+def edge_curvatures(v, n):  # type: ignore[no-untyped-def]
     """Return the bulge (m, 3, 3) [m] of each edge of the quadratic patches x = sum l_i x_i - sum c_ij l_i l_j through
     corners and corner normals (Nagata 2005, eq. 10), and which facets (m,) are curved."""
     m = len(v)
@@ -143,7 +143,7 @@ def bends(pair, v, n, normal, area):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def hulls(order, first, v, n, normal, bulge):  # type: ignore[no-untyped-def]
+def hulls(order, first, v, n, normal, edge_curvature):  # type: ignore[no-untyped-def]
     """Return for clusters of facets, order[first[i] : first[i + 1]], a ball, centre (k, 3) and radius (k,) [m], that
     holds their true surfaces, and a cone, axis (k, 3) and half angle (k,) [rad], that holds all their normals."""
     k = len(first) - 1
@@ -172,7 +172,7 @@ def hulls(order, first, v, n, normal, bulge):  # type: ignore[no-untyped-def]
                 for c in range(3):
                     off += (v[f, q, c] - centre[i, c]) ** 2
                     turn += n[f, q, c] * axis[i, c]
-                    out += bulge[f, q, c] ** 2
+                    out += edge_curvature[f, q, c] ** 2
                 radius[i], least, swell = max(radius[i], off), min(least, turn), max(swell, out)
             turn = normal[f, 0] * axis[i, 0] + normal[f, 1] * axis[i, 1] + normal[f, 2] * axis[i, 2]
             most, least = max(most, swell), min(least, turn)

@@ -8,7 +8,7 @@ from scipy.ndimage import maximum_filter
 
 from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, level, training
 from raychan.processing.doa import azimuth
-from raychan.radar.side_lobes import Envelope
+from raychan.radar.side_lobes import SideLobeEnvelope
 from raychan.radar.waveform import Waveform
 from raychan.records import Detections, RangeDoppler
 from raychan.units import C0, db, undb
@@ -122,7 +122,7 @@ def _own(place: Floats, power: Floats, smear: Floats, grid: Grid, windows: tuple
     Args: place (n, 2) and smear (n,) in resolution cells; a mover that migrates over `smear` cells of range spreads
     over as many of rate.
     """
-    envelopes = [Envelope(name, n) for name, n in zip(windows, grid.count, strict=True)]
+    envelopes = [SideLobeEnvelope(name, n) for name, n in zip(windows, grid.count, strict=True)]
     lobes = np.zeros(len(power))
     kept = np.zeros(len(power), bool)
     for i in range(len(power)):

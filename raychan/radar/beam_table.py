@@ -36,7 +36,7 @@ class Beam:
         found: Floats = fields_towards(np.ascontiguousarray(look), self.table)
         return found
 
-    def dark(self, look: Floats, around: Floats) -> NDArray[np.bool_]:
+    def outside_beam(self, look: Floats, around: Floats) -> NDArray[np.bool_]:
         """Tell about which unit directions (n, 3) the field is zero everywhere within angles (n,) [rad]."""
         out = around < _NARROW
         rows = np.flatnonzero(out)

@@ -21,7 +21,7 @@ Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Sensor:
+class Radar:
     """A monostatic radar: one transmitter, one or several receivers of the same pattern."""
 
     position: Floats
@@ -65,7 +65,7 @@ class Sensor:
         """What others make of the antennas and how they stand, by its class; shared with the same radar elsewhere."""
         return {}
 
-    def at(self, time: float) -> Sensor:
+    def at(self, time: float) -> Radar:
         """Return the radar where its velocity has brought it at a time [s]."""
         moved = replace(self, position=self.position + time * self.velocity)
         moved.__dict__["kept"] = self.kept

@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 _FINE = 16  # points per resolution cell
 
 
-class Envelope:
+class SideLobeEnvelope:
     """Least falling bound of a window's power response, 1 at the peak; offsets in resolution cells."""
 
     def __init__(self, name: str, n: int) -> None:

@@ -116,7 +116,7 @@ class Placer:
         self.axes = axes
         self.taken = np.zeros((0, 4))  # boxes in pixels: left, bottom, right, top
 
-    def settle(self) -> None:
+    def resolve_return_leg(self) -> None:
         """Lay the figure out, so that data and pixels belong together; call when all else is drawn."""
         self.axes.figure.draw_without_rendering()
 

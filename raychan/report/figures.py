@@ -133,7 +133,7 @@ def _mark_detections(result: Result, axes: Any) -> None:
 def _name_detections(result: Result, axes: Any) -> None:
     d = result.detections
     placer = Placer(axes)
-    placer.settle()
+    placer.resolve_return_leg()
     placer.avoid(d.range, d.rate, 9.0)
     placer.avoid(d.range[d.folded], d.rate[d.folded], 15.0)
     if (legend := axes.get_legend()) is not None:
@@ -159,7 +159,7 @@ def _name_peaks(result: Result, axes: Any, power: Floats, far: float) -> None:
     p = result.profile
     known, response = chains(result.paths, result.receiver.background), response_of(result.receiver)
     placer = Placer(axes)
-    placer.settle()
+    placer.resolve_return_leg()
     end = int(np.searchsorted(p.range, far))
     dense = np.linspace(p.range[0], p.range[max(end - 1, 0)], 8 * max(end, 1))
     placer.avoid(dense, np.interp(dense, p.range, power), 2.0)

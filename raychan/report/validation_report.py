@@ -234,7 +234,7 @@ def _gained(turn: Turn) -> str:
 
 
 def _turns(done: Validation, turns: Sequence[Turn], figures: dict[str, str]) -> list[str]:
-    edge = 0.5 * characteristics(done.bench.scene(ARRAY).sensor.tx).hpbw_h_deg
+    edge = 0.5 * characteristics(done.bench.scene(ARRAY).radar.tx).hpbw_h_deg
     most, at_edge = both_ways(done.bench, np.array([0.0, edge]))
     rows = [
         (t.title, f"{t.azimuth:.1f}", f"{t.pattern:+.1f}", _gained(t), f"{t.printed:+g}",

@@ -6,21 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.transfer import REFLECTED, SHADOW, FieldOf, transfer
-from raychan.tracing.contributions import Found
+from raychan.tracing.contributions import Contributions
 from raychan.tracing.footprints import elements
 from raychan.tracing.horizon import LIT
 from raychan.tracing.legs import Leg
-from raychan.tracing.return_leg import settle
+from raychan.tracing.return_leg import resolve_return_leg
 from raychan.tracing.routes import routes_of
 from raychan.tracing.tubes import Tubes
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
 def first_surface(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, found: Found, frequency: float, basis: FieldOf
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, frequency: float, basis: FieldOf
 ) -> Complexes:
     """Return what tubes on their first surface scatter to the end of `out` (2, 2), as `transfer` gives it.
 
@@ -29,22 +29,22 @@ def first_surface(
     radiation, which cancels the incident wave behind the body: whatever stands there too is in a shadow already, so it
     is never blocked. Source: Ufimtsev, Fundamentals of the Physical Theory of Diffraction, 2014, ch. 1.
     """
-    seen, corners, passed = settle(surface, leg, out, tubes, found, True, which=LIT)
-    total = _radiated(surface, leg, out, seen, (corners, passed), frequency, basis, REFLECTED)
+    seen, corners, passed = resolve_return_leg(geometry, leg, out, tubes, found, True, which=LIT)
+    total = _radiated(geometry, leg, out, seen, (corners, passed), frequency, basis, REFLECTED)
     free = np.zeros((len(tubes), 0, 3)), np.full((len(tubes), 1), -1, np.int32)
-    return total + _radiated(surface, leg, out, tubes, free, frequency, basis, SHADOW)
+    return total + _radiated(geometry, leg, out, tubes, free, frequency, basis, SHADOW)
 
 
 def _radiated(
-    surface: Surface, leg: Leg, out: Leg, tubes: Tubes, way: tuple[Floats, NDArray[np.int32]], frequency: float,
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, way: tuple[Floats, NDArray[np.int32]], frequency: float,
     basis: FieldOf, wave: int,
 ) -> Complexes:  # fmt: skip
     """Return what one of the two waves brings over a way out, its mirror points and layers."""
     if not len(tubes):
         return np.zeros((2, 2), complex)
     area = np.empty((len(tubes), 3, 3))
-    shape = surface.facets.vertices, surface.bulge, surface.curved, leg.image, out.image, out.far
+    shape = geometry.facets.vertices, geometry.edge_curvature, geometry.curved, leg.image, out.image, out.far
     elements(tubes.points, tubes.normals, tubes.facet, tubes.bary, *shape, area)
-    routes = routes_of(surface, leg, out, tubes, True, *way)
-    field = transfer(routes, surface.facets, frequency, basis, basis, wave=wave, elements=area)
+    routes = routes_of(geometry, leg, out, tubes, True, *way)
+    field = transfer(routes, geometry.facets, frequency, basis, basis, wave=wave, elements=area)
     return np.asarray(field.sum(axis=0))

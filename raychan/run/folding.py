@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import Complexes, Paths
-from raychan.run.point_spread import Response
+from raychan.run.point_spread import PointSpread
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -41,7 +41,7 @@ class Shown:
     at_rate: float
 
 
-def truth(paths: Paths, rows: Ints, strongest: int, response: Response, shown: Shown) -> Truth:
+def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown: Shown) -> Truth:
     """Return where the paths of one chain that feed a cell are.
 
     Args: rows of the chain's paths; strongest the row of the one that brings most to the cell.
@@ -68,7 +68,7 @@ def truth(paths: Paths, rows: Ints, strongest: int, response: Response, shown: S
     return max(found, key=lambda one: one[0] * (1.0 if one[1].folded else _EQUAL), default=(0.0, UNKNOWN))[1]
 
 
-def aliased(at: Floats, shown: float, response: Response) -> tuple[Floats, NDArray[np.bool_]]:
+def aliased(at: Floats, shown: float, response: PointSpread) -> tuple[Floats, NDArray[np.bool_]]:
     """Return how far (n,) [m] the nearest alias of echoes at ranges `at` (n,) [m] is from a range shown [m], and
     whether that alias is another place than theirs."""
     period = response.periods[0]
@@ -81,7 +81,7 @@ def aliased(at: Floats, shown: float, response: Response) -> tuple[Floats, NDArr
 
 
 def _folds(
-    paths: Paths, rows: Ints, response: Response, shown: Shown, mirrored: bool
+    paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """Return the ambiguities (n, 2) of range and rate between paths and the place shown, and whether the paths stand
     on the main lobe about it when these are taken out."""
@@ -100,7 +100,7 @@ def _folds(
     return whole.astype(np.int64), np.asarray((rest <= _NEAR + smear[:, None]).all(axis=1))
 
 
-def _powers(paths: Paths, rows: Ints, response: Response, shown: Shown, mirrored: bool) -> Floats:
+def _powers(paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool) -> Floats:
     """Return what paths, or their mirror images, bring to the cell shown, as powers (n,)."""
     delay = paths.delay[rows]
     if shown.rate is None:

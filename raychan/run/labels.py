@@ -13,7 +13,7 @@ from raychan.records import KIND_LETTERS, TRANSMIT, Detections, Paths, RangeDopp
 from raychan.run.cell_sums import cell_sums
 from raychan.run.convergence import figure
 from raychan.run.folding import Shown, truth
-from raychan.run.point_spread import Response
+from raychan.run.point_spread import PointSpread
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver
 from raychan.units import C0
 
@@ -61,7 +61,7 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
 def explain_cell(
     paths: Paths,
     known: Chains,
-    response: Response,
+    response: PointSpread,
     receiver: Receiver,
     range: float,
     rate: float | None,
@@ -91,7 +91,7 @@ class _Cell:
 
 
 def _explained(
-    paths: Paths, known: Chains, response: Response, sums: Any, cell: _Cell, receiver: Receiver
+    paths: Paths, known: Chains, response: PointSpread, sums: Any, cell: _Cell, receiver: Receiver
 ) -> Explanation:
     """Return the explanation of a cell by the sums over chains that it has of `Sums`, reported at its place."""
     summed, sizes, strongest = sums
@@ -133,7 +133,7 @@ def _explained(
 
 
 def waves_in(
-    paths: Paths, response: Response, range: float, rate: float | None
+    paths: Paths, response: PointSpread, range: float, rate: float | None
 ) -> tuple[NDArray[np.complexfloating[Any, Any]], Floats]:
     """Return what each path (n,) brings to a cell, its amplitude times the response of both windows there, and the
     range (n,) [m] at which it stands.
@@ -164,9 +164,9 @@ def provenance(
     return tuple(found)
 
 
-def response_of(receiver: Receiver) -> Response:
+def response_of(receiver: Receiver) -> PointSpread:
     """Return the response of a receiver's processor."""
-    return Response(receiver.waveform, receiver.range_window, receiver.rate_window)
+    return PointSpread(receiver.waveform, receiver.range_window, receiver.rate_window)
 
 
 def _alike(paths: Paths) -> tuple[Ints, Ints]:

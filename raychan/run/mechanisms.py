@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing.range_doppler import range_doppler
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, TRANSMIT, Paths, take
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
@@ -39,16 +39,16 @@ def layers(paths: Paths) -> NDArray[np.int64]:
     return np.asarray((paths.ways.kind == TRANSMIT).sum(axis=1))[paths.way]
 
 
-def peak(paths: Paths, rows: NDArray[np.bool_], sensor: Sensor, settings: Any) -> float:
+def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> float:
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
     if not rows.any():
         return 0.0
-    cube = synthesize(take(paths, rows), dataclasses.replace(sensor, noise=False), tolerance=_LEVEL)
-    rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
+    cube = synthesize(take(paths, rows), dataclasses.replace(radar, noise=False), tolerance=_LEVEL)
+    rdmap = range_doppler(cube, radar.waveform, settings.range_window, settings.rate_window, settings.pad)
     return float(rdmap.power.max())
 
 
-def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_db: float) -> Choice:
+def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db: float) -> Choice:
     """Return the fewest bounces and layers that keep every detectable return within the tolerance.
 
     Args: paths of a launch with all mechanisms; noise [W] of a cell of the map (0: 80 dB under the strongest cell
@@ -56,7 +56,7 @@ def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_
     [dB].
     """
     everything = np.ones(len(paths.delay), bool)
-    weakest = noise * undb(settings.min_snr_db) if noise > 0.0 else peak(paths, everything, sensor, settings) * 1e-8
+    weakest = noise * undb(settings.min_snr_db) if noise > 0.0 else peak(paths, everything, radar, settings) * 1e-8
     limit = float(weakest) * (10.0 ** (tolerance_db / 20.0) - 1.0) ** 2
     why, chosen = [], []
     if limit == 0.0:
@@ -67,7 +67,7 @@ def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_
     ):
         keep = least
         for n in range(least, int(count.max(initial=least)) + 1):
-            level = peak(paths, count == n, sensor, settings)
+            level = peak(paths, count == n, radar, settings)
             needed = level > limit
             keep = n if needed else keep
             if level > 0.0:
@@ -76,7 +76,7 @@ def choose(paths: Paths, sensor: Sensor, settings: Any, noise: float, tolerance_
                     f"{n} {name}: strongest cell {db(level / limit):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
                 )
         chosen.append(keep)
-    level = peak(paths, (paths.ways.kind == DIFFRACT).any(axis=1)[paths.way], sensor, settings)
+    level = peak(paths, (paths.ways.kind == DIFFRACT).any(axis=1)[paths.way], radar, settings)
     say = "needed" if level > limit else "not needed"
     why.append(
         f"diffraction: strongest cell {db(max(level / limit, 1e-30)):+.0f} dB of what {tolerance_db:g} dB allow: {say}"

@@ -12,7 +12,7 @@ from raychan.records import RangeDoppler
 from raychan.run.result import ExplainedDetections, Result
 from raychan.run.solver import Stats
 from raychan.run.unmodelled import Entry
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 _NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: what a whole number of dB shows as more than 0
@@ -74,15 +74,15 @@ def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, l
     return [*warned(found, tolerance_db, rdmap), *noted(found, tolerance_db, ledger)]
 
 
-def uncut(surface: Surface, *launches: Stats) -> tuple[str, ...]:
+def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
     """Return a line if launches had more tubes on some bodies than may be cut."""
-    left = np.zeros(len(surface.facets.role), np.int64)
+    left = np.zeros(len(geometry.facets.role), np.int64)
     for stats in launches:
         left[: len(stats.uncut)] += stats.uncut
     if not left.any():
         return ()
-    worst, facets = int(np.argmax(left)), surface.facets
-    area = float(surface.area[facets.body == worst].sum())
+    worst, facets = int(np.argmax(left)), geometry.facets
+    area = float(geometry.area[facets.body == worst].sum())
     body = f"body '{facets.body_names[worst]}': {int(left[worst]):,} tubes on its {area:.3g} m2"
     return (
         f"{body} were left coarser than asked for, too many hide parts of each other or are too large: errors may "

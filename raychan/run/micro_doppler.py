@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 
 from raychan.channel.slow_time import Poses, carried, strengths
 from raychan.channel.transfer import departures
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Routes, take
-from raychan.run.segments import Key, Piece, Retraced, Traced, echoes, joined, reach
+from raychan.run.segments import Keyframe, Retraced, Segment, Traced, echoes, joined, reach
 from raychan.run.solver import solve
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import ramp_sums
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
-from raychan.world.geometry import surface_at, surface_of
+from raychan.world.geometry import geometry_of, surface_at
 from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -46,14 +46,14 @@ def turning(scene: Scene) -> NDArray[np.bool_]:
 
 def moving(scene: Scene) -> NDArray[np.bool_]:
     """Return which bodies (b,) turn or move relative to the radar."""
-    own = np.asarray(scene.sensor.velocity, float)
+    own = np.asarray(scene.radar.velocity, float)
     return turning(scene) | np.array([not np.array_equal(b.motion.velocity, own) for b in scene.bodies], bool)
 
 
 def bend(scene: Scene, edge: float) -> float:
     """Return the phase [rad] that paths at their rates leave out over a frame: along the turn of a body's outermost
     point, and across a tube of a given edge [m]."""
-    wave, worst = scene.sensor.waveform, 0.0
+    wave, worst = scene.radar.waveform, 0.0
     k, half = 4.0 * np.pi / wave.wavelength, 0.5 * wave.frame_duration
     for body in (b for b, t in zip(scene.bodies, turning(scene), strict=True) if t):
         rate = float(np.linalg.norm(body.motion.spin()))
@@ -68,7 +68,7 @@ def bend(scene: Scene, edge: float) -> float:
 
 def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
     """Tell whether a frame is to be traced more than once."""
-    if retrace == 1 or scene.sensor.waveform.n_chirps < 3:
+    if retrace == 1 or scene.radar.waveform.n_chirps < 3:
         return False
     return bend(scene, edge) > _NEEDED if retrace == "auto" else bool(moving(scene).any())
 
@@ -87,7 +87,7 @@ def retraced(
     progress is told the share done.
     """
     work = _Work(scene, rule, model, progress)
-    last = scene.sensor.waveform.n_chirps - 1
+    last = scene.radar.waveform.n_chirps - 1
     if model.retrace == "auto":
         return work.adaptive(last, first)
     return work.even(last, first, int(model.retrace))
@@ -99,8 +99,8 @@ class _Work:
     def __init__(self, scene: Scene, rule: Refinement, model: Any, progress: Callable[[float], None] | None) -> None:
         self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
         self.turns = turning(scene) if model.retrace == "auto" else moving(scene)
-        self.sensor: Sensor = dataclasses.replace(scene.sensor, noise=False)
-        wave = self.sensor.waveform
+        self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
+        wave = self.radar.waveform
         self.chirps, self.step = wave.n_chirps, wave.repetition
         self.rays, self.times = 0, list[float]()
         self.most = max(3, 1 + self.chirps // _CHIRPS)
@@ -123,15 +123,15 @@ class _Work:
         self.reached = all(off <= limit for _, off, _ in known)
         return self.done(sorted((p for p, _, _ in known), key=lambda p: p.start.chirp))
 
-    def halves(self, piece: Piece) -> tuple[Piece, Piece]:
+    def halves(self, piece: Segment) -> tuple[Segment, Segment]:
         """Return a piece in two, with a tracing in its middle."""
         start, end = piece.start, piece.end
         key = self.key((start.chirp + end.chirp) // 2)
         left, right = reach(key.chirp - start.chirp), reach(end.chirp - key.chirp)
         c = self.carried(key, key.chirp - left, key.chirp + right)
         return (
-            Piece(start, key, piece.a[:, :, : left + 1], c[:, :, : left + 1]),
-            Piece(key, end, c[:, :, left:], piece.b[:, :, -right - 1 :]),
+            Segment(start, key, piece.a[:, :, : left + 1], c[:, :, : left + 1]),
+            Segment(key, end, c[:, :, left:], piece.b[:, :, -right - 1 :]),
         )
 
     def even(self, last: int, first: Traced | None, count: int) -> Retraced:
@@ -140,30 +140,30 @@ class _Work:
         keys = [self.key(int(c), first if c == 0 else None) for c in at]
         return self.done([self.piece(a, b) for a, b in pairwise(keys)])
 
-    def piece(self, start: Key, end: Key) -> Piece:
+    def piece(self, start: Keyframe, end: Keyframe) -> Segment:
         """Return the chirps between two tracings."""
         far = reach(end.chirp - start.chirp)
         a = self.carried(start, start.chirp, start.chirp + far)
-        return Piece(start, end, a, self.carried(end, end.chirp - far, end.chirp))
+        return Segment(start, end, a, self.carried(end, end.chirp - far, end.chirp))
 
-    def done(self, pieces: list[Piece]) -> Retraced:
+    def done(self, pieces: list[Segment]) -> Retraced:
         """Return the frame of pieces in order."""
         samples, error = joined([p.blend() for p in pieces]), joined([p.doubt() for p in pieces])
-        if not self.sensor.waveform.complex_sampling:
+        if not self.radar.waveform.complex_sampling:
             samples, error = samples.real.astype(complex), error.real.astype(complex)
         times = tuple(sorted(self.times))
         return Retraced(samples.sum(axis=0), samples[0], self.turns, error.sum(axis=0), times, self.rays, self.reached)
 
-    def key(self, chirp: int, known: Traced | None = None) -> Key:
+    def key(self, chirp: int, known: Traced | None = None) -> Keyframe:
         """Trace the scene at a chirp."""
         now = self.scene.at(chirp * self.step)
         self.times.append(chirp * self.step)
-        carrier = self.sensor.waveform.carrier
-        surface = surface_at(now) if known is None else surface_of(now)
+        carrier = self.radar.waveform.carrier
+        geometry = surface_at(now) if known is None else geometry_of(now)
         if known is None:
             found: list[Routes] = []
             paths, stats = solve(
-                surface, now.points(), now.sensor, carrier, self.rule, self.model.max_bounces, None,
+                geometry, now.points(), now.radar, carrier, self.rule, self.model.max_bounces, None,
                 self.model.diffraction, found.append,
             )  # fmt: skip
             self.rays += stats.rays
@@ -174,11 +174,11 @@ class _Work:
         rest = ~self.touches(ways.body, ways.kind) | (ways.kind == DIFFRACT).any(axis=1)
         if self.progress:
             self.progress(len(self.times) / self.most)
-        return Key(
+        return Keyframe(
             chirp,
             now,
             routes,
-            tuple(strengths(r, surface.facets, now.sensor, carrier) for r in routes),
+            tuple(strengths(r, geometry.facets, now.radar, carrier) for r in routes),
             take(known.paths, rest[known.paths.way]),
         )
 
@@ -186,11 +186,11 @@ class _Work:
         """Tell which chains (n, d) meet a turning body."""
         return np.asarray((self.turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))
 
-    def carried(self, key: Key, first: int, last: int) -> Samples:
+    def carried(self, key: Keyframe, first: int, last: int) -> Samples:
         """Return the samples (2, antenna, chirp, sample) of a tracing's paths carried over chirps first to last: those
         that meet turning bodies, all others."""
-        wave = self.sensor.waveform
-        shape = (2, len(self.sensor.elements), last - first + 1, wave.n_samples)
+        wave = self.radar.waveform
+        shape = (2, len(self.radar.elements), last - first + 1, wave.n_samples)
         out = np.zeros(shape, np.complex64)
         growth = 2.0 * key.others.rate / C0 * (first - key.chirp) * self.step
         late = key.others.replace(
@@ -198,10 +198,10 @@ class _Work:
             amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * growth),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
-        out[1] = synthesize(late, dataclasses.replace(self.sensor, waveform=frame)).samples
+        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame)).samples
         for routes, strength in zip(key.routes, key.strengths, strict=True):
             # A receiver moved towards the arriving wave has a shorter path.
-            nearer = departures(routes)[1] @ self.sensor.elements_world.T
+            nearer = departures(routes)[1] @ self.radar.elements_world.T
             for start in range(first, last + 1, _AT_ONCE):
                 count = min(_AT_ONCE, last + 1 - start)
                 # One instant more than chirps: growth from chirp to chirp is what a path's rate is.
@@ -214,12 +214,12 @@ class _Work:
 
     def turn(self, nearer: Floats) -> Complexes:
         """Return the carrier's turn and the transmitted amplitude [sqrt(W)] of ways shorter by [m]."""
-        wave = self.sensor.waveform
-        return np.asarray(np.sqrt(self.sensor.power) * np.exp(2j * np.pi / wave.wavelength * nearer))
+        wave = self.radar.waveform
+        return np.asarray(np.sqrt(self.radar.power) * np.exp(2j * np.pi / wave.wavelength * nearer))
 
     def ramps(self, lengths: Floats, amplitudes: Complexes) -> Samples:
         """Return the samples (chirp, sample) of parts (chirp + 1, n, 3) of routes with these lengths [m]."""
-        wave, count = self.sensor.waveform, len(lengths) - 1
+        wave, count = self.radar.waveform, len(lengths) - 1
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
         delay = lengths.reshape(count + 1, -1)[:, parts] / C0
         growth, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
@@ -230,16 +230,16 @@ class _Work:
             return np.asarray(rows)
         here = np.zeros(3)
         one = dataclasses.replace(
-            self.sensor, elements=here[None], power=1.0, waveform=dataclasses.replace(wave, n_chirps=1)
+            self.radar, elements=here[None], power=1.0, waveform=dataclasses.replace(wave, n_chirps=1)
         )
         return np.stack(
             [synthesize(echoes(*row, here), one).samples[0, 0] for row in zip(delay, strength, growth, strict=True)]
         )
 
-    def poses(self, key: Key, chirps: NDArray[np.signedinteger]) -> Poses:
+    def poses(self, key: Keyframe, chirps: NDArray[np.signedinteger]) -> Poses:
         """Return where bodies and radar are at chirps, as seen from a tracing."""
         late = (chirps - key.chirp) * self.step
-        motions, sensor = [b.motion for b in key.scene.bodies], key.scene.sensor
+        motions, radar = [b.motion for b in key.scene.bodies], key.scene.radar
         turn = np.broadcast_to(np.eye(3), (len(late), len(motions), 3, 3)).copy()
         for b in np.flatnonzero(self.turns):
             turn[:, b] = [motions[b].rotation(t) @ motions[b].rotation().T for t in late]
@@ -248,10 +248,10 @@ class _Work:
             origin=origin,
             turn=turn,
             place=origin + late[:, None, None] * velocity,
-            radar=sensor.position + late[:, None] * sensor.velocity,
+            radar=radar.position + late[:, None] * radar.velocity,
         )
 
 
-def _worth(piece: Piece, off: float, before: float, limit: float) -> bool:
+def _worth(piece: Segment, off: float, before: float, limit: float) -> bool:
     """Tell whether a tracing in the middle of a piece may help: where half the distance did not, launches differ."""
     return off > limit and off <= _HELPS * before and piece.chirps >= 5

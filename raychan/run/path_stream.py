@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join, strongest
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import response
@@ -26,7 +26,7 @@ class Launched:
 
     paths: Paths
     count: int
-    sensor: Sensor
+    radar: Radar
     window: str
     """Along range, for the profile."""
     told: tuple[Any, Any] | None = None
@@ -36,13 +36,13 @@ class Launched:
     def quiet(self) -> Cube:
         """The samples of all receivers and chirps, without noise."""
         if self.told is None:
-            return synthesize(self.paths, self.sensor)
+            return synthesize(self.paths, self.radar)
         return Cube(samples=self.told[0].astype(np.complex64), noise_power=0.0)
 
     @cached_property
     def response(self) -> NDArray[np.complex128]:
         """The channel's response to one ramp (see channel.profile)."""
-        return _response(self.paths, self.sensor, self.window) if self.told is None else self.told[1]
+        return _response(self.paths, self.radar, self.window) if self.told is None else self.told[1]
 
     @property
     def whole(self) -> bool:
@@ -57,11 +57,11 @@ class Launched:
         return replace(self, paths=there, told=(self.quiet.samples, self.response))
 
 
-class Gather:
+class PathStream:
     """Paths of a launch for a sensor, whose profile has a window along range: `add` each batch, then `done`."""
 
-    def __init__(self, sensor: Sensor, window: str) -> None:
-        self._sensor, self._window = replace(sensor, noise=False), window
+    def __init__(self, radar: Radar, window: str) -> None:
+        self._sensor, self._window = replace(radar, noise=False), window
         self._held: list[Paths] = []
         self._kept: list[Paths] = []
         self._told: tuple[Any, Any] | None = None
@@ -92,5 +92,5 @@ class Gather:
         return Launched(paths, self._count, self._sensor, self._window, self._told)
 
 
-def _response(paths: Paths, sensor: Sensor, window: str) -> NDArray[np.complex128]:
-    return response(paths, sensor.waveform, sensor.power, window)
+def _response(paths: Paths, radar: Radar, window: str) -> NDArray[np.complex128]:
+    return response(paths, radar.waveform, radar.power, window)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.run.cell_sums import cell_waves, periodic, sums_in_cells
@@ -23,7 +23,7 @@ _LEAST = 1e-3  # of a cell's amplitude: what all paths that are left out may bri
 _STEP = 0.25  # range cells that a path may move within one piece of the frame
 
 
-class Response:
+class PointSpread:
     """Response of both windows, side lobes and aliases included, 1 at the peak; migration by pieces of the frame.
 
     With real sampling each echo has a mirror image, its conjugate at minus its range and minus its rate, which shows
@@ -102,7 +102,7 @@ class Response:
                 *tables,
             )  # fmt: skip
 
-        in_two(len(cells), some, least=2)
+        parallel_for(len(cells), some, least=2)
         return total, size, strongest
 
     def _tables(self, rate: Floats) -> tuple[Any, ...]:

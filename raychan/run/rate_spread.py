@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.records import Detections, Paths, take
 from raychan.run.convergence import figure
 from raychan.run.folding import aliased
@@ -34,9 +34,9 @@ def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
     return kept
 
 
-def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], sensor: Sensor) -> float:
+def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: Radar) -> float:
     """Return by which share of their power two launches differ in what turning bodies bring to the first ramp."""
-    one = replace(sensor, noise=False, waveform=replace(sensor.waveform, n_chirps=1))
+    one = replace(radar, noise=False, waveform=replace(radar.waveform, n_chirps=1))
     a, b = (synthesize(take(p, meets(p, turns)), one).samples for p in (paths, others))
     power = float((np.abs(a) ** 2).sum())
     return float((np.abs(a - b) ** 2).sum()) / power if power > 0.0 else 0.0

@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.error import COVER, LARGEST_DB, MAX_ERROR_DB, stated_error
-from raychan.channel.mesh_error import Doubt, creeping, doubt_of
+from raychan.channel.mesh_error import MeshError, creeping, mesh_error
 from raychan.channel.terminator_error import terminator_error
 from raychan.channel.transfer import transfer
 from raychan.frames import direction, theta_phi
 from raychan.run.first_surface import first_surface
 from raychan.run.single_body import facets_of, mesh_of
-from raychan.tracing.contributions import Found
+from raychan.tracing.contributions import Contributions
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.units import C0
 from raychan.world.creases import readings
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.limits import BOUNCES, CREASE, FREQUENCY, LENGTH, TOLERANCE_DB
 from raychan.world.material import Material
 from raychan.world.point_in_body import refuse_within
@@ -102,8 +102,8 @@ def rcs(
     if not all(np.isfinite(a).all() for a in angles):
         raise ValueError("angles must be finite numbers of degrees")
     body = mesh_of(mesh, crease_deg)
-    surface = Surface(facets_of(body, material, frequency))
-    doubt = doubt_of(surface, readings(body), 2.0 * np.pi * frequency / C0)
+    geometry = Geometry(facets_of(body, material, frequency))
+    doubt = mesh_error(geometry, readings(body), 2.0 * np.pi * frequency / C0)
     row, col = _POLARIZATIONS[polarization.upper()]
     out, matrix = np.zeros((5, angles[0].size)), np.zeros((angles[0].size, 2, 2), complex)
     for i, (az, el, raz, rel) in enumerate(zip(*(a.ravel() for a in angles), strict=True)):
@@ -111,9 +111,9 @@ def rcs(
         back = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
         for end in (leg, back):
             if not end.far:
-                refuse_within(surface.facets.vertices, end.end, "radar")
+                refuse_within(geometry.facets.vertices, end.end, "radar")
         *out[:, i], matrix[i] = _refined(
-            surface, doubt, leg, back, frequency, max_bounces, tolerance_db, max_rays, row, col
+            geometry, doubt, leg, back, frequency, max_bounces, tolerance_db, max_rays, row, col
         )
     shape = angles[0].shape
     sigma, error, rays, bounces, further = (o.reshape(shape) for o in out)
@@ -121,12 +121,12 @@ def rcs(
 
 
 def refinements(
-    surface: Surface, frequency: float, steps: int = _STEPS, max_rays: float = np.inf
+    geometry: Geometry, frequency: float, steps: int = _STEPS, max_rays: float = np.inf
 ) -> Iterator[Refinement]:
     """Yield ever finer rules; the lattice of cuts differs from one to the next, and every step cuts most facets
     again. The first two keep to max_rays, about, where curvature and edges allow."""
-    edge = _first_edge(surface) * _stretch(surface, max_rays)
-    own = _typical_edge(surface)
+    edge = _first_edge(geometry) * _stretch(geometry, max_rays)
+    own = _typical_edge(geometry)
     for i in range(steps):
         fine = 2.0**-i
         longest = edge if i == 0 else min(edge, 1.35 * own) * 0.6**i
@@ -140,41 +140,41 @@ def refinements(
         )
 
 
-def _first_edge(surface: Surface) -> float:
+def _first_edge(geometry: Geometry) -> float:
     """Return the longest edge [m] of tubes at first."""
-    return min(_EDGE_ALONE if surface.convex_alone else _FIRST_EDGE, surface.extent / 4.0)
+    return min(_EDGE_ALONE if geometry.convex_alone else _FIRST_EDGE, geometry.extent / 4.0)
 
 
-def _stretch(surface: Surface, max_rays: float) -> float:
+def _stretch(geometry: Geometry, max_rays: float) -> float:
     """Return how many times longer than usual the first tubes are, so that max_rays do."""
-    edge = _first_edge(surface)
-    return max(1.0, float(np.sqrt(_RAYS * surface.area.sum() / max_rays)) / edge) if edge > 0.0 else 1.0
+    edge = _first_edge(geometry)
+    return max(1.0, float(np.sqrt(_RAYS * geometry.area.sum() / max_rays)) / edge) if edge > 0.0 else 1.0
 
 
-def _typical_edge(surface: Surface) -> float:
+def _typical_edge(geometry: Geometry) -> float:
     """Return the median over the surface's area of its facets' longest edges [m]."""
-    v = surface.facets.vertices
+    v = geometry.facets.vertices
     longest = np.linalg.norm(np.roll(v, -1, axis=1) - v, axis=2).max(axis=1)
     order = np.argsort(longest)
-    covered = np.cumsum(surface.area[order])
+    covered = np.cumsum(geometry.area[order])
     return float(longest[order][np.searchsorted(covered, 0.5 * covered[-1])])
 
 
-def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:
+def scattering(geometry: Geometry, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:
     """Return the scattering amplitudes (bounces, 2, 2) [m] by number of bounces; sigma = 4 pi |sum|^2.
 
     Rows are the receiver's V, H and columns the transmitter's; V, H are theta-hat, phi-hat of the direction that each
     end looks to. Point ends are scaled to their distances from the origin.
     """
-    every = np.ones(len(surface.piece_role), bool)
+    every = np.ones(len(geometry.piece_role), bool)
     total = np.zeros((bounces, 2, 2), complex)
 
-    def first(tubes: Tubes, found: Found) -> None:
-        total[0] += first_surface(surface, leg, out, tubes, found, frequency, _basis)
+    def first(tubes: Tubes, found: Contributions) -> None:
+        total[0] += first_surface(geometry, leg, out, tubes, found, frequency, _basis)
 
-    for routes in tube_routes(surface, leg, [out], every, rule, bounces, first=None if out == leg else first):
+    for routes in tube_routes(geometry, leg, [out], every, rule, bounces, first=None if out == leg else first):
         count = int((routes.kind[0] != 0).sum()) - int((routes.kind[0] == 2).sum())
-        total[min(count, bounces) - 1] += transfer(routes, surface.facets, frequency, _basis, _basis).sum(axis=0)
+        total[min(count, bounces) - 1] += transfer(routes, geometry.facets, frequency, _basis, _basis).sum(axis=0)
     reach = 1.0 if leg.far else float(np.linalg.norm(leg.end))
     reach *= 1.0 if out.far else float(np.linalg.norm(out.end))
     total *= 4.0 * np.pi * frequency / C0 * reach
@@ -182,8 +182,8 @@ def scattering(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: 
 
 
 def _refined(
-    surface: Surface,
-    doubt: Doubt,
+    geometry: Geometry,
+    doubt: MeshError,
     leg: Leg,
     out: Leg,
     frequency: float,
@@ -196,28 +196,28 @@ def _refined(
     """Return (sigma, error in dB, rays, bounces, further in dB, matrix), refining until the last two launches agree or
     rays run out."""
     before, first = None, 0j
-    rays, off, value, by_bounce = surface.rays + doubt.rays, np.inf, 0j, np.zeros(bounces, complex)
-    curved = _CURVED if surface.curved.any() else 0.0
+    rays, off, value, by_bounce = geometry.rays + doubt.rays, np.inf, 0j, np.zeros(bounces, complex)
+    curved = _CURVED if geometry.curved.any() else 0.0
     # A body without edges ends in the dark along one ring, all of which may return in phase.
     ring = 0.0
-    if surface.convex_alone and curved and not surface.smooth.any():
+    if geometry.convex_alone and curved and not geometry.smooth.any():
         k = 2.0 * np.pi * frequency / C0
         ring = _TERMINATOR / k + (
-            terminator_error(float(surface.area.sum()), leg.end, out.end, k, row, col) if out != leg else 0.0
+            terminator_error(float(geometry.area.sum()), leg.end, out.end, k, row, col) if out != leg else 0.0
         )
-    cover = _COVER_ALONE if surface.convex_alone else COVER
+    cover = _COVER_ALONE if geometry.convex_alone else COVER
     # Long tubes may miss the same in two launches.
-    cover *= np.sqrt(_stretch(surface, max_rays))
+    cover *= np.sqrt(_stretch(geometry, max_rays))
     rules = [
         replace(step, max_tubes=_most_tubes(i, max_rays), max_rays=max_rays)
-        for i, step in enumerate(refinements(surface, frequency, max_rays=max_rays))
+        for i, step in enumerate(refinements(geometry, frequency, max_rays=max_rays))
     ]
     for rule in rules:
-        coarse, so_far = surface.uncut, surface.rays
-        s = _both_ways(surface, leg, out, frequency, bounces, rule)
+        coarse, so_far = geometry.uncut, geometry.rays
+        s = _both_ways(geometry, leg, out, frequency, bounces, rule)
         by_bounce = s[:, row, col]
         value = complex(by_bounce.sum())
-        if surface.uncut > coarse and surface.rays - so_far > max_rays:
+        if geometry.uncut > coarse and geometry.rays - so_far > max_rays:
             # What hides what was not found out: nobody knows by how much that is off.
             off = np.inf
             break
@@ -227,22 +227,22 @@ def _refined(
             change = abs(value - before)
             shared = curved * rule.phase * abs(value) + ring
             off = cover * (change + shared)
-            spent = (surface.rays + doubt.rays - rays) * _GROWTH > max_rays
+            spent = (geometry.rays + doubt.rays - rays) * _GROWTH > max_rays
             # In a null of this polarisation nothing is left to find.
             null = change < _NULL * np.abs(s.sum(axis=0)).max()
             agreed = stated_error(value, off, 1.0) <= tolerance_db or null
             # Two launches may miss the same in tubes that their number alone kept from being cut.
-            if spent or (surface.uncut == coarse and agreed):
+            if spent or (geometry.uncut == coarse and agreed):
                 break
         before = value
 
-    def other(mesh: Surface) -> complex:
+    def other(mesh: Geometry) -> complex:
         return complex(_both_ways(mesh, leg, out, frequency, bounces, rules[0])[:, row, col].sum())
 
     # What no refinement mends: what the mesh leaves open, and waves that creep around the body. Launches and normals
     # miss of the same bright spots, in phase at worst; other waves and other readings know nothing of that phase and
     # add in squares.
-    around, share = creeping(doubt.rounded or surface, rules[0].wavenumber)
+    around, share = creeping(doubt.rounded or geometry, rules[0].wavenumber)
     sure = value != 0.0 and stated_error(value, off, 1.0) <= LARGEST_DB
     # Where the launches tell nothing, another reading of the mesh adds nothing.
     off += doubt.facets(first, value, other) * abs(value) if sure else 0.0
@@ -252,14 +252,14 @@ def _refined(
     counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
     # Nothing has no level to be off by.
     known = min(math.hypot(error_db, folds_db), MAX_ERROR_DB) if sure and error_db <= LARGEST_DB else np.nan
-    cast = surface.rays + doubt.rays - rays
-    most, further = int(counted.max(initial=-1)) + 1, _further(surface, by_bounce)
+    cast = geometry.rays + doubt.rays - rays
+    most, further = int(counted.max(initial=-1)) + 1, _further(geometry, by_bounce)
     return 4.0 * np.pi * abs(value) ** 2, known, cast, most, further, s.sum(axis=0)
 
 
-def _further(surface: Surface, by_bounce: Complexes) -> float:
+def _further(geometry: Geometry, by_bounce: Complexes) -> float:
     """Return by how much [dB] a level would change if one more bounce brought as much as the last of those given."""
-    if surface.convex_alone:
+    if geometry.convex_alone:
         return 0.0
     whole = abs(by_bounce.sum())
     return np.nan if len(by_bounce) == 1 or not whole else float(20.0 * np.log10(1.0 + abs(by_bounce[-1]) / whole))
@@ -272,12 +272,12 @@ def _most_tubes(step: int, max_rays: int) -> int:
     return later if step > 1 else max(later // 4, min(later, _TUBES))
 
 
-def _both_ways(surface: Surface, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:
+def _both_ways(geometry: Geometry, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:
     """Return scattering amplitudes (bounces, 2, 2) [m] of one launch, reciprocal by construction."""
-    s = scattering(surface, leg, out, frequency, bounces, rule)
+    s = scattering(geometry, leg, out, frequency, bounces, rule)
     if out != leg:
         # Over several bounces physical optics prefers the last surface; the mean of both ways is reciprocal.
-        s = 0.5 * (s + scattering(surface, out, leg, frequency, bounces, rule).transpose(0, 2, 1))
+        s = 0.5 * (s + scattering(geometry, out, leg, frequency, bounces, rule).transpose(0, 2, 1))
     return s
 
 

@@ -44,8 +44,8 @@ class Demand:
 
 def demand(scene: Scene) -> Demand:
     """Return what a run of a scene needs, roughly."""
-    wave = scene.sensor.waveform
-    samples = float(len(scene.sensor.elements)) * wave.n_chirps * wave.n_samples
+    wave = scene.radar.waveform
+    samples = float(len(scene.radar.elements)) * wave.n_chirps * wave.n_samples
     cells = samples * scene.processing.pad[0] * scene.processing.pad[1]
     facets = sum(len(body.geometry.faces) for body in scene.bodies)
     tracings = 1 if scene.model.retrace == "auto" else scene.model.retrace
@@ -60,7 +60,7 @@ def demand(scene: Scene) -> Demand:
 def _bend(scene: Scene) -> float:
     """Return the phase [rad], if more than one, by which the echoes of bodies at different rates bend apart over a long
     frame: grids and terms of the fast sum grow with it (see signal.keystone)."""
-    wave, own = scene.sensor.waveform, np.asarray(scene.sensor.velocity, float)
+    wave, own = scene.radar.waveform, np.asarray(scene.radar.velocity, float)
     fastest = max((float(np.linalg.norm(body.motion.velocity - own)) for body in scene.bodies), default=0.0)
     turn = 2.0 * math.pi * wave.slope * (fastest / C0 * 0.5 * wave.frame_duration) ** 2
     return turn if turn > 1.0 else 0.0
@@ -99,7 +99,7 @@ def long_run(scene: Scene, frames: int = 1) -> list[str]:
 
 def _refused(scene: Scene, need: float, may: float) -> SceneError:
     """Return what says by which key a scene needs too much, and how far to go down with it."""
-    wave, pad, receivers = scene.sensor.waveform, scene.processing.pad, len(scene.sensor.elements)
+    wave, pad, receivers = scene.radar.waveform, scene.processing.pad, len(scene.radar.elements)
     plain = float(wave.n_chirps) * wave.n_samples * (_SAMPLE_BYTES + _CELL_BYTES)
     key: str
     value: Any
@@ -122,7 +122,7 @@ def _refused(scene: Scene, need: float, may: float) -> SceneError:
 
 def _detector(scene: Scene) -> list[str]:
     """Return a line where the map is so small that the CFAR's guard must be smaller than asked for."""
-    wave, asked = scene.sensor.waveform, scene.processing
+    wave, asked = scene.radar.waveform, scene.processing
     count = wave.n_chirps, wave.n_samples if wave.complex_sampling else wave.n_samples // 2
     guard, train = (sizes and sizes[::-1] for sizes in (asked.guard, asked.train))
     fitted = fitting_guard(count, guard, train)

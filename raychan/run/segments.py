@@ -55,7 +55,7 @@ class Traced:
 
 
 @dataclass(frozen=True)
-class Key:
+class Keyframe:
     """One tracing: the routes that meet turning bodies, and the paths that do not."""
 
     chirp: int
@@ -71,12 +71,12 @@ def reach(chirps: int) -> int:
 
 
 @dataclass(frozen=True)
-class Piece:
+class Segment:
     """The chirps from one tracing to the next, both included: `a` and `b` (2, antenna, chirp, sample) are what both
     tell of the first and the last three quarters: bodies that turn, all others."""
 
-    start: Key
-    end: Key
+    start: Keyframe
+    end: Keyframe
     a: Samples
     b: Samples
 

@@ -13,7 +13,7 @@ from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
 from raychan.run.simulate import Channel, Clock, Progress, result_of, trace
 from raychan.run.storage import COLUMNS, CONTENTS, rows, save_result
-from raychan.world.geometry import surface_of
+from raychan.world.geometry import geometry_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
 
@@ -51,7 +51,7 @@ def frames(
     """
     FRAMES.check("count", count, whole=True)
     SEED.check("seed", seed, whole=True)
-    step = scene.sensor.waveform.frame_duration if interval is None else interval
+    step = scene.radar.waveform.frame_duration if interval is None else interval
     INTERVAL.check("interval", step)
     for k in range(count):
         scene.at(k * step)  # a radar that would run into a body is told before the first frame is computed
@@ -67,16 +67,16 @@ def _frames(
     max_bounces: int | None,
     progress: Progress | None,
 ) -> Iterator[Frame]:
-    once = carried(scene)
+    cached = carried(scene)
     first: Channel | None = None
     for k in range(count):
         time, clock = k * step, Clock(progress)
         now = scene.at(time)
-        if first is not None and once:
+        if first is not None and cached:
             channel = _carried_on(first, now, time)
         else:
             channel = trace(now, tolerance_db, max_bounces, clock)
-            first = channel if once else None
+            first = channel if cached else None
         result = result_of(now, channel, seed + k, clock)
         # What was built for this frame goes before the next builds its own.
         del channel, now
@@ -85,19 +85,19 @@ def _frames(
 
 def carried(scene: Scene) -> bool:
     """Tell whether all bodies move with the radar, so that its channel stays as it is."""
-    own = np.asarray(scene.sensor.velocity, float)
+    own = np.asarray(scene.radar.velocity, float)
     return all(np.array_equal(b.motion.velocity, own) and not b.motion.spin().any() for b in scene.bodies)
 
 
 def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
     """Return the channel of a scene that has moved as one."""
-    shift = time * np.asarray(scene.sensor.velocity, float)
+    shift = time * np.asarray(scene.radar.velocity, float)
 
     points = scene.points()
     stats = channel.stats | {"rays": 0, "tubes": 0}
     return replace(
         channel,
-        surface=surface_of(scene),
+        geometry=geometry_of(scene),
         points=points,
         launched=channel.launched.moved(shift),
         others=channel.others.moved(shift),

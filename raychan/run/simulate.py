@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 
 from raychan.frames import direction
-from raychan.parallel import at_once
+from raychan.parallel import run_pair
 from raychan.processing.cfar import Grid, fitting_guard
 from raychan.processing.detection import detect
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.beam_table import beam_of
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler, Routes
 from raychan.run.labels import provenance
 from raychan.run.mechanisms import Choice, choose
 from raychan.run.messages import counts, told, uncut
 from raychan.run.micro_doppler import needed, retraced
-from raychan.run.path_stream import Gather, Launched
+from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
 from raychan.run.resources import check_demand
 from raychan.run.result import ExplainedDetections, Receiver, Result
@@ -35,7 +35,7 @@ from raychan.signal.baseband import noisy, synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
-from raychan.world.geometry import Surface, surface_of
+from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.limits import BOUNCES, SEED, TOLERANCE_DB
 from raychan.world.scene import Scene
 
@@ -68,7 +68,7 @@ class Clock:
 class Channel:
     """What the tracing of a scene gives: the same whatever the noise."""
 
-    surface: Surface
+    geometry: Geometry
     points: Points
     launched: Launched
     others: Launched
@@ -107,20 +107,20 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
     if max_bounces is not None:
         BOUNCES.check("max_bounces", max_bounces, whole=True)
     check_demand(scene)
-    sensor, settings = scene.sensor, scene.processing
+    radar, settings = scene.radar, scene.processing
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
     model = _changed(scene.model, changes)
-    carrier = sensor.waveform.carrier
-    floor, cell = drowned(sensor, settings), C0 / sensor.waveform.bandwidth
+    carrier = radar.waveform.carrier
+    floor, cell = noise_equivalent_amplitude(radar, settings), C0 / radar.waveform.bandwidth
     with clock.stage("geometry"):
-        surface, points = surface_of(scene), scene.points(0.0)
-        beam_of(sensor)
+        geometry, points = geometry_of(scene), scene.points(0.0)
+        beam_of(radar)
     rule = refinement(carrier, 3.0 * model.tolerance_db, floor, model.max_transmissions, 0.13, cell)
     bounces, chosen = model.max_bounces, None
 
     def launch(rule: Refinement, bounces: int, diffraction: bool, **more: Any) -> tuple[Launched, Stats]:
-        gather = Gather(sensor, settings.range_window)
-        stats = solve_into(gather.add, surface, points, sensor, carrier, rule, bounces, diffraction=diffraction, **more)
+        gather = PathStream(radar, settings.range_window)
+        stats = solve_into(gather.add, geometry, points, radar, carrier, rule, bounces, diffraction=diffraction, **more)
         return gather.done(), stats
 
     def coarse(diffraction: bool, heard: bool = False) -> tuple[Launched, Stats]:
@@ -134,7 +134,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         # With all mechanisms, it first tells which are needed.
         with clock.stage("check"):
             others, more = coarse(True)
-            chosen = choose(others.paths, sensor, settings, noise_of_cell(sensor, settings), model.tolerance_db)
+            chosen = choose(others.paths, radar, settings, noise_of_cell(radar, settings), model.tolerance_db)
             kept = {"max_bounces": chosen.bounces, "max_transmissions": chosen.transmissions}
             model = _changed(model, kept | {"diffraction": chosen.diffraction})
     with clock.stage("trace"):
@@ -149,7 +149,7 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         if chosen:
             launched, stats = fine()
         else:
-            (launched, stats), (others, more) = at_once(fine, lambda: coarse(model.diffraction, heard=not again))
+            (launched, stats), (others, more) = run_pair(fine, lambda: coarse(model.diffraction, heard=not again))
     turned = None
     if again:
         with clock.stage("retrace"):
@@ -163,46 +163,46 @@ def trace(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clo
         "tracings": len(turned.times) if turned else 1,
         "tolerance_db": model.tolerance_db,
     }
-    return Channel(surface, points, launched, others, model, chosen, cost, uncut(surface, stats, more), turned)
+    return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)
 
 
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
     """Return what the receiver makes of a channel, and how each detection came about."""
     # Streams are numbered by stage, so that one more random stage leaves the others as they are.
     noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    sensor, settings = scene.sensor, scene.processing
-    facets, paths, others = channel.surface.facets, channel.launched.paths, channel.others.paths
+    radar, settings = scene.radar, scene.processing
+    facets, paths, others = channel.geometry.facets, channel.launched.paths, channel.others.paths
     with clock.stage("profile"):
-        noise = sensor.noise_power if sensor.noise else 0.0
-        pdp = profile_of(channel.launched.response, sensor.waveform, noise, settings.range_window)
+        noise = radar.noise_power if radar.noise else 0.0
+        pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
     with clock.stage("receive"):
         turned = channel.turned
         quiet = turned.cube if turned else channel.launched.quiet
-        cube = noisy(quiet, sensor, noise_rng)
-        rdmap, detections = received(cube, sensor, settings)
-        below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(sensor, settings)
+        cube = noisy(quiet, radar, noise_rng)
+        rdmap, detections = received(cube, radar, settings)
+        below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(radar, settings)
         if turned is None:
-            error = MapError(map_error(quiet, channel.others.quiet, sensor, settings).power + below)
+            error = MapError(map_error(quiet, channel.others.quiet, radar, settings).power + below)
         else:
-            brought, doubt = (quiet_map(x, sensor, settings) for x in (turned.turning, turned.error))
-            share = launch_share(paths, others, turned.turns, sensor)
+            brought, doubt = (quiet_map(x, radar, settings) for x in (turned.turning, turned.error))
+            share = launch_share(paths, others, turned.turns, radar)
             rest, others_rest = (without(x, turned.turns) for x in (paths, others))
-            still = map_error(synthesize(rest, sensor), synthesize(others_rest, sensor), sensor, settings)
+            still = map_error(synthesize(rest, radar), synthesize(others_rest, radar), radar, settings)
             error = MapError(still.power + doubt + share * brought + below)
     receiver = Receiver(
-        sensor.waveform,
+        radar.waveform,
         settings.range_window,
         settings.rate_window,
-        sensor.power,
-        sensor.ego_speed,
+        radar.power,
+        radar.ego_speed,
         background(facets),
     )
     with clock.stage("explain"):
         weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
-        reasons, left_out = at_once(
+        reasons, left_out = run_pair(
             lambda: provenance(paths, rdmap, detections, receiver, error.power),
             lambda: ledger(
-                paths, channel.surface, channel.points, sensor, settings, channel.model, weakest, scene.bodies
+                paths, channel.geometry, channel.points, radar, settings, channel.model, weakest, scene.bodies
             ),
         )
         if turned:
@@ -236,9 +236,9 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     )
 
 
-def received(cube: Cube, sensor: Sensor, settings: Any) -> tuple[RangeDoppler, Detections]:
+def received(cube: Cube, radar: Radar, settings: Any) -> tuple[RangeDoppler, Detections]:
     """Return what the receiver makes of its samples; it sees nothing else of the scene."""
-    rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, settings.pad)
+    rdmap = range_doppler(cube, radar.waveform, settings.range_window, settings.rate_window, settings.pad)
     # The scene file names range before rate; a map's axes are rate, then range.
     sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
     guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
@@ -249,47 +249,47 @@ def received(cube: Cube, sensor: Sensor, settings: Any) -> tuple[RangeDoppler, D
         pfa=settings.pfa,
         min_snr_db=settings.min_snr_db,
         method=settings.cfar,
-        ego_speed=sensor.ego_speed,
+        ego_speed=radar.ego_speed,
         windows=(settings.rate_window, settings.range_window),
-        waveform=sensor.waveform,
-        elements=np.asarray(sensor.elements),
+        waveform=radar.waveform,
+        elements=np.asarray(radar.elements),
         **sizes,
     )
     return rdmap, detections
 
 
-def drowned(sensor: Sensor, settings: Any) -> float:
+def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
     """Return the scattered amplitude [1/m, unit field at 1 m] of a return as strong as the noise in one cell of the
     map."""
-    if not sensor.noise:
+    if not radar.noise:
         return 0.0
     # The strongest direction of both antennas, on a grid finer than any beam of use.
     azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
-    look = direction(azimuth.ravel(), elevation.ravel()) @ sensor.axes.T
-    ends = (np.linalg.norm(f(look), axis=1).max() for f in (sensor.tx_field, sensor.rx_field))
-    amplitude = np.sqrt(noise_of_cell(sensor, settings) / sensor.power)
-    return float(amplitude * 4.0 * np.pi / sensor.waveform.wavelength / np.prod(list(ends)))
+    look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
+    ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
+    amplitude = np.sqrt(noise_of_cell(radar, settings) / radar.power)
+    return float(amplitude * 4.0 * np.pi / radar.waveform.wavelength / np.prod(list(ends)))
 
 
-def noise_of_cell(sensor: Sensor, settings: Any) -> float:
+def noise_of_cell(radar: Radar, settings: Any) -> float:
     """Return the thermal noise [W] of one cell of the map; 0 when noise is off."""
-    if not sensor.noise:
+    if not radar.noise:
         return 0.0
-    wave = sensor.waveform
+    wave = radar.waveform
     gain = processing_gain(window(settings.range_window, wave.n_samples))
-    return float(sensor.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
+    return float(radar.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
 
 
-def map_error(quiet: Cube, others: Cube, sensor: Sensor, settings: Any) -> MapError:
+def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapError:
     """Return the map of what two launches differ by: the samples of one less those of the other, without noise."""
-    return MapError(quiet_map(quiet.samples - others.samples, sensor, settings))
+    return MapError(quiet_map(quiet.samples - others.samples, radar, settings))
 
 
-def quiet_map(samples: Any, sensor: Sensor, settings: Any) -> Any:
+def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     """Return the powers (v, r) [W] of the map of samples (antenna, chirp, sample) without noise."""
     cube = Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0)
     windows = (settings.range_window, settings.rate_window, settings.pad)
-    return range_doppler(cube, sensor.waveform, *windows).power
+    return range_doppler(cube, radar.waveform, *windows).power
 
 
 def background(facets: Facets) -> tuple[str, ...]:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.paths import Radar, join, nothing, paths_of
+from raychan.channel.paths import RadarEnds, join, nothing, paths_of
 from raychan.radar.beam_table import beam_of
 from raychan.records import MIRROR, REFLECT, Facets, Paths, Points, Routes
-from raychan.tracing.contributions import Found
+from raychan.tracing.contributions import Contributions
 from raychan.tracing.edge_diffraction import diffracted_paths
 from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import legs_over, reachable
@@ -21,7 +21,7 @@ from raychan.tracing.point_targets import point_routes
 from raychan.tracing.shooting import tube_routes
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -78,7 +78,7 @@ def refinement(
     )
 
 
-def solve(facets: Facets | Surface, *args: Any, **options: Any) -> tuple[Paths, Stats]:
+def solve(facets: Facets | Geometry, *args: Any, **options: Any) -> tuple[Paths, Stats]:
     """Return the paths of a scene seen by a monostatic radar, and what they cost; args as for `solve_into` from
     `facets` on."""
     parts: list[Paths] = []
@@ -88,9 +88,9 @@ def solve(facets: Facets | Surface, *args: Any, **options: Any) -> tuple[Paths, 
 
 def solve_into(
     gather: Callable[[Paths], None],
-    facets: Facets | Surface,
+    facets: Facets | Geometry,
     points: Points,
-    radar: Radar,
+    radar: RadarEnds,
     frequency: float,
     rule: Refinement,
     bounces: int,
@@ -108,10 +108,10 @@ def solve_into(
     """
     stats = Stats()
     since = perf_counter()
-    surface = facets if isinstance(facets, Surface) else Surface(facets)
-    facets, before = surface.facets, surface.rays
+    geometry = facets if isinstance(facets, Geometry) else Geometry(facets)
+    facets, before = geometry.facets, geometry.rays
     stats.add("build", since)
-    legs = legs_over(surface, np.asarray(radar.position, float), bounces - 1, beam_of(radar))
+    legs = legs_over(geometry, np.asarray(radar.position, float), bounces - 1, beam_of(radar))
     stats.legs = len(legs)
     gather(nothing(facets, radar))
 
@@ -121,26 +121,26 @@ def solve_into(
             each(routes)
 
     since = perf_counter()
-    found = point_routes(surface, points, legs, legs, bounces, rule.slots, rule.layers)
+    found = point_routes(geometry, points, legs, legs, bounces, rule.slots, rule.layers)
     if found is not None:
         carry(found)
     if diffraction:
-        for paths in diffracted_paths(surface, points, radar, frequency, rule.slots, legs):
+        for paths in diffracted_paths(geometry, points, radar, frequency, rule.slots, legs):
             gather(paths)
-    found = _foot_points(surface, legs, rule)
+    found = _foot_points(geometry, legs, rule)
     if found is not None:
         carry(found)
     stats.add("points", since)
     cuts = _CUTS + _CUTS_A_FACET * len(facets.vertices)
-    so_far = Found(replace(rule.for_depth(bounces), max_tubes=min(rule.max_tubes, _TUBES), max_cuts=cuts))
+    so_far = Contributions(replace(rule.for_depth(bounces), max_tubes=min(rule.max_tubes, _TUBES), max_cuts=cuts))
     for i, leg in enumerate(legs):
         if progress:
             progress("trace", i / len(legs))
-        pieces = reachable(surface, leg)
+        pieces = reachable(geometry, leg)
         if not pieces.any():
             continue
         since = perf_counter()
-        for routes in tube_routes(surface, leg, legs, pieces, rule, bounces, so_far):
+        for routes in tube_routes(geometry, leg, legs, pieces, rule, bounces, so_far):
             stats.add("trace", since)
             since = perf_counter()
             stats.tubes += len(routes.kind)
@@ -148,15 +148,15 @@ def solve_into(
             stats.add("fields", since)
             since = perf_counter()
         stats.add("trace", since)
-    stats.rays, stats.uncut = surface.rays - before, so_far.uncut
+    stats.rays, stats.uncut = geometry.rays - before, so_far.uncut
     if progress:
         progress("trace", 1.0)
     return stats
 
 
-def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes | None:
+def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Routes | None:
     """Return the exact routes to the ground's foot points and back: a plane mirror too large for tubes."""
-    f = surface.facets
+    f = geometry.facets
     rows = []
     for leg in legs:
         if len(leg.mirrors) != 1 or f.role[leg.mirrors[0].body] != MIRROR:
@@ -164,8 +164,8 @@ def _foot_points(surface: Surface, legs: list[Leg], rule: Refinement) -> Routes 
         m = leg.mirrors[0]
         height = float((leg.end - m.point) @ m.normal)
         foot = leg.end - height * m.normal
-        hit, _ = surface.cast(leg.end[None], -m.normal[None], np.array([-1], np.int32))
-        if hit[0] >= 0 and surface.plane[hit[0]] == surface.plane[m.facet]:
+        hit, _ = geometry.cast(leg.end[None], -m.normal[None], np.array([-1], np.int32))
+        if hit[0] >= 0 and geometry.plane[hit[0]] == geometry.plane[m.facet]:
             rows.append((foot, m, height))
     if not rows:
         return None

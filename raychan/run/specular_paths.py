@@ -13,7 +13,7 @@ from raychan.channel.transfer import rates, transfer
 from raychan.frames import theta_phi
 from raychan.records import KIND_LETTERS, REFLECT, TRANSMIT, Facets, Routes
 from raychan.tracing.legs import Leg, Mirror
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.point_in_body import Place, place_of
 
 Floats = NDArray[np.float64]
@@ -25,37 +25,37 @@ _ALL_PAIRS = 2_000_000  # image tests that are cheaper than looking for candidat
 _SEARCH_RAYS = 200_000
 
 
-def specular_routes(surface: Surface, tx: Floats, rx: Floats, bounces: int, layers: int = 2, seed: int = 0) -> Routes:
+def specular_routes(geometry: Geometry, tx: Floats, rx: Floats, bounces: int, layers: int = 2, seed: int = 0) -> Routes:
     """Return every specular route from tx to rx with at most `bounces` reflections, line of sight included.
 
     All chains of planes are tried where that is affordable; else those that rays from both ends find.
     """
     tx, rx = np.asarray(tx, float), np.asarray(rx, float)
     chains: list[Chain] = [()]
-    planes = _planes(surface)
+    planes = _planes(geometry)
     if bounces and len(planes):
         if float(len(planes)) ** bounces <= _ALL_PAIRS:
-            chains += _every_chain(surface, planes, tx, bounces)
+            chains += _every_chain(geometry, planes, tx, bounces)
         else:
-            chains += _found_chains(surface, tx, rx, bounces, seed)
-    return _exact(surface, tx, rx, chains, bounces + layers, layers)
+            chains += _found_chains(geometry, tx, rx, bounces, seed)
+    return _exact(geometry, tx, rx, chains, bounces + layers, layers)
 
 
-def _planes(surface: Surface) -> Ints:
+def _planes(geometry: Geometry) -> Ints:
     """Return the largest facet of each plane."""
-    order = np.argsort(surface.area, kind="stable")
-    largest = np.full(len(surface.plane), -1, np.int64)
-    largest[surface.plane[order]] = order
+    order = np.argsort(geometry.area, kind="stable")
+    largest = np.full(len(geometry.plane), -1, np.int64)
+    largest[geometry.plane[order]] = order
     return largest[largest >= 0]
 
 
-def _every_chain(surface: Surface, planes: Ints, tx: Floats, bounces: int) -> list[Chain]:
+def _every_chain(geometry: Geometry, planes: Ints, tx: Floats, bounces: int) -> list[Chain]:
     """Return all chains whose images lie in front of the planes that mirror them; level by level."""
-    normal, point = surface.normal[planes], surface.first[planes]
+    normal, point = geometry.normal[planes], geometry.first[planes]
     # A body about the transmitter is met from within.
-    body = surface.facets.body
-    around = [place_of(surface.facets.vertices[body == b], tx) for b in range(len(surface.facets.role))]
-    both = surface.both_sides[planes] | (np.array(around) == Place.INSIDE)[body[planes]]
+    body = geometry.facets.body
+    around = [place_of(geometry.facets.vertices[body == b], tx) for b in range(len(geometry.facets.role))]
+    both = geometry.both_sides[planes] | (np.array(around) == Place.INSIDE)[body[planes]]
     images, last = tx[None], np.full(1, -1)
     chains: list[Chain] = [()]
     out: list[Chain] = []
@@ -72,28 +72,28 @@ def _every_chain(surface: Surface, planes: Ints, tx: Floats, bounces: int) -> li
     return out
 
 
-def _found_chains(surface: Surface, tx: Floats, rx: Floats, bounces: int, seed: int) -> list[Chain]:
+def _found_chains(geometry: Geometry, tx: Floats, rx: Floats, bounces: int, seed: int) -> list[Chain]:
     """Return the chains that rays from either end meet: towards points spread over all facets, and all around."""
     rng = np.random.default_rng(seed)
     found: set[Chain] = set()
-    largest = np.full(len(surface.plane), -1, np.int64)
-    order = np.argsort(surface.area, kind="stable")
-    largest[surface.plane[order]] = order
+    largest = np.full(len(geometry.plane), -1, np.int64)
+    order = np.argsort(geometry.area, kind="stable")
+    largest[geometry.plane[order]] = order
     for end, backwards in ((tx, False), (rx, True)):
-        facet = rng.integers(len(surface.plane), size=_SEARCH_RAYS // 2)
+        facet = rng.integers(len(geometry.plane), size=_SEARCH_RAYS // 2)
         bary = rng.dirichlet(np.ones(3), size=len(facet))
-        aim = np.einsum("ni,nij->nj", bary, surface.facets.vertices[facet]) - end
+        aim = np.einsum("ni,nij->nj", bary, geometry.facets.vertices[facet]) - end
         d = np.concatenate([aim, rng.normal(size=(_SEARCH_RAYS // 2, 3))])
         d /= np.linalg.norm(d, axis=1, keepdims=True)
         p, skip = np.broadcast_to(end, d.shape).copy(), np.full(len(d), -1, np.int32)
         met = np.zeros((len(d), 0, 2), np.int64)
         for _ in range(bounces):
-            hit, t = surface.cast(p, d, skip)
+            hit, t = geometry.cast(p, d, skip)
             ok = hit >= 0
             p, d, hit, met = p[ok] + t[ok, None] * d[ok], d[ok], hit[ok], met[ok]
-            n = surface.normal[hit]
+            n = geometry.normal[hit]
             slope = np.einsum("ij,ij->i", d, n)
-            step = np.column_stack([largest[surface.plane[hit]], np.where(slope < 0.0, 1, -1)])
+            step = np.column_stack([largest[geometry.plane[hit]], np.where(slope < 0.0, 1, -1)])
             met = np.concatenate([met, step[:, None]], axis=1)
             d, skip = d - 2.0 * slope[:, None] * n, hit
             for row in np.unique(met.reshape(len(met), -1), axis=0).reshape(-1, met.shape[1], 2):
@@ -102,13 +102,13 @@ def _found_chains(surface: Surface, tx: Floats, rx: Floats, bounces: int, seed: 
     return sorted(found, key=lambda c: (len(c), c))
 
 
-def _exact(surface: Surface, tx: Floats, rx: Floats, chains: list[Chain], slots: int, layers: int) -> Routes:
+def _exact(geometry: Geometry, tx: Floats, rx: Floats, chains: list[Chain], slots: int, layers: int) -> Routes:
     """Return the routes of the chains that are real: bounce points on their planes, in order, nothing in between."""
     rows = []
-    known = {step: Mirror.of(surface, *step) for step in {s for chain in chains for s in chain}}
+    known = {step: Mirror.of(geometry, *step) for step in {s for chain in chains for s in chain}}
     for chain in chains:
         mirrors = tuple(known[step] for step in chain)
-        row = _one(surface, Leg(end=tx, mirrors=mirrors), rx, slots, layers)
+        row = _one(geometry, Leg(end=tx, mirrors=mirrors), rx, slots, layers)
         if row is not None:
             rows.append(row)
     n = len(rows)
@@ -116,7 +116,7 @@ def _exact(surface: Surface, tx: Floats, rx: Floats, chains: list[Chain], slots:
     column = [np.array([r[i] for r in rows]) for i in range(1, 5)]
     shape = (n, slots)
     facet = column[2].reshape(shape).astype(np.int32)
-    body = surface.facets.body[np.maximum(facet, 0)] if len(surface.facets.body) else facet
+    body = geometry.facets.body[np.maximum(facet, 0)] if len(geometry.facets.body) else facet
     return Routes(
         tx=tx,
         rx=rx,
@@ -139,7 +139,7 @@ def _exact(surface: Surface, tx: Floats, rx: Floats, chains: list[Chain], slots:
     )
 
 
-def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # type: ignore[no-untyped-def]
+def _one(geometry: Geometry, leg: Leg, rx: Floats, slots: int, layers: int):  # type: ignore[no-untyped-def]
     """Return (length, vertices, normals, facets, kinds) of one chain, or None if it is not real."""
     if np.linalg.norm(rx - leg.image) == 0.0 or not leg.may_reach(rx[None], np.zeros(1))[0]:
         return None
@@ -161,18 +161,18 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
             return None
         near = np.array([max(gap * 1e-7, 1e-6)])
         aim = np.array([-1], np.int32)
-        reached, passed, _ = surface.walk(a[None], d, np.array([gap]), near, skip, aim, layers - _passes(kinds))
+        reached, passed, _ = geometry.walk(a[None], d, np.array([gap]), near, skip, aim, layers - _passes(kinds))
         if not reached[0]:
             return None
         for f in passed[0][passed[0] >= 0]:
-            t = surface.distance(np.array([f]), a[None], d)[0]
+            t = geometry.distance(np.array([f]), a[None], d)[0]
             vertices.append(a + t * d[0])
-            normals.append(surface.normal[f])
+            normals.append(geometry.normal[f])
             facets.append(int(f))
             kinds.append(TRANSMIT)
         if mirror is None:
             break
-        hit = _there(surface, b, d[0], gap, mirror)
+        hit = _there(geometry, b, d[0], gap, mirror)
         if hit < 0:
             return None
         vertices.append(b)
@@ -190,19 +190,19 @@ def _one(surface: Surface, leg: Leg, rx: Floats, slots: int, layers: int):  # ty
     )
 
 
-def _there(surface: Surface, at: Floats, way: Floats, gap: float, mirror: Mirror) -> int:
+def _there(geometry: Geometry, at: Floats, way: Floats, gap: float, mirror: Mirror) -> int:
     """Return the facet of a mirror that a ray, `gap` [m] long along `way`, meets at its end, or -1: none, or one that
     coincides with another that counts."""
     step = min(1e-3, 0.5 * gap)
-    hit, t = surface.cast((at - step * way)[None], way[None], np.array([-1], np.int32))
-    if hit[0] >= 0 and surface.plane[hit[0]] == surface.plane[mirror.facet]:
+    hit, t = geometry.cast((at - step * way)[None], way[None], np.array([-1], np.int32))
+    if hit[0] >= 0 and geometry.plane[hit[0]] == geometry.plane[mirror.facet]:
         return int(hit[0])
-    if hit[0] >= 0 and abs(t[0] - step) < surface.touch:
+    if hit[0] >= 0 and abs(t[0] - step) < geometry.touch:
         return -1
     # A layer just before the mirror was met, or float32 let the ray through an edge.
-    rows = np.flatnonzero(surface.plane == surface.plane[mirror.facet])
-    v = surface.facets.vertices[rows]
-    inward = np.cross(surface.normal[rows, None], np.roll(v, -1, axis=1) - v)
+    rows = np.flatnonzero(geometry.plane == geometry.plane[mirror.facet])
+    v = geometry.facets.vertices[rows]
+    inward = np.cross(geometry.normal[rows, None], np.roll(v, -1, axis=1) - v)
     held = (np.einsum("fqc,fqc->fq", at - v, inward) >= 0.0).all(axis=1)
     return int(rows[np.argmax(held)]) if held.any() else -1
 
@@ -266,7 +266,7 @@ def specular_paths(
     if max_bounces < 0:
         raise ValueError(f"max_bounces = {max_bounces}: must be 0 or more")
     facets = scene.facets(0.0)
-    routes = specular_routes(Surface(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)
+    routes = specular_routes(Geometry(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)
     gain = jones(routes, facets, scene.frequency)
     order = np.argsort(routes.length, kind="stable")
     order = order[np.abs(gain[order]).max(axis=(1, 2), initial=0.0) > 0.0]

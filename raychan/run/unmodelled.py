@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.paths import join
 from raychan.em.fresnel import coefficients_array
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
 from raychan.run.mechanisms import interactions, layers, peak
 from raychan.run.tessellation import strongest_bend
@@ -19,7 +19,7 @@ from raychan.tracing.edge_diffraction import diffracted_paths
 from raychan.tracing.legs import Leg
 from raychan.units import C0, db
 from raychan.world.body import Body
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 
@@ -40,9 +40,9 @@ class Entry:
 
 def ledger(
     paths: Paths,
-    surface: Surface,
+    geometry: Geometry,
     points: Points,
-    sensor: Sensor,
+    radar: Radar,
     settings: Any,
     model: Any,
     weakest: float,
@@ -52,17 +52,17 @@ def ledger(
 
     Args: settings, model the scene's processing and what was modelled; bodies those of the scene.
     """
-    if not weakest > 0.0 or not len(surface.facets.vertices):
+    if not weakest > 0.0 or not len(geometry.facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
     found = {
-        "further bounces": _further(paths, sensor, settings, model.max_bounces, weakest),
-        "transmission": _transmission(paths, sensor, settings, weakest),
-        "diffraction": _diffraction(surface, sensor, weakest),
-        "diffraction to point targets": _around(surface, points, sensor, settings, model, weakest),
-        "diffuse scattering": _diffuse(surface, sensor, weakest),
-        "tessellation": _tessellation(paths, surface, bodies, sensor, settings, weakest),
+        "further bounces": _further(paths, radar, settings, model.max_bounces, weakest),
+        "transmission": _transmission(paths, radar, settings, weakest),
+        "diffraction": _diffraction(geometry, radar, weakest),
+        "diffraction to point targets": _around(geometry, points, radar, settings, model, weakest),
+        "diffuse scattering": _diffuse(geometry, radar, weakest),
+        "tessellation": _tessellation(paths, geometry, bodies, radar, settings, weakest),
         "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
-        "intra-frame motion": _motion(paths, surface.facets, sensor),
+        "intra-frame motion": _motion(paths, geometry.facets, radar),
     }
     return {name: found[name] for name in _NAMES}
 
@@ -79,9 +79,9 @@ _NAMES = (
 )
 
 
-def _further(paths: Paths, sensor: Sensor, settings: Any, bounces: int, weakest: float) -> Entry:
+def _further(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
     met = interactions(paths)
-    last, before = (peak(paths, met == n, sensor, settings) for n in (bounces, bounces - 1))
+    last, before = (peak(paths, met == n, radar, settings) for n in (bounces, bounces - 1))
     if last == 0.0 or before == 0.0:
         return Entry(UNKNOWN, "none", f"no path has {bounces} interactions: nothing to extrapolate from")
     ratio = min(last / before, 1.0)
@@ -89,68 +89,66 @@ def _further(paths: Paths, sensor: Sensor, settings: Any, bounces: int, weakest:
     return Entry(float(db(last * ratio / weakest)), "estimate", how)
 
 
-def _transmission(paths: Paths, sensor: Sensor, settings: Any, weakest: float) -> Entry:
+def _transmission(paths: Paths, radar: Radar, settings: Any, weakest: float) -> Entry:
     passes = layers(paths)
     most = int(passes.max(initial=0))
     if most == 0:
         return Entry(NOTHING, "exact", "no path passes a thin layer")
-    last = peak(paths, passes == most, sensor, settings)
-    loss = peak(paths, passes == max(most - 1, 0), sensor, settings)
+    last = peak(paths, passes == most, radar, settings)
+    loss = peak(paths, passes == max(most - 1, 0), radar, settings)
     ratio = min(last / loss, 1.0) if loss > 0.0 else 1.0
     how = f"paths through {most} layers are in; one more, by their ratio to {most - 1}"
     return Entry(float(db(max(last * ratio, 1e-40) / weakest)), "estimate", how)
 
 
-def _gain(sensor: Sensor, points: Floats) -> tuple[Floats, Floats, Floats]:
+def _gain(radar: Radar, points: Floats) -> tuple[Floats, Floats, Floats]:
     """Return directions, distances [m] and the product of both antennas' gains towards points (n, 3)."""
-    d = points - np.asarray(sensor.position)
+    d = points - np.asarray(radar.position)
     r = np.linalg.norm(d, axis=1)
     look = d / r[:, None]
-    both = [np.linalg.norm(f(look), axis=1) ** 2 for f in (sensor.tx_field, sensor.rx_field)]
+    both = [np.linalg.norm(f(look), axis=1) ** 2 for f in (radar.tx_field, radar.rx_field)]
     return look, r, both[0] * both[1]
 
 
-def _diffraction(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
+def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     """Edges' fringe currents: a straight edge of length L seen broadside returns at most L^2/pi (Ross 1966; Knott
     2004)."""
-    edges = surface.outline
+    edges = geometry.outline
     if not len(edges):
         return Entry(NOTHING, "exact", "no surface has an edge")
     middle = edges.mean(axis=1)
-    look, r, gain = _gain(sensor, middle)
+    look, r, gain = _gain(radar, middle)
     span = edges[:, 1] - edges[:, 0]
-    wavelength = sensor.waveform.wavelength
+    wavelength = radar.waveform.wavelength
     # Only one Fresnel zone of a long edge is in phase; off broadside its ends are left: sinc^2.
     length = np.linalg.norm(span, axis=1)
     zone = np.minimum(length, np.sqrt(0.5 * wavelength * r))
     along = np.einsum("ij,ij->i", span, look) * zone / np.where(length > 0, length, 1.0)
     sigma = zone**2 / np.pi * np.sinc(2.0 * along / wavelength) ** 2
-    power = sensor.power * gain * wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
+    power = radar.power * gain * wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
     at = int(np.argmax(power))
-    name = surface.facets.body_names[surface.facets.body[surface.outline_facet[at]]]
+    name = geometry.facets.body_names[geometry.facets.body[geometry.outline_facet[at]]]
     how = f"strongest edge's fringe field, L^2/pi broadside, if it were seen: on {name} at {r[at]:.1f} m"
     return Entry(float(db(power[at] / weakest)), "bound", how)
 
 
-def _around(surface: Surface, points: Points, sensor: Sensor, settings: Any, model: Any, weakest: float) -> Entry:
+def _around(geometry: Geometry, points: Points, radar: Radar, settings: Any, model: Any, weakest: float) -> Entry:
     """What reaches targets given by their RCS over one wedge in, out or both."""
     if not len(points.body):
         return Entry(NOTHING, "exact", "no target is given by its RCS")
     if model.diffraction:
         return Entry(NOTHING, "exact", "modelled: single wedges, UTD")
-    parts = diffracted_paths(
-        surface, points, sensor, sensor.waveform.carrier, 8, [Leg(end=np.asarray(sensor.position))]
-    )
+    parts = diffracted_paths(geometry, points, radar, radar.waveform.carrier, 8, [Leg(end=np.asarray(radar.position))])
     if not parts:
         return Entry(NOTHING, "estimate", "no wedge stands near the way to a target")
     found = join(parts)
-    level = peak(found, np.ones(len(found.delay), bool), sensor, settings)
+    level = peak(found, np.ones(len(found.delay), bool), radar, settings)
     return Entry(float(db(max(level, 1e-40) / weakest)), "estimate", "strongest cell of the diffracted returns (UTD)")
 
 
-def _diffuse(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
+def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     """What roughness takes from the mirror, sent out by Lambert's law from one range cell of the surface."""
-    f = surface.facets
+    f = geometry.facets
     m = f.materials
     rough = m.roughness[f.material] > 0.0
     if not rough.any():
@@ -158,20 +156,20 @@ def _diffuse(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
     rng = np.random.default_rng(0)
     rows = np.flatnonzero(rough)
     # Points over the rough facets, a ring of the ground at a time: near ground first.
-    at = _samples(surface, rows, np.asarray(sensor.position), rng)
+    at = _samples(geometry, rows, np.asarray(radar.position), rng)
     points, facet, weight = at
-    look, r, gain = _gain(sensor, points)
-    cosine = np.abs(np.einsum("ij,ij->i", look, surface.normal[facet]))
+    look, r, gain = _gain(radar, points)
+    cosine = np.abs(np.einsum("ij,ij->i", look, geometry.normal[facet]))
     row = f.material[facet]
-    k = 2.0 * np.pi / sensor.waveform.wavelength
+    k = 2.0 * np.pi / radar.waveform.wavelength
     flat = np.abs(coefficients_array(m.kind[row], m.eps[row], m.thickness[row], 0.0 * cosine, cosine, k)[:, :2]) ** 2
     lost = 1.0 - np.exp(-4.0 * (k * m.roughness[row] * cosine) ** 2)
     sigma = 4.0 * flat.mean(axis=1) * lost * cosine**2 * weight
-    power = sensor.power * gain * sensor.waveform.wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
-    cell = np.floor(r / sensor.waveform.range_resolution).astype(int)
+    power = radar.power * gain * radar.waveform.wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
+    cell = np.floor(r / radar.waveform.range_resolution).astype(int)
     summed = np.bincount(cell, power)
     best = int(np.argmax(summed))
-    where = best * sensor.waveform.range_resolution
+    where = best * radar.waveform.range_resolution
     how = (
         f"power that roughness takes from the mirror, by Lambert's law, strongest range cell ({where:.1f} m), all rates"
     )
@@ -179,26 +177,26 @@ def _diffuse(surface: Surface, sensor: Sensor, weakest: float) -> Entry:
 
 
 def _samples(
-    surface: Surface, rows: NDArray[np.int64], eye: Floats, rng: np.random.Generator
+    geometry: Geometry, rows: NDArray[np.int64], eye: Floats, rng: np.random.Generator
 ) -> tuple[Floats, NDArray[np.int64], Floats]:
     """Return points on facets, their facet and the area [m^2] each stands for; the ground is sampled by its
     distance."""
-    f = surface.facets
+    f = geometry.facets
     ground = np.isin(f.body[rows], np.flatnonzero(f.role == MIRROR))
     points, facet, weight = [], [], []
     if (~ground).any():
-        some = rng.choice(rows[~ground], size=4000, p=surface.area[rows[~ground]] / surface.area[rows[~ground]].sum())
+        some = rng.choice(rows[~ground], size=4000, p=geometry.area[rows[~ground]] / geometry.area[rows[~ground]].sum())
         bary = rng.dirichlet(np.ones(3), size=len(some))
         points.append(np.einsum("ni,nij->nj", bary, f.vertices[some]))
         facet.append(some)
-        weight.append(np.full(len(some), surface.area[rows[~ground]].sum() / len(some)))
+        weight.append(np.full(len(some), geometry.area[rows[~ground]].sum() / len(some)))
     if ground.any():
         one = rows[ground][0]
         radius = np.geomspace(0.2, 80.0, 400)
         angle = np.radians(np.arange(-180.0, 180.0, 3.0))
         step = np.gradient(radius)
         x, y = (np.outer(radius, g(angle)).ravel() for g in (np.cos, np.sin))
-        z = np.full(x.size, float(surface.first[one, 2]))
+        z = np.full(x.size, float(geometry.first[one, 2]))
         points.append(np.column_stack([eye[0] + x, eye[1] + y, z]))
         facet.append(np.full(x.size, one))
         weight.append(np.repeat(radius * step, len(angle)) * np.radians(3.0))
@@ -206,23 +204,23 @@ def _samples(
 
 
 def _tessellation(
-    paths: Paths, surface: Surface, bodies: Collection[Body], sensor: Sensor, settings: Any, weakest: float
+    paths: Paths, geometry: Geometry, bodies: Collection[Body], radar: Radar, settings: Any, weakest: float
 ) -> Entry:
     """Facets that were taken for smooth, if they are flat."""
     estimated = {b.name for b in bodies if b.geometry.crease_deg is not None}
     if not estimated:
         return Entry(NOTHING, "exact", "every body knows its surface")
-    name, phase, changed = strongest_bend(paths, surface, estimated, sensor, settings)
+    name, phase, changed = strongest_bend(paths, geometry, estimated, radar, settings)
     if not name:
         return Entry(NOTHING, "exact", "no body that returns has smoothed facets")
     how = f"facets of {name} are taken for smooth: against flat ones {phase:.2g} rad (rms) of its strongest cell"
     return Entry(float(db(changed / weakest)), "estimate", how)
 
 
-def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:
+def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     """Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at
     most."""
-    frame = sensor.waveform.frame_duration
+    frame = radar.waveform.frame_duration
     if not len(paths.delay):
         return Entry(NOTHING, "exact", "no path")
     size = np.abs(paths.amplitude)
@@ -234,13 +232,13 @@ def _motion(paths: Paths, facets: Facets, sensor: Sensor) -> Entry:
     used = body >= 0
     body = np.maximum(body, 0)
     used &= facets.role[body] != MIRROR
-    relative = facets.velocity[body] - np.asarray(sensor.velocity)
+    relative = facets.velocity[body] - np.asarray(radar.velocity)
     along = np.einsum("ndi,ni->nd", relative, away)
     across = np.einsum("ndi,ndi->nd", relative, relative) - along**2
     turning = np.linalg.norm(facets.spin, axis=1)[body]
     # Lever arm of turning bodies: at most a few metres of a vehicle.
     bend = np.where(used, across / nearest[taken, None] + turning**2 * 2.5, 0.0).max(axis=1)
-    phase = 2.0 * np.pi / sensor.waveform.wavelength * bend * frame**2 / 4.0
+    phase = 2.0 * np.pi / radar.waveform.wavelength * bend * frame**2 / 4.0
     worst = float(phase.max(initial=0.0))
     how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level against the return that has it"
     return Entry(float(db(max(worst, 1e-15) ** 2)), "bound", how)

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube, Paths
 from raychan.signal.dechirp import beat_sum
@@ -29,7 +29,7 @@ _FEW = 0.2  # paths summed directly in the time that a cell of a grid takes for 
 
 def synthesize(
     paths: Paths,
-    sensor: Sensor,
+    radar: Radar,
     rng: np.random.Generator | None = None,
     tolerance: float = 1e-6,
     method: str = "auto",
@@ -44,12 +44,12 @@ def synthesize(
         raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
     if not 1e-13 <= tolerance < 1.0:
         raise ValueError(f"tolerance = {tolerance!r}: must lie from 1e-13 to 1")
-    wave = sensor.waveform
+    wave = radar.waveform
     growth = 2.0 * paths.rate / C0
-    elements = sensor.elements_world
+    elements = radar.elements_world
     samples = np.zeros((len(elements), wave.n_chirps, wave.n_samples), np.complex64)
     if len(growth):
-        scaled, arrival = np.sqrt(sensor.power) * paths.amplitude, paths.arrival
+        scaled, arrival = np.sqrt(radar.power) * paths.amplitude, paths.arrival
         echoes = Echoes(paths.delay + growth * middle(wave)[0], growth, scaled, arrival)
         grids = keystones(echoes, wave, tolerance, float(np.linalg.norm(elements, axis=1).max()) / C0)
         cells = sum(grid.cells for grid, _ in grids) / (wave.n_chirps * wave.n_samples)
@@ -63,19 +63,19 @@ def synthesize(
     if not wave.complex_sampling:
         samples.imag = 0.0
     quiet = Cube(samples=samples, noise_power=0.0)
-    return quiet if rng is None else noisy(quiet, sensor, rng)
+    return quiet if rng is None else noisy(quiet, radar, rng)
 
 
-def noisy(quiet: Cube, sensor: Sensor, rng: np.random.Generator) -> Cube:
+def noisy(quiet: Cube, radar: Radar, rng: np.random.Generator) -> Cube:
     """Return the samples with thermal noise, if the sensor has any."""
-    if not sensor.noise:
+    if not radar.noise:
         return quiet
-    scale = np.float32(np.sqrt(0.5 * sensor.noise_power))
+    scale = np.float32(np.sqrt(0.5 * radar.noise_power))
     samples = scale * rng.standard_normal((*quiet.samples.shape, 2), np.float32).view(np.complex64)[..., 0]
     samples += quiet.samples
-    if not sensor.waveform.complex_sampling:
+    if not radar.waveform.complex_sampling:
         samples.imag = 0.0
-    return Cube(samples=samples, noise_power=sensor.noise_power)
+    return Cube(samples=samples, noise_power=radar.noise_power)
 
 
 def _direct(amplitude: Complexes, delay: Floats, growth: Floats, wave: Waveform) -> Complexes:

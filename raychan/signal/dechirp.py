@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.phasor import unit_phasor
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -36,7 +36,7 @@ def beat_sum(
     def some(rows: slice) -> None:
         _beat_sum(amplitude, delay, growth, carrier, slope, repetition, step, rows.start, out[rows])
 
-    in_two(chirps, some, 2)
+    parallel_for(chirps, some, 2)
     return out
 
 
@@ -170,7 +170,7 @@ def ramp_sums(
     def some(rows: slice) -> None:
         _ramp_sums(amplitude[rows], delay[rows], growth[rows], carrier, slope, step, out[rows])
 
-    in_two(len(delay), some, 2)
+    parallel_for(len(delay), some, 2)
     return out
 
 

@@ -8,7 +8,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from raychan.radar import windows
-from raychan.radar.side_lobes import Envelope
+from raychan.radar.side_lobes import SideLobeEnvelope
 from raychan.radar.waveform import Waveform
 from raychan.records import Paths, Profile
 
@@ -61,7 +61,7 @@ def profile_of(told: NDArray[np.complex128], waveform: Waveform, noise_power: fl
     around = np.stack([np.roll(received, s) for s in range(-_PAD, _PAD + 1)])
     floor = max(noise * 10.0 ** (0.1 * _ABOVE_DB), received.max() * 10.0 ** (-0.1 * _SIDE_LOBES_DB))
     peaks = np.flatnonzero((received == around.max(axis=0)) & (received > floor))
-    peaks = _own(peaks[np.argsort(-received[peaks], kind="stable")], received, Envelope(window, n))
+    peaks = _own(peaks[np.argsort(-received[peaks], kind="stable")], received, SideLobeEnvelope(window, n))
     return Profile(
         range=np.arange(length, dtype=np.float64) * (waveform.range_resolution / _PAD),
         power=received,
@@ -70,7 +70,7 @@ def profile_of(told: NDArray[np.complex128], waveform: Waveform, noise_power: fl
     )
 
 
-def _own(peaks: NDArray[np.int64], power: NDArray[np.float64], envelope: Envelope) -> NDArray[np.int64]:
+def _own(peaks: NDArray[np.int64], power: NDArray[np.float64], envelope: SideLobeEnvelope) -> NDArray[np.int64]:
     """Return the peaks, strongest first, that are more than side lobes of stronger ones."""
     lobes = np.zeros(len(peaks))
     kept = np.zeros(len(peaks), bool)

@@ -16,9 +16,9 @@ from raychan.run.rcs import facets_of, refinements, scattering
 from raychan.study.ray_lattice import Window, echoes
 from raychan.tracing.legs import Leg
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.mesh import Mesh
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 from raychan.world.shapes import build
 
 Floats = NDArray[np.float64]
@@ -143,12 +143,12 @@ def car(quick: bool = False) -> Target:
     mesh, fine = build("car"), build("car", {"max_sag": 1e-4})
     views = np.array([[15.0, 0.0, 12.0], [70.0, 0.0, 12.0]])
     # Never the launches under test, which would meet themselves: a lattice of cuts of its own, and the next step finer.
-    surface = Surface(facets_of(mesh, "pec", FREQUENCY))
-    rules = [replace(r, jitter=0.21) for r in refinements(surface, FREQUENCY)][0 if quick else 1 : 2 if quick else 3]
+    geometry = Geometry(facets_of(mesh, "pec", FREQUENCY))
+    rules = [replace(r, jitter=0.21) for r in refinements(geometry, FREQUENCY)][0 if quick else 1 : 2 if quick else 3]
     found = []
     for rule in rules:
         legs = [Leg(end=direction(*np.radians(v[:2])) * v[2]) for v in views]
-        s = [scattering(surface, leg, leg, FREQUENCY, 3, rule)[:, 0, 0].sum() for leg in legs]
+        s = [scattering(geometry, leg, leg, FREQUENCY, 3, rule)[:, 0, 0].sum() for leg in legs]
         found.append(4.0 * np.pi * np.abs(s) ** 2)
     known = float(np.sqrt(np.mean((10.0 * np.log10(found[0] / found[1])) ** 2)))
     source = f"adaptive tubes, finer and cut elsewhere; moved by {known:.2f} dB rms in its last refinement"
@@ -183,7 +183,7 @@ def vertical(look: Floats) -> NDArray[np.complex128]:
 def _uniform(facets: Facets, end: Floats, rays: int) -> float:
     """Return the RCS [m^2] of flat facets by uniform tubes from `end` (3,) [m], three bounces."""
     window = Window.onto(end, facets.vertices.reshape(-1, 3), -end)
-    found = echoes(Tracer(facets), window, [Leg(end=end)], vertical, vertical, FREQUENCY, rays, 3, True)
+    found = echoes(RayCaster(facets), window, [Leg(end=end)], vertical, vertical, FREQUENCY, rays, 3, True)
     return float(4.0 * np.pi * abs(sum(e.amplitude.sum() for e in found) * (end @ end)) ** 2)
 
 

@@ -18,9 +18,9 @@ from raychan.study.cases import FREQUENCY, WAVENUMBER, Target, vertical
 from raychan.study.ray_lattice import Window, echoes
 from raychan.study.specular_points import glints
 from raychan.tracing.legs import Leg
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.mesh import Mesh
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -46,7 +46,7 @@ class Run:
 def lattice(target: Target, rays: int, tubes: bool) -> Run:
     """Return the RCS by rays on a lattice, the phase constant over each or linear over its tube."""
     since = perf_counter()
-    tracer = Tracer(facets_of(target.fine, "pec", FREQUENCY))
+    tracer = RayCaster(facets_of(target.fine, "pec", FREQUENCY))
     out = []
     for end in target.ends():
         window = Window.onto(end, target.fine.vertices, -end)
@@ -71,20 +71,20 @@ def adaptive(target: Target, tolerance_db: float) -> Run:
 def launched(target: Target, step: int) -> Run:
     """Return the RCS by one launch of adaptive tubes, the `step`-th that `raychan.rcs` would try; no error stated."""
     since = perf_counter()
-    surface = Surface(facets_of(target.mesh, "pec", FREQUENCY))
-    rule = list(refinements(surface, FREQUENCY))[step]
+    geometry = Geometry(facets_of(target.mesh, "pec", FREQUENCY))
+    rule = list(refinements(geometry, FREQUENCY))[step]
     out = []
     for end in target.ends():
         leg = Leg(end=end)
-        s = scattering(surface, leg, leg, FREQUENCY, target.bounces, rule)[:, 0, 0].sum()
+        s = scattering(geometry, leg, leg, FREQUENCY, target.bounces, rule)[:, 0, 0].sum()
         out.append(4.0 * np.pi * abs(s) ** 2)
-    return Run(np.array(out), float(surface.rays), perf_counter() - since)
+    return Run(np.array(out), float(geometry.rays), perf_counter() - since)
 
 
 def mirrors(target: Target, finely: float) -> Run:
     """Return the RCS by the specular points of one reflection alone, on the plain (0) or the fine (1) mesh."""
     since = perf_counter()
-    tracer = Tracer(facets_of(target.fine if finely else target.mesh, "pec", FREQUENCY))
+    tracer = RayCaster(facets_of(target.fine if finely else target.mesh, "pec", FREQUENCY))
     out = []
     for end in target.ends():
         total = glints(tracer, end, WAVENUMBER).field.sum()
@@ -107,7 +107,7 @@ def as_points(target: Target, aspects: float) -> Run:
 def mean_rcs(mesh: Mesh, aspects: int, distance: float, bounces: int, span_deg: float = 180.0, seed: int = 0) -> float:
     """Return the mean RCS [m^2] of a conducting mesh over random azimuths within +-span about +x, by uniform tubes."""
     rng = np.random.default_rng(seed)
-    tracer = Tracer(facets_of(mesh, "pec", FREQUENCY))
+    tracer = RayCaster(facets_of(mesh, "pec", FREQUENCY))
     found = []
     for azimuth in np.radians(rng.uniform(-span_deg, span_deg, aspects)):
         end = distance * direction(azimuth, 0.0)

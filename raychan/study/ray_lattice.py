@@ -20,7 +20,7 @@ from raychan.em.polarization import reflect
 from raychan.records import MIRROR, SCATTERER
 from raychan.tracing.legs import Leg
 from raychan.units import C0
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -73,7 +73,7 @@ class Echo:
 
 
 def echoes(
-    tracer: Tracer,
+    tracer: RayCaster,
     window: Window,
     outs: list[Leg],
     tx_field: FieldOf,
@@ -138,7 +138,7 @@ def echoes(
 
 
 def _seen(
-    tracer: Tracer, out: Leg, p: Floats, n: Floats, hit: NDArray[np.int32], rows: NDArray[np.int64], bounce: int
+    tracer: RayCaster, out: Leg, p: Floats, n: Floats, hit: NDArray[np.int32], rows: NDArray[np.int64], bounce: int
 ) -> NDArray[np.int64]:
     """Return those of `rows` whose points face the end of `out` and see it."""
     along, _ = out.rays(p[rows])
@@ -156,7 +156,7 @@ def _seen(
     return rows[clear]
 
 
-def _receiver(tracer: Tracer, out: Leg, p: Floats, rx_field: FieldOf, k: float) -> tuple[Floats, Complexes]:
+def _receiver(tracer: RayCaster, out: Leg, p: Floats, rx_field: FieldOf, k: float) -> tuple[Floats, Complexes]:
     """Return where the receiver looks (n, 3) and its field at points p (n, 3) over the leg."""
     towards = out.bounces(p)[:, 0] if out.mirrors else p
     look = towards - out.end

@@ -17,9 +17,9 @@ from raychan.study.regimes_base import (
     amplitudes,
     at_most,
     far,
+    geometry_of,
     plate_far,
     same_db,
-    surface_of,
 )
 from raychan.units import EPS0
 from raychan.world.body import Body
@@ -136,9 +136,9 @@ def exchange(quick: bool) -> Outcome:
             )
             if there.sigma > 1e-12:
                 worst = max(worst, abs(10 * np.log10(float(back.sigma / there.sigma))))
-        surface = surface_of(mesh)
+        geometry = geometry_of(mesh)
         one, two = far(a[0], b[0]), far(a[1], b[1])
-        s, t = amplitudes(surface, one, two, step=2), amplitudes(surface, two, one, step=2).T
+        s, t = amplitudes(geometry, one, two, step=2), amplitudes(geometry, two, one, step=2).T
         one_way.append(float(20 * np.log10(np.linalg.norm(s) / np.linalg.norm(t))))
         rows.append(
             Row(

@@ -14,7 +14,7 @@ from raychan.records import Facets
 from raychan.run.rcs import facets_of, refinements, scattering
 from raychan.tracing.legs import Leg
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.mesh import Mesh, make_mesh
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def same_db(name: str, seen: float, exact: float, tolerance: float, truth: str, 
 
 
 def amplitudes(
-    surface: Surface,
+    geometry: Geometry,
     leg: Leg,
     out: Leg,
     step: int = 3,
@@ -105,15 +105,15 @@ def amplitudes(
     Args: step of `refinements` (0 coarse to 5); jitter of the lattice of cuts; max_edge [m] of first tubes, if not
     that of the step; only: that number of bounces alone.
     """
-    rule = list(refinements(surface, FREQUENCY))[step]
+    rule = list(refinements(geometry, FREQUENCY))[step]
     rule = replace(rule, jitter=jitter, max_edge=rule.max_edge if max_edge is None else max_edge)
-    by_bounce = scattering(surface, leg, out, FREQUENCY, bounces, rule)
+    by_bounce = scattering(geometry, leg, out, FREQUENCY, bounces, rule)
     return np.asarray(by_bounce[only - 1] if only else by_bounce.sum(axis=0))
 
 
-def surface_of(mesh: Any, material: Any = "pec") -> Surface:
+def geometry_of(mesh: Any, material: Any = "pec") -> Geometry:
     """Return the surface of one body at the origin."""
-    return Surface(facets_of(mesh, material, FREQUENCY))
+    return Geometry(facets_of(mesh, material, FREQUENCY))
 
 
 def far(azimuth_deg: float, elevation_deg: float = 0.0) -> Leg:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.study.regimes_base import Floats, Outcome, Regime, Row, surface_of
+from raychan.study.regimes_base import Floats, Outcome, Regime, Row, geometry_of
 from raychan.world.mesh import Mesh
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 from raychan.world.shapes import SHAPES, build
 
 Ints = NDArray[np.int64]
@@ -40,10 +40,10 @@ def leaks(quick: bool) -> Outcome:
     counts: list[list[_Count]] = []
     for name in SHAPES:
         mesh = build(name)
-        surface = surface_of(mesh)
+        geometry = geometry_of(mesh)
         # Half of all rays at edges, a quarter at vertices, a quarter at corner rays.
         wanted = [total // (k * len(SHAPES)) + 1 for k in (2, 4, 4)]
-        found = [_leaks(surface, mesh, target, n, rng) for target, n in zip(_TARGETS, wanted, strict=True)]
+        found = [_leaks(geometry, mesh, target, n, rng) for target, n in zip(_TARGETS, wanted, strict=True)]
         counts.append(found)
         rows += [_row(name, target, c) for target, c in zip(_TARGETS, found, strict=True) if c.rays]
     for i, target in enumerate(_TARGETS):
@@ -64,7 +64,7 @@ def _row(name: str, target: str, c: _Count) -> Row:
     return Row(what, 0.0, 1e6 * c.leaks / max(c.rays, 1), 0.0, "per million", "topology: no gap", "; ".join(notes))
 
 
-def _leaks(surface: Tracer, mesh: Mesh, target: str, count: int, rng: np.random.Generator) -> _Count:
+def _leaks(geometry: RayCaster, mesh: Mesh, target: str, count: int, rng: np.random.Generator) -> _Count:
     """Return what became of rays from outside at targets (see _TARGETS) whose faces all show the same side."""
     f, v = mesh.faces.astype(np.int64), mesh.vertices
     start, end = f.ravel(), np.roll(f, -1, axis=1).ravel()
@@ -87,22 +87,22 @@ def _leaks(surface: Tracer, mesh: Mesh, target: str, count: int, rng: np.random.
         length = np.linalg.norm(d, axis=1)
         d /= length[:, None]
         # A ray past an outline may miss with right: all faces round the point must show the same side.
-        ca = np.einsum("ij,ij->i", surface.normal[a[e] // 3], d)
-        cb = np.einsum("ij,ij->i", surface.normal[b[e] // 3], d)
+        ca = np.einsum("ij,ij->i", geometry.normal[a[e] // 3], d)
+        cb = np.einsum("ij,ij->i", geometry.normal[b[e] // 3], d)
         ok = np.abs(ca) > _SLANT
         if target != "corner rays of tubes":
             ok &= (ca * cb > 0.0) & (np.abs(cb) > _SLANT)
         if target == "vertices":
-            low, high = fan.turns(surface.normal, start[a[e]], d)
+            low, high = fan.turns(geometry.normal, start[a[e]], d)
             ok &= (low * high > 0.0) & (np.minimum(np.abs(low), np.abs(high)) > _SLANT)
         rows = np.flatnonzero(ok)[: count - out.rays]
         if not len(rows):
             return out
-        hit, dist = surface.cast(origin[rows], d[rows], np.full(len(rows), -1, np.int32))
+        hit, dist = geometry.cast(origin[rows], d[rows], np.full(len(rows), -1, np.int32))
         # Embree's float32 moves a ray sideways by some 1e-7 of its coordinates; the slant makes that 50 times.
         slack = 1e-6 * size / _SLANT
         late = rows[(hit < 0) | (dist > length[rows] + slack)]
-        real = [_meets(surface.facets.vertices, origin[i], d[i], length[i] + slack) for i in late]
+        real = [_meets(geometry.facets.vertices, origin[i], d[i], length[i] + slack) for i in late]
         out.rays += len(rows)
         out.leaks += sum(real)
         out.moved += len(real) - sum(real)

@@ -19,16 +19,16 @@ from raychan.study.regimes_base import (
     amplitudes,
     at_most,
     far,
+    geometry_of,
     moved,
     plate_far,
     rectangle,
     same_db,
     sheet,
-    surface_of,
 )
 from raychan.tracing.legs import Leg
 from raychan.world.body import Body
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 from raychan.world.mesh import Mesh, make_mesh
 from raychan.world.scene import Scene
 from raychan.world.shapes import build
@@ -48,12 +48,12 @@ def far_from_home(quick: bool) -> Outcome:
     shift = np.array([1e4, -1e4, 30.0])
     turn = rotation(1.0, 0.4, -0.7)
     for name, params in cases:
-        facets = surface_of(build(name, params)).facets
+        facets = geometry_of(build(name, params)).facets
         end = np.array([12.0, 1.5, 0.8])
-        here = _power(Surface(facets), end, np.linalg.norm(end))
-        there = _power(Surface(moved(facets, np.eye(3), shift)), end + shift, np.linalg.norm(end + shift))
-        turned = _power(Surface(moved(facets, turn, np.zeros(3))), turn @ end, np.linalg.norm(end))
-        both = _power(Surface(moved(facets, turn, shift)), turn @ end + shift, np.linalg.norm(turn @ end + shift))
+        here = _power(Geometry(facets), end, np.linalg.norm(end))
+        there = _power(Geometry(moved(facets, np.eye(3), shift)), end + shift, np.linalg.norm(end + shift))
+        turned = _power(Geometry(moved(facets, turn, np.zeros(3))), turn @ end, np.linalg.norm(end))
+        both = _power(Geometry(moved(facets, turn, shift)), turn @ end + shift, np.linalg.norm(turn @ end + shift))
         # The bar for a turn is the tolerance of the run; flat bodies cut by the same rule do far better.
         rows.append(same_db(f"{name} moved by 14 km", there, here, 0.01, "symmetry: translation"))
         rows.append(same_db(f"{name} turned", turned, here, 0.25, "symmetry: rotation"))
@@ -61,12 +61,12 @@ def far_from_home(quick: bool) -> Outcome:
     return Outcome(rows)
 
 
-def _power(surface: Surface, end: Floats, reach: Any) -> float:
+def _power(geometry: Geometry, end: Floats, reach: Any) -> float:
     """Return the power over all polarisations from a near radar, which no choice of axes changes.
 
     `amplitudes` scales by the distance of the radar from the origin, once each way; that is taken out.
     """
-    s = amplitudes(surface, Leg(end=end), Leg(end=end), step=2)
+    s = amplitudes(geometry, Leg(end=end), Leg(end=end), step=2)
     return float(np.linalg.norm(s) ** 2 / float(reach) ** 4)
 
 
@@ -77,14 +77,16 @@ def facet_sizes(quick: bool) -> Outcome:
     # Tubes of the default launch are at most 0.3 m: those of a huge target are let be a quarter of it.
     for size in _SIZES:
         edge = 0.25 * size
-        s = amplitudes(surface_of(build("plate", {"width": size, "height": size})), far(0), far(0), 1, 1, max_edge=edge)
+        s = amplitudes(
+            geometry_of(build("plate", {"width": size, "height": size})), far(0), far(0), 1, 1, max_edge=edge
+        )
         exact = 4 * np.pi * (size * size / LAMBDA) ** 2
         level = 4 * np.pi * abs(s[0, 0]) ** 2
         rows.append(same_db(f"plate of {size:g} m", level, exact, 0.05, "closed form: physical optics"))
         plates.append(rows[-1].seen)
     for size in _SIZES:
         edge = 0.25 * size
-        corner = surface_of(build("dihedral", {"size": size, "height": size}))
+        corner = geometry_of(build("dihedral", {"size": size, "height": size}))
         s = amplitudes(corner, far(0), far(0), 1, 2, max_edge=edge, only=2)
         exact = 8 * np.pi * (size * size / LAMBDA) ** 2
         level, truth = 4 * np.pi * abs(s[0, 0]) ** 2, "closed form: 8 pi a2 b2 / lambda2"
@@ -104,7 +106,7 @@ def facet_sizes(quick: bool) -> Outcome:
             name = f"plate 0.1 m with strips of {strip:g} m, {angle:g} deg"
             rows.append(same_db(name, float(r.sigma), plate_far(0.1, 0.1, angle), 0.05, "closed form: physical optics"))
     near = Leg(end=np.array([15.0, 0.0, 0.0]))
-    huge = surface_of(build("plate", {"width": 30.0, "height": 30.0}))
+    huge = geometry_of(build("plate", {"width": 30.0, "height": 30.0}))
     level = 4 * np.pi * abs(amplitudes(huge, near, near, 0, 1)[0, 0]) ** 2
     # Edge waves are about 1 / sqrt(k D) of the image, spread over four edges that are not in phase.
     rows.append(same_db("plate of 30 m from 15 m", level, np.pi * 15.0**2, 0.05, "limit: image (pi D2)"))
@@ -167,8 +169,8 @@ def _coplanar() -> list[Row]:
         row = same_db(f"one body: {name}", float(r.sigma), exact, 0.01, "energy: what is behind is not lit")
         rows.append(row if row.passed else same_db(row.name, float(r.sigma), exact, 0.01, row.truth, cause))
         bodies = [Body(name=f"b{i}", mesh=sheet(p, mend=False)) for i, p in enumerate((one, second))]
-        surface = Surface(Scene(bodies=bodies, frequency=FREQUENCY).facets(0.0))
-        s = amplitudes(surface, far(0.0), far(0.0), bounces=1)
+        geometry = Geometry(Scene(bodies=bodies, frequency=FREQUENCY).facets(0.0))
+        s = amplitudes(geometry, far(0.0), far(0.0), bounces=1)
         level = 4 * np.pi * abs(s[0, 0]) ** 2
         row = same_db(f"two bodies: {name}", level, exact, 0.01, "energy: what is behind is not lit")
         rows.append(row if row.passed else same_db(row.name, level, exact, 0.01, row.truth, cause))
@@ -223,27 +225,27 @@ def lattice(quick: bool) -> Outcome:
         ("pedestrian", {}, 30.0, 0.0, 2),
     )
     for name, params, az, el, bounces in cases[: 3 if quick else 5]:
-        surface = surface_of(build(name, params))
-        level, stated = _settled(surface, far(az, el), bounces, 0.0)
+        geometry = geometry_of(build(name, params))
+        level, stated = _settled(geometry, far(az, el), bounces, 0.0)
         for jitter in (0.13,) if name == "pedestrian" else (0.13, 0.3):
-            other, its = _settled(surface, far(az, el), bounces, jitter)
+            other, its = _settled(geometry, far(az, el), bounces, jitter)
             # Where rays ran out before the tolerance, each lattice answers for the error that it states.
             allowed = _TOLERANCE_DB if max(stated, its) <= _TOLERANCE_DB else stated + its
-            note = f"stated error {stated:.3f} and {its:.3f} dB; {surface.rays} rays in all launches"
+            note = f"stated error {stated:.3f} and {its:.3f} dB; {geometry.rays} rays in all launches"
             rows.append(
                 same_db(f"{name}, cuts {jitter:g} off the middle", other, level, allowed, "symmetry: lattice", note)
             )
     return Outcome(rows)
 
 
-def _settled(surface: Surface, end: Leg, bounces: int, jitter: float) -> tuple[float, float]:
+def _settled(geometry: Geometry, end: Leg, bounces: int, jitter: float) -> tuple[float, float]:
     """Return |S|^2 [m2] of VV and its stated error [dB], refined on one lattice until two launches agree within
     _TOLERANCE_DB or a million rays are cast."""
-    before, level, stated, spent = 0j, 0j, 60.0, surface.rays
+    before, level, stated, spent = 0j, 0j, 60.0, geometry.rays
     for step in range(6):
-        level = complex(amplitudes(surface, end, end, step, bounces, jitter)[0, 0])
+        level = complex(amplitudes(geometry, end, end, step, bounces, jitter)[0, 0])
         stated = stated_error(level, abs(level - before))
-        if step and (stated <= _TOLERANCE_DB or surface.rays - spent > 1_000_000):
+        if step and (stated <= _TOLERANCE_DB or geometry.rays - spent > 1_000_000):
             break
         before = level
     return abs(level) ** 2, stated

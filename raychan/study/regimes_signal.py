@@ -10,7 +10,7 @@ import numpy as np
 
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.antenna import Isotropic
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.records import Paths, RangeDoppler, take
 from raychan.signal.baseband import synthesize
@@ -21,9 +21,9 @@ _WAVE = Waveform(FREQUENCY, 1e9, 25.6e-6, 40e-6, 128, 512)
 _GB = 1e9
 
 
-def _sensor(wave: Waveform = _WAVE, **changes: Any) -> Sensor:
+def _sensor(wave: Waveform = _WAVE, **changes: Any) -> Radar:
     given: dict[str, Any] = {"position": np.zeros(3), "power": 1.0, "noise_figure_db": 15.0, "noise": False} | changes
-    return Sensor(tx=Isotropic(), rx=Isotropic(), waveform=wave, **given)
+    return Radar(tx=Isotropic(), rx=Isotropic(), waveform=wave, **given)
 
 
 def _echoes(ranges: Any, rates: Any = 0.0, amplitudes: Any = 1.0) -> Paths:
@@ -49,7 +49,7 @@ def path_counts(quick: bool) -> Outcome:
     """Try 0 to 1e7 paths: none is silence, many are the sum of their copies, in bounded time and memory."""
     rng = np.random.default_rng(2)
     rows: list[Row] = []
-    sensor = _sensor()
+    radar = _sensor()
     counts = [0, 1, 10, 1_000, 100_000, 1_000_000, *([] if quick else [10_000_000])]
     seconds, held = [], []
     few = 1_000
@@ -59,11 +59,11 @@ def path_counts(quick: bool) -> Outcome:
         paths = _copies(unique, copies) if copies else _first(unique, rest)
         tracemalloc.start()
         since = time.perf_counter()
-        cube = synthesize(paths, sensor)
+        cube = synthesize(paths, radar)
         seconds.append(time.perf_counter() - since)
         held.append(tracemalloc.get_traced_memory()[1] / _GB)
         tracemalloc.stop()
-        exact = max(copies, 1) * synthesize(paths if not copies else unique, sensor, method="direct").samples
+        exact = max(copies, 1) * synthesize(paths if not copies else unique, radar, method="direct").samples
         size = float(np.sqrt(np.mean(np.abs(exact) ** 2)))
         off = float(np.sqrt(np.mean(np.abs(cube.samples - exact) ** 2)))
         truth = "silence" if n == 0 else "term by term" if not copies else "linearity: copies of 1000 echoes"
@@ -167,11 +167,11 @@ def near_array(quick: bool) -> Outcome:
     y = (np.arange(count) - 0.5 * (count - 1)) * LAMBDA / 2
     elements = np.stack([np.zeros(count), y, np.zeros(count)], axis=1)
     edge = 2 * float(np.ptp(y)) ** 2 / LAMBDA
-    sensor = _sensor(elements=elements)
+    radar = _sensor(elements=elements)
     distances = np.array([0.5, 1.0, 4.0, 16.0]) * edge
     worst = []
     for distance in distances:
-        cube = synthesize(_echoes(float(distance)), sensor)
+        cube = synthesize(_echoes(float(distance)), radar)
         seen = np.angle(cube.samples[:, 0, 0] / cube.samples[count // 2, 0, 0])
         mid = K * (_WAVE.carrier / FREQUENCY)
         detour = np.hypot(distance, y) - np.hypot(distance, y[count // 2])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -22,7 +22,7 @@ class Glints:
     field: Complexes
 
 
-def glints(tracer: Tracer, end: Floats, wavenumber: float) -> Glints:
+def glints(tracer: RayCaster, end: Floats, wavenumber: float) -> Glints:
     """Return the specular points of conducting bodies that a radar at `end` (3,) [m] sees.
 
     The stationary-phase value of physical optics: 1 / (2 r^2 sqrt|det H|), H the curvature of the path's length over

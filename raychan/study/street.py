@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.range_doppler import range_doppler
 from raychan.records import MIRROR, SCATTERER, Facets, Paths
-from raychan.run.simulate import drowned
+from raychan.run.simulate import noise_equivalent_amplitude
 from raychan.run.solver import refinement, solve
 from raychan.signal.baseband import synthesize
 from raychan.study.cases import Street
@@ -22,8 +22,8 @@ from raychan.study.ray_lattice import Echo, Window, echoes
 from raychan.study.specular_points import glints
 from raychan.tracing.legs import Leg, Mirror
 from raychan.units import C0
-from raychan.world.geometry import Surface
-from raychan.world.ray_caster import Tracer
+from raychan.world.geometry import Geometry
+from raychan.world.ray_caster import RayCaster
 from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -39,12 +39,12 @@ class Road:
 
     def __init__(self, case: Street) -> None:
         self.scene = Scene.load(case.path)
-        self.sensor: Any = dataclasses.replace(self.scene.sensor, noise=False)
-        self.frequency = float(self.sensor.waveform.carrier)
+        self.radar: Any = dataclasses.replace(self.scene.radar, noise=False)
+        self.frequency = float(self.radar.waveform.carrier)
         self.bounces = self.scene.model.max_bounces
         self.tolerance_db = float(self.scene.model.tolerance_db)
         self.facets = self.scene.facets(0.0)
-        self.floor = drowned(self.scene.sensor, self.scene.processing)
+        self.floor = noise_equivalent_amplitude(self.scene.radar, self.scene.processing)
         curved = [b.name for b in self.scene.bodies if b.name and self._takes_sag(b)]
         changes = [f"bodies.{name}.params.max_sag={_FINE_SAG}" for name in curved]
         self.fine = (self.scene.override(changes) if changes else self.scene).facets(0.0)
@@ -55,13 +55,13 @@ class Road:
     @property
     def end(self) -> Floats:
         """Where the radar stands [m]."""
-        return np.asarray(self.sensor.position, float)
+        return np.asarray(self.radar.position, float)
 
     def map_of(self, paths: Paths) -> Floats:
         """Return the noiseless range-Doppler map [W] of paths."""
-        cube = synthesize(paths, self.sensor)
+        cube = synthesize(paths, self.radar)
         p = self.scene.processing
-        found = range_doppler(cube, self.sensor.waveform, p.range_window, p.rate_window, p.pad)
+        found = range_doppler(cube, self.radar.waveform, p.range_window, p.rate_window, p.pad)
         return np.asarray(found.power[:, (found.range > _NEAR) & (found.range < found.range[-1] - _NEAR)])
 
     def paths_of(self, parts: list[Echo]) -> Paths:
@@ -95,27 +95,27 @@ class Road:
 def tubes(road: Road, tolerance_db: float, checked: bool = True) -> Run:
     """Return the map by adaptive tubes as `raychan run` does: cut for a tolerance, and once more to state the error."""
     since = perf_counter()
-    f, s, points, surface = road.frequency, road.sensor, road.scene.points(0.0), Surface(road.facets)
+    f, s, points, geometry = road.frequency, road.radar, road.scene.points(0.0), Geometry(road.facets)
     cell = C0 / s.waveform.bandwidth
     rules = [refinement(f, tolerance_db, road.floor, cell=cell)]
     if checked:
         rules.append(refinement(f, 3.0 * tolerance_db, road.floor, jitter=0.13, cell=cell))
-    paths = [solve(surface, points, s, f, rule, road.bounces)[0] for rule in rules]
-    return Run(road.map_of(paths[0]), surface.rays, perf_counter() - since)
+    paths = [solve(geometry, points, s, f, rule, road.bounces)[0] for rule in rules]
+    return Run(road.map_of(paths[0]), geometry.rays, perf_counter() - since)
 
 
 def converged(road: Road, tolerance_db: float) -> Floats:
     """Return the map of a launch on a lattice of cuts of its own: never that of a method."""
-    cell = C0 / road.sensor.waveform.bandwidth
+    cell = C0 / road.radar.waveform.bandwidth
     rule = refinement(road.frequency, tolerance_db, road.floor, jitter=0.2, cell=cell)
-    paths, _ = solve(road.facets, road.scene.points(0.0), road.sensor, road.frequency, rule, road.bounces)
+    paths, _ = solve(road.facets, road.scene.points(0.0), road.radar, road.frequency, rule, road.bounces)
     return road.map_of(paths)
 
 
 def lattice(road: Road, rays: int, phased: bool) -> Run:
     """Return the map by rays on a lattice over the bodies and their images in the ground."""
     since = perf_counter()
-    tracer = Tracer(road.fine)
+    tracer = RayCaster(road.fine)
     outs = [Leg(end=road.end)]
     v = road.fine.vertices[road.targets(road.fine)].reshape(-1, 3)
     for facet in np.flatnonzero(road.fine.role[road.fine.body] == MIRROR)[:1]:
@@ -126,7 +126,7 @@ def lattice(road: Road, rays: int, phased: bool) -> Run:
         image = v - 2.0 * ((v - mirror.point) @ mirror.normal)[:, None] * mirror.normal
         v = np.concatenate([v, image])
     window = Window.onto(road.end, v, np.array([1.0, 0.0, 0.0]))
-    s = road.sensor
+    s = road.radar
     found = echoes(
         tracer, window, outs, s.tx_field, s.rx_field, road.frequency, rays, road.bounces, phased, np.asarray(s.velocity)
     )  # fmt: skip
@@ -137,7 +137,7 @@ def specular(road: Road, fine: int) -> Run:
     """Return the map by specular points of one reflection alone, the bodies conducting."""
     since = perf_counter()
     facets = road.fine if fine else road.facets
-    tracer = Tracer(facets)
+    tracer = RayCaster(facets)
     k = 2.0 * np.pi * road.frequency / C0
     found = glints(tracer, road.end, k)
     mine = road.targets(facets)[found.facet]
@@ -171,7 +171,7 @@ def _direct(road: Road, point: Floats, field: Any, velocity: Floats) -> Echo:
     d = point - road.end
     r = np.linalg.norm(d, axis=1)
     d = d / r[:, None]
-    s = road.sensor
+    s = road.radar
     couple = np.einsum("ij,ij->i", s.tx_field(d), s.rx_field(d))
     rate = np.einsum("ij,ij->i", velocity - np.asarray(s.velocity), d)
     return Echo(field * couple, 2.0 * r, rate, d, d)

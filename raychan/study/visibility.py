@@ -9,7 +9,7 @@ import numpy as np
 
 from raychan.channel.paths import join
 from raychan.processing.range_doppler import range_doppler
-from raychan.radar.radar import Sensor
+from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points, take
 from raychan.run.labels import Chains, chains, label_of
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
@@ -19,7 +19,7 @@ from raychan.tracing.edge_diffraction import diffracted_paths
 from raychan.tracing.legs import Leg
 from raychan.tracing.occlusion import Occlusion, occlusion
 from raychan.units import db, undb
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 DIFFRACTED = "diffracted"
 WAYS = (DIRECT, MULTIPATH, DIFFRACTED)
@@ -62,9 +62,9 @@ def visibility(result: Result, target: str) -> Visibility:
     """
     scene = result.scene
     check_target(scene, target)
-    facets, points, sensor = scene.facets(0.0), scene.points(0.0), scene.sensor
-    hidden = occlusion(facets, points, sensor.position, target, scene.model.max_transmissions)
-    return Visibility(target, hidden, _levels(result, facets, points, sensor, target), led_by(result, target))
+    facets, points, radar = scene.facets(0.0), scene.points(0.0), scene.radar
+    hidden = occlusion(facets, points, radar.position, target, scene.model.max_transmissions)
+    return Visibility(target, hidden, _levels(result, facets, points, radar, target), led_by(result, target))
 
 
 def check_target(scene: Any, target: str) -> None:
@@ -95,15 +95,15 @@ def _holds(why: Explanation, target: str) -> bool:
     return any(link.split(".")[0] == target for link in why.contributions[0].chain)
 
 
-def _levels(result: Result, facets: Facets, points: Points, sensor: Sensor, target: str) -> dict[str, Level | None]:
+def _levels(result: Result, facets: Facets, points: Points, radar: Radar, target: str) -> dict[str, Level | None]:
     settings = result.scene.processing
-    weakest = noise_of_cell(sensor, settings) * float(undb(settings.min_snr_db))
+    weakest = noise_of_cell(radar, settings) * float(undb(settings.min_snr_db))
     kind = ways_of(result, chains(result.paths, result.receiver.background), target)
     found: dict[str, Level | None] = {
-        name: _level(take(result.paths, kind == i), sensor, settings, weakest) for i, name in enumerate(WAYS)
+        name: _level(take(result.paths, kind == i), radar, settings, weakest) for i, name in enumerate(WAYS)
     }
     if not (kind == WAYS.index(DIFFRACTED)).any():
-        found[DIFFRACTED] = _diffracted(facets, points, sensor, settings, weakest, target)
+        found[DIFFRACTED] = _diffracted(facets, points, radar, settings, weakest, target)
     return found
 
 
@@ -125,23 +125,23 @@ def ways_of(result: Result, known: Chains, target: str) -> np.ndarray[Any, np.dt
 
 
 def _diffracted(
-    facets: Facets, points: Points, sensor: Sensor, settings: Any, weakest: float, target: str
+    facets: Facets, points: Points, radar: Radar, settings: Any, weakest: float, target: str
 ) -> Level | None:
     mine = points.body == facets.body_names.index(target)
     if not mine.any():
         return None
     row = {f: getattr(points, f)[mine] for f in ("position", "velocity", "body", "sigma", "heading")}
-    straight = [Leg(end=np.asarray(sensor.position))]
-    parts = diffracted_paths(Surface(facets), replace(points, **row), sensor, sensor.waveform.carrier, _SLOTS, straight)
-    return _level(join(parts), sensor, settings, weakest) if parts else _strength(0.0, None, weakest)
+    straight = [Leg(end=np.asarray(radar.position))]
+    parts = diffracted_paths(Geometry(facets), replace(points, **row), radar, radar.waveform.carrier, _SLOTS, straight)
+    return _level(join(parts), radar, settings, weakest) if parts else _strength(0.0, None, weakest)
 
 
-def _level(paths: Paths, sensor: Sensor, settings: Any, weakest: float) -> Level:
+def _level(paths: Paths, radar: Radar, settings: Any, weakest: float) -> Level:
     if not len(paths.delay):
         return _strength(0.0, None, weakest)
-    cube = synthesize(paths, replace(sensor, noise=False))
+    cube = synthesize(paths, replace(radar, noise=False))
     pad = (max(_FINE, settings.pad[0]), max(_FINE, settings.pad[1]))
-    rdmap = range_doppler(cube, sensor.waveform, settings.range_window, settings.rate_window, pad)
+    rdmap = range_doppler(cube, radar.waveform, settings.range_window, settings.rate_window, pad)
     column = int(np.argmax(rdmap.power.max(axis=0)))
     return _strength(float(rdmap.power[:, column].max()), float(rdmap.range[column]), weakest)
 

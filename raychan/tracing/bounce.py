@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.records import REFLECT
-from raychan.tracing.contributions import Found
+from raychan.tracing.contributions import Contributions
 from raychan.tracing.edge_crossings import edges_within
 from raychan.tracing.launch import on_facets, write_layers
 from raychan.tracing.legs import Leg
@@ -17,7 +17,7 @@ from raychan.tracing.resolve_hits import agreeing, ahead_of, corner_rays, fates,
 from raychan.tracing.silhouette_crossings import between
 from raychan.tracing.subdivide import divide
 from raychan.tracing.tubes import CENTRE, Refinement, Tubes
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -29,7 +29,9 @@ _LIGHT = 0.1  # of the cost of a cut for sight: what one between bounces takes
 _MANY = 2000  # tubes from which on a second thread pays
 
 
-def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, last: bool, found: Found) -> Tubes:
+def bounce(
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, first: bool, last: bool, found: Contributions
+) -> Tubes:
     """Return the tubes after one more reflection, standing where they land.
 
     Args: out the way back used to weigh tubes, but for its antenna; first, last whether `tubes` stand on their first
@@ -42,10 +44,10 @@ def bounce(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, last
     n = len(tubes)
     flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, rule.layers), -1, np.int32), np.zeros((2, n), np.int8))
     while len(flight.tubes):
-        flight = _step(surface, leg, out, flight, first, last, found, landed)
+        flight = _step(geometry, leg, out, flight, first, last, found, landed)
     if not landed:
         return tubes.take(np.zeros(n, bool))
-    weights = [_weigh(surface, out, t, rule) for t in landed]
+    weights = [_weigh(geometry, out, t, rule) for t in landed]
     area, bound, whole = np.concatenate(weights, axis=1)
     return Tubes.join(landed, found.that_count(bound if last else area, whole))
 
@@ -62,43 +64,50 @@ class _Flight:
 
 
 def _step(
-    surface: Surface, leg: Leg, out: Leg, flight: _Flight, first: bool, last: bool, found: Found, landed: list[Tubes]
+    geometry: Geometry,
+    leg: Leg,
+    out: Leg,
+    flight: _Flight,
+    first: bool,
+    last: bool,
+    found: Contributions,
+    landed: list[Tubes],
 ) -> _Flight:
     """Cast centre rays, and corners where they matter; land what agrees; return what was cut, and what goes on behind
     the thin layers that were hit."""
     rule, tubes = found.rule, flight.tubes
-    area, _, whole = _weigh(surface, out, tubes, rule)
+    area, _, whole = _weigh(geometry, out, tubes, rule)
     way = np.empty_like(tubes.k)
-    in_two(len(tubes), lambda rows: reflected(tubes.k[rows], tubes.normals[rows], way[rows]), _MANY)
-    points = on_facets(surface, tubes) if first else tubes.points
-    mid, ahead = surface.cast(points[:, CENTRE], way[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
+    parallel_for(len(tubes), lambda rows: reflected(tubes.k[rows], tubes.normals[rows], way[rows]), _MANY)
+    points = on_facets(geometry, tubes) if first else tubes.points
+    mid, ahead = geometry.cast(points[:, CENTRE], way[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
     if last:
         # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
         # back. Before more mirrors nobody knows. Where the centre meets nothing a body may still stand beside it.
         span, whole = np.empty((2, len(tubes)))
-        ways = surface.first, surface.normal, out.image, out.far, rule.wavenumber
+        ways = geometry.first, geometry.normal, out.image, out.far, rule.wavenumber
         ahead_of(*(tubes.points, way, tubes.length, mid, ahead, *ways, span, whole))
         matters = area > found.doubt(whole) * (1.0 + 0.5 * span)
     else:
         matters = area > found.doubt(whole)
-    matters &= not found.spent(surface)
+    matters &= not found.spent(geometry)
     # Beside a centre that meets nothing no corner is cast: the outline of a body there runs through the tube.
     hit, t = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     agree = mid >= 0
     rows = np.flatnonzero(matters & agree)
-    met, reach = surface.cast(*corner_rays(rows, points, way, tubes.facet, flight.start))
+    met, reach = geometry.cast(*corner_rays(rows, points, way, tubes.facet, flight.start))
     hit[rows, :3], t[rows, :3] = met.reshape(-1, 3), reach.reshape(-1, 3)
-    agreeing(rows, hit, surface.plane, surface.smooth, surface.normal, _ALIKE, agree)
-    side = _edges(surface, leg, tubes, points, way, hit, t, np.flatnonzero(matters))
+    agreeing(rows, hit, geometry.plane, geometry.smooth, geometry.normal, _ALIKE, agree)
+    side = _edges(geometry, leg, tubes, points, way, hit, t, np.flatnonzero(matters))
     mixed = (~agree & (mid >= 0)) | side.any(axis=1)
-    split = found.affords(surface, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _LIGHT)
+    split = found.affords(geometry, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _LIGHT)
     ready = np.flatnonzero(~split & (mid >= 0))
-    landed.append(_land(surface, leg, tubes, ready, way, hit, agree, flight.through, rule))
-    parts, rows = divide(surface, leg, tubes, np.flatnonzero(split), side, first, rule.jitter)
+    landed.append(_land(geometry, leg, tubes, ready, way, hit, agree, flight.through, rule))
+    parts, rows = divide(geometry, leg, tubes, np.flatnonzero(split), side, first, rule.jitter)
     start = flight.start[rows]
     start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
     cut = _Flight(parts, start, flight.through[rows], flight.count[:, rows] + np.array([[1], [0]], np.int8))
-    behind = ready[surface.is_layer[mid[ready]] & (flight.count[1, ready] < rule.layers)]
+    behind = ready[geometry.is_layer[mid[ready]] & (flight.count[1, ready] < rule.layers)]
     return _beyond(flight, behind, mid, t, cut) if len(behind) else cut
 
 
@@ -117,39 +126,39 @@ def _beyond(flight: _Flight, rows: Rows, mid: Ints, t: Floats, cut: _Flight) -> 
     )
 
 
-def _weigh(surface: Surface, out: Leg, tubes: Tubes, rule: Refinement) -> Floats:
+def _weigh(geometry: Geometry, out: Leg, tubes: Tubes, rule: Refinement) -> Floats:
     """Return what tubes could scatter over a way, all in phase or as their corners' phases run [1/m], and the length
     of the whole way [m] (3, n)."""
     weights = np.empty((3, len(tubes)))
     rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.strength, tubes.spread
-    how = out.image, out.far, rule.wavenumber, surface.dull, *surface.matter
+    how = out.image, out.far, rule.wavenumber, geometry.dull, *geometry.matter
 
     def some(rows: slice) -> None:
         weigh(*(*(x[rows] for x in rays), *how, *weights[:, rows]))
 
-    in_two(len(tubes), some, _MANY)
+    parallel_for(len(tubes), some, _MANY)
     return weights
 
 
 def _edges(
-    surface: Surface, leg: Leg, tubes: Tubes, points: Floats, way: Floats, hit: Ints, t: Floats, rows: Rows
+    geometry: Geometry, leg: Leg, tubes: Tubes, points: Floats, way: Floats, hit: Ints, t: Floats, rows: Rows
 ) -> Floats:
     """Return the sides (n, 3) of an edge that runs through each of the tubes `rows`; zeros where none does."""
-    flat = tubes.flat & ~surface.curved[tubes.facet]
+    flat = tubes.flat & ~geometry.curved[tubes.facet]
     side = np.zeros((len(tubes), 3))
     rays = points, way, tubes.length
-    around = surface.extent, surface.plane, surface.first_edge, surface.outline, surface.first, surface.normal
+    around = geometry.extent, geometry.plane, geometry.first_edge, geometry.outline, geometry.first, geometry.normal
 
     def some(part: slice) -> None:
         edges_within(*(rows[part], *rays, flat, leg.far, hit, t, *around, side))
 
-    in_two(len(rows), some, _MANY)
-    between(surface).across(rows, *rays, leg.far, flat, hit, t, side)
+    parallel_for(len(rows), some, _MANY)
+    between(geometry).across(rows, *rays, leg.far, flat, hit, t, side)
     return side
 
 
 def _land(
-    surface: Surface,
+    geometry: Geometry,
     leg: Leg,
     tubes: Tubes,
     rows: Rows,
@@ -161,21 +170,21 @@ def _land(
 ) -> Tubes:
     """Return the tubes `rows` put down on the planes of the facets that they hit, or of the centre's where these do not
     agree, their reflection written into the history."""
-    rows, facet, reach = fates(rows, tubes.points, way, hit, agree, surface.first, surface.normal)
+    rows, facet, reach = fates(rows, tubes.points, way, hit, agree, geometry.first, geometry.normal)
     n = len(rows)
     points, k, normals = np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4, 3))
     length, (spread, strength) = np.empty((n, 4)), np.empty((2, n))
     flat, caustics = np.empty(n, bool), np.empty_like(tubes.caustics, shape=n)
     rays = tubes.points, way, tubes.length, tubes.normals, tubes.facet, tubes.spread, tubes.strength, tubes.flat
-    f = surface.facets
-    shape = f.vertices, f.normals, surface.curved, leg.far, rule.wavenumber, *surface.matter
+    f = geometry.facets
+    shape = f.vertices, f.normals, geometry.curved, leg.far, rule.wavenumber, *geometry.matter
     written = points, k, length, normals, spread, strength, flat, caustics
 
     def some(part: slice) -> None:
         there = rows[part], facet[part], reach[part]
         put_down(*(*there, *rays, tubes.caustics, *shape, *(x[part] for x in written)))
 
-    in_two(n, some, _MANY)
+    parallel_for(n, some, _MANY)
     vertex, normal = tubes.points[rows, CENTRE], tubes.normals[rows, CENTRE]
     after = Tubes(
         points=points,
@@ -195,5 +204,5 @@ def _land(
     )
     passed = through[rows]
     if (passed >= 0).any():
-        write_layers(surface, after, vertex, k[:, CENTRE], passed, rule)
+        write_layers(geometry, after, vertex, k[:, CENTRE], passed, rule)
     return after

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.em.phase_integral import quadratic_means
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.tracing.tubes import Phases, Refinement
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -21,7 +21,7 @@ _DEPTH = 1e-2  # of the strongest cell: weaker ones are no finer than such a one
 _SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
 
 
-class Found:
+class Contributions:
     """The scattered field [1/m] found within each stretch of two-way length, `rule.cell` long."""
 
     def __init__(self, rule: Refinement) -> None:
@@ -31,32 +31,32 @@ class Found:
         self.uncut = np.zeros(0, np.int64)
         """Tubes (bodies,) that budgets kept from being cut."""
 
-    def affords_phase(self, surface: Surface, facet: Ints, wanted: Bools) -> Bools:
+    def affords_phase(self, geometry: Geometry, facet: Ints, wanted: Bools) -> Bools:
         """Return which tubes (n,) on facets (n,) may be cut for their phase: none once there are `rule.max_tubes`."""
         self._tubes += len(wanted)
-        return self._within(surface, facet, wanted, self._tubes > self.rule.max_tubes)
+        return self._within(geometry, facet, wanted, self._tubes > self.rule.max_tubes)
 
-    def affords(self, surface: Surface, facet: Ints, wanted: Bools, weight: float = 1.0) -> Bools:
+    def affords(self, geometry: Geometry, facet: Ints, wanted: Bools, weight: float = 1.0) -> Bools:
         """Return which tubes (n,) may be cut for what hides parts of them: none once `rule.max_cuts` are made, each
         counted by its weight, or `rule.max_rays` cast by this launch."""
-        rest = 0.0 if self.spent(surface) else (self.rule.max_cuts - self._cuts) / weight
+        rest = 0.0 if self.spent(geometry) else (self.rule.max_cuts - self._cuts) / weight
         self._cuts += weight * np.count_nonzero(wanted)
         within = wanted & (np.cumsum(wanted) <= rest)
-        return within | self._within(surface, facet, wanted & ~within, True)
+        return within | self._within(geometry, facet, wanted & ~within, True)
 
-    def spent(self, surface: Surface) -> bool:
+    def spent(self, geometry: Geometry) -> bool:
         """Tell whether nothing may be cut any more for what hides it."""
         if self._rays < 0:
-            self._rays = surface.rays
-        return self._cuts > self.rule.max_cuts or surface.rays - self._rays > self.rule.max_rays
+            self._rays = geometry.rays
+        return self._cuts > self.rule.max_cuts or geometry.rays - self._rays > self.rule.max_rays
 
-    def _within(self, surface: Surface, facet: Ints, wanted: Bools, spent: bool) -> Bools:
+    def _within(self, geometry: Geometry, facet: Ints, wanted: Bools, spent: bool) -> Bools:
         if not spent or not wanted.any():
             return wanted
-        bodies = surface.facets.body[facet[wanted]]
-        count = np.bincount(bodies, minlength=max(len(surface.facets.role), len(self.uncut)))
+        bodies = geometry.facets.body[facet[wanted]]
+        count = np.bincount(bodies, minlength=max(len(geometry.facets.role), len(self.uncut)))
         self.uncut = count + np.pad(self.uncut, (0, len(count) - len(self.uncut)))
-        surface.uncut += int(np.count_nonzero(wanted))
+        geometry.uncut += int(np.count_nonzero(wanted))
         return np.zeros_like(wanted)
 
     def _cell(self, length: Floats) -> NDArray[np.int64]:
@@ -78,7 +78,7 @@ class Found:
         def some(rows: slice) -> None:
             each[rows] = ph.area[rows] * quadratic_means(ph.six[rows], 0.5)
 
-        in_two(len(each), some, _THREADS)
+        parallel_for(len(each), some, _THREADS)
         cell = self._cell(ph.length)
         # A cell more at the end, which stays empty, for all that is longer.
         n = max(len(self._level), int(cell.max()) + 3)

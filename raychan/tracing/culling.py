@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.frames import sizes
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.tracing.edge_crossings import dot
 from raychan.tracing.legs import Leg
-from raychan.tracing.occluders import Screens
-from raychan.world.geometry import Surface
+from raychan.tracing.occluders import Occluders
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -25,12 +25,12 @@ _MANY = 1000  # clusters from which on a second thread pays
 _WIDE = 1e-6  # rad: rounding must not hide what grazes
 
 
-def seeds(surface: Surface, leg: Leg, pieces: Bools) -> Ints:
+def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     """Return the facets of pieces (p,) that could be met over a leg, in order."""
-    f = surface.facets
+    f = geometry.facets
     if not len(f.body) or not pieces.any():
         return np.zeros(0, np.int32)
-    c, screens = surface.clusters, _screens(surface)
+    c, screens = geometry.clusters, _screens(geometry)
     walls, balls = screens.over(leg), screens.within(leg)
     mirror = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
     if leg.mirrors and not leg.far:
@@ -39,7 +39,7 @@ def seeds(surface: Surface, leg: Leg, pieces: Bools) -> Ints:
     image = np.asarray(leg.image, float)
     way = image, leg.far, bool(leg.mirrors) and not leg.far, *mirror
     lead = c.order[c.first[:-1]]
-    of, sides, piece = f.body[lead], surface.fabric.cluster_sides, surface.fabric.cluster_piece
+    of, sides, piece = f.body[lead], geometry.scene_topology.cluster_sides, geometry.scene_topology.cluster_piece
     # Of clusters of several pieces each facet is asked later.
     wanted = pieces[piece] | (piece < 0)
     alive = np.zeros(len(lead), np.bool_)
@@ -49,13 +49,13 @@ def seeds(surface: Surface, leg: Leg, pieces: Bools) -> Ints:
         about = wanted[rows], of[rows], sides[rows], *hull
         _alive(*(*about, *way, *walls, *balls, alive[rows]))
 
-    in_two(len(lead), some, _MANY)
+    parallel_for(len(lead), some, _MANY)
     left = np.flatnonzero(alive)
-    left = left[~leg.dark(c.centre[left], c.radius[left])]
-    shape = f.vertices, f.normals, surface.area, surface.both_sides
+    left = left[~leg.outside_beam(c.centre[left], c.radius[left])]
+    shape = f.vertices, f.normals, geometry.area, geometry.both_sides
     rows = np.sort(_lit(left, c.order, c.first, *shape, image, leg.far))
     if not pieces.all():
-        rows = rows[pieces[surface.piece[rows]]]
+        rows = rows[pieces[geometry.piece[rows]]]
     if leg.mirrors:
         v = f.vertices[rows]
         middle = v.mean(axis=1)
@@ -63,11 +63,11 @@ def seeds(surface: Surface, leg: Leg, pieces: Bools) -> Ints:
     return rows
 
 
-def _screens(surface: Surface) -> Any:
-    with surface.making:
-        if surface.screens is None:
-            surface.screens = Screens(surface)
-    return surface.screens
+def _screens(geometry: Geometry) -> Any:
+    with geometry.making:
+        if geometry.screens is None:
+            geometry.screens = Occluders(geometry)
+    return geometry.screens
 
 
 @njit(cache=True, forceinline=True)
@@ -149,7 +149,7 @@ def _eclipsed(centre, radius, body, image, far, core, size, owner):  # type: ign
 @njit(cache=True, nogil=True)
 def _alive(  # type: ignore[no-untyped-def]
     wanted, body, is_open, centre, radius, axis, spread, image, far, mirrored, at, normal, middle, reach, walls,
-    normals, owners, begins, edges, inwards, touch, cores, sizes, solids, out,
+    normals, owners, begins, edges, inwards, touch, inner_spheres, sizes, solids, out,
 ):  # fmt: skip
     """Tell of clusters (k,), each with a ball and a cone of normals, which may hold a facet that could be met."""
     d, work = np.empty(3), np.empty(3)
@@ -167,7 +167,7 @@ def _alive(  # type: ignore[no-untyped-def]
         swell = 1.001 * radius[i] + touch
         if _hidden(centre[i], swell, body[i], walls, normals, owners, begins, edges, inwards):
             continue
-        out[i] = not _eclipsed(centre[i], swell, body[i], image, far, cores, sizes, solids)
+        out[i] = not _eclipsed(centre[i], swell, body[i], image, far, inner_spheres, sizes, solids)
 
 
 @njit(cache=True, nogil=True)

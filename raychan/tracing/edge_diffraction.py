@@ -16,7 +16,7 @@ from raychan.records import DIFFRACT, POINT, Paths, Points
 from raychan.tracing.legs import Leg
 from raychan.tracing.point_targets import bistatic_sigma
 from raychan.units import C0
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -39,7 +39,7 @@ class Way:
 
 
 def ways(
-    surface: Surface, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
+    geometry: Geometry, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
 ) -> list[Way]:
     """Return the straight way, where it is free, and those over one wedge each.
 
@@ -50,30 +50,30 @@ def ways(
     found = []
     gap = float(np.linalg.norm(point - end))
     straight = (point - end) / gap
-    if _free(surface, end, point, -1, body):
+    if _free(geometry, end, point, -1, body):
         wave = np.asarray(field_of(straight[None]))[0] / gap * np.exp(-1j * k * gap)
         found.append(Way(wave, gap, straight, straight, point, -1))
-    for w in _candidates(surface, end, point, body, gap, k):
-        way = _over(surface, w, end, point, body, field_of, k)
+    for w in _candidates(geometry, end, point, body, gap, k):
+        way = _over(geometry, w, end, point, body, field_of, k)
         if way is not None:
             found.append(way)
     return found
 
 
-def _candidates(surface: Surface, end: Floats, point: Floats, body: int, gap: float, k: float) -> NDArray[np.int64]:
+def _candidates(geometry: Geometry, end: Floats, point: Floats, body: int, gap: float, k: float) -> NDArray[np.int64]:
     """Return wedges long enough, near enough to the straight line, and not of the target's own body."""
-    a, b = surface.wedge[:, 0], surface.wedge[:, 1]
+    a, b = geometry.wedge[:, 0], geometry.wedge[:, 1]
     size = np.linalg.norm(b - a, axis=1)
     middle = 0.5 * (a + b)
     detour = np.linalg.norm(middle - end, axis=1) + np.linalg.norm(middle - point, axis=1) - gap - size
-    own = surface.facets.body[surface.wedge_facet[:, 0]] == body
+    own = geometry.facets.body[geometry.wedge_facet[:, 0]] == body
     return np.flatnonzero((size * k > 2.0 * np.pi * _SHORTEST) & (detour < _LONGEST_DETOUR) & ~own)
 
 
 def _over(
-    surface: Surface, w: int, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
+    geometry: Geometry, w: int, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
 ) -> Way | None:
-    start, stop = surface.wedge[w]
+    start, stop = geometry.wedge[w]
     size = float(np.linalg.norm(stop - start))
     edge = (stop - start) / size
     at = edge_point(tuple(end), tuple(point), tuple(start), tuple(edge))
@@ -83,15 +83,15 @@ def _over(
     s_in, s_out = float(np.linalg.norm(spot - end)), float(np.linalg.norm(point - spot))
     if s_in + s_out - np.linalg.norm(point - end) > _LONGEST_DETOUR:
         return None
-    face, other = (int(f) for f in surface.wedge_facet[w])
+    face, other = (int(f) for f in geometry.wedge_facet[w])
     k_in, k_out = (spot - end) / s_in, (point - spot) / s_out
-    normal = surface.normal[face]
+    normal = geometry.normal[face]
     # Both ends see the edge from the open side of one of its faces; the rays themselves graze those faces.
-    lift = 1e-4 * (normal + surface.normal[other])
-    if not (_free(surface, end, spot + lift, face, -1) and _free(surface, point, spot + lift, face, body)):
+    lift = 1e-4 * (normal + geometry.normal[other])
+    if not (_free(geometry, end, spot + lift, face, -1) and _free(geometry, point, spot + lift, face, body)):
         return None
     e = np.asarray(field_of(k_in[None]))[0] / s_in * np.exp(-1j * k * s_in)
-    r_0, r_n = (_reflection(surface, f, k_in, k_out, k) for f in (face, other))
+    r_0, r_n = (_reflection(geometry, f, k_in, k_out, k) for f in (face, other))
     field: Any = tuple(complex(x) for x in e)
     vector = diffract(
         field,
@@ -99,7 +99,7 @@ def _over(
         tuple(k_out),
         tuple(edge),
         tuple(normal),
-        float(surface.wedge_n[w]),
+        float(geometry.wedge_n[w]),
         k,
         s_in,
         s_out,
@@ -110,39 +110,39 @@ def _over(
     return Way(wave, s_in + s_out, k_in, k_out, spot, face)
 
 
-def _reflection(surface: Surface, facet: int, k_in: Floats, k_out: Floats, k: float) -> tuple[complex, complex]:
-    m = surface.facets.materials
-    row = surface.facets.material[facet]
-    normal = surface.normal[facet]
+def _reflection(geometry: Geometry, facet: int, k_in: Floats, k_out: Floats, k: float) -> tuple[complex, complex]:
+    m = geometry.facets.materials
+    row = geometry.facets.material[facet]
+    normal = geometry.normal[facet]
     cosine = max(abs(float(k_in @ normal)), abs(float(k_out @ normal)))
     c = coefficients(m.kind[row], complex(m.eps[row]), m.thickness[row], m.roughness[row], cosine, k)
     return c[0], c[1]
 
 
-def _free(surface: Surface, start: Floats, stop: Floats, facet: int, body: int) -> bool:
+def _free(geometry: Geometry, start: Floats, stop: Floats, facet: int, body: int) -> bool:
     gap = float(np.linalg.norm(stop - start))
     d = ((stop - start) / gap)[None]
     inside = np.array([body]) if body >= 0 else None
     near, none = np.array([2e-4]), np.array([-1], np.int32)
     target = np.array([facet], np.int32)
-    reached, _, _ = surface.walk(start[None], d, np.array([gap]), near, none, target, 0, inside)
+    reached, _, _ = geometry.walk(start[None], d, np.array([gap]), near, none, target, 0, inside)
     return bool(reached[0])
 
 
 def diffracted_paths(
-    surface: Surface, points: Points, radar: Any, frequency: float, slots: int, legs: list[Leg]
+    geometry: Geometry, points: Points, radar: Any, frequency: float, slots: int, legs: list[Leg]
 ) -> list[Paths]:
     """Return the paths to point targets over at least one wedge; the straight way in or out may be the other half.
 
     Args: legs the mirror-free leg first (its end is the radar). Each pair of ways is one path.
     """
     k = 2.0 * np.pi * frequency / C0
-    end, f = np.asarray(legs[0].end, float), surface.facets
+    end, f = np.asarray(legs[0].end, float), geometry.facets
     out: list[Paths] = []
     for p in range(len(points.body)):
         at, body = points.position[p], int(points.body[p])
-        there = ways(surface, end, at, body, radar.tx_field, k)
-        back = ways(surface, end, at, body, radar.rx_field, k)
+        there = ways(geometry, end, at, body, radar.tx_field, k)
+        back = ways(geometry, end, at, body, radar.rx_field, k)
         rows = [(i, o) for i, o in product(there, back) if i.facet >= 0 or o.facet >= 0]
         if not rows:
             continue

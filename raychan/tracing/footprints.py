@@ -72,7 +72,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
     length (n,) of the way out.
     """
     points, k, normals, length, facet, bary = tubes
-    facing, vertices, bulge, curved = facets
+    facing, vertices, edge_curvature, curved = facets
     six, lengths, whole, taper, area, way_out = out
     bent = bary.shape[1] == 3
     flat, element = np.empty(3), np.empty(3)
@@ -103,7 +103,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
             centre /= length[i, 3] * back[3]
         for j in range(3):
             if bent and curved[f]:
-                element_of(vertices[f], bulge[f], bary[i, j], element)
+                element_of(vertices[f], edge_curvature[f], bary[i, j], element)
                 strength = _mean_cosine(element, k[i, j], back_k[j]) * (0.5 * abs(share) / least)
                 if side < 0.0:
                     strength = -strength
@@ -125,7 +125,7 @@ def _toward(p, image, far):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def elements(points, normals, facet, bary, vertices, bulge, curved, image, out_image, far, out):  # type: ignore[no-untyped-def]
+def elements(points, normals, facet, bary, vertices, edge_curvature, curved, image, out_image, far, out):  # type: ignore[no-untyped-def]
     """Write the vector elements of area (n, 3, 3) [m^2] of first tubes at their corners, on the lit side: the mean of
     the three is the tube's, weighed by both ends' spreading there over that at the centre.
 
@@ -143,7 +143,7 @@ def elements(points, normals, facet, bary, vertices, bulge, curved, image, out_i
         for j in range(3):
             size = 0.5 * centre / (_toward(points[i, j], image, far) * _toward(points[i, j], out_image, far))
             if curved[f]:
-                element_of(vertices[f], bulge[f], w[j], one)
+                element_of(vertices[f], edge_curvature[f], w[j], one)
                 size *= share
             else:
                 for c in range(3):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from raychan.radar.beam_table import Beam
 from raychan.tracing.horizon import radiating
 from raychan.tracing.image_paths import bounces, may_leave, possible, rays_from, stretch, weights
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -31,13 +31,13 @@ class Mirror:
     radius: float
 
     @staticmethod
-    def of(surface: Surface, facet: int, side: float) -> Mirror:
+    def of(geometry: Geometry, facet: int, side: float) -> Mirror:
         """Return the mirror of the plane of a facet, lit on its outward side (+1) or from behind (-1)."""
-        v = surface.facets.vertices[surface.plane == surface.plane[facet]].reshape(-1, 3)
+        v = geometry.facets.vertices[geometry.plane == geometry.plane[facet]].reshape(-1, 3)
         centre = 0.5 * (v.min(axis=0) + v.max(axis=0))
         radius = float(np.linalg.norm(v - centre, axis=1).max())
-        body = int(surface.facets.body[facet])
-        return Mirror(surface.first[facet], side * surface.normal[facet], facet, body, centre, radius)
+        body = int(geometry.facets.body[facet])
+        return Mirror(geometry.first[facet], side * geometry.normal[facet], facet, body, centre, radius)
 
     def turned(self) -> Mirror:
         """Return the same plane lit from its other side."""
@@ -88,9 +88,9 @@ class Leg:
         radius = np.array([m.radius for m in self.mirrors])
         object.__setattr__(self, "_chain", (np.array(images), *(s.reshape(-1, 3) for s in sheets), radius))
 
-    def pieces(self, surface: Surface) -> Ints:
+    def pieces(self, geometry: Geometry) -> Ints:
         """Return the pieces (m,) of the mirrors."""
-        return surface.piece[[m.facet for m in self.mirrors]]
+        return geometry.piece[[m.facet for m in self.mirrors]]
 
     def rays(self, points: Floats) -> tuple[Floats, Floats]:
         """Return unit directions (..., 3) at the points, travelling from the end, and lengths [m]."""
@@ -113,12 +113,14 @@ class Leg:
         images, _, normals = self._chain[:3]
         return images, self.far, normals, np.zeros((0, 0)) if self.beam is None else self.beam.table
 
-    def dark(self, points: Floats, radius: Floats) -> Bools:
+    def outside_beam(self, points: Floats, radius: Floats) -> Bools:
         """Tell to which balls (n,), about points (n, 3) [m], the end's antenna sends nothing at all over this leg."""
         if self.beam is None or self.far:
             return np.zeros(len(points), bool)
         look, length = self._look(points)
-        return self.beam.dark(look, np.where(radius < length, np.arcsin(np.minimum(radius / length, 1.0)), np.pi))
+        return self.beam.outside_beam(
+            look, np.where(radius < length, np.arcsin(np.minimum(radius / length, 1.0)), np.pi)
+        )
 
     def _look(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the unit directions (n, 3) in which the end looks at points, and their distances (n,) [m]."""
@@ -149,7 +151,7 @@ class Leg:
         return share, facing
 
     def visible(
-        self, surface: Surface, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None
+        self, geometry: Geometry, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None
     ) -> View:
         """Tell which points the end sees by this leg, through which layers.
 
@@ -158,20 +160,20 @@ class Leg:
         """
         n = len(points)
         corners = self.bounces(points)
-        chain = *self._chain[:3], self.far, 2.0 * surface.extent + 1.0
+        chain = *self._chain[:3], self.far, 2.0 * geometry.extent + 1.0
         rows, skip = np.arange(n), np.full(n, -1, np.int32)
         for i, m in enumerate(self.mirrors):
             rows, start, d, _ = stretch(i, rows, points, corners, *chain)
-            hit, _ = surface.cast(start, d, skip[rows])
+            hit, _ = geometry.cast(start, d, skip[rows])
             # The mirror itself is hit first.
-            ok = (hit >= 0) & (surface.plane[hit] == surface.plane[m.facet])
+            ok = (hit >= 0) & (geometry.plane[hit] == geometry.plane[m.facet])
             rows = rows[ok]
             skip[rows] = hit[ok]
         rows, start, d, length = stretch(len(self.mirrors), rows, points, corners, *chain)
         aims: Any = start, d, length, slack, skip, facet, layers, inside
         if len(rows) < n:
             aims = *aims[:3], slack[rows], skip[rows], facet[rows], layers, None if inside is None else inside[rows]
-        reached, passed, in_way = surface.walk(*aims)
+        reached, passed, in_way = geometry.walk(*aims)
         if len(rows) == n:
             return View(reached, corners, passed, in_way)
         view = View(np.zeros(n, bool), corners, np.full((n, layers), -1, np.int32), np.full(n, -1, np.int32))

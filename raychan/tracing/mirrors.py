@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from raychan.radar.beam_table import Beam
 from raychan.records import BLOCKER, MIRROR
 from raychan.tracing.legs import Leg, Mirror
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -20,43 +20,43 @@ _LEAST_AREA = 0.5  # m^2
 _MOST = 24
 
 
-def planes_that_mirror(surface: Surface, end: Floats) -> list[Mirror]:
+def planes_that_mirror(geometry: Geometry, end: Floats) -> list[Mirror]:
     """Return the mirrors that `end` (3,) [m] could use: ground planes, and plane faces of at least half a square metre.
 
     Smaller faces count as scatterers only: at street distances they lie within a few Fresnel zones.
     The largest 24 as seen from `end` are kept.
     """
-    f = surface.facets
+    f = geometry.facets
     if not len(f.vertices):
         return []
-    usable = ~surface.curved & (f.role[f.body] != BLOCKER)
-    area = np.bincount(surface.plane, weights=np.where(usable, surface.area, 0.0))
+    usable = ~geometry.curved & (f.role[f.body] != BLOCKER)
+    area = np.bincount(geometry.plane, weights=np.where(usable, geometry.area, 0.0))
     largest = np.full(len(area), -1, np.int64)
-    order = np.argsort(surface.area, kind="stable")
-    largest[surface.plane[order]] = order
+    order = np.argsort(geometry.area, kind="stable")
+    largest[geometry.plane[order]] = order
     found: list[tuple[float, Mirror]] = []
     for plane in np.flatnonzero(area >= _LEAST_AREA):
         facet = int(largest[plane])
         body = int(f.body[facet])
-        height = float((end - surface.first[facet]) @ surface.normal[facet])
-        if height < 0.0 and not surface.both_sides[facet]:
+        height = float((end - geometry.first[facet]) @ geometry.normal[facet])
+        if height < 0.0 and not geometry.both_sides[facet]:
             continue
-        mirror = Mirror.of(surface, facet, 1.0 if height >= 0.0 else -1.0)
+        mirror = Mirror.of(geometry, facet, 1.0 if height >= 0.0 else -1.0)
         view = area[plane] * abs(height) / np.linalg.norm(end - mirror.centre) ** 3
         found.append((np.inf if f.role[body] == MIRROR else view, mirror))
     found.sort(key=lambda pair: -pair[0])
     return [m for _, m in found[:_MOST]]
 
 
-def legs_over(surface: Surface, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
+def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
     """Return the legs from `end` (3,) [m], whose antenna has a `beam`, with at most `bounces` mirrors, the direct one
     first."""
     direct = Leg(end=np.asarray(end, float), beam=beam)
     legs = [direct]
     if bounces < 1:
         return legs
-    mirrors = planes_that_mirror(surface, direct.end)
-    everything = mirrors if bounces < 2 else _both_sides(surface, mirrors)
+    mirrors = planes_that_mirror(geometry, direct.end)
+    everything = mirrors if bounces < 2 else _both_sides(geometry, mirrors)
     for count in range(1, bounces + 1):
         for chain in permutations(everything, count):
             if _possible(direct.end, chain):
@@ -64,10 +64,10 @@ def legs_over(surface: Surface, end: Floats, bounces: int, beam: Beam | None = N
     return legs
 
 
-def _both_sides(surface: Surface, mirrors: list[Mirror]) -> list[Mirror]:
+def _both_sides(geometry: Geometry, mirrors: list[Mirror]) -> list[Mirror]:
     """Add the back of what can be met from either side: a second mirror may be met from behind as seen from the end."""
-    backs = [m.turned() for m in mirrors if surface.both_sides[m.facet]]
-    return mirrors + [m for m in backs if surface.facets.role[m.body] != MIRROR]
+    backs = [m.turned() for m in mirrors if geometry.both_sides[m.facet]]
+    return mirrors + [m for m in backs if geometry.facets.role[m.body] != MIRROR]
 
 
 def _possible(end: Floats, chain: tuple[Mirror, ...]) -> bool:
@@ -80,13 +80,13 @@ def _possible(end: Floats, chain: tuple[Mirror, ...]) -> bool:
     return True
 
 
-def reachable(surface: Surface, leg: Leg) -> Bools:
+def reachable(geometry: Geometry, leg: Leg) -> Bools:
     """Return which pieces (p,) can be met over a leg: in front of its last mirror and through its outline's sphere."""
-    known: WeakKeyDictionary[Leg, Bools] = surface.reach
+    known: WeakKeyDictionary[Leg, Bools] = geometry.reach
     if leg not in known:
-        ok = np.ones(len(surface.piece_role), bool)
+        ok = np.ones(len(geometry.piece_role), bool)
         if leg.mirrors:
-            ok = leg.may_reach(*surface.piece_balls)
-            ok[leg.pieces(surface)[-1]] = False
+            ok = leg.may_reach(*geometry.piece_balls)
+            ok[leg.pieces(geometry)[-1]] = False
         known[leg] = ok
     return known[leg]

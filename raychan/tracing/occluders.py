@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.frames import sizes
 from raychan.tracing.legs import Leg
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -20,27 +20,33 @@ _OUTSIDE = 1.001  # of a ball's radius: an end nearer to its centre does not loo
 _MOST_EDGES = 64  # around one
 
 
-class Screens:
+class Occluders:
     """The large opaque planes of a surface with the edges around them, in the facets' own sense, and the balls inside
     closed opaque bodies."""
 
-    def __init__(self, surface: Surface) -> None:
-        f = surface.facets
-        area = surface.wall_area
-        large = (area >= _LEAST_AREA) & (surface.fabric.around <= _MOST_EDGES)
+    def __init__(self, geometry: Geometry) -> None:
+        f = geometry.facets
+        area = geometry.wall_area
+        large = (area >= _LEAST_AREA) & (geometry.scene_topology.around <= _MOST_EDGES)
         if len(f.role) < 2:
             # A body hides others only: how far its own surface may lie before its facets is not known here.
             large[:] = False
-        rows = np.flatnonzero(large[surface.plane])
-        rows = rows[np.argsort(surface.plane[rows], kind="stable")]
-        numbers, lead = np.unique(surface.plane[rows], return_index=True)
+        rows = np.flatnonzero(large[geometry.plane])
+        rows = rows[np.argsort(geometry.plane[rows], kind="stable")]
+        numbers, lead = np.unique(geometry.plane[rows], return_index=True)
         half = (3 * rows[:, None] + np.arange(3)).ravel()
-        half = half[surface.fabric.borders[half]]
-        self.touch = 1e-4 + surface.touch
-        self.area, self.edge = area[numbers], surface.ends(half)
-        self.first = np.searchsorted(surface.plane[half // 3], np.append(numbers, len(area)))
-        self.balls = surface.cores if len(f.role) > 1 else (np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32))
-        self.point, self.normal, self.owner = surface.first[rows[lead]], surface.normal[rows[lead]], f.body[rows[lead]]
+        half = half[geometry.scene_topology.borders[half]]
+        self.touch = 1e-4 + geometry.touch
+        self.area, self.edge = area[numbers], geometry.ends(half)
+        self.first = np.searchsorted(geometry.plane[half // 3], np.append(numbers, len(area)))
+        self.balls = (
+            geometry.inner_spheres if len(f.role) > 1 else (np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32))
+        )
+        self.point, self.normal, self.owner = (
+            geometry.first[rows[lead]],
+            geometry.normal[rows[lead]],
+            f.body[rows[lead]],
+        )
 
     def over(self, leg: Leg) -> tuple[Any, ...]:
         """Return the walls that hide most over a leg: point (w, 3), normal (w, 3) towards the leg, body (w,), the first

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import MIRROR, Facets, Points
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def occlusion(facets: Facets, points: Points, eye: Floats, body: str, layers: in
     if facets.role[index] == MIRROR:
         raise ValueError(f"'{body}' is a mirror without an outline")
     eye = np.asarray(eye, float)
-    scene = Tracer(facets)
+    scene = RayCaster(facets)
     own = np.flatnonzero(facets.body == index)
     aims, weight = _aims(facets.vertices[own].reshape(-1, 3) - eye, max(rays // 2, 1))
     hit, distance = _alone(facets, own).cast(np.broadcast_to(eye, aims.shape), aims, np.full(len(aims), -1, np.int32))
@@ -114,9 +114,9 @@ def _aims(corners: Floats, cells: int) -> tuple[Floats, Floats]:
     return np.column_stack([ring * np.cos(u), ring * np.sin(u), v]), np.full(len(u), area)
 
 
-def _alone(facets: Facets, rows: NDArray[np.int64]) -> Tracer:
+def _alone(facets: Facets, rows: NDArray[np.int64]) -> RayCaster:
     """Return a tracer of some facets alone."""
-    return Tracer(
+    return RayCaster(
         facets.replace(**{k: getattr(facets, k)[rows] for k in ("vertices", "normals", "body", "part", "material")})
     )
 
@@ -132,7 +132,7 @@ def _error(residual: Floats, whole: float, count: int) -> float:
     return max(2.0 * deviation, 1.0 / count)
 
 
-def _point(scene: Tracer, points: Points, eye: Floats, body: int, layers: int) -> str | None:
+def _point(scene: RayCaster, points: Points, eye: Floats, body: int, layers: int) -> str | None:
     """Return what hides the point of a target given by its RCS."""
     mine = np.flatnonzero(points.body == body)
     if not len(mine):

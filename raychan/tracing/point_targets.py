@@ -7,26 +7,26 @@ from numpy.typing import NDArray
 
 from raychan.records import POINT, REFLECT, TRANSMIT, Points, Routes
 from raychan.tracing.legs import Leg, View
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 
 
 def point_routes(
-    surface: Surface, points: Points, ways_in: list[Leg], ways_out: list[Leg], bounces: int, slots: int, layers: int
+    geometry: Geometry, points: Points, ways_in: list[Leg], ways_out: list[Leg], bounces: int, slots: int, layers: int
 ) -> Routes | None:
     """Return the routes over point targets with at most `bounces` interactions, or None where there are none."""
     if not len(points.body):
         return None
-    seen_in = [_see(surface, points, leg, layers) for leg in ways_in]
-    seen_out = seen_in if ways_out == ways_in else [_see(surface, points, leg, layers) for leg in ways_out]
+    seen_in = [_see(geometry, points, leg, layers) for leg in ways_in]
+    seen_out = seen_in if ways_out == ways_in else [_see(geometry, points, leg, layers) for leg in ways_out]
     rows = []
     for i, leg in enumerate(ways_in):
         for j, out in enumerate(ways_out):
             if len(leg.mirrors) + len(out.mirrors) + 1 > bounces:
                 continue
             for p in np.flatnonzero(seen_in[i].seen & seen_out[j].seen):
-                rows.append(_route(surface, points, int(p), leg, out, seen_in[i], seen_out[j], slots))
+                rows.append(_route(geometry, points, int(p), leg, out, seen_in[i], seen_out[j], slots))
     if not rows:
         return None
     tx, rx = ways_in[0].end, ways_out[0].end
@@ -34,13 +34,13 @@ def point_routes(
     return Routes(tx=tx, rx=rx, far=False, **columns)
 
 
-def _see(surface: Surface, points: Points, leg: Leg, layers: int) -> View:
+def _see(geometry: Geometry, points: Points, leg: Leg, layers: int) -> View:
     n = len(points.body)
     none = np.full(n, -1, np.int32)
-    return leg.visible(surface, points.position, none, np.full(n, 1e-6), layers, points.body)
+    return leg.visible(geometry, points.position, none, np.full(n, 1e-6), layers, points.body)
 
 
-def _route(surface, points, p, leg, out, seen_in, seen_out, slots):  # type: ignore[no-untyped-def]
+def _route(geometry, points, p, leg, out, seen_in, seen_out, slots):  # type: ignore[no-untyped-def]
     at = points.position[p]
     (k_in, l_in), (k_out, l_out) = leg.rays(at[None]), out.rays(at[None])
     vertices, normals, facets, kinds = [], [], [], []
@@ -56,8 +56,8 @@ def _route(surface, points, p, leg, out, seen_in, seen_out, slots):  # type: ign
             add(spot, m.normal, m.facet, REFLECT)
         for facet in seen.passed[p]:
             if facet >= 0:
-                t = surface.distance(np.array([facet]), at[None], k)
-                add(at + t[0] * k[0], surface.normal[facet], facet, TRANSMIT)
+                t = geometry.distance(np.array([facet]), at[None], k)
+                add(at + t[0] * k[0], geometry.normal[facet], facet, TRANSMIT)
 
     add_way(leg, seen_in, k_in)
     scatter = len(vertices)
@@ -67,7 +67,7 @@ def _route(surface, points, p, leg, out, seen_in, seen_out, slots):  # type: ign
     for column in (vertices, normals, facets, kinds):
         column[head:] = column[head:][::-1]
     used, free = len(vertices), slots - len(vertices)
-    body = [int(surface.facets.body[f]) if f >= 0 else int(points.body[p]) for f in facets]
+    body = [int(geometry.facets.body[f]) if f >= 0 else int(points.body[p]) for f in facets]
     length = float(l_in[0] + l_out[0])
     return {
         "vertices": np.array(vertices + [out.end] * free),

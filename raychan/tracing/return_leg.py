@@ -6,25 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.frames import sizes
-from raychan.tracing.contributions import Found
+from raychan.tracing.contributions import Contributions
 from raychan.tracing.horizon import FACING, LIT, OBLIQUE
 from raychan.tracing.launch import GAPS, RUNNING, sight
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.subdivide import divide, halves
 from raychan.tracing.tubes import Phases, Tubes, phases_of
 from raychan.tracing.visibility import BENT, READY, SHADED, sort_out
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
-def settle(
-    surface: Surface,
+def resolve_return_leg(
+    geometry: Geometry,
     leg: Leg,
     out: Leg,
     tubes: Tubes,
-    found: Found,
+    found: Contributions,
     first: bool = False,
     veiled: bool = False,
     which: int = FACING,
@@ -41,24 +41,24 @@ def settle(
         share, facing = out.radiating(tubes.points, tubes.k, tubes.normals, which)
         rows = np.flatnonzero(share > 0.0)
         tubes, share, facing = tubes.take(rows), share[rows], facing[rows]
-        ph = phases_of(surface, leg, out, tubes, rule)
+        ph = phases_of(geometry, leg, out, tubes, rule)
         if which == OBLIQUE and not facing.all():
             # Beyond the horizon most is out of phase with its neighbours, and little of it counts.
             weak = np.flatnonzero(~facing)
             left = found.that_count(RUNNING * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
-        matters = (ph.bound > found.doubt(ph.length)) & (not found.spent(surface))
+        matters = (ph.bound > found.doubt(ph.length)) & (not found.spent(geometry))
         # Of what little a scene sees of them, currents beyond the horizon are asked for by their centres alone.
         asked = matters if which == LIT else matters & facing
-        view = sight(surface, out, tubes, asked, first, rule, level < GAPS, beyond=~facing)
+        view = sight(geometry, out, tubes, asked, first, rule, level < GAPS, beyond=~facing)
         cut = matters if level < rule.levels else np.zeros_like(matters)
         if veiled:
             view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
         how = facing, view.centre.seen, view.some, view.mixed, ph.rough
         what = sort_out(*how, cut)
         wanted = (what == BENT) | (what == SHADED)
-        cut &= ~wanted | found.affords(surface, tubes.facet, wanted)
+        cut &= ~wanted | found.affords(geometry, tubes.facet, wanted)
         what = sort_out(*how, cut)
         ready, bent, shaded = (np.flatnonzero(what == w) for w in (READY, BENT, SHADED))
         kept.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
@@ -68,11 +68,11 @@ def settle(
         lengths = sizes(tubes.points[bent, :3] - np.roll(tubes.points[bent, :3], -1, axis=1))
         bend = np.abs(ph.bend[bent])
         edge = np.argmax(np.where((ph.rough[bent] > 1.0)[:, None], bend, lengths), axis=1)
-        halved = halves(surface, leg, tubes, bent, edge, first, rule.jitter)
-        parted, _ = divide(surface, leg, tubes, shaded, view.side, first, rule.jitter)
+        halved = halves(geometry, leg, tubes, bent, edge, first, rule.jitter)
+        parted, _ = divide(geometry, leg, tubes, shaded, view.side, first, rule.jitter)
         tubes = Tubes.join([halved, parted])
     some, views, phases = zip(*kept, strict=True)
-    if not surface.convex_alone:
+    if not geometry.convex_alone:
         found.add(Phases.join(list(phases)))
     way = View.join(list(views))
     return Tubes.join(list(some)), way.corners, way.passed

@@ -5,36 +5,38 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.records import Routes
 from raychan.tracing.footprints import footprints
 from raychan.tracing.legs import Leg
 from raychan.tracing.replay import chains, way_back
 from raychan.tracing.tubes import Tubes, middles
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
-def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, corners: Floats, passed: Ints) -> Routes:
+def routes_of(
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, first: bool, corners: Floats, passed: Ints
+) -> Routes:
     """Return the routes of tubes that scatter on their present footprint and leave over `out`.
 
     Args: first whether this is their first surface; corners (n, m, 3) mirror points of the way out, receiver's side
     first; passed (n, l) layers on its last stretch. Chains are as long as the longest.
     """
-    n, m, f = len(tubes), len(out.mirrors), surface.facets
+    n, m, f = len(tubes), len(out.mirrors), geometry.facets
     end = np.asarray(out.end, float)
-    middle, half_way = middles(surface, leg, tubes, first)
+    middle, half_way = middles(geometry, leg, tubes, first)
     slots = int((tubes.slots + (passed >= 0).sum(axis=1)).max(initial=0)) + 1 + m
     vertices, normals = np.empty((2, n, slots, 3))
     facet, body = np.empty((n, slots), np.int32), np.empty((n, slots), np.int16)
     kind = np.empty((n, slots), np.int8)
     points, lengths, taper = np.empty((n, 6, 3)), np.empty((n, 6)), np.empty((n, 3))
     length, area, way_out = np.empty((3, n))
-    planes = surface.first, surface.normal, f.body
+    planes = geometry.first, geometry.normal, f.body
     mirrors = np.array([x.normal for x in out.mirrors]).reshape(m, 3), np.array([x.facet for x in out.mirrors], int)
-    shape = surface.normal, f.vertices, surface.bulge, surface.curved
+    shape = geometry.normal, f.vertices, geometry.edge_curvature, geometry.curved
     # Far off, nothing is said of where unused slots are.
     fill = np.zeros(3) if out.far else end
 
@@ -50,7 +52,7 @@ def routes_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, first: bool, c
             tuple(x[at] for x in (points, lengths, length, taper, area, way_out)),
         )  # fmt: skip
 
-    in_two(n, some)
+    parallel_for(n, some)
     return Routes(
         tx=np.asarray(leg.end, float),
         rx=end,

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import copy_to
 from raychan.geometry.edge_grid import most_within, starts_again
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.tracing.edge_crossings import above, apart, dot, pyramid, scale_at, size_of, within
 from raychan.tracing.legs import Leg
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -24,13 +24,13 @@ _KEPT = 64  # legs; each takes a megabyte or two
 _CELLS = 512  # along the longest side of the grid of directions
 
 
-class Shadows:
+class ShadowEdges:
     """The silhouette edges of all bodies as seen over one leg, in a grid of directions from the leg's last image: of
     these the two coordinates that vary most."""
 
-    def __init__(self, surface: Surface, leg: Leg) -> None:
-        self.edges, self._smooth = _silhouette(surface, leg)
-        self._from = surface.normal, surface.smooth, leg.image, leg.far, surface.touch
+    def __init__(self, geometry: Geometry, leg: Leg) -> None:
+        self.edges, self._smooth = _silhouette(geometry, leg)
+        self._from = geometry.normal, geometry.smooth, leg.image, leg.far, geometry.touch
         if len(self.edges):
             low, high = _bounds(self.edges, leg.image, leg.far)
             low, high, _ = most_within(_places(self.edges.mean(axis=1), leg.image, leg.far), low, high)
@@ -55,29 +55,29 @@ class Shadows:
             shadows = *self._from, self.edges, self._smooth, *self._grid
             _across(*(points[rows], facet[rows], slack[rows], *shadows, side[rows]))
 
-        in_two(len(points), some, _MANY)
+        parallel_for(len(points), some, _MANY)
         return side
 
 
-def shadows_of(surface: Surface, leg: Leg) -> Shadows:
+def shadow_edges_of(geometry: Geometry, leg: Leg) -> ShadowEdges:
     """Return the shadows of a leg, made once for all legs of the same last image and mirror: a surface keeps the newest
     few."""
     last = (leg.mirrors[-1].facet, leg.mirrors[-1].normal.tobytes()) if leg.mirrors else None
     key = np.asarray(leg.image, float).tobytes(), leg.far, last
-    known: dict[Any, Shadows] = surface.shadows
-    with surface.making:
+    known: dict[Any, ShadowEdges] = geometry.shadows
+    with geometry.making:
         if key not in known:
             if len(known) >= _KEPT:
                 del known[next(iter(known))]
-            known[key] = Shadows(surface, leg)
+            known[key] = ShadowEdges(geometry, leg)
         return known[key]
 
 
-def _silhouette(surface: Surface, leg: Leg) -> tuple[Floats, Ints]:
+def _silhouette(geometry: Geometry, leg: Leg) -> tuple[Floats, Ints]:
     """Return the edges (m, 2, 3) [m] at which a body turns away, and the rims of open sheets, in front of the last
     mirror; and the smooth patches (m, 2) that meet there."""
-    half, pair = surface.turning(leg.image, leg.far)
-    edges, smooth = surface.ends(half), surface.smooth[np.where(pair < 0, pair[:, ::-1], pair)]
+    half, pair = geometry.turning(leg.image, leg.far)
+    edges, smooth = geometry.ends(half), geometry.smooth[np.where(pair < 0, pair[:, ::-1], pair)]
     if leg.mirrors:
         m = leg.mirrors[-1]
         ahead = ((edges - m.point) @ m.normal > 0.0).any(axis=1)
@@ -184,8 +184,8 @@ def _across(  # type: ignore[no-untyped-def]
             k[c] /= size
         sign = -1.0 if dot(k, normal) > 0.0 else 1.0
         level = sign * dot(centre, normal)
-        bulge = 0.0 if far else 0.125 * np.sum((most - least) ** 2)
-        margin = 0.5 * cell + bulge
+        edge_curvature = 0.0 if far else 0.125 * np.sum((most - least) ** 2)
+        margin = 0.5 * cell + edge_curvature
         u, v = axes
         i0, i1 = _cells(least[u] - margin, most[u] + margin, low[0], cell, shape[0])
         j0, j1 = _cells(least[v] - margin, most[v] + margin, low[1], cell, shape[1])

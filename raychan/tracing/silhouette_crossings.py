@@ -12,10 +12,10 @@ from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import copy_to
 from raychan.geometry.edge_grid import fill_grid, most_within, packed
 from raychan.geometry.grid_traversal import ALONG, BLOCK, crowded, layer, layers, span, widths
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.records import MIRROR
 from raychan.tracing.edge_crossings import above, apart, dot, pyramid, scale_at, size_of, within
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -29,13 +29,13 @@ _MANY = 500  # tubes from which on a second thread pays
 _CLEAR = 1e-5  # m: what lies nearer to a surface belongs to it
 
 
-class Between:
+class SilhouetteCrossings:
     """Every edge that can be an outline, in a grid of cubes; tubes walk through it from mirror to landing."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, geometry: Geometry) -> None:
         # The surface holds this: a reference back would keep both until the garbage collector comes by.
-        self.surface = proxy(surface)
-        ends = surface.edge_ends
+        self.geometry = proxy(geometry)
+        ends = geometry.edge_ends
         low, high = (ends.min(axis=(0, 1)), ends.max(axis=(0, 1))) if len(ends) else (np.zeros(3), np.ones(3))
         low, high, self.cut_off = most_within(ends.mean(axis=1), low, high)
         volume = float(np.prod(high - low + _LEAST_CELL))
@@ -43,13 +43,13 @@ class Between:
         self.low = low - self.cell
         self.shape = np.ceil((high - self.low) / self.cell).astype(np.int64) + 2
         self.first, self.index = fill_grid(ends, self.low, self.cell, self.shape)
-        self.edges, self.planes = packed(self.index, ends, surface.edge_faces, surface.normal)
+        self.edges, self.planes = packed(self.index, ends, geometry.edge_faces, geometry.normal)
         held = np.flatnonzero(np.diff(self.first))
         blocks = np.stack(np.unravel_index(held, tuple(self.shape))) // BLOCK
         self.crowd = np.zeros(tuple(self.shape // BLOCK + 1), np.bool_)
         self.crowd[tuple(blocks)] = True
-        centre, radius, empty = surface.balls
-        solid = ~empty & (surface.facets.role != MIRROR)
+        centre, radius, empty = geometry.balls
+        solid = ~empty & (geometry.facets.role != MIRROR)
         self.centre, self.radius = centre[solid], radius[solid]
 
     def across(
@@ -71,7 +71,7 @@ class Between:
         behind where all mirrors were flat (n,); hit (n, 4) facets on which rays land, -1 for none, after reach
         (n, 4) [m].
         """
-        s = self.surface
+        s = self.geometry
         rows = rows[~side[rows].any(axis=1)]
 
         def some(part: slice) -> None:
@@ -81,15 +81,15 @@ class Between:
                 self.crowd, self.centre, self.radius, side,
             )  # fmt: skip
 
-        in_two(len(rows), some, _MANY)
+        parallel_for(len(rows), some, _MANY)
 
 
-def between(surface: Surface) -> Between:
+def between(geometry: Geometry) -> SilhouetteCrossings:
     """Return the grid of a surface's edges, made once."""
-    with surface.making:
-        if surface.between is None:
-            surface.between = Between(surface)
-    found: Between = surface.between
+    with geometry.making:
+        if geometry.between is None:
+            geometry.between = SilhouetteCrossings(geometry)
+    found: SilhouetteCrossings = geometry.between
     return found
 
 

@@ -15,22 +15,24 @@ from raychan.tracing.subdivide_kernels import (
     sound_parts,
 )
 from raychan.tracing.tubes import CENTRE, Tubes, first_rays
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.signedinteger]
 
 
-def halves(surface: Surface, leg: Leg, tubes: Tubes, rows: Rows, edge: Rows, first: bool, jitter: float = 0.0) -> Tubes:
+def halves(
+    geometry: Geometry, leg: Leg, tubes: Tubes, rows: Rows, edge: Rows, first: bool, jitter: float = 0.0
+) -> Tubes:
     """Return both halves of the tubes `rows` (m,), cut from the middle of edge 0, 1 or 2 (m,) to the corner
     opposite."""
-    return _parts(surface, leg, tubes, np.concatenate([rows, rows]), half_weights(edge, jitter), first, 2 * len(rows))[
+    return _parts(geometry, leg, tubes, np.concatenate([rows, rows]), half_weights(edge, jitter), first, 2 * len(rows))[
         0
     ]
 
 
 def divide(
-    surface: Surface, leg: Leg, tubes: Tubes, rows: Rows, side: Floats, first: bool, jitter: float
+    geometry: Geometry, leg: Leg, tubes: Tubes, rows: Rows, side: Floats, first: bool, jitter: float
 ) -> tuple[Tubes, Rows]:
     """Cut the tubes `rows` (m,) along the edge that runs through them, or in half; return the parts and the row of
     each.
@@ -41,11 +43,11 @@ def divide(
     blunt, sharp = rows[~known], rows[known]
     parent = np.concatenate([blunt, blunt, sharp, sharp, sharp])
     half = half_weights(longest_edges(tubes.points[blunt]), jitter)
-    return _parts(surface, leg, tubes, parent, np.concatenate([half, line_weights(side[sharp])]), first, len(half))
+    return _parts(geometry, leg, tubes, parent, np.concatenate([half, line_weights(side[sharp])]), first, len(half))
 
 
 def _parts(
-    surface: Surface, leg: Leg, tubes: Tubes, parent: Rows, weights: Floats, first: bool, many: int
+    geometry: Geometry, leg: Leg, tubes: Tubes, parent: Rows, weights: Floats, first: bool, many: int
 ) -> tuple[Tubes, Rows]:
     """Return part tubes whose corner i is the mean of the parent's corners by weights[:, i] (m, 3, 3), and the parent
     (m,) of each; but for the first `many` only those that have an area.
@@ -55,7 +57,7 @@ def _parts(
     n, facet = len(parent), tubes.facet[parent]
     bary = on_first(weights, parent, tubes.bary) if first else np.empty((n, 0, 3))
     if first:
-        points, k, length, normals = first_rays(surface, leg, facet, bary)
+        points, k, length, normals = first_rays(geometry, leg, facet, bary)
         spread = leg.spread(length[:, CENTRE])
     else:
         points, k, normals, length = np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4))

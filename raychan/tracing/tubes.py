@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from raychan.frames import sizes
 from raychan.geometry.curved_patches import rays_on
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 from raychan.records import REFLECT
 from raychan.tracing.history import History
 from raychan.tracing.legs import Leg
 from raychan.tracing.tube_phases import phases
-from raychan.world.geometry import Surface
+from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -40,7 +40,7 @@ class Refinement:
     same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
     [m] of first tubes; `levels` of cutting for sight and bounces; `slots` of history; `layers` that a stretch may
     pass; `max_tubes` that cuts for phase may come by, `max_cuts` for sight and `max_rays` cast after which a launch
-    cuts no more (see `Found.affords`); `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
+    cuts no more (see `Contributions.affords`); `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
     """
 
     wavenumber: float
@@ -130,10 +130,10 @@ class Tubes:
 _ROWS = tuple(f.name for f in fields(Tubes) if f.name != "history")
 
 
-def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> Tubes:
+def stand(geometry: Geometry, leg: Leg, facet: Ints, bary: Floats) -> Tubes:
     """Return first-bounce tubes on the true surface at barycentric corners (n, 3, 3), seen from the end of `leg`."""
     n = len(facet)
-    points, k, length, normals = first_rays(surface, leg, facet, bary)
+    points, k, length, normals = first_rays(geometry, leg, facet, bary)
     return Tubes(
         points=points,
         k=k,
@@ -152,18 +152,18 @@ def stand(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> Tubes:
     )
 
 
-def first_rays(surface: Surface, leg: Leg, facet: Ints, bary: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def first_rays(geometry: Geometry, leg: Leg, facet: Ints, bary: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return points, directions, lengths and normals of the rays of a leg to barycentric corners (n, 3, 3) and their
     centres."""
-    f = surface.facets
-    return rays_on(facet, bary, f.vertices, f.normals, surface.bulge, surface.both_sides, leg.image, leg.far)
+    f = geometry.facets
+    return rays_on(facet, bary, f.vertices, f.normals, geometry.edge_curvature, geometry.both_sides, leg.image, leg.far)
 
 
-def middles(surface: Surface, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
+def middles(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
     """Return the middles of the three edges (n, 3, 3) [m] and the lengths there (n, 3) [m]."""
     if first:
         points, _, length, _ = first_rays(
-            surface, leg, tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1))
+            geometry, leg, tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1))
         )
         return points[:, :3].copy(), length[:, :3].copy()
     p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
@@ -197,20 +197,20 @@ class Phases:
         return Phases(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Phases)})
 
 
-def phases_of(surface: Surface, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
+def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
     """Return the phases of tubes over the way out, and what each can scatter back at most."""
-    n, f = len(tubes), surface.facets
+    n, f = len(tubes), geometry.facets
     six, bend, (bound, area, rough, way) = np.empty((n, 6)), np.empty((n, 3)), np.empty((4, n))
     rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary
     held = tubes.strength, tubes.spread
     written = six, bend, bound, area, rough, way
-    shape = f.vertices, surface.bulge, leg.image, leg.far, out.antenna, rule.wavenumber
+    shape = f.vertices, geometry.edge_curvature, leg.image, leg.far, out.antenna, rule.wavenumber
 
     def some(rows: slice) -> None:
         here, of, to = ([x[rows] for x in arrays] for arrays in (rays, held, written))
-        phases(*(*here, *shape, *of, (rule.phase, rule.turn, MOST_BEND), surface.dull, *surface.matter, *to))
+        phases(*(*here, *shape, *of, (rule.phase, rule.turn, MOST_BEND), geometry.dull, *geometry.matter, *to))
 
-    in_two(n, some, _MANY)
+    parallel_for(n, some, _MANY)
     return Phases(six, bend, bound, area, rough, way)
 
 

@@ -20,13 +20,13 @@ _PNG_END = b"IEND\xaeB`\x82"  # without it the disk was full
 
 def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | None = None) -> Drawing:
     """Return the drawing of a scene, with the rays of its result if given, or with those of one cell of its map."""
-    sensor, title = scene.sensor, scene.title
+    radar, title = scene.radar, scene.title
     if cell is not None:
         where = f"{cell.range:.2f} m, {cell.speed:+.2f} m/s, {cell.label}"
         where += f", folded from {cell.true_range:.2f} m" if cell.folded else ""
         where += "" if cell.converged else ", not converged"
         title = f"{title}: {where}" if title else where
-    return draw(title, scene.facets(0.0), scene.points(0.0), sensor.position, sensor.boresight, result, cell)
+    return draw(title, scene.facets(0.0), scene.points(0.0), radar.position, radar.boresight, result, cell)
 
 
 def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:

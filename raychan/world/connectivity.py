@@ -12,14 +12,14 @@ from scipy.spatial import cKDTree
 
 from raychan.geometry.triangles import ends
 from raychan.records import MIRROR, Facets
-from raychan.world.topology import Joints
+from raychan.world.topology import MeshTopology
 
 Ints = NDArray[np.int32]
 
 _WELD = 2e-6  # m: corners nearer than this are one
 
 
-def pieces(facets: Facets, joined: Sequence[tuple[Joints, int]], rim: Ints) -> Ints:
+def pieces(facets: Facets, joined: Sequence[tuple[MeshTopology, int]], rim: Ints) -> Ints:
     """Return the number (n,) of the piece that each facet hangs together with, from 0 on.
 
     Args: joined joints and the first facet of each; rim half edges (r,) that have no other side in their body. Bodies

@@ -107,13 +107,13 @@ def _hard_folds(mesh: Mesh) -> tuple[Ints, Floats]:
     pair, fold = _all_folds(mesh)
     if not mesh.crease_deg or not len(pair):
         return pair[:0], fold[:0]
-    smooth = rounded(mesh.joints, mesh.corners, pair, _outward(mesh, pair) * fold, crease_angle(mesh.crease_deg))
+    smooth = rounded(mesh.topology, mesh.corners, pair, _outward(mesh, pair) * fold, crease_angle(mesh.crease_deg))
     return pair[smooth], fold[smooth]
 
 
 def _all_folds(mesh: Mesh) -> tuple[Ints, Floats]:
     """Return the half edges (e, 2) that two facets walk in opposite ways, and their folds (e,) [rad]."""
-    pair = mesh.joints.pair
+    pair = mesh.topology.pair
     corner = mesh.faces.astype(np.int64).ravel()
     pair = pair[corner[pair[:, 0]] != corner[pair[:, 1]]]
     return pair, folds(mesh.vertices, mesh.faces, pair)

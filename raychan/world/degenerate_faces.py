@@ -56,6 +56,6 @@ def alive(v: Floats, f: Ints) -> tuple[NDArray[np.bool_], int, int]:
     longest = np.linalg.norm(np.roll(c, -1, axis=1) - c, axis=2).max(axis=1, initial=0.0)
     flat = np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1) <= 1e-12 * longest**2
     _, first = np.unique(np.sort(f, axis=1), axis=0, return_index=True)
-    once = np.zeros(len(f), bool)
-    once[first] = True
-    return once & ~flat, int(flat.sum()), int((~once & ~flat).sum())
+    cached = np.zeros(len(f), bool)
+    cached[first] = True
+    return cached & ~flat, int(flat.sum()), int((~cached & ~flat).sum())

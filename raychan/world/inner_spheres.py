@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from raychan.geometry.closed_surfaces import clearance, crossed, winding
-from raychan.world.topology import Joints
+from raychan.world.topology import MeshTopology
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -23,20 +23,20 @@ _WHOLE = 0.01  # how far a winding number may be from a whole one: facets that d
 _INNER = 0.999  # of the way to the nearest facet: rounding of a ray must not pass between
 
 
-def closed_pieces(joints: Joints, opaque: Bools) -> Bools:
+def closed_pieces(topology: MeshTopology, opaque: Bools) -> Bools:
     """Tell which facets (n,) are of pieces that hang together, close about an inside, and are opaque (n,) all over."""
-    piece = joints.piece
+    piece = topology.piece
     # Two sheets upon each other share every edge twice, yet have no inside.
     closed = np.zeros(len(opaque), bool)
-    one_plane = np.empty(len(opaque), joints.plane.dtype)
-    one_plane[piece] = joints.plane
-    closed[piece[joints.plane != one_plane[piece]]] = True
+    one_plane = np.empty(len(opaque), topology.plane.dtype)
+    one_plane[piece] = topology.plane
+    closed[piece[topology.plane != one_plane[piece]]] = True
     closed[piece[~opaque]] = False
-    closed[piece[joints.rim // 3]] = False
+    closed[piece[topology.rim // 3]] = False
     return np.asarray(closed[piece])
 
 
-def cores_of(v: Floats) -> tuple[Floats, Floats]:
+def inner_spheres_of(v: Floats) -> tuple[Floats, Floats]:
     """Return centres (k, 3) [m] and radii (k,) [m] of balls inside a closed surface, the largest first.
 
     Args: v (n, 3, 3) corners [m] of facets that close: every edge is of two. A ball holds

@@ -13,9 +13,9 @@ from scipy.sparse.csgraph import connected_components
 
 from raychan.world import degenerate_faces
 from raychan.world.errors import SceneError
-from raychan.world.inner_spheres import closed_pieces, cores_of
+from raychan.world.inner_spheres import closed_pieces, inner_spheres_of
 from raychan.world.merge_coplanar import merge_flat
-from raychan.world.topology import Joints, joined, places
+from raychan.world.topology import MeshTopology, joined, places
 from raychan.world.vertex_normals import folds, smoothed
 
 Floats = NDArray[np.float64]
@@ -73,18 +73,18 @@ class Mesh:
     crease_deg: float | None = None
 
     @cached_property
-    def joints(self) -> Joints:
+    def topology(self) -> MeshTopology:
         """How the faces hang together."""
         return joined(places(self.vertices)[self.faces], self.part, self.corners, self.normals)
 
-    def cores(self, opaque: tuple[bool, ...]) -> tuple[Floats, Floats]:
+    def inner_spheres(self, opaque: tuple[bool, ...]) -> tuple[Floats, Floats]:
         """Return centres (k, 3) [m] and radii (k,) [m] of balls inside, whose shadow the mesh's own holds.
 
         Args: opaque: which parts let nothing through.
         """
         if opaque not in self._cores:
-            solid = closed_pieces(self.joints, np.array(opaque, bool)[self.part])
-            self._cores[opaque] = cores_of(self.corners[solid])
+            solid = closed_pieces(self.topology, np.array(opaque, bool)[self.part])
+            self._cores[opaque] = inner_spheres_of(self.corners[solid])
         return self._cores[opaque]
 
     @cached_property

@@ -82,29 +82,29 @@ def _inside(body: Body, other: Body) -> float:
     return float(np.mean([other.geometry.winding(p) > _INSIDE for p in asked])) * len(near) / len(places)
 
 
-def unseen(bodies: Sequence[Body], sensor: Any) -> list[str]:
+def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
     """Return a line where no body is in view of the radar, in its beam, or within its unambiguous range."""
     things = [b for b in bodies if b.kind != MIRROR and not b.name.startswith("ego")]
     if not things:
         return ["no body is in view: the scene has none but ground and the radar's own car (bodies)"]
     spread = [surface_sample(b) for b in things]
     spread += [b.motion.to_world(b.target_point())[None] for b in things if b.rcs is not None]
-    way = np.concatenate(spread) - sensor.position
+    way = np.concatenate(spread) - radar.position
     far = np.linalg.norm(way, axis=1)
-    gain = _two_way(sensor, way[far > 0.0] / far[far > 0.0, None])
-    peak = float(np.max(_two_way(sensor, _around() @ sensor.axes.T)))
-    if not (gain > 0.0).any() and not (way @ sensor.boresight > 0.0).any():
+    gain = _two_way(radar, way[far > 0.0] / far[far > 0.0, None])
+    peak = float(np.max(_two_way(radar, _around() @ radar.axes.T)))
+    if not (gain > 0.0).any() and not (way @ radar.boresight > 0.0).any():
         return ["no body is in view: all are behind the antenna (radar.yaw_deg, radar.position, bodies.*.position)"]
     if not (gain > _BEAM * peak).any():
         return ["no body is in the beam: all are 60 dB or more under its peak (radar.yaw_deg, radar.antenna)"]
-    limit = sensor.waveform.unambiguous_range
+    limit = radar.waveform.unambiguous_range
     if far.min() > limit:
         return [f"no body is within the unambiguous range of {limit:.4g} m (radar.waveform.samples, bandwidth_mhz)"]
     return []
 
 
-def _two_way(sensor: Any, look: Floats) -> Floats:
-    ends = (np.linalg.norm(f(look), axis=1) ** 2 for f in (sensor.tx_field, sensor.rx_field))
+def _two_way(radar: Any, look: Floats) -> Floats:
+    ends = (np.linalg.norm(f(look), axis=1) ** 2 for f in (radar.tx_field, radar.rx_field))
     return np.asarray(np.prod(list(ends), axis=0))
 
 

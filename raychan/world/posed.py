@@ -12,12 +12,12 @@ from raychan.geometry.triangles import stand
 from raychan.records import Facets
 from raychan.world.body import Body
 from raychan.world.material import Material, resolve
-from raychan.world.static_geometry import Still
+from raychan.world.static_geometry import StaticGeometry
 
 Index = tuple[list[Material], list[str], list[tuple[NDArray[np.int32], NDArray[np.int32]]]]
 
 
-def placed(bodies: Sequence[Body], index: Index, frequency: float, time: float, still: Still | None) -> Facets:
+def placed(bodies: Sequence[Body], index: Index, frequency: float, time: float, still: StaticGeometry | None) -> Facets:
     """Return all triangles in the world at a time [s], bodies in order.
 
     Args: index all materials, all part names, and for each body the material and the part number of its parts;
@@ -38,7 +38,7 @@ def placed(bodies: Sequence[Body], index: Index, frequency: float, time: float, 
     return now
 
 
-def _shared(facets: Facets, still: Still) -> Facets:
+def _shared(facets: Facets, still: StaticGeometry) -> Facets:
     """Return the same record of columns that are kept."""
     vertices, normals = still.keep("facets", (facets.vertices, facets.normals))
     kept: Facets = facets.rebuilt(vertices=vertices, normals=normals)

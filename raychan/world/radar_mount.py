@@ -15,9 +15,9 @@ from raychan.world.schema import AntennaTable, RadarTable
 from raychan.world.schema_errors import checked
 
 
-def sensor_of(table: RadarTable, folder: Path, file: Any = None) -> Any:
+def radar_of(table: RadarTable, folder: Path, file: Any = None) -> Any:
     """Return the radar.Sensor of a radar table; antenna files are looked up in `folder`."""
-    from raychan.radar.radar import Sensor
+    from raychan.radar.radar import Radar
     from raychan.radar.waveform import Waveform
 
     w = table.waveform
@@ -32,7 +32,7 @@ def sensor_of(table: RadarTable, folder: Path, file: Any = None) -> Any:
         complex_sampling=w.iq,
     )
     yaw, pitch, roll = (float(x) for x in np.radians([table.yaw_deg, table.pitch_deg, table.roll_deg]))
-    return Sensor(
+    return Radar(
         position=np.array(table.position),
         yaw=yaw,
         pitch=pitch,

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from raychan.geometry.intersect import arrive, companions, land, near_ball, plane_distances, set_out
 from raychan.geometry.triangles import extents, planes_of, turned
-from raychan.parallel import in_two, once
+from raychan.parallel import cached, parallel_for
 from raychan.records import LAYER, Facets
 from raychan.world.backed_layers import backed
-from raychan.world.static_geometry import Still, columns, lasting
+from raychan.world.static_geometry import StaticGeometry, columns, lasting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -43,7 +43,7 @@ class Triangles:
         self._corners: Callable[[], Floats] | None = corners
         self.centre, self.making = centre, threading.RLock()
 
-    @once
+    @cached
     def scene(self) -> Any:
         """What answers rays from the centre."""
         from embreex.mesh_construction import TriangleMesh
@@ -89,10 +89,10 @@ class Group:
         return hit if self._rows is None else np.where(hit >= 0, self._rows[hit], _MISS)
 
 
-class Tracer:
+class RayCaster:
     """A scene of facets that answers rays, and counts them by thread."""
 
-    def __init__(self, facets: Facets, still: Still | None = None) -> None:
+    def __init__(self, facets: Facets, still: StaticGeometry | None = None) -> None:
         self.facets = facets
         v, n = facets.vertices, len(facets.vertices)
         self.first = np.ascontiguousarray(v[:, 0])
@@ -132,7 +132,7 @@ class Tracer:
             Group(lambda: v[thin], self.extents, thin, behind=self.touch),
         ]
 
-    def _parted(self, still: Still) -> list[Group]:
+    def _parted(self, still: StaticGeometry) -> list[Group]:
         """Return what stands still, what is large and moves, and all that is small and moves, each by itself."""
         v, extents = self.facets.vertices, self.extents
         groups = []
@@ -185,7 +185,7 @@ class Tracer:
                 for group in self._groups[1:]:
                     self._nearer(group, *ways, facet[at], distance[at])
 
-        in_two(n, some, _MANY)
+        parallel_for(n, some, _MANY)
         # A ray and its two companions count as one, however many groups it is cast at.
         self._count(sum(casts))
         return facet, distance
@@ -265,7 +265,7 @@ class Tracer:
         return reached, passed, blocker
 
 
-def _extents(facets: Facets, still: Still | None) -> Floats:
+def _extents(facets: Facets, still: StaticGeometry | None) -> Floats:
     """Return the lowest and highest corner (b, 2, 3) [m] of each body."""
     count = len(facets.role)
     shared = still if still is not None and still.shares else None

@@ -22,12 +22,12 @@ from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.posed import placed, stack
-from raychan.world.radar_mount import sensor_of
+from raychan.world.radar_mount import radar_of
 from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 from raychan.world.seams import over_seams
-from raychan.world.static_geometry import Still
-from raychan.world.topology import Joints
+from raychan.world.static_geometry import StaticGeometry
+from raychan.world.topology import MeshTopology
 
 __all__ = ["Body", "Scene", "SceneError"]
 
@@ -57,10 +57,10 @@ class Scene(Told):
         self.title, self.text, self.path = title, text, path
         self.folder = folder or Path.cwd()
         self.bodies = tuple(bodies)
-        self.radar: RadarTable | None = None if radar is None else checked(RadarTable, radar, path)
+        self.radar_table: RadarTable | None = None if radar is None else checked(RadarTable, radar, path)
         self.processing: Processing = checked(Processing, processing or Processing(), path)
         self.model: Model = checked(Model, model or Model(), path)
-        carrier = self.radar.waveform.carrier_ghz * 1e9 if self.radar else 77e9
+        carrier = self.radar_table.waveform.carrier_ghz * 1e9 if self.radar_table else 77e9
         self.frequency = carrier if frequency is None else float(frequency)
         if not FREQUENCY.allows(self.frequency):
             raise SceneError(
@@ -73,7 +73,7 @@ class Scene(Told):
         # the scenes that share it.
         self.kept: dict[Any, Any] = {}
         # The same of what stands still, for this scene and all that it becomes as time goes on.
-        self._still: dict[type, Still | None] = {}
+        self._still: dict[type, StaticGeometry | None] = {}
         try:
             self._prepare()
         except SceneError as e:
@@ -168,16 +168,16 @@ class Scene(Told):
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.bodies = over_seams(self.bodies)
-        checks.radar_outside(self.bodies, self.radar)
-        if self.radar is not None:
-            _ = self.sensor
+        checks.radar_outside(self.bodies, self.radar_table)
+        if self.radar_table is not None:
+            _ = self.radar
 
     @cached_property
-    def sensor(self) -> Any:
+    def radar(self) -> Any:
         """The radar.Sensor at time 0; SceneError where the scene has no radar."""
-        if self.radar is None:
+        if self.radar_table is None:
             raise SceneError("the scene has no radar", file=self.path, key="radar", allowed="a [radar] table")
-        return sensor_of(self.radar, self.folder, self.path)
+        return radar_of(self.radar_table, self.folder, self.path)
 
     def at(self, time: float) -> Scene:
         """Return the scene as it stands at a time [s]: bodies and radar moved on, meshes and materials shared.
@@ -190,10 +190,10 @@ class Scene(Told):
         moved.bodies = tuple(b.at(time) for b in self.bodies)
         moved.kept = self.kept if moved._stands_as(self) else {}
         moved._still = self._still
-        if self.radar is not None:
-            there = np.asarray(self.radar.position) + time * np.asarray(self.radar.velocity_mps)
-            moved.radar = self.radar.model_copy(update={"position": there.tolist()})
-            moved.__dict__["sensor"] = self.sensor_at(time)
+        if self.radar_table is not None:
+            there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
+            moved.radar = self.radar_table.model_copy(update={"position": there.tolist()})
+            moved.__dict__["sensor"] = self.radar_at(time)
         moved.__dict__.pop("warnings", None)
         moved.text, moved._data = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
         try:
@@ -207,9 +207,9 @@ class Scene(Told):
         """Return the scene without what is kept for it: a result that stays does not hold on to that."""
         return copy(self)
 
-    def sensor_at(self, time: float) -> Any:
+    def radar_at(self, time: float) -> Any:
         """Return the radar.Sensor where its velocity has brought it at a time [s]."""
-        return self.sensor.at(time)
+        return self.radar.at(time)
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -221,11 +221,11 @@ class Scene(Told):
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
         opaque = [all(m.kind != LAYER for m in self._chosen(b)) for b in self.bodies]
         said += overlaps.overlaps(self.bodies, opaque)
-        if self.radar is None:
+        if self.radar_table is None:
             return said
-        said += checks.edge_on(self.bodies, self.radar)
-        said += overlaps.unseen(self.bodies, self.sensor)
-        return said + checks.aliases(self.bodies, self.radar, self.sensor.waveform)
+        said += checks.edge_on(self.bodies, self.radar_table)
+        said += overlaps.unseen(self.bodies, self.radar)
+        return said + checks.aliases(self.bodies, self.radar_table, self.radar.waveform)
 
     def _chosen(self, body: Body) -> list[Material]:
         """Return the materials of a body's parts: the scene's own first, then the built-in ones."""
@@ -253,11 +253,11 @@ class Scene(Told):
         return list(materials), list(parts), rows
 
     @property
-    def still(self) -> Still | None:
+    def still(self) -> StaticGeometry | None:
         """What is kept of the bodies through all instants; None where that does not pay."""
-        if Still not in self._still:
-            self._still[Still] = Still.of(self.bodies)
-        still = self._still[Still]
+        if StaticGeometry not in self._still:
+            self._still[StaticGeometry] = StaticGeometry.of(self.bodies)
+        still = self._still[StaticGeometry]
         return still and still.at(self.bodies)
 
     def facets(self, time: float = 0.0) -> Facets:
@@ -265,17 +265,17 @@ class Scene(Told):
         return placed(self.bodies, self._index, self.frequency, time, self.still)
 
     @property
-    def joints(self) -> list[Joints]:
+    def topology(self) -> list[MeshTopology]:
         """How the facets of each body hang together."""
-        return [b.geometry.joints for b in self.bodies]
+        return [b.geometry.topology for b in self.bodies]
 
     @property
-    def cores(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
+    def inner_spheres(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
         """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of balls inside bodies at time 0."""
         found = []
         for i, b in enumerate(self.bodies):
             if b.kind != MIRROR:
-                centre, radius = b.geometry.cores(tuple(m.kind != LAYER for m in self._chosen(b)))
+                centre, radius = b.geometry.inner_spheres(tuple(m.kind != LAYER for m in self._chosen(b)))
                 found.append((b.motion.to_world(centre), radius, np.full(len(radius), i, np.int32)))
         centres, radii, owners = zip(*found, strict=True) if found else ((), (), ())
         return stack(list(centres), (3,), float), stack(list(radii), (), float), stack(list(owners), (), np.int32)

@@ -10,37 +10,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.silhouettes import by_cluster
-from raychan.parallel import once
+from raychan.parallel import cached
 from raychan.records import LAYER, MIRROR, Facets
 from raychan.world.connectivity import pieces
 from raychan.world.inner_spheres import closed_pieces
-from raychan.world.topology import Joints
+from raychan.world.topology import MeshTopology
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 
-class Fabric:
+class SceneTopology:
     """Planes, smooth patches, edges and clusters of all bodies' facets, numbered through the scene.
 
     Args: facets, of which only what does not change with the poses is read; joints of each body's facets, bodies one
     after the other.
     """
 
-    def __init__(self, facets: Facets, joints: Sequence[Joints]) -> None:
+    def __init__(self, facets: Facets, topology: Sequence[MeshTopology]) -> None:
         n = len(facets.body)
         # Held while something is made that serves all threads.
         self.making = threading.RLock()
-        self.joined = list(zip(joints, np.cumsum([0, *(len(j.plane) for j in joints)]), strict=False))
-        self.plane = _numbers([j.plane for j in joints], [j.planes for j in joints])
-        self.smooth = _numbers([j.smooth for j in joints], [j.patches for j in joints])
+        self.joined = list(zip(topology, np.cumsum([0, *(len(j.plane) for j in topology)]), strict=False))
+        self.plane = _numbers([j.plane for j in topology], [j.planes for j in topology])
+        self.smooth = _numbers([j.smooth for j in topology], [j.patches for j in topology])
         self._mirror = (facets.role == MIRROR)[facets.body]
         self._layer = (facets.materials.kind == LAYER)[facets.material]
         self.both_sides = self._entered()
         # Over the borders of bodies too.
         self.piece = pieces(facets, self.joined, self.halves("rim"))
-        lone = len(joints) == 1 and joints[0].convex and not self.both_sides.any()
+        lone = len(topology) == 1 and topology[0].convex and not self.both_sides.any()
         self.convex_alone = n > 0 and len(facets.role) == 1 and (lone or not self.plane.any())
         self.hides_nothing = self.convex_alone and lone
 
@@ -57,25 +57,25 @@ class Fabric:
         at = [x + np.int32(3 * i) for x, (_, i) in zip(found, self.joined, strict=True)]
         return np.concatenate(at) if at else np.zeros((0, 2) if name == "pair" else 0, np.int32)
 
-    @once
+    @cached
     def borders(self) -> Bools:
         """Which half edges (3 n,) are not inside a plane: 3 f + k runs from corner k of facet f to the next."""
         return np.concatenate([np.zeros(0, bool), *(j.border for j, _ in self.joined)])
 
-    @once
+    @cached
     def around(self) -> NDArray[np.int64]:
         """How many edges (p,) run around each plane."""
         count = self.borders.reshape(-1, 3).sum(axis=1)
         return np.bincount(self.plane, weights=count, minlength=len(self.plane)).astype(np.int64)
 
-    @once
+    @cached
     def outlines(self) -> tuple[Ints, NDArray[np.int64]]:
         """Half edges (e,) around the planes, and where those of each plane begin (p + 1,)."""
         outer = self.halves("outer")
         count = np.bincount(self.plane[outer // 3], minlength=len(self.plane))
         return outer, np.concatenate([[0], np.cumsum(count)])
 
-    @once
+    @cached
     def silhouettes(self) -> tuple[Ints, Ints]:
         """Half edges (e,) that can be a body's outline, and the facets (e, 2) on both sides, -1 beyond a rim."""
         if self.convex_alone:
@@ -98,14 +98,14 @@ class Fabric:
         faces = np.concatenate([pair // 3, np.stack([rim // 3, np.full(len(rim), -1)], axis=1)])
         return np.concatenate([pair[:, 0], rim]), faces.astype(np.int32)
 
-    @once
+    @cached
     def clusters(self) -> tuple[Ints, NDArray[np.int64]]:
         """Facets (n,) in the order of clusters of neighbours, and where each of these begins (k + 1,)."""
         parts = [(j.order + np.int32(i), j.first[:-1] + i) for j, i in self.joined]
         order, first = (np.concatenate(x) for x in zip(*parts, strict=True))
         return order, np.append(first, len(order))
 
-    @once
+    @cached
     def cluster_piece(self) -> Ints:
         """The piece (k,) that each cluster is of, -1 for one of several."""
         order, first = self.clusters
@@ -113,13 +113,13 @@ class Fabric:
         least, most = np.minimum.reduceat(own, first[:-1]), np.maximum.reduceat(own, first[:-1])
         return np.where(least == most, least, -1).astype(np.int32)
 
-    @once
+    @cached
     def cluster_sides(self) -> Bools:
         """Which clusters (k,) hold a facet that can be met from either side."""
         order, first = self.clusters
         return np.logical_or.reduceat(self.both_sides[order], first[:-1])
 
-    @once
+    @cached
     def outlining(self) -> tuple[NDArray[Any], ...]:
         """Facets (e, 2) of `silhouettes` with its edges by cluster (see geometry.silhouettes.by_cluster)."""
         faces = self.silhouettes[1]

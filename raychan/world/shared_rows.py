@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Sheet:
+class SharedRows:
     """An array (n, ...) kept to be copied. Where the system maps a part of memory twice, copies share all pages that
     nobody wrote to; elsewhere they are plain copies."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from raychan.world.body import Body
 from raychan.world.mesh import Mesh
-from raychan.world.shared_rows import Sheet
+from raychan.world.shared_rows import SharedRows
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -23,7 +23,7 @@ MANY = 200_000  # facets from which on they are kept
 
 
 @dataclass(frozen=True)
-class Rigid:
+class Instance:
     """A body of many facets that moves: its number, its rows of facets (n,), its mesh, and where that stands: turn
     (3, 3) from body to world axes, origin (3,) [m]."""
 
@@ -34,7 +34,7 @@ class Rigid:
     origin: Floats
 
 
-class Still:
+class StaticGeometry:
     """What is kept of bodies through all instants, and `rigid` those of many facets that move. What is kept is the same
     whichever instant was asked for first."""
 
@@ -51,25 +51,27 @@ class Still:
         self.rest = np.flatnonzero(rest).astype(np.int32)
         # Whether rows are kept: where most facets move, all are as soon made anew.
         self.shares = len(self.rest) > len(self.rows)
-        self.rigid: tuple[Rigid, ...] = ()
+        self.rigid: tuple[Instance, ...] = ()
         self._kept: dict[str, Any] = {}
-        self._sheets: dict[str, tuple[Sheet, ...]] = {}
+        self._sheets: dict[str, tuple[SharedRows, ...]] = {}
 
     @staticmethod
-    def of(bodies: Sequence[Body]) -> Still | None:
+    def of(bodies: Sequence[Body]) -> StaticGeometry | None:
         """Return what to keep for bodies; None where that does not pay."""
         moving = np.array([b.moves for b in bodies], bool)
         if not moving.any():
             return None
         count = np.array([len(b.geometry.faces) for b in bodies], np.int64)
         pays = count[~moving].sum() >= MANY or (count[moving] >= MANY).any()
-        return Still(moving, count) if pays else None
+        return StaticGeometry(moving, count) if pays else None
 
-    def at(self, bodies: Sequence[Body]) -> Still:
+    def at(self, bodies: Sequence[Body]) -> StaticGeometry:
         """Return the same with bodies where they stand now."""
         now = copy(self)
         large = [(int(b), bodies[b]) for b in np.setdiff1d(self.moving, self.few)]
-        now.rigid = tuple(Rigid(i, self._rows[i], b.geometry, b.motion.rotation(), b.motion.origin()) for i, b in large)
+        now.rigid = tuple(
+            Instance(i, self._rows[i], b.geometry, b.motion.rotation(), b.motion.origin()) for i, b in large
+        )
         return now
 
     def lasting(self, name: str, make: Callable[[], T]) -> T:
@@ -90,7 +92,7 @@ class Still:
 
     def keep(self, name: str, columns: Arrays) -> Arrays:
         """Keep columns (n, ...) of all facets; return them, shared with what is kept."""
-        self._sheets[name] = tuple(Sheet(x) for x in columns)
+        self._sheets[name] = tuple(SharedRows(x) for x in columns)
         return tuple(s.copy() for s in self._sheets[name])
 
     def copies(self, name: str, parts: Arrays) -> Arrays:
@@ -101,11 +103,11 @@ class Still:
         return out
 
 
-def lasting(still: Still | None, name: str, make: Callable[[], T]) -> T:
+def lasting(still: StaticGeometry | None, name: str, make: Callable[[], T]) -> T:
     """Return what `make` finds, or found before where something is kept."""
     return make() if still is None else still.lasting(name, make)
 
 
-def columns(still: Still | None, name: str, make: Callable[[Any], Arrays]) -> Arrays:
+def columns(still: StaticGeometry | None, name: str, make: Callable[[Any], Arrays]) -> Arrays:
     """Return the columns that `make` finds for rows of facets, or those kept with the rows of what moves made anew."""
     return make(slice(None)) if still is None else still.columns(name, make)

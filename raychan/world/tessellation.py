@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.world.topology import Joints
+from raychan.world.topology import MeshTopology
 from raychan.world.vertex_normals import components
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,7 @@ def band(crease: float) -> tuple[float, float]:
     return crease, min(BAND * crease, _MOST)
 
 
-def rounded(joints: Joints, corners: Floats, pair: Ints, fold: Floats, crease: float) -> Bools:
+def rounded(topology: MeshTopology, corners: Floats, pair: Ints, fold: Floats, crease: float) -> Bools:
     """Return which edges (e,) above the crease angle [rad] may be meant as smooth.
 
     Such folds go on from panel to panel by much the same angle and in the same sense, four or more of them, and the
@@ -44,7 +44,7 @@ def rounded(joints: Joints, corners: Floats, pair: Ints, fold: Floats, crease: f
     if not among.any():
         return found
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    panel = _panels(joints, pair, fold, low)
+    panel = _panels(topology, pair, fold, low)
     length, across = _across(corners, pair)
     uneven = np.minimum(_apart(area, pair // 3), _apart(np.asarray(np.bincount(panel, area), float), panel[pair // 3]))
     for sense in (1.0, -1.0):
@@ -63,11 +63,11 @@ def rounded(joints: Joints, corners: Floats, pair: Ints, fold: Floats, crease: f
     return found
 
 
-def _panels(joints: Joints, pair: Ints, fold: Floats, low: float) -> Ints:
+def _panels(topology: MeshTopology, pair: Ints, fold: Floats, low: float) -> Ints:
     """Return the panel (f,) of each facet: its plane, or itself and the neighbour to which both bend least, as the two
     halves of a quadrilateral that is not plane do."""
-    facet, n = pair // 3, len(joints.plane)
-    single = np.bincount(joints.plane)[joints.plane] == 1
+    facet, n = pair // 3, len(topology.plane)
+    single = np.bincount(topology.plane)[topology.plane] == 1
     usable = np.flatnonzero((np.abs(fold) < low) & single[facet].all(axis=1))
     order = usable[np.argsort(np.abs(fold[usable]), kind="stable")]
     least = np.full(n, -1)
@@ -79,7 +79,7 @@ def _panels(joints: Joints, pair: Ints, fold: Floats, low: float) -> Ints:
         better = (rival < 0) | (np.abs(fold[back]) <= np.abs(fold[rival]))
         least[here[better]] = back[better]
     halves = order[(least[facet[order, 0]] == order) & (least[facet[order, 1]] == order)]
-    by_plane = np.unique(joints.plane, return_index=True)[1][joints.plane]
+    by_plane = np.unique(topology.plane, return_index=True)[1][topology.plane]
     links = np.concatenate([np.stack([np.arange(n), by_plane], axis=1), facet[halves]])
     return components(links, n)
 

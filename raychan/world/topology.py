@@ -23,7 +23,7 @@ _CLUSTER = 64  # facets
 
 
 @dataclass(frozen=True, eq=False)
-class Joints:
+class MeshTopology:
     """The neighbours among n facets. Half edge 3 f + k runs from corner k of facet f to the next.
 
     Fields: plane, smooth (n,) number of the plane (adjacent coplanar facets of one kind) and of the smooth patch of
@@ -78,7 +78,7 @@ def joined(
     v: Floats,
     normals: Floats,
     body: NDArray[np.signedinteger[Any]] | None = None,
-) -> Joints:
+) -> MeshTopology:
     """Return the joints of facets.
 
     Args: vertex (n, 3) number of each corner's place; kind (n,): only facets of one kind share planes and patches;
@@ -109,7 +109,7 @@ def joined(
     along = _along_curve(v.mean(axis=1))
     if body is not None:
         along = along[np.argsort(body[along], kind="stable")]
-    return Joints(
+    return MeshTopology(
         plane=plane,
         smooth=_components(pair[soft], n),
         pair=pair,

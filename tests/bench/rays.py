@@ -10,7 +10,7 @@ import numpy as np
 from bench.bare import recorded, replay
 from bench.measure import Row, against
 from raychan.frames import direction
-from raychan.world.ray_caster import Tracer
+from raychan.world.ray_caster import RayCaster
 from raychan.world.scene import Scene
 
 
@@ -20,10 +20,10 @@ def rays(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
     count = 100_000 if quick else 1_000_000
     rng = np.random.default_rng(0)
     way = direction(rng.uniform(-0.8, 0.8, count), rng.uniform(-0.2, 0.2, count))
-    start = np.broadcast_to(np.asarray(scene.sensor.position), (count, 3)).copy()
+    start = np.broadcast_to(np.asarray(scene.radar.position), (count, 3)).copy()
     left = np.full(count, -1, np.int32)
     with recorded() as casts:
-        tracer = Tracer(scene.facets())
+        tracer = RayCaster(scene.facets())
         casts.clear()
         tracer.cast(start, way, left)
     bare, cast = replay(casts)

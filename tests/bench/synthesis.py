@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.fft
-from echoes import echoes, sensor
+from echoes import echoes, make_radar
 
 from bench.direct import recurrent_sum
 from bench.measure import Row, against, barred, rounds
@@ -32,7 +32,7 @@ def some_paths(count: int) -> Paths:
 def synthesis(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
     """1e5 paths into 128 chirps of 1,024 samples, 4 GHz, with range migration."""
     count = 10_000 if quick else 100_000
-    paths, radar = some_paths(count), sensor(WAVE)
+    paths, radar = some_paths(count), make_radar(WAVE)
     name = f"{count:,} paths into 128 x 1,024"
     few = (paths.amplitude[:_FEW], paths.delay[:_FEW], 2.0 * paths.rate[:_FEW] / C0)
     ramp = (WAVE.carrier, WAVE.slope, WAVE.repetition, WAVE.chirp_duration / WAVE.n_samples, 128, 1024)
@@ -80,7 +80,7 @@ def scaling(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
         for name, paths, wave, receivers in jobs:
             elements = np.zeros((receivers, 3))
             elements[:, 1] = 0.5 * wave.wavelength * np.arange(receivers)
-            radar = replace(sensor(wave), elements=elements)
+            radar = replace(make_radar(wave), elements=elements)
             calls.append((name, lambda p=paths, r=radar: synthesize(p, r)))
         for row in rounds(f"synthesis by {group}", calls, repeats):
             yield barred(row, "<= 5", row.ratio <= 5.0) if row.name == "8 receivers" else row

@@ -23,7 +23,7 @@ def turbine(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
     some = 8 if quick else 32
     for rpm in (20.0, 200.0):
         scene = rotor(rpm)
-        wave = scene.sensor.waveform
+        wave = scene.radar.waveform
         rule = refinement(wave.carrier, scene.model.tolerance_db, 0.0, scene.model.max_transmissions)
         at = np.linspace(0, _CHIRPS - 1, some).astype(int)
         few: list[Any] = []
@@ -52,10 +52,10 @@ def turbine(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
 
 def _chirp(scene: rc.Scene, rule: Any, chirp: int) -> Any:
     """Return the samples (antenna, 1, sample) of a chirp of the scene moved to it."""
-    wave = scene.sensor.waveform
+    wave = scene.radar.waveform
     now = scene.at(chirp * wave.repetition)
-    paths, _ = solve(now.facets(), now.points(), now.sensor, wave.carrier, rule, scene.model.max_bounces)
-    one = dataclasses.replace(now.sensor, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
+    paths, _ = solve(now.facets(), now.points(), now.radar, wave.carrier, rule, scene.model.max_bounces)
+    one = dataclasses.replace(now.radar, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
     return synthesize(paths, one).samples
 
 

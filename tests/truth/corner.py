@@ -213,7 +213,7 @@ def _last_face(part, n, order, planes, k, tx, rx, form):
         ]
         return -1j * k / (4 * np.pi) * np.array(pairs)
 
-    def once(finer):
+    def cached(finer):
         total = np.zeros((2, 2), complex)
         # the image end bounds the phase slope as the true one does
         turned = po_image(tx, turn, offset)
@@ -225,7 +225,7 @@ def _last_face(part, n, order, planes, k, tx, rx, form):
                 total = total + samples(points, weights)
         return total, k * area(part, n)
 
-    return po.converged(once, 1e-6)
+    return po.converged(cached, 1e-6)
 
 
 def po_image(end, turn, offset):

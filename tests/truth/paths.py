@@ -16,7 +16,7 @@ class Face:
     """Convex planar face: corners (m, 3); surface(cos_i) -> (R_s, R_p) or, for thin layers, (R_s, R_p, T_s, T_p)."""
 
     corners: np.ndarray
-    surface: Callable = slab.pec
+    geometry: Callable = slab.pec
     body: str = ""
     lets_through: bool = False
 
@@ -38,17 +38,17 @@ class Path:
     gain: np.ndarray
 
 
-def box(low, high, surface=slab.pec, body="box"):
+def box(low, high, geometry=slab.pec, body="box"):
     """Six faces of an axis-parallel box, normals outward."""
     corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return [Face(corners[list(q)], surface, body) for q in quads]
+    return [Face(corners[list(q)], geometry, body) for q in quads]
 
 
-def ground(size=1e3, height=0.0, surface=slab.pec, body="ground"):
+def ground(size=1e3, height=0.0, geometry=slab.pec, body="ground"):
     """Large horizontal square facing up."""
     s = size
-    return [Face([[-s, -s, height], [s, -s, height], [s, s, height], [-s, s, height]], surface, body)]
+    return [Face([[-s, -s, height], [s, -s, height], [s, s, height], [-s, s, height]], geometry, body)]
 
 
 def _mirror(point, face):
@@ -110,7 +110,7 @@ def _bounce(travel, face, through=False):
     if np.linalg.norm(s) < 1e-9:
         s = np.cross(n, [1.0, 0, 0] if abs(n[0]) < 0.7 else [0, 1.0, 0])
     s /= np.linalg.norm(s)
-    both = face.surface(abs(travel @ n))
+    both = face.geometry(abs(travel @ n))
     c_s, c_p = both[2:4] if through else both[:2]
     return out, c_s * np.outer(s, s) + c_p * np.outer(np.cross(s, out), np.cross(s, travel))
 

@@ -44,36 +44,36 @@ def dots(a, b):
     return np.sum(a * b, axis=-1)
 
 
-def reflected(e, k_in, n, surface):
+def reflected(e, k_in, n, geometry):
     """(E_r, eta H_r) of fields e (..., 3) at planes of normal n; surface(cos_i) -> (R_s, R_p), None a conductor."""
     k_out = k_in - 2 * dots(k_in, n)[..., None] * n
-    if surface is None:
+    if geometry is None:
         e_r = -e + 2 * dots(e, n)[..., None] * n
     else:
         s = np.cross(k_in, n)
         size = np.linalg.norm(s, axis=-1, keepdims=True)
         other = np.cross(n, np.where(np.abs(n[..., :1]) < 0.7, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
         s = np.where(size > 1e-9, s / np.maximum(size, 1e-30), other / np.linalg.norm(other, axis=-1, keepdims=True))
-        r_s, r_p = surface(-dots(k_in, n))
+        r_s, r_p = geometry(-dots(k_in, n))
         e_r = (r_s * dots(e, s))[..., None] * s + (r_p * dots(e, np.cross(s, k_in)))[..., None] * np.cross(s, k_out)
     return e_r, np.cross(k_out, e_r)
 
 
-def coupling(n, k_in, e_in, k_out, e_out, surface=None, form="huygens"):
+def coupling(n, k_in, e_in, k_out, e_out, geometry=None, form="huygens"):
     """Reaction per unit area of the surface's currents with the receiver's would-be wave (e_out along k_out)."""
     if form == "reciprocal":
-        there = coupling(n, k_in, e_in, k_out, e_out, surface)
-        return 0.5 * (there + coupling(n, k_out, e_out, k_in, e_in, surface))
+        there = coupling(n, k_in, e_in, k_out, e_out, geometry)
+        return 0.5 * (there + coupling(n, k_out, e_out, k_in, e_in, geometry))
     if form == "classic":
         return dots(e_out, 2 * np.cross(n, np.cross(k_in, e_in)))
-    e_r, h_r = reflected(e_in, k_in, n, surface)
+    e_r, h_r = reflected(e_in, k_in, n, geometry)
     return dots(e_out, np.cross(n, h_r)) + dots(np.cross(k_out, e_out), np.cross(n, e_r))
 
 
-def amplitude(points, normals, weights, k, tx, rx=None, surface=None, form="huygens"):
+def amplitude(points, normals, weights, k, tx, rx=None, geometry=None, form="huygens"):
     """S (2, 2) [m] of surface samples (n, 3) with area weights, all taken as lit and seen."""
     k_in, a_in, l_in = wave(points, tx)
-    if rx is None and surface is None:
+    if rx is None and geometry is None:
         # both ends in one place: the currents couple like to like, with 2 cos(theta_i) in every form
         lone = np.sum(-2 * dots(k_in, normals) * weights * a_in**2 * np.exp(-2j * k * l_in))
         return -1j * k / (4 * np.pi) * lone * np.eye(2)
@@ -82,7 +82,7 @@ def amplitude(points, normals, weights, k, tx, rx=None, surface=None, form="huyg
     field = weights * a_in * a_out * np.exp(-1j * k * (l_in + l_out))
     n = np.broadcast_to(normals, points.shape)
     pairs = [
-        [np.sum(field * coupling(n, k_in, e_in[b], k_out, e_out[a], surface, form)) for b in (0, 1)] for a in (0, 1)
+        [np.sum(field * coupling(n, k_in, e_in[b], k_out, e_out[a], geometry, form)) for b in (0, 1)] for a in (0, 1)
     ]
     return -1j * k / (4 * np.pi) * np.array(pairs)
 
@@ -100,10 +100,10 @@ def _panels(edge, corners, k, ends, finer):
     return int(np.ceil(finer * (1.3 * np.max(np.abs(slopes)) * k / (2 * np.pi) / CYCLES + 1)))
 
 
-def converged(once, rtol):
+def converged(cached, rtol):
     """Value of once(finer) that a grid half again as fine confirms; ArithmeticError otherwise."""
-    coarse, scale = once(1.0)
-    fine, _ = once(1.5)
+    coarse, scale = cached(1.0)
+    fine, _ = cached(1.5)
     if np.max(np.abs(fine - coarse)) > rtol * max(np.max(np.abs(fine)), 1e-6 * scale):
         raise ArithmeticError("quadrature has not converged")
     return fine
@@ -123,7 +123,7 @@ def patch_nodes(corner, u, v, k, ends, finer, triangle):
         yield (corner + si * u + cross).reshape(-1, 3), weights.ravel()
 
 
-def polygon(corners, k, tx, rx=None, surface=None, form="huygens", rtol=1e-7):
+def polygon(corners, k, tx, rx=None, geometry=None, form="huygens", rtol=1e-7):
     """S (2, 2) of a convex planar polygon (m, 3), counter-clockwise seen from its face; zero from behind."""
     p = np.asarray(corners, float)
     ends = [tx, tx if rx is None else rx]
@@ -137,20 +137,20 @@ def polygon(corners, k, tx, rx=None, surface=None, form="huygens", rtol=1e-7):
         else [(p[0], p[i] - p[0], p[i + 1] - p[0]) for i in range(1, len(p) - 1)]
     )
 
-    def once(finer):
+    def cached(finer):
         total, area = np.zeros((2, 2), complex), 0.0
         for patch in patches:
             for points, weights in patch_nodes(*patch, k, ends, finer, not square):
-                total = total + amplitude(points, normal, weights, k, tx, rx, surface, form)
+                total = total + amplitude(points, normal, weights, k, tx, rx, geometry, form)
                 area += weights.sum()
         return total, area * k
 
-    return converged(once, rtol)
+    return converged(cached, rtol)
 
 
-def triangles(corners, k, tx, rx=None, surface=None, form="huygens", rtol=1e-7):
+def triangles(corners, k, tx, rx=None, geometry=None, form="huygens", rtol=1e-7):
     """S (2, 2) of triangles (n, 3, 3) without shadowing: those that both ends see from the front."""
-    return sum((polygon(t, k, tx, rx, surface, form, rtol) for t in corners), np.zeros((2, 2), complex))
+    return sum((polygon(t, k, tx, rx, geometry, form, rtol) for t in corners), np.zeros((2, 2), complex))
 
 
 def unit_normal(p):
@@ -184,20 +184,20 @@ def fourier(corners, g):
     return terms.sum() / (1j * size)
 
 
-def polygon_far(corners, k, tx, rx=None, surface=None, form="huygens"):
+def polygon_far(corners, k, tx, rx=None, geometry=None, form="huygens"):
     """S (2, 2) of a planar polygon in the far field: vector factor times exact Fourier integral."""
     p = np.asarray(corners, float)
     rx = tx if rx is None else rx
     normal = unit_normal(p)
     if normal @ tx <= 0 or normal @ rx <= 0:
         return np.zeros((2, 2), complex)
-    return vector_factor(normal, tx, rx, surface, form) * (-1j * k / (4 * np.pi)) * fourier(p, k * (tx + rx))
+    return vector_factor(normal, tx, rx, geometry, form) * (-1j * k / (4 * np.pi)) * fourier(p, k * (tx + rx))
 
 
-def vector_factor(normal, tx, rx, surface=None, form="huygens"):
+def vector_factor(normal, tx, rx, geometry=None, form="huygens"):
     """(2, 2) coupling per unit area of plane waves of directions tx, rx (towards the ends)."""
     e_in, e_out = polarisations(-tx), polarisations(-rx)
-    return np.array([[coupling(normal, -tx, e_in[b], -rx, e_out[a], surface, form) for b in (0, 1)] for a in (0, 1)])
+    return np.array([[coupling(normal, -tx, e_in[b], -rx, e_out[a], geometry, form) for b in (0, 1)] for a in (0, 1)])
 
 
 def rectangle(width, height):
@@ -206,20 +206,20 @@ def rectangle(width, height):
     return np.array([[0, -y, -z], [0, y, -z], [0, y, z], [0, -y, z]])
 
 
-def rectangle_far(width, height, k, tx, rx=None, surface=None, form="huygens"):
+def rectangle_far(width, height, k, tx, rx=None, geometry=None, form="huygens"):
     """S (2, 2) of the canonical plate in the far field: one sinc an axis (Balanis eq. 11-37)."""
     rx = tx if rx is None else rx
     q = tx + rx
     shape = width * height * np.sinc(k * width * q[1] / (2 * np.pi)) * np.sinc(k * height * q[2] / (2 * np.pi))
-    return vector_factor(np.array([1.0, 0, 0]), tx, rx, surface, form) * (-1j * k / (4 * np.pi)) * shape
+    return vector_factor(np.array([1.0, 0, 0]), tx, rx, geometry, form) * (-1j * k / (4 * np.pi)) * shape
 
 
-def disc_far(radius, k, tx, rx=None, surface=None, form="huygens"):
+def disc_far(radius, k, tx, rx=None, geometry=None, form="huygens"):
     """S (2, 2) of a disc facing +x in the far field: 2 pi a^2 J1(w)/w (Balanis eq. 11-60 ff.)."""
     rx = tx if rx is None else rx
     w = k * radius * np.hypot(*(tx + rx)[1:])
     shape = np.pi * radius**2 * (2 * j1(w) / w if w > 1e-6 else 1.0)
-    return vector_factor(np.array([1.0, 0, 0]), tx, rx, surface, form) * (-1j * k / (4 * np.pi)) * shape
+    return vector_factor(np.array([1.0, 0, 0]), tx, rx, geometry, form) * (-1j * k / (4 * np.pi)) * shape
 
 
 def _disc(centre, u, v, radius, k, ends, finer):
@@ -232,18 +232,18 @@ def _disc(centre, u, v, radius, k, ends, finer):
         yield centre + radius * ri * ring, 2 * np.pi * radius**2 * ri * wi * wf
 
 
-def disc(radius, k, tx, rx=None, surface=None, form="huygens", rtol=1e-7):
+def disc(radius, k, tx, rx=None, geometry=None, form="huygens", rtol=1e-7):
     """S (2, 2) of a disc facing +x by quadrature, near or far."""
     n, ends = np.array([1.0, 0, 0]), [tx, tx if rx is None else rx]
 
-    def once(finer):
+    def cached(finer):
         parts = _disc(np.zeros(3), np.array([0, 1.0, 0]), np.array([0, 0, 1.0]), radius, k, ends, finer)
-        return sum(amplitude(p, n, w, k, tx, rx, surface, form) for p, w in parts), np.pi * radius**2 * k
+        return sum(amplitude(p, n, w, k, tx, rx, geometry, form) for p, w in parts), np.pi * radius**2 * k
 
-    return converged(once, rtol)
+    return converged(cached, rtol)
 
 
-def cylinder(radius, height, k, tx, rx=None, surface=None, form="huygens", caps=True, rtol=1e-6):
+def cylinder(radius, height, k, tx, rx=None, geometry=None, form="huygens", caps=True, rtol=1e-6):
     """S (2, 2) of a cylinder about z, centred at the origin: the side that both ends see, and its caps."""
     ends = [tx, tx if rx is None else rx]
     low, high = -np.inf, np.inf
@@ -256,7 +256,7 @@ def cylinder(radius, height, k, tx, rx=None, surface=None, form="huygens", caps=
         off = (np.arctan2(to_end[1], to_end[0]) - middle + np.pi) % (2 * np.pi) - np.pi
         low, high = max(low, off - half), min(high, off + half)
 
-    def once(finer):
+    def cached(finer):
         total = np.zeros((2, 2), complex)
         if high > low:
             turns = int(finer * (4 * k * radius / (2 * np.pi) / CYCLES + 2))
@@ -270,12 +270,12 @@ def cylinder(radius, height, k, tx, rx=None, surface=None, form="huygens", caps=
             for zi, wi in zip(z, wz, strict=True):
                 weights = radius * (high - low) * wf * height * wi
                 points = radius * n + [0, 0, height * (zi - 0.5)]
-                total = total + amplitude(points, n, weights, k, tx, rx, surface, form)
+                total = total + amplitude(points, n, weights, k, tx, rx, geometry, form)
         for sign in (1.0, -1.0):
             top, n = np.array([0, 0, sign * height / 2]), np.array([0, 0, sign])
             if caps and all(side(top, n, end) > 1e-12 for end in ends):
                 for p, w in _disc(top, np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), radius, k, ends, finer):
-                    total = total + amplitude(p, n, w, k, tx, rx, surface, form)
+                    total = total + amplitude(p, n, w, k, tx, rx, geometry, form)
         return total, 2 * radius * height * k
 
-    return converged(once, rtol)
+    return converged(cached, rtol)

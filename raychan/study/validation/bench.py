@@ -83,7 +83,7 @@ class Bench:
         """Return the point (3,) by which a target's place in its scene is told, and its distance [m] from the radar."""
         given = self.target(target)
         scene = self.drawn(given.scene)
-        radar = np.asarray(scene.sensor.position)
+        place = np.asarray(scene.radar.position)
         facets = scene.facets(0.0)
         if given.reference == POINT:
             points = scene.points(0.0)
@@ -98,9 +98,9 @@ class Bench:
                 area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
                 at = np.average(corners.mean(axis=1), axis=0, weights=area)
             else:
-                close = trimesh.triangles.closest_point(corners, np.broadcast_to(radar, (len(corners), 3)))
-                at = close[np.argmin(np.linalg.norm(close - radar, axis=1))]
-        return at, float(np.linalg.norm(at - radar))
+                close = trimesh.triangles.closest_point(corners, np.broadcast_to(place, (len(corners), 3)))
+                at = close[np.argmin(np.linalg.norm(close - place, axis=1))]
+        return at, float(np.linalg.norm(at - place))
 
     def expected_range(self, target: str) -> float:
         """Return where [m] a target's echo is expected: a ghost's stated range, or its place in the scene."""
@@ -156,11 +156,11 @@ def over(result: Result, parts: tuple[str, ...], via: tuple[str, ...] = ()) -> M
 def peak_snr(result: Result, ways: Mask, at: float, room: float) -> float:
     """Return the highest SNR [dB] within `room` [m] of a range [m] in a map of some paths (n,) without noise."""
     scene = result.scene
-    settings, quiet = scene.processing, dataclasses.replace(scene.sensor, noise=False)
+    settings, quiet = scene.processing, dataclasses.replace(scene.radar, noise=False)
     cube = synthesize(take(result.paths, ways), quiet)
     made = range_doppler(cube, quiet.waveform, settings.range_window, settings.rate_window, settings.pad)
     column = np.abs(made.range - at) <= room
-    return float(db(made.power[:, column].max() / noise_of_cell(scene.sensor, settings)))
+    return float(db(made.power[:, column].max() / noise_of_cell(scene.radar, settings)))
 
 
 def _is(part: str, body: Any, kind: Any, names: Paths | Any) -> Mask:

@@ -31,7 +31,7 @@ _ALONE = 10.0 ** (0.5 / 20.0) - 1.0  # one point's response that moves the other
 
 def _echo(bench: Bench, run: str, at: float, rate: float, window: str, pad: tuple[int, int], iq: bool = True) -> Any:
     """Return the map of a lone point at a range [m] and range rate [m/s], without noise."""
-    given = bench.scene(run).sensor
+    given = bench.scene(run).radar
     wave = dataclasses.replace(given.waveform, complex_sampling=iq)
     look, none = np.array([[1.0, 0.0, 0.0]]), np.full((1, 1), -1)
     here = np.asarray(given.position)
@@ -62,7 +62,7 @@ def _top(made: RangeDoppler) -> tuple[int, int]:
 @measure
 def gap(bench: Bench, run: str, window: str) -> Seen:
     """Return the least gap [m] at which two equal points both read their own power to 0.5 dB, whatever their phases."""
-    cell = bench.scene(run).sensor.waveform.range_resolution
+    cell = bench.scene(run).radar.waveform.range_resolution
     made = _echo(bench, run, _FAR * cell, 0.0, window, (_FINE, 1))
     row, column = _top(made)
     return float(np.argmax(np.abs(made.spectrum[0, row, column:]) < _ALONE * np.sqrt(made.power.max())) * cell / _FINE)
@@ -71,7 +71,7 @@ def gap(bench: Bench, run: str, window: str) -> Seen:
 @measure
 def rate_gap(bench: Bench, run: str, window: str) -> Seen:
     """Return the same gap [m/s] of two movers at one range."""
-    wave = bench.scene(run).sensor.waveform
+    wave = bench.scene(run).radar.waveform
     made = _echo(bench, run, _FAR * wave.range_resolution, 0.0, window, (1, _FINE))
     row, column = _top(made)
     below = np.abs(made.spectrum[0, row:, column]) < _ALONE * np.sqrt(made.power.max())
@@ -81,7 +81,7 @@ def rate_gap(bench: Bench, run: str, window: str) -> Seen:
 @measure
 def unambiguous_range(bench: Bench, run: str, iq: bool) -> Seen:
     """Return the range [m] at which the beat folds, with I/Q or real samples."""
-    return float(dataclasses.replace(bench.scene(run).sensor.waveform, complex_sampling=iq).unambiguous_range)
+    return float(dataclasses.replace(bench.scene(run).radar.waveform, complex_sampling=iq).unambiguous_range)
 
 
 @measure
@@ -107,14 +107,14 @@ def threshold(bench: Bench, run: str, cells: float) -> Seen:
 @measure
 def point_loss(bench: Bench, run: str, at: float, rcs_dbsm: float) -> Seen:
     """Return the loss [dB] to a target of given RCS [dBsm] at a range [m] and back, between isotropic antennas."""
-    wavelength = bench.scene(run).sensor.waveform.wavelength
+    wavelength = bench.scene(run).radar.waveform.wavelength
     return float(db((4.0 * np.pi) ** 3 * at**4 / wavelength**2) - rcs_dbsm)
 
 
 @measure
 def reach(bench: Bench, run: str, sensitivity_dbm: float, rcs_dbsm: float) -> Seen:
     """Return the range [m] at which that loss is the greatest that the link budget allows, without receive gain."""
-    most = bench.scene(run).sensor.link_budget(sensitivity_dbm)["max_path_loss_db"]
+    most = bench.scene(run).radar.link_budget(sensitivity_dbm)["max_path_loss_db"]
     return float(10.0 ** ((most - float(point_loss(bench, run, 1.0, rcs_dbsm) or 0.0)) / 40.0))
 
 
@@ -133,7 +133,7 @@ def gain_change(bench: Bench, azimuth_deg: float, first: str = PATCH, later: str
 def both_ways(bench: Bench, azimuth_deg: Floats, first: str = PATCH, later: str = ARRAY) -> Floats:
     """Return the gain [dB] of a run's antenna over that of another, both ways, at azimuths (n,) [deg]."""
     look = direction(np.radians(azimuth_deg))
-    patch, array = ((np.abs(bench.scene(run).sensor.tx.field(look)) ** 2).sum(axis=1) for run in (first, later))
+    patch, array = ((np.abs(bench.scene(run).radar.tx.field(look)) ** 2).sum(axis=1) for run in (first, later))
     return np.asarray(2.0 * (db(array) - db(patch)))
 
 
@@ -144,17 +144,17 @@ def link_snr(bench: Bench, run: str, target: str) -> dict[str, float]:
     and elevation, RCS by the aspect; the run's noise figure and nothing else enters.
     """
     scene = bench.scene(run)
-    sensor, points = scene.sensor, scene.points(0.0)
+    radar, points = scene.radar, scene.points(0.0)
     row = scene.facets(0.0).body_names.index(bench.target(target).parts[0])
     k = int(np.flatnonzero(points.body == row)[0])
-    ray = points.position[k] - np.asarray(sensor.position)
+    ray = points.position[k] - np.asarray(radar.position)
     distance = float(np.linalg.norm(ray))
     azimuth, elevation = (float(a) for a in angles(ray))
     back = (azimuth + np.pi - points.heading[k] + np.pi) % (2.0 * np.pi) - np.pi
     sigma = float(np.interp(back, points.azimuth, points.sigma[k], period=2.0 * np.pi))
-    gain = gain_dbi(sensor.tx, azimuth - sensor.yaw, elevation)
+    gain = gain_dbi(radar.tx, azimuth - radar.yaw, elevation)
     loss = float(point_loss(bench, run, distance, float(db(sigma))) or 0.0)
-    snr = dbm(sensor.power) + 2.0 * gain - loss - dbm(noise_of_cell(sensor, scene.processing))
+    snr = dbm(radar.power) + 2.0 * gain - loss - dbm(noise_of_cell(radar, scene.processing))
     return {
         "range": distance,
         "azimuth_deg": float(np.degrees(azimuth)),

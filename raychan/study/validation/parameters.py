@@ -41,19 +41,19 @@ def antenna(bench: Bench, name: str, figure: str) -> Seen:
 @measure
 def budget(bench: Bench, run: str, figure: str, sensitivity_dbm: float | None = None) -> Seen:
     """Return a line of the link budget."""
-    return _figure(bench.scene(run).sensor.link_budget(sensitivity_dbm), figure)
+    return _figure(bench.scene(run).radar.link_budget(sensitivity_dbm), figure)
 
 
 @measure
 def waveform(bench: Bench, run: str, figure: str, scale: float = 1.0) -> Seen:
     """Return a figure of the waveform times `scale`."""
-    return scale * _figure(bench.scene(run).sensor.waveform, figure)
+    return scale * _figure(bench.scene(run).radar.waveform, figure)
 
 
 @measure
 def samples(bench: Bench, run: str) -> Seen:
     """Return the samples of a chirp, from rate and duration."""
-    wave = bench.scene(run).sensor.waveform
+    wave = bench.scene(run).radar.waveform
     return float(wave.sample_rate * wave.chirp_duration)
 
 
@@ -78,7 +78,7 @@ def rays(bench: Bench, run: str) -> Seen:
 @measure
 def height(bench: Bench, run: str) -> Seen:
     """Return the radar's height [m]."""
-    return float(bench.scene(run).sensor.position[2])
+    return float(bench.scene(run).radar.position[2])
 
 
 @measure
@@ -95,7 +95,7 @@ def ground_speed(bench: Bench, target: str) -> Seen:
     at, distance = bench.place(target)
     facets = scene.facets(0.0)
     velocity = facets.velocity[facets.body_names.index(given.parts[0].split(".")[0])]
-    return float(velocity @ (at - np.asarray(scene.sensor.position)) / distance)
+    return float(velocity @ (at - np.asarray(scene.radar.position)) / distance)
 
 
 @measure

@@ -150,7 +150,7 @@ def split(bench: Bench, run: str, at: list[float]) -> Seen:
     made = bench.run(run).profile
     tops = made.range[made.peaks]
     # What lies further off than a cell is the peak of something else.
-    near = min(float(np.diff(sorted(at)).min()) / 3.0, bench.scene(run).sensor.waveform.range_resolution)
+    near = min(float(np.diff(sorted(at)).min()) / 3.0, bench.scene(run).radar.waveform.range_resolution)
     return all(np.abs(tops - x).min(initial=np.inf) < near for x in at)
 
 
