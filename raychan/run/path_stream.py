@@ -49,6 +49,13 @@ class Launched:
         """Whether `paths` are all."""
         return len(self.paths.delay) == self.count
 
+    def notes(self) -> list[str]:
+        """Return what to tell of a launch that had more paths than a result can hold."""
+        if self.whole:
+            return []
+        kept = len(self.paths.delay)
+        return [f"{self.count:,} paths: all are in the samples, the {kept:,} strongest are kept to explain them"]
+
     def moved(self, shift: NDArray[np.float64]) -> Launched:
         """Return the same for a scene that has moved on as one, by a shift (3,) [m]."""
         paths = self.paths
