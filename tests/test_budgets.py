@@ -107,7 +107,7 @@ import time, raychan.run.simulate, raychan.cli
 def trace(*a):
     print("ready", flush=True)
     time.sleep(60.0)
-raychan.run.simulate.trace = trace
+raychan.run.simulate.channel_of = trace
 raychan.cli.main(["run", "occluded_pedestrian", "--out", {out!r}])
 """
 

@@ -11,7 +11,7 @@ import numpy as np
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
-from raychan.records import MIRROR, Cube, Facets, MapError, Points
+from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
 from raychan.run.labels import provenance
 from raychan.run.mechanisms import Choice, choose
@@ -21,7 +21,7 @@ from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.resources import check_demand
-from raychan.run.result import ExplainedDetections, Receiver, Result
+from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.rules import asked, changed, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
@@ -129,41 +129,25 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     """Return what the receiver makes of a channel, and how each detection came about."""
     # Streams are numbered by stage, so that one more random stage leaves the others as they are.
     noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    radar, settings, turned = scene.radar, scene.processing, channel.turned
-    paths = channel.launched.paths
+    radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
         noise = radar.noise_power if radar.noise else 0.0
         pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
-        quiet = turned.cube if turned else channel.launched.quiet
+        quiet = channel.turned.cube if channel.turned else channel.launched.quiet
         cube = noisy(quiet, radar, noise_rng)
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
         error = _error_of(channel, quiet, radar, settings)
-    receiver = Receiver(
-        radar.waveform,
-        settings.range_window,
-        settings.rate_window,
-        radar.power,
-        radar.ego_speed,
-        background(channel.geometry.facets),
-    )
+    windows = settings.range_window, settings.rate_window
+    names = background(channel.geometry.facets)
+    receiver = Receiver(radar.waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
-        weakest = float(detections.power.min(initial=np.inf)) if len(detections.power) else 0.0
-        reasons, left_out = run_pair(
-            lambda: provenance(paths, rdmap, detections, receiver, error.power),
-            lambda: ledger(
-                paths, channel.geometry, channel.points, radar, settings, channel.model, weakest, scene.bodies
-            ),
-        )
-        if turned:
-            left_out["intra-frame motion"] = motion(turned)
-            brought = quiet_map(turned.turning, radar, settings)
-            reasons = claimed(reasons, paths, turned.turns, brought, error.power, detections, receiver)
+        reasons, left_out = _explained(scene, channel, rdmap, detections, receiver, error)
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
-        paths=paths,
+        paths=channel.launched.paths,
         profile=pdp,
         cube=cube,
         rdmap=rdmap,
@@ -186,6 +170,24 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
+
+
+def _explained(
+    scene: Scene, channel: Channel, rdmap: RangeDoppler, found: Detections, receiver: Receiver, error: MapError
+) -> tuple[tuple[Explanation, ...], dict[str, Any]]:
+    """Return where each detection came from, and the ledger of what the run left out."""
+    radar, settings, turned = scene.radar, scene.processing, channel.turned
+    paths, model = channel.launched.paths, channel.model
+    weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
+    reasons, left_out = run_pair(
+        lambda: provenance(paths, rdmap, found, receiver, error.power),
+        lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
+    )
+    if turned:
+        left_out["intra-frame motion"] = motion(turned)
+        brought = quiet_map(turned.turning, radar, settings)
+        reasons = claimed(reasons, paths, turned.turns, brought, error.power, found, receiver)
+    return reasons, left_out
 
 
 def _error_of(channel: Channel, quiet: Cube, radar: Radar, settings: Any) -> MapError:
