@@ -67,7 +67,9 @@ def _followed(
         # Ground has no return of its own here.
         own = f.role[f.body[tubes.facet]] != MIRROR
         by_image = images.returns(geometry, leg, tubes, first)
-        for out in outs if single or not first else []:
+        # What returns by the leg that it came by counts first: the order of the others then does not matter.
+        every = sorted(outs, key=lambda out: out is not leg) if first else outs
+        for out in every if single or not first else []:
             if count + len(out.mirrors) > bounces:
                 continue
             twice = by_image & (not first or images.over(geometry, out))
