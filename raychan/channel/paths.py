@@ -1,5 +1,5 @@
-"""Paths of routes: what each carries for a radar, and its delay and rate; footprints long in range give a path a
-corner."""
+"""Paths of routes: the gain, delay and rate of each for a radar. A footprint long in range gives one path for each of
+its three corners."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float) -> Paths:
-    """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
+    """Return what routes carry for a radar at a frequency [Hz]; a footprint long in range becomes three paths."""
     if isinstance(routes, DiffractedRoutes):
         return diffracted_paths(routes, facets, radar, frequency)
     a = transfer(
