@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from raychan.frames import direction, theta_phi
+from raychan.poses import direction, theta_phi
 from raychan.radar.antenna import Antenna, CosinePattern, Isotropic, UniformArray
 from raychan.radar.pattern import MeasuredPattern, PatternError, characteristics, gain_dbi
 from raychan.radar.radar import Radar

@@ -7,7 +7,7 @@ import pytest
 from helpers import box, facets, quad
 from test_solve import point, radar
 
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 from raychan.records import DIFFRACT
 from raychan.run.solver import refinement, solve
 from raychan.tracing.edge_diffraction import ways

@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[1] / "raychan"
 STOREYS = (
     ("units", "parallel", "compile"),
-    ("frames", "reprs"),
+    ("poses", "reprs"),
     ("records",),
     ("em", "geometry"),
     ("radar",),

@@ -10,7 +10,7 @@ import trimesh
 from helpers import box, facets, ground, quad
 from truth import slab, tworay
 
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 from raychan.records import HALF_SPACE, PEC, Points
 from raychan.run.solver import refinement, solve
 from raychan.units import C0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from printed import figures
 
-from raychan.frames import rotation
+from raychan.poses import rotation
 from raychan.radar.antenna import CosinePattern, Isotropic, UniformArray
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import angles, direction
+from raychan.poses import angles, direction
 from raychan.radar.antenna import Antenna, check, polarized
 from raychan.units import undb
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import rotation
+from raychan.poses import rotation
 from raychan.radar.antenna import Antenna
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.spherical_vectors import turned, vectors

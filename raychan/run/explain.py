@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import angles
+from raychan.poses import angles
 from raychan.records import KIND_WORDS, NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler, Record, column
 from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result

@@ -14,7 +14,7 @@ from raychan.channel.error import COVER, LARGEST_DB, MAX_ERROR_DB, stated_error
 from raychan.channel.mesh_error import MeshError, creeping, mesh_error
 from raychan.channel.terminator_error import terminator_error
 from raychan.channel.transfer import transfer
-from raychan.frames import direction, theta_phi
+from raychan.poses import direction, theta_phi
 from raychan.run.first_surface import first_surface
 from raychan.run.single_body import facets_of, mesh_of
 from raychan.tracing.contributions import Contributions

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from raychan.frames import direction
 from raychan.parallel import run_pair
+from raychan.poses import direction
 from raychan.processing.cfar import Grid, fitting_guard
 from raychan.processing.detection import detect
 from raychan.processing.range_doppler import range_doppler

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.transfer import rates, transfer
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 from raychan.records import KIND_LETTERS, REFLECT, TRANSMIT, Facets, Routes
 from raychan.tracing.legs import Leg, Mirror
 from raychan.world.geometry import Geometry

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.em.fresnel import coefficients
-from raychan.frames import rotation
+from raychan.poses import rotation
 from raychan.records import LAYER, PEC, Facets, Materials, Paths, Points
 from raychan.run.rcs import stated_error
 from raychan.run.solver import refinement, solve

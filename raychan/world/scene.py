@@ -192,12 +192,12 @@ class Scene(Told):
         moved._still = self._still
         if self.radar_table is not None:
             there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
-            moved.radar = self.radar_table.model_copy(update={"position": there.tolist()})
-            moved.__dict__["sensor"] = self.radar_at(time)
+            moved.radar_table = self.radar_table.model_copy(update={"position": there.tolist()})
+            moved.__dict__["radar"] = self.radar_at(time)
         moved.__dict__.pop("warnings", None)
         moved.text, moved._data = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
         try:
-            checks.radar_outside(moved.bodies, moved.radar)
+            checks.radar_outside(moved.bodies, moved.radar_table)
         except SceneError as e:
             late = f"{e.problem} {time:g} s on"
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None

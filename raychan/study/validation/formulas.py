@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import angles, direction
+from raychan.poses import angles, direction
 from raychan.processing.cfar import factor
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.pattern import gain_dbi
