@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from raychan.units import C0, db, dbm
+from raychan.units import db, dbm
 
 _ROWS = 12
 
@@ -122,15 +122,16 @@ def _columns(record: Any) -> Facts:
 def _paths(p: Any) -> Facts:
     bodies = np.unique(p.ways.body[p.ways.body >= 0])
     met = [p.body_names[b] for b in bodies]
+    gain = p.amplitude if hasattr(p, "amplitude") else p.gain[np.abs(p.gain) > 0.0]
     depth = (p.ways.kind > 0).sum(axis=1)
     lines = [
-        ("range", span(0.5 * C0 * p.delay, "m")),
-        ("range rate", span(p.rate, "m/s")),
-        ("gain", span(db(np.abs(p.amplitude) ** 2), "dB")),
+        ("range", span(p.range, "m")),
+        ("range rate", span(p.range_rate, "m/s")),
+        ("gain", span(db(np.abs(gain) ** 2), "dB")),
         ("interactions", span(depth)),
         ("over", ", ".join(met[:8]) + (f" and {len(met) - 8} more" if len(met) > 8 else "") or "nothing"),
     ]
-    return Facts(f"Paths: {counted(len(p.delay), 'path')}", tuple(lines))
+    return Facts(f"{type(p).__name__}: {counted(len(p.delay), 'path')}", tuple(lines))
 
 
 def _map(m: Any) -> Facts:
@@ -203,5 +204,5 @@ def _place(at: Any) -> str:
     return "(" + ", ".join(f"{x:g}" for x in at) + ")"
 
 
-_OWN = {"Paths": _paths, "RangeDoppler": _map, "Detections": _detections, "Scene": _scene, "Result": _result}
+_OWN = {"PropagationPaths": _paths, "RangeDoppler": _map, "Detections": _detections, "Scene": _scene, "Result": _result}
 """Those of which more is to be told than their columns."""

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[1] / "raychan"
 STOREYS = (
     ("units", "parallel", "compile"),
     ("poses", "reprs"),
+    ("columns",),
     ("records",),
     ("em", "geometry"),
     ("radar",),

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import column
 from raychan.radar.waveform import Waveform
-from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler, column
+from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler
 from raychan.reprs import Drawn, Told
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from raychan.channel.paths import join
+from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
-from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points, take
+from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points
 from raychan.run.labels import Chains, chains, label_of
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
 from raychan.run.simulate import noise_of_cell

@@ -163,15 +163,15 @@ def diffracted_paths(
             speed.append(np.asarray(radar.velocity))
             stops = [end, *(c[1] for c in chain), end]
             steps = [(b - a) / np.linalg.norm(b - a) for a, b in pairwise(stops)]
-            rate[r] = 0.5 * sum(float((speed[j + 1] - speed[j]) @ d) for j, d in enumerate(steps))
+            rate[r] = sum(float((speed[j + 1] - speed[j]) @ d) for j, d in enumerate(steps))
             sigma = bistatic_sigma(points, p, -i.arrives, -o.arrives)
             amplitude[r] = 0.5 / k * np.sqrt(sigma / (4.0 * np.pi)) * (i.field @ o.field)
             length[r], away[r], look[r] = i.length + o.length, i.leaves, o.leaves
         out.append(
             Paths.of(
-                delay=length / C0,
+                length=length,
                 amplitude=amplitude,
-                rate=rate,
+                length_rate=rate,
                 departure=away,
                 arrival=look,
                 body=body_of.astype(np.int16),

@@ -11,13 +11,14 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
-from raychan.records import TRANSMIT, Paths, take
+from raychan.records import TRANSMIT, Paths
 from raychan.run.result import MULTIPATH, Result
 from raychan.run.simulate import STAGES, background, noise_of_cell, simulate
 from raychan.signal.baseband import synthesize
 from raychan.study.validation.data import POINT, Study, Target
-from raychan.units import C0, db
+from raychan.units import db
 from raychan.world.errors import SceneError, nearest
 from raychan.world.scene import Scene
 
@@ -127,7 +128,7 @@ class Bench:
         given, result = self.target(target), self.run(run)
         at = self.expected_range(target)
         # Paths of another length, folded ones among them, would show there by the side lobes of the window only.
-        ways = over(result, given.parts, given.over) & (np.abs(0.5 * C0 * result.paths.delay - at) <= _ROOM)
+        ways = over(result, given.parts, given.over) & (np.abs(result.paths.range - at) <= _ROOM)
         if not ways.any():
             return None
         top = peak_snr(result, ways, at, _ROOM)
