@@ -11,52 +11,20 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import Record, column
+from raychan.kinds import *  # noqa: F403
 from raychan.reprs import Drawn
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
+Vectors = NDArray[np.float32] | NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 Ints = NDArray[np.signedinteger[Any]]
-
-
-class InteractionType(IntEnum):
-    """What happens at a vertex of a route."""
-
-    NONE = 0  # an unused slot
-    REFLECT = 1  # at a plane, by the image method
-    TRANSMIT = 2  # straight through a thin layer
-    SCATTER = 3  # by physical optics over a footprint
-    POINT = 4  # at a target of given RCS
-    DIFFRACT = 5  # at a wedge, by UTD
-
-
-class MaterialKind(IntEnum):
-    """What a material is to a wave."""
-
-    PEC = 0  # a perfect conductor
-    HALF_SPACE = 1  # so thick that nothing returns from behind its surface
-    LAYER = 2  # thin: reflects and passes
-
-
-class Role(IntEnum):
-    """What a body does besides blocking rays."""
-
-    SCATTERER = 0  # scatters and reflects
-    MIRROR = 1  # only reflects: the infinite ground
-    BLOCKER = 2  # nothing else
-
-
-# The same as plain integers: numba compiles a global integer into the code.
-NONE, REFLECT, TRANSMIT, SCATTER, POINT, DIFFRACT = map(int, InteractionType)
-PEC, HALF_SPACE, LAYER = map(int, MaterialKind)
-SCATTERER, MIRROR, BLOCKER = map(int, Role)
 
 
 @dataclass(frozen=True)
@@ -131,12 +99,12 @@ class Routes(Record):
 class Ways(Record):
     """Where paths went; a row a way, d slots a chain. Float32 but for specular paths (`ExactWays`)."""
 
-    departure: NDArray[np.floating[Any]] = column("w 3", np.float32, doc="unit direction of departure, world axes")
+    departure: Vectors = column("w 3", np.float32, doc="unit direction of departure, world axes")
     arrival: Floats = column("w 3", doc="unit direction towards which the receiver looks, world axes")
-    body: Ints = column("w d", np.int16)
-    part: Ints = column("w d", np.int16)
-    kind: Ints = column("w d", np.int8)
-    vertices: NDArray[np.floating[Any]] = column("w d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
+    body: NDArray[np.int16] = column("w d", np.int16)
+    part: NDArray[np.int16] = column("w d", np.int16)
+    kind: NDArray[np.int8] = column("w d", np.int8)
+    vertices: Vectors = column("w d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
 
 
 @dataclass(frozen=True)
@@ -157,7 +125,7 @@ class PropagationPaths(Record):
 
     length: Floats = column("n", unit="m", doc="from transmitter to receiver, the whole way")
     length_rate: Floats = column("n", unit="m/s", doc="rate of the length; positive = growing")
-    way: Ints = column("n", np.int32, doc="row of `ways`")
+    way: NDArray[np.int32] = column("n", np.int32, doc="row of `ways`")
     ways: Ways
     body_names: tuple[str, ...]
     part_names: tuple[str, ...]
@@ -180,7 +148,7 @@ class PropagationPaths(Record):
         return 0.5 * self.length_rate
 
     @property
-    def departure(self) -> NDArray[np.floating[Any]]:
+    def departure(self) -> Vectors:
         """Unit directions of departure (n, 3), world axes."""
         return self.ways.departure[self.way]
 
@@ -190,7 +158,7 @@ class PropagationPaths(Record):
         return self.ways.arrival[self.way]
 
     @property
-    def body(self) -> Ints:
+    def body(self) -> NDArray[np.int16]:
         """Bodies met (n, d) as rows of `body_names`, -1 in unused slots."""
         return self.ways.body[self.way]
 
@@ -200,17 +168,17 @@ class PropagationPaths(Record):
         return np.array([*self.body_names, ""])[self.body]
 
     @property
-    def part(self) -> Ints:
+    def part(self) -> NDArray[np.int16]:
         """Parts met (n, d) as rows of `part_names`, -1 in unused slots."""
         return self.ways.part[self.way]
 
     @property
-    def kind(self) -> Ints:
+    def kind(self) -> NDArray[np.int8]:
         """What happened at each vertex (n, d): values of InteractionType, NONE in unused slots."""
         return self.ways.kind[self.way]
 
     @property
-    def vertices(self) -> NDArray[np.floating[Any]]:
+    def vertices(self) -> Vectors:
         """Vertices (n, d + 2, 3) [m] from transmitter to receiver; unused slots repeat the receiver."""
         inner = self.ways.vertices[self.way]
         first, last = (np.broadcast_to(x.astype(inner.dtype), (len(inner), 1, 3)) for x in (self.tx, self.rx))
@@ -221,7 +189,7 @@ class PropagationPaths(Record):
 class Paths(PropagationPaths):
     """What the routes of a scene carry from the radar and back to it; a row a path (or corner of a tube)."""
 
-    amplitude: Complexes = column(
+    amplitude: NDArray[np.complex128] = column(
         "n", np.complex128, doc="received over transmitted voltage wave, antennas in, carrier phase in"
     )
 
@@ -260,7 +228,7 @@ class Profile(Record, Drawn):
 class Cube(Record):
     """Dechirped samples; voltage waves in sqrt(W), so |x|^2 is received power before processing."""
 
-    samples: Complexes = column("a c s", np.complex64, unit="sqrt(W)", doc="antenna, chirp, sample")
+    samples: NDArray[np.complex64] = column("a c s", np.complex64, unit="sqrt(W)", doc="antenna, chirp, sample")
     noise_power: float  # thermal, per complex sample, kT0BF [W]; 0 when noise is off
 
 
@@ -270,7 +238,7 @@ class RangeDoppler(Record, Drawn):
 
     range: Floats = column("r", unit="m")
     rate: Floats = column("v", unit="m/s", doc="range rate, positive = receding, increasing")
-    spectrum: Complexes = column("a v r", np.complex64, unit="sqrt(W)")
+    spectrum: NDArray[np.complex64] = column("a v r", np.complex64, unit="sqrt(W)")
     power: Floats = column("v r", unit="W", doc="mean over antennas of |spectrum|^2")
     noise: float
     """Expected thermal noise power per cell [W]; 0 when unknown."""
@@ -297,4 +265,4 @@ class Detections(Record):
     azimuth: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
-    cell: Ints = column("n 2", np.int32, doc="map indices (rate, range) of the peak")
+    cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")

@@ -9,11 +9,16 @@ import dataclasses
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from raychan.units import db, dbm
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
 
 _ROWS = 12
 
@@ -72,11 +77,22 @@ class Told:
 class Drawn:
     """Base of what has a picture."""
 
-    def plot(self, axes: Any = None) -> Any:
+    def plot(self, axes: Axes | None = None) -> Axes:
         """Draw with matplotlib and return the axes, those given or those of a new figure of pyplot."""
         from raychan.report.shown import draw
 
-        return draw(self, axes)
+        return draw(self, axes)  # type: ignore[no-any-return]
+
+
+class DrawnTwice:
+    """Base of what has two pictures, side by side."""
+
+    def plot(self, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
+        """Draw with matplotlib and return both axes, those given or those of a new figure of pyplot."""
+        from raychan.report.shown import draw
+
+        first, second = draw(self, axes)
+        return first, second
 
 
 def span(values: Any, unit: str = "", digits: int = 4) -> str:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from raychan.channel.transfer import departures, rates, transfer
 from raychan.poses import theta_phi
@@ -14,6 +13,7 @@ from raychan.records import NONE, REFLECT, TRANSMIT, ExactWays, Facets, Routes, 
 from raychan.tracing.legs import Leg, Mirror
 from raychan.world.geometry import Geometry
 from raychan.world.point_in_body import Place, place_of
+from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -227,12 +227,12 @@ def jones(routes: Routes, facets: Facets, frequency: float) -> NDArray[np.comple
 
 
 def specular_paths(
-    scene: Any,
-    tx: Any,
-    rx: Any,
+    scene: Scene,
+    tx: ArrayLike,
+    rx: ArrayLike,
     max_bounces: int = 3,
-    tx_velocity: Any = (0.0, 0.0, 0.0),
-    rx_velocity: Any = (0.0, 0.0, 0.0),
+    tx_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    rx_velocity: ArrayLike = (0.0, 0.0, 0.0),
 ) -> SpecularPaths:
     """Return the exact specular paths between two points of a scene, line of sight included, isotropic ends.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -22,6 +22,11 @@ from raychan.world.mesh import CREASE_DEG, Floats, Mesh
 from raychan.world.mesh_io import from_trimesh, load, oddities
 from raychan.world.motion import Motion
 
+if TYPE_CHECKING:
+    import trimesh
+
+MeshLike: TypeAlias = "Mesh | trimesh.Trimesh | trimesh.Scene | str | Path"
+"""A mesh of ours, one of trimesh, or the name of a file."""
 ROLES = {role.name.lower(): role for role in Role}
 
 
@@ -36,9 +41,9 @@ class Body:
     """
 
     name: str
-    mesh: Any = None
+    mesh: MeshLike | None = None
     shape: str | None = None
-    params: Mapping[str, Any] = field(default_factory=dict)
+    params: Mapping[str, object] = field(default_factory=dict)
     material: str | Material | None = None
     materials: Mapping[str, str | Material] = field(default_factory=dict)
     position: Sequence[float] = (0.0, 0.0, 0.0)
@@ -168,8 +173,8 @@ class Body:
             return []
         mesh, key = self.geometry, f"bodies.{self.name}."
         said = list(mesh.report.warnings())
-        is_file = isinstance(self.mesh, (str, Path))
-        said += oddities(mesh, self.mesh if is_file else "", self.unit, self.up if is_file else "z", key)
+        file = self.mesh if isinstance(self.mesh, str | Path) else ""
+        said += oddities(mesh, file, self.unit, self.up if file else "z", key)
         folds = folds_told(mesh, f"{key}crease_deg")
         said += [folds] if folds else []
         bare = [] if mesh.part_materials or self.material or self.rcs_dbsm is not None else self._bare_parts()

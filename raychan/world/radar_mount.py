@@ -111,6 +111,14 @@ def is_antenna(file: Path) -> bool:
         return False
 
 
+def load_antenna(path: str | Path, polarization: str = "V") -> Antenna:
+    """Return the antenna of a file, or one that comes with raychan by its name, such as 'antennas/patch'.
+
+    Args: path of the TOML file; polarization V or H. Raises: SceneError where there is none, or where it is wrong.
+    """
+    return antenna_of(str(path), polarization, Path(), "path")
+
+
 def antenna_of(given: str | AntennaTable, polarization: str, folder: Path, key: str, file: Any = None) -> Antenna:
     """Return the antenna that a table or an antenna file describes."""
     from raychan.radar.pattern import gain_dbi

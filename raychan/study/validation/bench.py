@@ -148,7 +148,7 @@ def over(result: Result, parts: tuple[str, ...], via: tuple[str, ...] = ()) -> M
     led = np.any(touched[: len(parts)], axis=0)
     if via:
         return np.asarray((led & np.all(touched[len(parts) :], axis=0))[paths.way])
-    own = {p.split(".")[0] for p in parts} | set(background(result.scene.facets(0.0)))
+    own = {p.split(".")[0] for p in parts} | set(background(result.require_scene().facets(0.0)))
     strange = [i for i, name in enumerate(paths.body_names) if name not in own]
     led &= ~(np.isin(ways.body, strange) & met & (ways.kind != TRANSMIT)).any(axis=1)
     return np.asarray(led[paths.way])
@@ -156,7 +156,7 @@ def over(result: Result, parts: tuple[str, ...], via: tuple[str, ...] = ()) -> M
 
 def peak_snr(result: Result, ways: Mask, at: float, room: float) -> float:
     """Return the highest SNR [dB] within `room` [m] of a range [m] in a map of some paths (n,) without noise."""
-    scene = result.scene
+    scene = result.require_scene()
     settings, quiet = scene.processing, dataclasses.replace(scene.radar, noise=False)
     cube = synthesize(take(result.paths, ways), quiet)
     made = range_doppler(cube, quiet.waveform, settings.range_window, settings.rate_window, settings.pad)
