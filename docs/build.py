@@ -6,6 +6,7 @@ docstrings of the public names and of the records.
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import re
 import shutil
@@ -13,6 +14,7 @@ import sys
 import warnings
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from markdown_it import MarkdownIt
 
@@ -35,14 +37,15 @@ body { font: 16px/1.5 system-ui, sans-serif; color: #222; margin: 0; display: fl
 nav { flex: 0 0 15em; min-height: 100vh; background: #f5f6f8; padding: 1.5em; box-sizing: border-box; font-size: 14px; }
 nav b { display: block; margin: 1.2em 0 .2em; } nav a { display: block; padding: .1em 0; }
 nav a.here { font-weight: 600; color: #222; }
-main { flex: 1; min-width: 0; max-width: 52em; padding: 1.5em 2.5em 4em; }
+main { flex: 1; min-width: 0; max-width: 60em; padding: 1.5em 2.5em 4em; }
 h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2em; border-bottom: 1px solid #ddd; padding-bottom: .2em; }
 a { color: #1f5fa8; text-decoration: none; } a:hover { text-decoration: underline; }
 table { border-collapse: collapse; font-size: 14px; margin: 1em 0; display: block; overflow-x: auto; }
 th, td { border-bottom: 1px solid #e4e4e4; padding: .3em .7em; text-align: left; vertical-align: top; }
 th { background: #f5f6f8; } img { max-width: 100%; height: auto; }
 code { background: #f5f6f8; padding: 0 .2em; font-size: 90%; }
-pre { background: #f5f6f8; padding: .8em 1em; overflow-x: auto; line-height: 1.35; } pre code { padding: 0; }
+pre { background: #f5f6f8; padding: .8em 1em; overflow-x: auto; line-height: 1.35; font-size: 95%; }
+pre code { padding: 0; }
 """
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -108,12 +111,26 @@ def relinked(body: str, page: Path, name: str, out: Path) -> str:
     return re.sub(r'(href|src)="([^"]+)"', link, body)
 
 
+def coloured(code: str, language: str, attributes: str) -> str:
+    """Return a code block as HTML; markdown-it calls this."""
+    from pygments import highlight
+    from pygments.formatters import HtmlFormatter
+    from pygments.lexers import get_lexer_by_name
+
+    return str(highlight(code, get_lexer_by_name(language or "text"), HtmlFormatter(nowrap=True)))
+
+
 def pages(out: Path) -> None:
     """Write all pages of the menu."""
     listed = {(HERE / n).resolve() for _, names in MENU for n in names}
     if missing := {p.resolve() for p in HERE.rglob("*.md")} - listed:
         raise SystemExit(f"pages in no menu: {sorted(map(str, missing))}")
-    render = MarkdownIt("commonmark", {"html": False}).enable("table").render
+    from pygments.formatters import HtmlFormatter
+
+    render = MarkdownIt("commonmark", {"html": False, "highlight": coloured}).enable("table").render
+    style = (
+        STYLE + str(HtmlFormatter(style="friendly").get_style_defs("pre")) + "pre, pre code { background: #f5f6f8; }"
+    )
     for _, names in MENU:
         for name in names:
             page = HERE / name
@@ -121,7 +138,7 @@ def pages(out: Path) -> None:
             place = out / target(name)
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text(
-                PAGE.format(title=title_of(page), style=STYLE, menu=menu(name), body=body), encoding="utf-8"
+                PAGE.format(title=title_of(page), style=style, menu=menu(name), body=body), encoding="utf-8"
             )
 
 
@@ -133,13 +150,26 @@ def loaded(name: str) -> ModuleType:
     return module
 
 
+def column(variable: Any) -> str:
+    """Return axes, dtype, unit and meaning of a record's column, which pdoc does not know; empty for all else."""
+    class_name, _, name = variable.qualname.rpartition(".")
+    owner = getattr(sys.modules.get(variable.modulename), class_name, None)
+    for field in dataclasses.fields(owner) if dataclasses.is_dataclass(owner) else ():
+        if field.name == name and "axes" in field.metadata:
+            m = field.metadata
+            unit = f" [{m['unit']}]" if m["unit"] != "1" else ""
+            return f"({', '.join(m['axes'])}) {m['dtype']}{unit}{': ' if m['doc'] else ''}{m['doc']}"
+    return ""
+
+
 def reference(out: Path) -> None:
     """Write the API reference."""
     import pdoc
 
     for name in MODULES:
         loaded(name)
-    pdoc.render.configure(docformat="google", show_source=False, footer_text="raychan")
+    pdoc.render.configure(show_source=False, template_directory=HERE / "api_template")
+    pdoc.render.env.filters["column"] = column
     pdoc.pdoc(*MODULES, output_directory=out / "api")
 
 
