@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 BOUNDS := $(addprefix tests/test_,bounds.py cores.py cut.py diffract.py jit.py shapes.py sight.py spectrum.py utd.py)
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: help demo test test-bounds fuzz signatures bench clean
+.PHONY: help demo test test-bounds fuzz signatures bench docs clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
@@ -19,6 +19,7 @@ help:
 	@echo "make fuzz   random scene files, meshes and flags for half an hour (FUZZ=--help: more)"
 	@echo "make signatures   list anew what a cold run compiles, for its second process (some minutes)"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
+	@echo "make docs   the pages of docs/ and the API reference into out/docs; warnings are errors"
 	@echo "make clean  remove $(VENV), out and caches"
 
 demo: $(VENV)/.installed
@@ -43,6 +44,9 @@ signatures: $(VENV)/.installed-dev
 bench: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
+docs: $(VENV)/.installed-docs
+	$(BIN)/python docs/build.py out/docs
+
 # A stamp younger than pyproject.toml says that the environment is up to date.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
@@ -50,6 +54,10 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 
 $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@ $(VENV)/.installed
 
 $(BIN)/python:
