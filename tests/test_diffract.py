@@ -1,4 +1,4 @@
-"""Diffracted ways to points: continuous over shadow boundaries, half at the boundary, alike both ways."""
+"""Diffracted point_legs to points: continuous over shadow boundaries, half at the boundary, alike both point_legs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from test_solve import point, radar
 from raychan.frames import theta_phi
 from raychan.records import DIFFRACT
 from raychan.run.solver import refinement, solve
-from raychan.tracing.edge_diffraction import ways
+from raychan.tracing.edge_diffraction import point_legs
 from raychan.units import C0
 from raychan.world.geometry import Geometry
 
@@ -27,13 +27,13 @@ def horizontal(look):
 
 
 def field(geometry, y, x=20.0):
-    """Field of all ways at (x, y, 0) from the origin, over that of free space; the mean of V and H.
+    """Field of all point_legs at (x, y, 0) from the origin, over that of free space; the mean of V and H.
 
     The mean of soft and hard diffraction is what scalar theory gives.
     """
     at, scale = np.array([x, y, 0.0]), np.hypot(x, y) * np.exp(1j * K * np.hypot(x, y))
-    v = sum(w.field for w in ways(geometry, np.zeros(3), at, -1, vertical, K))
-    h = sum(w.field for w in ways(geometry, np.zeros(3), at, -1, horizontal, K))
+    v = sum(w.field for w in point_legs(geometry, np.zeros(3), at, -1, vertical, K))
+    h = sum(w.field for w in point_legs(geometry, np.zeros(3), at, -1, horizontal, K))
     straight = at / np.linalg.norm(at)
     return 0.5 * scale * (v @ theta_phi(straight[None])[0][0] + h @ theta_phi(straight[None])[1][0])
 

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from raychan.em.phase_integral import quadratic_means
 from raychan.parallel import parallel_for
-from raychan.tracing.tubes import Phases, Refinement
+from raychan.tracing.tube_phases import Phases
+from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -56,7 +57,7 @@ class Contributions:
         bodies = geometry.facets.body[facet[wanted]]
         count = np.bincount(bodies, minlength=max(len(geometry.facets.role), len(self.uncut)))
         self.uncut = count + np.pad(self.uncut, (0, len(count) - len(self.uncut)))
-        geometry.uncut += int(np.count_nonzero(wanted))
+        geometry.count_uncut(int(np.count_nonzero(wanted)))
         return np.zeros_like(wanted)
 
     def _cell(self, length: Floats) -> NDArray[np.int64]:
@@ -76,7 +77,7 @@ class Contributions:
         each = np.empty(len(ph.six), complex)
 
         def some(rows: slice) -> None:
-            each[rows] = ph.area[rows] * quadratic_means(ph.six[rows], 0.5)
+            each[rows] = ph.in_phase[rows] * quadratic_means(ph.six[rows], 0.5)
 
         parallel_for(len(each), some, _THREADS)
         cell = self._cell(ph.length)

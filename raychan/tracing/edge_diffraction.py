@@ -1,4 +1,4 @@
-"""Diffracted ways to point targets: once over a wedge in, out, or both (UTD)."""
+"""Paths to point targets by single diffraction at a wedge on the leg in, out, or both (UTD)."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-_LONGEST_DETOUR = 2.0  # m beyond the straight line
-_SHORTEST = 10.0  # wavelengths: an edge shorter than this is not a wedge to the wave
+_LONGEST_DETOUR = 2.0  # m beyond the straight line: longer ones diffract into deep shadow; not measured
+_SHORTEST = 10.0  # wavelengths: a shorter edge does not act as an infinite wedge; not measured
 
 
 @dataclass(frozen=True)
-class Way:
-    """One way between an end and a point: the field there (3,) per unit wave [1/m], phase in, its length [m], unit
-    direction of departure, unit direction at the point, and the wedge met (facet -1: straight)."""
+class PointLeg:
+    """A leg between an end and a point: the field there (3,) per unit wave [1/m], with its phase; its length [m]; unit
+    directions of travel at the end and at the point; where it meets a wedge, and a facet of that (-1: straight)."""
 
     field: Complexes
     length: float
@@ -38,12 +38,12 @@ class Way:
     facet: int
 
 
-def ways(
+def point_legs(
     geometry: Geometry, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
-) -> list[Way]:
-    """Return the straight way, where it is free, and those over one wedge each.
+) -> list[PointLeg]:
+    """Return the straight leg, where nothing blocks it, and those over one wedge each.
 
-    Args: end, point (3,) [m]; body in which the point stands; field_of directions (n, 3) -> antenna vectors (n, 3); k
+    Args: end, point (3,) [m]; body in which the point lies; field_of directions (n, 3) -> antenna vectors (n, 3); k
     [rad/m].
     Source: Keller 1962 (law of edge diffraction); Kouyoumjian and Pathak 1974.
     """
@@ -52,7 +52,7 @@ def ways(
     straight = (point - end) / gap
     if _free(geometry, end, point, -1, body):
         wave = np.asarray(field_of(straight[None]))[0] / gap * np.exp(-1j * k * gap)
-        found.append(Way(wave, gap, straight, straight, point, -1))
+        found.append(PointLeg(wave, gap, straight, straight, point, -1))
     for w in _candidates(geometry, end, point, body, gap, k):
         way = _over(geometry, w, end, point, body, field_of, k)
         if way is not None:
@@ -61,7 +61,7 @@ def ways(
 
 
 def _candidates(geometry: Geometry, end: Floats, point: Floats, body: int, gap: float, k: float) -> NDArray[np.int64]:
-    """Return wedges long enough, near enough to the straight line, and not of the target's own body."""
+    """Return the wedges that are long enough, near enough to the straight line, and not of the target's own body."""
     a, b = geometry.wedge[:, 0], geometry.wedge[:, 1]
     size = np.linalg.norm(b - a, axis=1)
     middle = 0.5 * (a + b)
@@ -72,7 +72,8 @@ def _candidates(geometry: Geometry, end: Floats, point: Floats, body: int, gap: 
 
 def _over(
     geometry: Geometry, w: int, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
-) -> Way | None:
+) -> PointLeg | None:
+    """Return the leg over wedge w, None where it has no point of diffraction or is blocked."""
     start, stop = geometry.wedge[w]
     size = float(np.linalg.norm(stop - start))
     edge = (stop - start) / size
@@ -86,7 +87,7 @@ def _over(
     face, other = (int(f) for f in geometry.wedge_facet[w])
     k_in, k_out = (spot - end) / s_in, (point - spot) / s_out
     normal = geometry.normal[face]
-    # Both ends see the edge from the open side of one of its faces; the rays themselves graze those faces.
+    # Shadow rays aim a little above both faces, which the diffracted rays themselves may graze.
     lift = 1e-4 * (normal + geometry.normal[other])
     if not (_free(geometry, end, spot + lift, face, -1) and _free(geometry, point, spot + lift, face, body)):
         return None
@@ -107,10 +108,11 @@ def _over(
         r_n,
     )
     wave = np.array(vector) * np.exp(-1j * k * s_out)
-    return Way(wave, s_in + s_out, k_in, k_out, spot, face)
+    return PointLeg(wave, s_in + s_out, k_in, k_out, spot, face)
 
 
 def _reflection(geometry: Geometry, facet: int, k_in: Floats, k_out: Floats, k: float) -> tuple[complex, complex]:
+    """Return (R_s, R_p) of a face at the steeper of both rays' angles (after Luebbers 1984)."""
     m = geometry.facets.materials
     row = geometry.facets.material[facet]
     normal = geometry.normal[facet]
@@ -120,6 +122,7 @@ def _reflection(geometry: Geometry, facet: int, k_in: Floats, k_out: Floats, k: 
 
 
 def _free(geometry: Geometry, start: Floats, stop: Floats, facet: int, body: int) -> bool:
+    """Tell whether nothing blocks the line from start to stop (3,) [m], on a facet or in a body (-1: none)."""
     gap = float(np.linalg.norm(stop - start))
     d = ((stop - start) / gap)[None]
     inside = np.array([body]) if body >= 0 else None
@@ -132,17 +135,17 @@ def _free(geometry: Geometry, start: Floats, stop: Floats, facet: int, body: int
 def diffracted_paths(
     geometry: Geometry, points: Points, radar: Any, frequency: float, slots: int, legs: list[Leg]
 ) -> list[Paths]:
-    """Return the paths to point targets over at least one wedge; the straight way in or out may be the other half.
+    """Return the paths to point targets over at least one wedge; one leg of each may be straight.
 
-    Args: legs the mirror-free leg first (its end is the radar). Each pair of ways is one path.
+    Args: frequency [Hz]; slots for interactions; legs the mirror-free one first (its end is the radar).
     """
     k = 2.0 * np.pi * frequency / C0
     end, f = np.asarray(legs[0].end, float), geometry.facets
     out: list[Paths] = []
     for p in range(len(points.body)):
         at, body = points.position[p], int(points.body[p])
-        there = ways(geometry, end, at, body, radar.tx_field, k)
-        back = ways(geometry, end, at, body, radar.rx_field, k)
+        there = point_legs(geometry, end, at, body, radar.tx_field, k)
+        back = point_legs(geometry, end, at, body, radar.rx_field, k)
         rows = [(i, o) for i, o in product(there, back) if i.facet >= 0 or o.facet >= 0]
         if not rows:
             continue

@@ -21,7 +21,7 @@ from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
-from raychan.world.posed import placed, stack
+from raychan.world.posed import posed, stack
 from raychan.world.radar_mount import radar_of
 from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
@@ -262,7 +262,7 @@ class Scene(Told):
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        return placed(self.bodies, self._index, self.frequency, time, self.still)
+        return posed(self.bodies, self._index, self.frequency, time, self.still)
 
     @property
     def topology(self) -> list[MeshTopology]:
