@@ -1,4 +1,4 @@
-"""Found: how much field a launch has found so far, by length of way; what is let go is weighed against it."""
+"""The scattered field that a launch has found so far, by two-way length: the level against which tubes are pruned."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_MANY = 4096  # tubes under which letting some go saves nothing
-_THREADS = 1000  # tubes from which on a second thread pays
+_MANY = 4096  # tubes from which on pruning pays; not measured
+_THREADS = 1000  # tubes from which on a second thread pays; not measured
 _NOTHING = 1e-100  # 1/m
-_DEPTH = 1e-2  # of the strongest cell: weaker ones are no finer than such a one, should there be no noise
-_SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
+_DEPTH = 1e-2  # of the strongest cell: without noise weaker cells are refined as if they held this; not measured
+_SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; not measured
 
 
 class Contributions:
@@ -30,23 +30,23 @@ class Contributions:
         self._level = np.zeros(1)
         self._tubes, self._cuts, self._rays = 0, 0.0, -1
         self.uncut = np.zeros(0, np.int64)
-        """Tubes (bodies,) that budgets kept from being cut."""
+        """Tubes (bodies,) that budgets kept from being subdivided."""
 
     def affords_phase(self, geometry: Geometry, facet: Ints, wanted: Bools) -> Bools:
-        """Return which tubes (n,) on facets (n,) may be cut for their phase: none once there are `rule.max_tubes`."""
+        """Return which tubes (n,) on facets (n,) may be bisected for their phase: none once there are `rule.max_tubes`."""
         self._tubes += len(wanted)
         return self._within(geometry, facet, wanted, self._tubes > self.rule.max_tubes)
 
     def affords(self, geometry: Geometry, facet: Ints, wanted: Bools, weight: float = 1.0) -> Bools:
-        """Return which tubes (n,) may be cut for what hides parts of them: none once `rule.max_cuts` are made, each
-        counted by its weight, or `rule.max_rays` cast by this launch."""
+        """Return which tubes (n,) may be subdivided for visibility: none once `rule.max_cuts` are made, each counted by
+        its weight, or `rule.max_rays` cast by this launch."""
         rest = 0.0 if self.spent(geometry) else (self.rule.max_cuts - self._cuts) / weight
         self._cuts += weight * np.count_nonzero(wanted)
         within = wanted & (np.cumsum(wanted) <= rest)
         return within | self._within(geometry, facet, wanted & ~within, True)
 
     def spent(self, geometry: Geometry) -> bool:
-        """Tell whether nothing may be cut any more for what hides it."""
+        """Tell whether the budgets for visibility are spent."""
         if self._rays < 0:
             self._rays = geometry.rays
         return self._cuts > self.rule.max_cuts or geometry.rays - self._rays > self.rule.max_rays
@@ -64,14 +64,14 @@ class Contributions:
         return np.asarray(np.maximum(length / self.rule.cell, 0.0), np.int64)
 
     def doubt(self, length: Floats) -> Floats:
-        """Return the bound [1/m] under which doubtful tubes of two-way lengths (n,) [m] are left as they are; about a
-        hundred such add up to `rule.relative` of what was found there."""
+        """Return the prune threshold [1/m] at two-way lengths (n,) [m]: tubes of a lower bound are not subdivided; about
+        a hundred such add up to `rule.relative` of the field found there."""
         at = np.minimum(self._cell(length), len(self._level) - 1)
         level = np.maximum(self._level[at], _DEPTH * self._level.max())
         return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * level)
 
     def add(self, ph: Phases) -> None:
-        """Count tubes that are seen: in each cell the scalar sum of all, or their rms sum where that cancels."""
+        """Add tubes that are seen: in each cell the sum of their amplitudes, or their rms sum where that cancels."""
         if not len(ph.six):
             return
         each = np.empty(len(ph.six), complex)
@@ -81,7 +81,7 @@ class Contributions:
 
         parallel_for(len(each), some, _THREADS)
         cell = self._cell(ph.length)
-        # A cell more at the end, which stays empty, for all that is longer.
+        # One more cell at the end, which stays empty, for all longer paths.
         n = max(len(self._level), int(cell.max()) + 3)
         whole = np.hypot(np.bincount(cell, each.real, n), np.bincount(cell, each.imag, n))
         size = np.maximum(whole, np.sqrt(np.bincount(cell, np.abs(each) ** 2, n)))
@@ -93,12 +93,12 @@ class Contributions:
             self._level = self._level[:1]
 
     def that_count(self, bound: Floats, length: Floats, many: int = _MANY) -> NDArray[np.intp]:
-        """Return the tubes to keep: of `many` or more, the weakest of each cell are let go while all these in phase
-        stay under 0.3 of the doubt."""
+        """Return the tubes to keep: of `many` or more, the weakest of each cell are pruned while their sum in phase stays
+        under a share of the prune threshold."""
         if len(bound) < many:
             return np.arange(len(bound))
         share = bound / self.doubt(length)
-        # The weakest few are enough: none that alone exceeds the sum is looked at.
+        # Only tubes that alone stay under the sum can be among them.
         weak = np.flatnonzero(share < _SHARE)
         cell = self._cell(length[weak])
         order = np.lexsort((share[weak], cell))

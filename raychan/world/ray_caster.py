@@ -1,4 +1,4 @@
-"""Rays against facets: triangle ids from Embree, everything else in float64 (the only import of embreex).
+"""Ray casting: triangle ids from Embree, everything else in float64 (the only import of embreex).
 
 Embree answers in float32, whose spacing at 200 m is 15 um: 0.05 rad two-way at 77 GHz. So only the triangle's id is
 taken; the hit point is the float64 intersection with that triangle's plane. The world is shifted to the centre of the
