@@ -33,7 +33,8 @@ class Contributions:
         """Tubes (bodies,) that budgets kept from being subdivided."""
 
     def affords_phase(self, geometry: Geometry, facet: Ints, wanted: Bools) -> Bools:
-        """Return which tubes (n,) on facets (n,) may be bisected for their phase: none once there are `rule.max_tubes`."""
+        """Return which tubes (n,) on facets (n,) may be bisected for their phase: none once there are
+        `rule.max_tubes`."""
         self._tubes += len(wanted)
         return self._within(geometry, facet, wanted, self._tubes > self.rule.max_tubes)
 
@@ -64,8 +65,8 @@ class Contributions:
         return np.asarray(np.maximum(length / self.rule.cell, 0.0), np.int64)
 
     def doubt(self, length: Floats) -> Floats:
-        """Return the prune threshold [1/m] at two-way lengths (n,) [m]: tubes of a lower bound are not subdivided; about
-        a hundred such add up to `rule.relative` of the field found there."""
+        """Return the prune threshold [1/m] at two-way lengths (n,) [m]: tubes of a lower bound are not subdivided;
+        about a hundred such add up to `rule.relative` of the field found there."""
         at = np.minimum(self._cell(length), len(self._level) - 1)
         level = np.maximum(self._level[at], _DEPTH * self._level.max())
         return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * level)
@@ -93,8 +94,8 @@ class Contributions:
             self._level = self._level[:1]
 
     def that_count(self, bound: Floats, length: Floats, many: int = _MANY) -> NDArray[np.intp]:
-        """Return the tubes to keep: of `many` or more, the weakest of each cell are pruned while their sum in phase stays
-        under a share of the prune threshold."""
+        """Return the tubes to keep: of `many` or more, the weakest of each cell are pruned while their sum in phase
+        stays under a share of the prune threshold."""
         if len(bound) < many:
             return np.arange(len(bound))
         share = bound / self.doubt(length)
