@@ -142,7 +142,7 @@ def _one(geometry: Geometry, leg: Leg, rx: Floats, slots: int, layers: int):  # 
     """Return (length, vertices, normals, facets, kinds) of one chain, or None if it is not real."""
     if np.linalg.norm(rx - leg.image) == 0.0 or not leg.may_reach(rx[None], np.zeros(1))[0]:
         return None
-    stops = [leg.end, *leg.bounces(rx[None])[0], rx]
+    stops = [leg.end, *leg.mirror_points(rx[None])[0], rx]
     vertices: list[Floats] = []
     normals: list[Floats] = []
     facets: list[int] = []

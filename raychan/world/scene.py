@@ -23,7 +23,7 @@ from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.point_targets import points_of
-from raychan.world.posed import placed, stack
+from raychan.world.posed import posed, stack
 from raychan.world.radar_mount import mount, processing_of, radar_of
 from raychan.world.schema import BodyTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
@@ -274,7 +274,7 @@ class Scene(Told):
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        return placed(self.bodies, self._index, self.frequency, time, self.still)
+        return posed(self.bodies, self._index, self.frequency, time, self.still)
 
     @property
     def topology(self) -> list[MeshTopology]:
