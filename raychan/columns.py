@@ -62,7 +62,7 @@ class Record(Told):
             object.__setattr__(out, name, frozen)
         return out
 
-    def replace(self, **changes: Any) -> Self:
+    def replace(self, **changes: object) -> Self:
         """Return a copy with some fields changed (and all checked again)."""
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 

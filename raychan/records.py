@@ -194,10 +194,11 @@ class Paths(PropagationPaths):
     )
 
     @classmethod
-    def of(cls, **columns: Any) -> Paths:
+    def of(cls, **columns: object) -> Paths:
         """Return paths of columns of which each has a row a path, those of `Ways` among them."""
-        ways = Ways(**{f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)})
-        return cls(way=np.arange(len(columns["length"]), dtype=np.int32), ways=ways, **columns)
+        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)}
+        rows: dict[str, Any] = columns
+        return cls(way=np.arange(len(rows["length"]), dtype=np.int32), ways=Ways(**held), **rows)
 
 
 @dataclass(frozen=True)
