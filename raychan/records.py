@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from raychan.columns import Record, column
 from raychan.kinds import *  # noqa: F403
-from raychan.reprs import Drawn
+from raychan.reprs import Plotted
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -216,7 +216,7 @@ class SpecularPaths(PropagationPaths):
 
 
 @dataclass(frozen=True)
-class Profile(Record, Drawn):
+class Profile(Record, Plotted):
     """Power-delay profile as received in the waveform's bandwidth."""
 
     range: Floats = column("r", unit="m", doc="c tau / 2")
@@ -234,7 +234,7 @@ class Cube(Record):
 
 
 @dataclass(frozen=True)
-class RangeDoppler(Record, Drawn):
+class RangeDoppler(Record, Plotted):
     """Range-Doppler map; scaled so that a lone path's peak reads its received power."""
 
     range: Floats = column("r", unit="m")

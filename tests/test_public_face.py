@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import doctest
 import re
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import assert_type
 
@@ -79,6 +81,11 @@ def test_types_of_all_public_names_are_known_to_a_strict_checker(monkeypatch: py
     monkeypatch.setenv("MYPYPATH", str(ROOT))
     told, trouble, _ = api.run([*FLAGS, __file__])
     assert (told, trouble) == ("", "")
+
+
+@pytest.mark.parametrize("home", sorted({getattr(rc, n).__module__ for n in rc.__all__ if n != "__version__"}))
+def test_examples_in_docstrings_run(home: str) -> None:
+    assert doctest.testmod(import_module(home)).failed == 0
 
 
 def public_annotations(name: str) -> Iterator[tuple[str, str]]:
