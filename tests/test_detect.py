@@ -206,7 +206,7 @@ def test_maps_of_any_size_are_searched_or_refused(shape):
 def test_azimuth_of_a_line_of_receivers(count, degrees):
     line = np.zeros((count, 3))
     line[:, 1] = np.arange(count) * 0.5 * 0.0038
-    radar = {"elements": line, "yaw": 0.2}
+    radar = {"elements": line, "yaw_deg": np.degrees(0.2)}
     m = rdmap(echoes([6.0], 2.0, 1e-4, np.radians(degrees) + 0.2), **radar)
     found = detect(m, waveform=SMALL, elements=line)
     assert np.degrees(found.azimuth[0]) == pytest.approx(degrees, abs=0.05)
