@@ -98,7 +98,7 @@ def test_what_changes_a_surface_makes_a_new_one(scene, change):
 def test_joints_of_meshes_are_those_found_from_facets_alone(scene):
     turned = scene.override(["bodies.box.yaw_deg=33.0"])
     own, blind = Geometry(turned.facets(), turned.topology), Geometry(turned.facets())
-    for name in ("plane", "smooth", "both_sides", "piece", "first_edge", "outline"):
+    for name in ("plane", "smooth", "both_sides", "piece", "first_edge", "plane_edges"):
         np.testing.assert_array_equal(getattr(own, name), getattr(blind, name), err_msg=name)
     for name in ("edge_ends", "wedge"):
         a, b = (np.sort(getattr(s, name).reshape(-1, 6), axis=0) for s in (own, blind))
