@@ -85,7 +85,9 @@ def test_no_module_imports_itself_by_way_of_others():
 
 
 LONGEST_FILE, LONGEST_FUNCTION, DEEPEST = 300, 60, 4
-LONG: dict[str, str] = {}
+LONG: dict[str, str] = {
+    "cli/rcs:rcs": "48 lines declare its options, each with its help",
+}
 """Functions that may be longer or deeper, each with its reason."""
 
 

@@ -79,7 +79,7 @@ def info(
 def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
     import numpy as np
 
-    from raychan.world.creases import folds_told
+    from raychan.world.creases import uncertain_folds
     from raychan.world.mesh_io import oddities
 
     low, high = mesh.bounds
@@ -97,7 +97,7 @@ def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
     screen.print(show.table(str(source), ("mesh", ""), facts, left=(0, 1)))
     parts = [(n, str(c), f"{a:.4g}") for n, c, a in zip(mesh.part_names, counts, areas, strict=True)]
     screen.print(show.table("", ("part", "facets", "area m2"), parts))
-    folds = folds_told(mesh, "crease_deg (raychan rcs: --crease)")
+    folds = uncertain_folds(mesh, "crease_deg (raychan rcs: --crease)")
     show.warn([*r.warnings(), *oddities(mesh, source, unit, up, "--"), *([folds] if folds else [])])
 
 

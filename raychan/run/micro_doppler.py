@@ -192,10 +192,10 @@ class _Work:
         wave = self.radar.waveform
         shape = (2, len(self.radar.elements), last - first + 1, wave.n_samples)
         out = np.zeros(shape, np.complex64)
-        growth = 2.0 * key.others.rate / C0 * (first - key.chirp) * self.step
+        delay_rate = 2.0 * key.others.rate / C0 * (first - key.chirp) * self.step
         late = key.others.replace(
-            delay=key.others.delay + growth,
-            amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * growth),
+            delay=key.others.delay + delay_rate,
+            amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
         out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame)).samples
@@ -204,7 +204,7 @@ class _Work:
             nearer = departures(routes)[1] @ self.radar.elements_world.T
             for start in range(first, last + 1, _AT_ONCE):
                 count = min(_AT_ONCE, last + 1 - start)
-                # One instant more than chirps: growth from chirp to chirp is what a path's rate is.
+                # One instant more than chirps: delay_rate from chirp to chirp is what a path's rate is.
                 poses = self.poses(key, np.arange(start, start + count + 1))
                 lengths, amplitudes = carried(routes, strength, poses, wave.carrier)
                 rows = slice(start - first, start - first + count)
@@ -222,18 +222,18 @@ class _Work:
         wave, count = self.radar.waveform, len(lengths) - 1
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
         delay = lengths.reshape(count + 1, -1)[:, parts] / C0
-        growth, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
+        delay_rate, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
         strength = amplitudes.reshape(count + 1, -1)[:-1, parts]
         if len(parts) * wave.n_samples <= _FEW:
             step = wave.chirp_duration / wave.n_samples
-            rows = ramp_sums(strength, delay, growth, wave.carrier, wave.slope, step, wave.n_samples)
+            rows = ramp_sums(strength, delay, delay_rate, wave.carrier, wave.slope, step, wave.n_samples)
             return np.asarray(rows)
         here = np.zeros(3)
         one = dataclasses.replace(
             self.radar, elements=here[None], power=1.0, waveform=dataclasses.replace(wave, n_chirps=1)
         )
         return np.stack(
-            [synthesize(echoes(*row, here), one).samples[0, 0] for row in zip(delay, strength, growth, strict=True)]
+            [synthesize(echoes(*row, here), one).samples[0, 0] for row in zip(delay, strength, delay_rate, strict=True)]
         )
 
     def poses(self, key: Keyframe, chirps: NDArray[np.signedinteger]) -> Poses:

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from raychan.frames import direction, theta_phi
 from raychan.records import Facets
-from raychan.run.rcs import facets_of, refinements, scattering
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
 from raychan.study.ray_lattice import Window, echoes
 from raychan.tracing.legs import Leg
 from raychan.units import C0

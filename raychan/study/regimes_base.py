@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from raychan.frames import direction
 from raychan.records import Facets
-from raychan.run.rcs import facets_of, refinements, scattering
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.geometry import Geometry
