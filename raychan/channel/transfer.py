@@ -154,15 +154,15 @@ def _transfer(  # type: ignore[no-untyped-def]
             whole *= (sigma[i] / (4.0 * np.pi)) ** 0.5 * spread_out[i]
             _couple(out[i], whole, leaving, arriving)
             continue
+        normal = _vec(normals[i, at])
+        ci = _coefficients(table, material[i, at], k_in, normal, k)
+        co = _coefficients(table, material[i, at], k_out, normal, k)
         scale = wavelength_4pi * (-0.25j * k / np.pi) * spread_in[i] * spread_out[i]
         for _ in range(caustics[i]):
             scale *= 1j
         for c6 in range(6):
             phases[c6] = k * lengths[i, c6]
         triangle_terms(phases, _LINEAR, terms)
-        normal = _vec(normals[i, at])
-        ci = _coefficients(table, material[i, at], k_in, normal, k)
-        co = _coefficients(table, material[i, at], k_out, normal, k)
         _scatter(
             out[i], scale, terms, wave, arriving, leaving, (k_in, k_out), normal, (ci, co), area[i], taper[i],
             elements[i],
