@@ -1,4 +1,4 @@
-"""raychan info: what is in a scene or a mesh, and what the radar can do with it."""
+"""raychan info: contents of a scene, an antenna or a mesh, and the figures of the radar."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ def info(
         ),
     ] = None,
 ) -> None:
-    """Say what is in a scene, an antenna or a mesh.
+    """Show what is in a scene, an antenna or a mesh.
 
-    Of a scene: bodies, parts, materials, link budget, resolutions, and the figures of its antennas; of an antenna its
-    figures, computed from its pattern, beside the published ones if its file has them; of a mesh its health.
-    """
+    For a scene: bodies, parts, materials, link budget, resolutions, and the figures of its antennas. For an antenna:
+    its figures, computed from its pattern, beside the published ones if its file has them. For a mesh: its size and
+    defects."""
     from raychan.world.bundled import found
     from raychan.world.mesh_io import SUFFIXES, load
 
