@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.mesh_error import mesh_error
 from raychan.frames import direction
-from raychan.run.rcs_refinement import Case, refined
+from raychan.run.rcs_refinement import Case, Value, refined
 from raychan.run.single_body import facets_of, mesh_of
 from raychan.tracing.legs import Leg
 from raychan.units import C0
@@ -99,7 +99,11 @@ def rcs(
             if not end.far:
                 refuse_within(geometry.facets.vertices, end.end, "radar")
         found.append(refined(Case(geometry, other, leg, out, frequency, max_bounces, tolerance_db, max_rays, row, col)))
-    shape = angles[0].shape
+    return _collected(found, angles[0].shape)
+
+
+def _collected(found: list[Value], shape: tuple[int, ...]) -> Rcs:
+    """Return the cross-sections of all angles in their shape."""
 
     def column(name: str, kind: type) -> Any:
         return np.array([getattr(one, name) for one in found], kind).reshape(shape)

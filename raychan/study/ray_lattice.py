@@ -100,11 +100,10 @@ def echoes(
             front, hit = _advanced(tracer, front)
             if not len(hit):
                 break
-            for out in outs:
-                if bounce + len(out.mirrors) <= bounces:
-                    found = _returned(tracer, front, hit, out, own, rx_field, k, step, tubes, bounce)
-                    if found is not None:
-                        yield found
+            for out in (leg for leg in outs if bounce + len(leg.mirrors) <= bounces):
+                found = _returned(tracer, front, hit, out, own, rx_field, k, step, tubes, bounce)
+                if found is not None:
+                    yield found
             if bounce < bounces:
                 front = _reflected(tracer, front, hit, k)
 
