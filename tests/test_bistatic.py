@@ -10,7 +10,10 @@ from truth import mie, po
 
 from raychan.channel.transfer import transfer
 from raychan.poses import direction, theta_phi
-from raychan.run.rcs import facets_of, rcs, refinements, scattering
+from raychan.run.rcs import rcs
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
 from raychan.tracing.beyond_horizon import exit_points
 from raychan.tracing.legs import Leg, Mirror
 from raychan.tracing.shooting import tube_routes

@@ -66,10 +66,10 @@ def test_a_scene_whose_tubes_were_too_many_to_cut_names_the_body(tmp_path, monke
     file = tmp_path / "scene.toml"
     file.write_text(_SCENE)
     scene = rc.Scene.load(file)
-    assert not [w for w in rc.simulate(scene).warnings if "left coarser" in w]
+    assert not [w for w in rc.simulate(scene).warnings if "are coarser than" in w]
     monkeypatch.setattr(solver, "_CUTS", 20)
     monkeypatch.setattr(solver, "_CUTS_A_FACET", 0)
-    told = [w for w in rc.simulate(scene).warnings if "left coarser" in w]
+    told = [w for w in rc.simulate(scene).warnings if "are coarser than" in w]
     assert len(told) == 1 and "'knot'" in told[0]
 
 

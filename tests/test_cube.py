@@ -30,9 +30,9 @@ def worst_db(cube, truth) -> float:
 
 
 def grids(paths, wave: Waveform):
-    growth = paths.length_rate / C0
-    middle = paths.delay + growth * centre(wave)[0]
-    return keystones(Echoes(middle, growth, paths.amplitude, paths.arrival), wave, 1e-6, 0.0)
+    delay_rate = paths.length_rate / C0
+    middle = paths.delay + delay_rate * centre(wave)[0]
+    return keystones(Echoes(middle, delay_rate, paths.amplitude, paths.arrival), wave, 1e-6, 0.0)
 
 
 def random_paths(seed: int, n: int, wave: Waveform, fastest: float = 30.0):

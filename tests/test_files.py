@@ -118,7 +118,7 @@ put({out!r}, data="new", b_png="new")
 
 
 @NOT_WINDOWS
-@pytest.mark.parametrize("at", ["inside", "between renames", "_carry", "_remove", "_come_in"])
+@pytest.mark.parametrize("at", ["inside", "between renames", "_move_foreign", "_remove", "_replace"])
 def test_after_a_kill_at_any_moment_the_next_run_of_the_folder_finds_all_that_is_anyones(at, tmp_path):
     out = tmp_path / "out"
     put(out, data="old", a_png="old")
@@ -129,7 +129,7 @@ def test_after_a_kill_at_any_moment_the_next_run_of_the_folder_finds_all_that_is
     assert len(list(tmp_path.iterdir())) > 1 or at == "between renames", "it left something"
     with pytest.raises(KeyError), staging(out, KIND):
         raise KeyError  # a run that comes to nothing clears and restores too
-    swapped = at in ("_carry", "_remove")
+    swapped = at in ("_move_foreign", "_remove")
     assert tree(out) == ({"data": "new", "b.png": "new"} if swapped else {"data": "old", "a.png": "old"}) | {
         "notes": "mine"
     }

@@ -11,7 +11,7 @@ from raychan.channel.mesh_error import mesh_error
 from raychan.geometry.triangles import edge_curvatures
 from raychan.run.rcs import rcs
 from raychan.run.single_body import facets_of
-from raychan.world.creases import readings
+from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
 from raychan.world.mesh import make_mesh
@@ -86,4 +86,4 @@ def test_what_coarse_facets_miss_of_a_superquadric_is_in_the_stated_error(known)
 def test_a_fine_ball_and_a_box_are_not_halved():
     for mesh in (trimesh.creation.icosphere(5, 0.2), trimesh.creation.box((0.2, 0.3, 0.4))):
         geometry = Geometry(facets_of(mesh, "pec", shapes.F))
-        assert mesh_error(geometry, readings(make_mesh(mesh.vertices, mesh.faces)), shapes.K).halved is None
+        assert mesh_error(geometry, alternatives(make_mesh(mesh.vertices, mesh.faces)), shapes.K).halved is None

@@ -12,7 +12,7 @@ from raychan.channel.mesh_error import creeping
 from raychan.run.rcs import rcs
 from raychan.run.single_body import facets_of
 from raychan.units import C0
-from raychan.world.creases import readings
+from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
 from raychan.world.mesh import make_mesh
 from raychan.world.mesh_io import from_trimesh
@@ -61,22 +61,22 @@ def test_the_stated_error_covers_smooth_and_flat_bodies_not_looked_at_before():
 def test_of_bodies_that_bend_one_way_both_readings_are_stated(build, sides):
     """A prism of many sides may be meant as flat; a ball of as small folds, and the prism once told apart, are not."""
     mesh = getattr(trimesh.creation, build)(0.08, 0.15, sections=sides)
-    assert readings(from_trimesh(mesh)).creased is not None
+    assert alternatives(from_trimesh(mesh)).creased is not None
     az, el = np.array([10.0, 73.0, 201.0]), 17.0 if build == "cone" else 1.5
     flat = [shapes.flat(mesh, shapes.po.direction(np.radians(a), np.radians(el))) for a in az]
     got = rcs(mesh, F, az, el)
     known = got.converged
     assert (np.abs(db(got.sigma / flat)) <= got.error_db)[known].all() and known.any()
-    assert readings(from_trimesh(mesh, crease_deg=1.0)).creased is None
-    assert readings(from_trimesh(trimesh.creation.icosphere(3))).creased is None
+    assert alternatives(from_trimesh(mesh, crease_deg=1.0)).creased is None
+    assert alternatives(from_trimesh(trimesh.creation.icosphere(3))).creased is None
 
 
 def test_a_mesh_that_knows_its_normals_is_in_no_doubt():
     ball = trimesh.creation.icosphere(2, 0.1)
     mesh = make_mesh(ball.vertices, ball.faces, normals=np.asarray(ball.vertices)[ball.faces] / 0.1)
-    found = readings(mesh)
+    found = alternatives(mesh)
     assert found.fitted is None and found.creased is None
-    assert readings(from_trimesh(trimesh.creation.box())).creased is None
+    assert alternatives(from_trimesh(trimesh.creation.box())).creased is None
 
 
 def test_small_spheres_lie_within_the_stated_error():

@@ -16,7 +16,10 @@ from raychan.channel.transfer import transfer
 from raychan.em.fresnel import coefficients_array
 from raychan.poses import theta_phi
 from raychan.records import HALF_SPACE, LAYER
-from raychan.run.rcs import facets_of, rcs, refinements, scattering
+from raychan.run.rcs import rcs
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
 from raychan.units import C0
@@ -386,7 +389,7 @@ def test_the_true_error_lies_within_the_stated_one_and_not_far_within(monkeypatc
         mesh, material, az, el, d, exact = random_case(rng, i)
         with monkeypatch.context() as m:
             if i % 7 != 1:
-                m.setattr("raychan.run.rcs.creeping", lambda *_: (0.0, 0.0))
+                m.setattr("raychan.run.rcs_refinement.creeping", lambda *_: (0.0, 0.0))
             got = rcs(mesh, F, az, el, distance=d, material=material)
         true.append(abs(float(db(got.sigma / exact))))
         stated.append(float(got.error_db))

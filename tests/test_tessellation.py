@@ -8,7 +8,7 @@ import trimesh
 from truth import po, shapes
 
 from raychan.run.rcs import rcs
-from raychan.world.creases import folds_told, readings
+from raychan.world.creases import alternatives, uncertain_folds
 from raychan.world.mesh import make_mesh
 from raychan.world.mesh_io import from_trimesh
 
@@ -95,18 +95,18 @@ TRUE_EDGES = {
 @pytest.mark.parametrize("name", ROUND)
 def test_equal_folds_that_go_on_may_be_a_curve(name):
     mesh, count = ROUND[name]
-    assert f"{count} folds of" in folds_told(from_trimesh(mesh), "--crease")
-    assert "may be a curved surface: --crease decides" in folds_told(from_trimesh(mesh), "--crease")
-    assert readings(from_trimesh(mesh)).rounded is not None
+    assert f"{count} folds of" in uncertain_folds(from_trimesh(mesh), "--crease")
+    assert "may be a curved surface: --crease decides" in uncertain_folds(from_trimesh(mesh), "--crease")
+    assert alternatives(from_trimesh(mesh)).rounded is not None
     # Whoever says what the folds are is not asked.
     for deg in (0.0, 60.0):
-        assert readings(from_trimesh(mesh, crease_deg=deg)).rounded is None
+        assert alternatives(from_trimesh(mesh, crease_deg=deg)).rounded is None
 
 
 @pytest.mark.parametrize("name", TRUE_EDGES)
 def test_edges_stay_edges(name):
-    assert readings(from_trimesh(TRUE_EDGES[name])).rounded is None
-    assert "curved" not in folds_told(from_trimesh(TRUE_EDGES[name]), "")
+    assert alternatives(from_trimesh(TRUE_EDGES[name])).rounded is None
+    assert "curved" not in uncertain_folds(from_trimesh(TRUE_EDGES[name]), "")
 
 
 def test_turning_and_scaling_and_the_order_of_facets_change_nothing():
@@ -117,7 +117,7 @@ def test_turning_and_scaling_and_the_order_of_facets_change_nothing():
         other.apply_scale(7.3)
         faces = other.faces[rng.permutation(len(other.faces))]
         turned = make_mesh(other.vertices, np.array([np.roll(f, rng.integers(3)) for f in faces]))
-        assert f"{count} folds of" in folds_told(turned, "")
+        assert f"{count} folds of" in uncertain_folds(turned, "")
 
 
 @pytest.mark.parametrize("sides", [10, 17])

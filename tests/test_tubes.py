@@ -13,7 +13,8 @@ from truth import corner, po
 import raychan
 from raychan.em.gauss_quadrature import mean_parts, points_for
 from raychan.em.phase_integral import triangle_terms
-from raychan.run.rcs import facets_of, refinements
+from raychan.run.rcs_refinement import refinements
+from raychan.run.single_body import facets_of
 from raychan.tracing.footprints import element_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes

@@ -1,4 +1,5 @@
-"""What a mesh leaves open and physical optics cannot know, as parts of a cross-section's stated error."""
+"""Parts of a cross-section's stated error that refinement does not reduce: the surface that a mesh stands for is not
+fully known, and physical optics has no creeping waves."""
 
 from __future__ import annotations
 
@@ -9,27 +10,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import take
-from raychan.world.creases import Readings
+from raychan.world.creases import Alternatives
 from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
 
 Floats = NDArray[np.float64]
 
-# The factors were chosen on the shapes of tests/truth/shapes.py of seed 1; the test judges on another.
-_FITS = 2.0  # of what the other fit of normals changes: both miss alike in part
-_FACETS = 0.005  # of the value: what the quadratic patches behind facets miss although their normals are right
-_HALVED = 4.0 / 3.0  # of what halving the facets changes: the rest of a series that halves on with second order
-_CUBIC = 0.01  # rad: where the cubic edges of facets are nearer to the quadratic ones, both are the same
-_EDGES_DB = 1.2  # of what the doubtful folds as edges change, in dB
-_PARTLY = 0.5  # of the field's change: where some of the folds are edges, and not the others
-_CREEPING = 2.3  # of x^(4/3) exp(-2.2 x^(1/3)) / k: the creeping wave of a sphere of k a = x, at the most
-_RESONANCE = 6.0  # k a under which that falls again, but not what physical optics is off by
+# Factors trade coverage of the true error against statements too large. They were chosen on the shapes of
+# tests/truth/shapes.py of seed 1; tests/test_truth.py judges on another seed.
+_FITS = 2.0  # of the change by the alternative fit of normals: both fits share part of their error
+_FACETS = 0.005  # of the value: error of quadratic patches although their normals are right
+_HALVED = 4.0 / 3.0  # of the change by halving the facets: the limit of a series that converges with second order
+_CUBIC = 0.01  # rad of phase: cubic edges that deviate less from the quadratic ones are not computed
+_EDGES_DB = 1.2  # of the change in dB by taking the uncertain folds as edges
+_PARTLY = 0.5  # of the field's change: only some of the uncertain folds may be edges
+_CREEPING = 2.3  # of x^(4/3) exp(-2.2 x^(1/3)) / k: upper bound of the creeping wave of a sphere of k a = x
+_RESONANCE = 6.0  # k a: below it the creeping wave falls again, but the error of physical optics does not
 
 
 @dataclass(frozen=True)
 class MeshError:
-    """Surfaces that a mesh may stand for beside the one taken: by another fit of its normals, with edges for doubtful
-    folds, with smooth folds for doubtful edges, and of facets halved along cubic edges."""
+    """The other surfaces that a mesh may stand for: with normals by another fit, with uncertain folds as edges, with
+    uncertain edges as smooth folds, and with facets halved along cubic edges."""
 
     fitted: Geometry | None
     creased: Geometry | None
@@ -42,20 +44,19 @@ class MeshError:
         return sum(s.rays for s in (self.fitted, self.creased, self.rounded, self.halved) if s is not None)
 
     def facets(self, first: complex, value: complex, of: Callable[[Geometry], complex]) -> float:
-        """Return how far off an amplitude may be, as a share of it, because normals are estimated and facets coarse.
+        """Return the error of an amplitude, relative to it, due to estimated normals and coarse facets.
 
-        Args: first the amplitude of the surface taken, by the first launch, value by the last; of returns that of
-        another by the first.
+        Args: first the amplitude of the surface taken by the first launch, value by the last; of returns the amplitude
+        of another surface by a launch of the first rule.
         """
         if not (first and value):
             return 0.0
         off = 0.0 if self.fitted is None else _FITS * abs(of(self.fitted) - first) / abs(first) + _FACETS
-        # Facets of another size share no tubes with the first launch, so that the better one tells more.
+        # Facets of another size share no tubes with the first launch; the last one is the better reference.
         return off + (0.0 if self.halved is None else _HALVED * abs(of(self.halved) - value) / abs(value))
 
     def edges_db(self, first: complex, value: complex, of: Callable[[Geometry], complex]) -> float:
-        """Return how far off a level [dB] may be because doubtful folds are edges, or the other way round; value by the
-        last launch."""
+        """Return the error [dB] of a level due to uncertain folds and edges; args as for `facets`."""
         if not (first and value):
             return 0.0
         said = [0.0]
@@ -69,16 +70,16 @@ class MeshError:
         return float(max(said))
 
 
-def mesh_error(geometry: Geometry, found: Readings, wavenumber: float) -> MeshError:
-    """Return the other surfaces of a body by itself, given the readings of its mesh."""
+def mesh_error(geometry: Geometry, found: Alternatives, wavenumber: float) -> MeshError:
+    """Return the other surfaces of a body by itself, given the alternatives of its mesh; wavenumber [1/m]."""
     facets = geometry.facets
     other = (found.fitted, found.creased, found.rounded)
     fitted, creased, rounded = (None if n is None else Geometry(facets.replace(normals=n)) for n in other)
     return MeshError(fitted, creased, rounded, _halved(geometry, found, wavenumber))
 
 
-def _halved(geometry: Geometry, found: Readings, wavenumber: float) -> Geometry | None:
-    """Return the surface of facets halved, None where that is the same; what is in doubt by its folds is left out."""
+def _halved(geometry: Geometry, found: Alternatives, wavenumber: float) -> Geometry | None:
+    """Return the surface with facets halved, None where it is the same; uncertain folds do not count for that."""
     facets = geometry.facets
     certain = geometry.curved.copy()
     for normals in (found.creased, found.rounded):
@@ -94,11 +95,11 @@ def _halved(geometry: Geometry, found: Readings, wavenumber: float) -> Geometry 
 
 
 def creeping(geometry: Geometry, wavenumber: float) -> tuple[float, float]:
-    """Return what waves creeping around a body change of its amplitude: at most [m] and at most as a share of it.
+    """Return bounds on what waves creeping around a body add to its amplitude: absolute [m] and relative to it.
 
-    Both are those of the PEC sphere as wide as the body is at its thinnest, Mie's series less physical optics over
-    k a = 0.3 to 300; infinite cylinders of both polarisations lie below it. Nothing is said of bodies without curved
-    sides, which have no creeping wave, and of open sheets.
+    Both are those of the PEC sphere as wide as the body's smallest extent: Mie's series less physical optics over
+    k a = 0.3 to 300; infinite cylinders of both polarisations lie below. 0 for bodies without curved sides, which have
+    no creeping wave, and for open sheets, for which no bound is known.
     Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
     """
     if not geometry.curved.any() or geometry.both_sides.any():

@@ -1,9 +1,9 @@
-"""Advance: what routes carry once their bodies have moved on; no ray is traced.
+"""Slow time: lengths and gains of traced routes at later instants, after their bodies have moved; no ray is traced.
 
-A footprint goes with its body, so that the lengths through its corners and the phase integral over it are found anew
-for every instant. Over plane mirrors a length is that to the images of both ends in the planes where they are by then:
-exact for any turn, as long as the same surfaces are met and seen; on a curved mirror the plane at the vertex stands in
-for the surface. Obliquity and spreading stay as they were.
+A footprint moves with its body; the lengths through its corners and the phase integral over it are computed again for
+each instant. Over plane mirrors a length is that to the image points of both ends in the planes as they then lie: exact
+for any turn as long as the same surfaces are met and seen. A curved mirror is replaced by its tangent plane at the
+vertex. Obliquity and spreading keep their values at the time of tracing.
 """
 
 from __future__ import annotations
@@ -23,32 +23,33 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-_LINEAR = 1e-4  # rad: how far the phase of a piece of the footprint may bend in the integral
+_LINEAR = 1e-4  # rad: deviation from a linear phase up to which a piece of the footprint is integrated in closed form
 
 
 @dataclass(frozen=True)
 class Poses:
-    """Where bodies and radar are at instants t: points x of body b have gone to turn[t, b] @ (x - origin[b]) +
+    """Where bodies and radar are at instants t: a point x of body b is then at turn[t, b] @ (x - origin[b]) +
     place[t, b]."""
 
     origin: Floats
-    """(b, 3) [m] when traced."""
+    """Body origins (b, 3) [m] at the time of tracing."""
     turn: Floats
-    """(t, b, 3, 3)."""
+    """Rotations (t, b, 3, 3) since then."""
     place: Floats
-    """(t, b, 3) [m]."""
+    """Body origins (t, b, 3) [m]."""
     radar: Floats
-    """(t, 3) [m]."""
+    """Radar positions (t, 3) [m]."""
 
 
-_SOON = 1e-4  # s: over which a rate is a difference; its error is far below a rate cell for any turn
+_SOON = 1e-4  # s: time over which a rate is a difference quotient; its error is far below a rate cell for any turn
 
 
 def corner_rates(routes: Routes, rows: NDArray[np.int64], facets: Facets, velocity: Floats) -> Floats:
-    """Return range rates (r, 3) [m/s] of the ways over the corners of some footprints: half the rate of their length.
+    """Return range rates (r, 3) [m/s] through the corners of some footprints: half the rate of the route's length.
 
-    Args: rows (r,) of the routes; velocity (3,) [m/s] of the radar. Rates differ over a body that turns or crosses, and
-    what neighbouring tubes have at the corner they share cancels only if it keeps moving alike.
+    Rates differ over a body that turns or crosses. Neighbouring tubes have terms at a shared corner that cancel, and go
+    on to cancel only if both have the rate of that corner.
+    Args: rows (r,) of the routes; velocity (3,) [m/s] of the radar.
     """
     late = _SOON * np.array([-0.5, 0.5])[:, None, None]
     poses = Poses(
@@ -77,7 +78,7 @@ def _turned(turn: Floats) -> Floats:
 
 
 def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> Complexes:
-    """Return what routes (n,) carry but for their phase and the integral over their footprint."""
+    """Return the gains (n,) of routes without carrier phase and without the phase integral over the footprint."""
     n = len(routes.kind)
     bare: Routes = routes.replace(lengths=np.zeros((n, 6)), length=np.zeros(n), taper=np.ones((n, 3)))
     ends: list[Any] = [lambda d, f=f: np.asarray(f(d))[:, None] for f in (radar.tx_field, radar.rx_field)]
@@ -85,9 +86,10 @@ def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> C
 
 
 def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:
-    """Return lengths [m] and amplitudes (t, n, 3) of the parts of routes that belong to each corner of their footprint.
+    """Return lengths [m] and amplitudes (t, n, 3) of routes at later instants, by corners of their footprint.
 
-    Without a footprint, or where the integral is one part, the second and third are empty: amplitude 0.
+    Routes without a footprint, or whose footprint is short in range, have one part; the others have amplitude 0.
+    Args: strength (n,) from `strengths`; poses of bodies and radar at the instants; frequency [Hz].
     """
     shape = (len(poses.radar), len(routes.kind), 3)
     lengths, amplitudes = np.empty(shape), np.empty(shape, np.complex128)
@@ -106,6 +108,7 @@ def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float)
 
 @njit(cache=True, forceinline=True)
 def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
+    """Return where body b has carried a point."""
     u, v, w = x[0] - origin[b, 0], x[1] - origin[b, 1], x[2] - origin[b, 2]
     return (
         turn[b, 0, 0] * u + turn[b, 0, 1] * v + turn[b, 0, 2] * w + place[b, 0],
@@ -131,8 +134,8 @@ def _apart(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _ways(vertices, normals, kind, body, at, used, points, turn, origin, place, end, out):  # type: ignore[no-untyped-def]
-    """Write the lengths (p + 1,) of one route through p points of its footprint and its vertex at one instant."""
+def _part_lengths(vertices, normals, kind, body, at, used, points, turn, origin, place, end, out):  # type: ignore[no-untyped-def]
+    """Write the lengths (p + 1,) [m] of one route through p points of its footprint, and through its vertex."""
     forth = (end[0], end[1], end[2])
     back = forth
     for j in range(at):
@@ -171,13 +174,17 @@ def _corner_rates(  # type: ignore[no-untyped-def]
             used += 1
         at = scatter[i]
         corners = points[i, :3]
-        _ways(vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[0], origin, place[0], radar[0], then)
-        _ways(vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[1], origin, place[1], radar[1], now)
+        _part_lengths(
+            vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[0], origin, place[0], radar[0], then
+        )
+        _part_lengths(
+            vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[1], origin, place[1], radar[1], now
+        )
         for c in range(3):
             out[r, c] = 0.5 * (now[c] - then[c]) / _SOON
 
 
-APART = 3e-4  # m of path: footprints longer than this in range give each corner its own delay
+APART = 3e-4  # m of path: footprints longer than this in range give each corner its own delay (cost not measured)
 
 
 @njit(cache=True, nogil=True)
@@ -195,9 +202,9 @@ def _carry(  # type: ignore[no-untyped-def]
         while used < d and kind[i, used] > 0:
             used += 1
         at = scatter[i] if scatter[i] >= 0 else used
-        _ways(vertices[i], normals[i], kind[i], body[i], at, used, points[i], still, origin, origin, tx, then)
+        _part_lengths(vertices[i], normals[i], kind[i], body[i], at, used, points[i], still, origin, origin, tx, then)
         for t in range(radar.shape[0]):
-            _ways(
+            _part_lengths(
                 vertices[i], normals[i], kind[i], body[i], at, used, points[i], turn[t], origin, place[t], radar[t], now
             )
             centre = length[i] + now[6] - then[6]
@@ -208,16 +215,14 @@ def _carry(  # type: ignore[no-untyped-def]
                 continue
             low, high = np.inf, -np.inf
             for c in range(6):
-                way = lengths[i, c] + now[c] - then[c]
-                phases[c] = k * way
+                total = lengths[i, c] + now[c] - then[c]
+                phases[c] = k * total
                 if c < 3:
-                    out_lengths[t, i, c] = way
-                    low, high = min(low, way), max(high, way)
+                    out_lengths[t, i, c] = total
+                    low, high = min(low, total), max(high, total)
             triangle_terms(phases, _LINEAR, terms)
-            if high - low > APART:
-                for c in range(3):
-                    out[t, i, c] = strength[i] * taper[i, c] * terms[c]
-            else:
+            split = high - low > APART
+            if not split:
                 out_lengths[t, i, :] = centre
-                for c in range(3):
-                    out[t, i, 0] += strength[i] * taper[i, c] * terms[c]
+            for c in range(3):
+                out[t, i, c if split else 0] += strength[i] * taper[i, c] * terms[c]

@@ -1,4 +1,4 @@
-"""Terminator: what physical optics itself misses of a smooth body at whose terminator its currents end at once."""
+"""Error of physical optics at the terminator of a smooth body, where its currents end abruptly and true ones do not."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from raychan.poses import theta_phi
 
 Floats = NDArray[np.float64]
 
-_FOCK = 0.25  # of the belt's amplitude: what its true currents differ by where those of physical optics end smoothly
+_FOCK = 0.25  # of the amplitude of Fock's belt: its error where PO currents end smoothly (not measured by itself)
 
 
 def terminator_error(area: float, to_tx: Floats, to_rx: Floats, wavenumber: float, row: int, col: int) -> float:
-    """Return how far [m] a bistatic amplitude of a smooth convex body may be off for its terminator's sake.
+    """Return the error [m] of a bistatic amplitude of a smooth convex body due to its terminator.
 
-    Light ends on a ring, of the radius a of a sphere of the body's area. Its two bright points scatter
+    The terminator is taken as a ring of radius a, that of a sphere of the body's area. Its two specular points scatter
     a sqrt(2 / (pi k a sin g)) D at an angle g off the forward direction, over a depth k D = 1 / (1 - cos g) that is at
-    most the belt of light and dark, k a (2 / k a)^(1/3) (Fock 1946). In the bistatic plane the currents of physical
-    optics end with full strength, sin g of which is seen: all of it is false. Across it they end smoothly.
+    most Fock's belt of half-shadow, k a (2 / k a)^(1/3) (Fock 1946). In the bistatic plane PO currents end with full
+    strength, of which sin g is seen, all of it false; across that plane they end smoothly.
     Args: area [m^2] of the body's surface; to_tx, to_rx (3,) from the body to the ends; wavenumber [1/m]; row, col
-    polarisation (V, H) of receiver and transmitter. Source: Bowman, Senior, Uslenghi, Electromagnetic
-    and Acoustic Scattering by Simple Shapes, 1969, ch. 10.
+    polarisation (V, H) of receiver and transmitter.
+    Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, ch. 10.
     """
     tx, rx = (np.asarray(x / np.linalg.norm(x), float) for x in (to_tx, to_rx))
     cosine = float(np.clip(-tx @ rx, -1.0, 1.0))

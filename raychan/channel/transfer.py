@@ -1,5 +1,6 @@
-"""Fields: the replay of routes through the kernels. Materials, antennas and polarisations change here, never the
-routes."""
+"""The channel gain of each route: the wave followed from the transmitter over mirrors and layers to the scatterer, and
+by reciprocity from the receiver to it. Materials, antennas and polarisations enter here only; routes are geometry.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +22,17 @@ from raychan.units import C0
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 HUYGENS, REFLECTED, SHADOW = 0, 1, 2
-"""Which currents radiate: the reflected wave's, the mean of both ways; the reflected wave's; the shadow's."""
+"""Which currents radiate: those of the reflected wave, averaged over both directions so that the result is reciprocal;
+those of the reflected wave; those of the shadow radiation."""
 
-_LINEAR = 1e-4  # rad: how far the phase of a piece of the footprint may bend in the integral
+_LINEAR = 1e-4  # rad: deviation from a linear phase up to which a piece of the footprint is integrated in closed form
 
 FieldOf = Callable[[Floats], Complexes]
-"""Directions (n, 3) that an antenna looks to -> its vector fields (n, p, 3), one for each of p polarisations."""
+"""Function from directions (n, 3) to an antenna's vector fields (n, p, 3), one for each of p polarisations."""
 
 
 def departures(routes: Routes) -> tuple[Floats, Floats]:
-    """Return unit directions (n, 3) in which the transmitter sends and to which the receiver looks."""
+    """Return the unit directions (n, 3) in which the transmitter radiates and to which the receiver looks."""
     away, look = np.empty((2, len(routes.kind), 3))
     _departures(routes.tx, routes.rx, routes.far, routes.vertices, routes.kind, away, look)
     return away, look
@@ -46,16 +48,17 @@ def transfer(
     wave: int = HUYGENS,
     elements: Floats | None = None,
 ) -> Complexes:
-    """Return what each route carries (n, q, p): received over transmitted wave, lambda/4 pi and carrier phase in.
+    """Return the gain (n, q, p) of each route: received over transmitted wave, with lambda / 4 pi and carrier phase.
 
-    Args: tx_field, rx_field vector fields of p and q polarisations; corners: give (n, q, p, 3), the parts
-    belonging to the three footprint corners, whose sum is the whole; wave which currents radiate, and, unless HUYGENS,
-    the vector elements (n, 3, 3) [m^2] of their area at the corners, in place of taper and area.
+    Args: tx_field, rx_field vector fields of p and q polarisations; corners: return (n, q, p, 3), the parts that belong
+    to the three footprint corners and sum to the gain; wave which currents radiate; unless it is HUYGENS, elements
+    (n, 3, 3) [m^2] are the vector area elements at the corners, in place of taper and area.
     """
     away, look = departures(routes)
     e_tx = np.ascontiguousarray(tx_field(away), dtype=np.complex128)
     e_rx = np.ascontiguousarray(rx_field(look), dtype=np.complex128)
     m: Materials = facets.materials
+    table = m.kind, m.eps, m.thickness, m.roughness
     material = facets.material[np.maximum(routes.facet, 0)].astype(np.int64) if len(facets.material) else routes.facet
     k = 2.0 * np.pi * frequency / C0
     out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3 if corners else 1), np.complex128)
@@ -67,8 +70,7 @@ def transfer(
 
     def some(at: slice) -> None:
         _transfer(
-            routes.tx, routes.rx, routes.far, m.kind, m.eps, m.thickness, m.roughness, k, wave,
-            *(c[at] for c in columns),
+            (routes.tx, routes.rx, routes.far), table, k, wave, *(c[at] for c in columns),
         )  # fmt: skip
 
     parallel_for(len(out), some)
@@ -113,11 +115,12 @@ def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-unt
 
 @njit(cache=True, nogil=True)
 def _transfer(  # type: ignore[no-untyped-def]
-    tx, rx, far, m_kind, m_eps, m_thickness, m_rough, k, wave, vertices, normals, kind, material, scatter, lengths,
-    length, taper, area, spread_in, spread_out, caustics, sigma, e_tx, e_rx, elements, out,
+    ends, table, k, wave, vertices, normals, kind, material, scatter, lengths, length, taper, area, spread_in,
+    spread_out, caustics, sigma, e_tx, e_rx, elements, out,
 ):  # fmt: skip
+    tx, rx, far = ends
     n, d = kind.shape
-    ins, outs, apart = e_tx.shape[1], e_rx.shape[1], out.shape[3] == 3
+    ins, outs = e_tx.shape[1], e_rx.shape[1]
     terms, phases = np.empty(3, np.complex128), np.empty(6)
     arriving, leaving = np.empty((ins, 3), np.complex128), np.empty((outs, 3), np.complex128)
     wavelength_4pi = 0.5 / k
@@ -132,61 +135,93 @@ def _transfer(  # type: ignore[no-untyped-def]
             k_in = _heading(tx, vertices[i, 0]) if used > 0 else _heading(tx, rx)
         for p in range(ins):
             copy_to(arriving[p], e_tx[i, p])
-        for j in range(at):
-            mat = material[i, j]
-            c = coefficients(
-                m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normals[i, j]), k
-            )  # fmt: skip
-            _passed(arriving, k_in, _vec(normals[i, j]), c, kind[i, j] == TRANSMIT)
-            k_in = _heading(vertices[i, j], vertices[i, j + 1] if j + 1 < used else rx)
-        if at == used or kind[i, at] == POINT:
-            whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
+        k_in = _over_mirrors(
+            arriving, k_in, 0, at, 1, vertices[i], normals[i], kind[i], material[i], used, rx, table, k
+        )  # fmt: skip
         if at == used:
-            for p in range(ins):
-                for q in range(outs):
-                    out[i, q, p, 0] = whole * dot(_vec(e_rx[i, q]), _vec(arriving[p]))
+            whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
+            _couple(out[i], whole, e_rx[i], arriving)
             continue
-        # Out: the receiver's field by reciprocity, over the rest of the chain backwards.
+        # Out: the receiver's field by reciprocity, over the rest of the route backwards.
         k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
         for q in range(outs):
             copy_to(leaving[q], e_rx[i, q])
-        for j in range(used - 1, at, -1):
-            mat = material[i, j]
-            c = coefficients(
-                m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normals[i, j]), k
-            )  # fmt: skip
-            _passed(leaving, k_out, _vec(normals[i, j]), c, kind[i, j] == TRANSMIT)
-            k_out = _heading(vertices[i, j], vertices[i, j - 1])
+        k_out = _over_mirrors(
+            leaving, k_out, used - 1, at, -1, vertices[i], normals[i], kind[i], material[i], used, rx, table, k
+        )  # fmt: skip
         if kind[i, at] == POINT:
+            whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
             whole *= (sigma[i] / (4.0 * np.pi)) ** 0.5 * spread_out[i]
-            for p in range(ins):
-                for q in range(outs):
-                    out[i, q, p, 0] = whole * dot(_vec(leaving[q]), _vec(arriving[p]))
+            _couple(out[i], whole, leaving, arriving)
             continue
         normal = _vec(normals[i, at])
-        mat = material[i, at]
-        ci = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_in, normal), k)
-        co = coefficients(m_kind[mat], m_eps[mat], m_thickness[mat], m_rough[mat], _cosine(k_out, normal), k)
+        ci = _coefficients(table, material[i, at], k_in, normal, k)
+        co = _coefficients(table, material[i, at], k_out, normal, k)
         scale = wavelength_4pi * (-0.25j * k / np.pi) * spread_in[i] * spread_out[i]
         for _ in range(caustics[i]):
             scale *= 1j
         for c6 in range(6):
             phases[c6] = k * lengths[i, c6]
         triangle_terms(phases, _LINEAR, terms)
-        to, mean = (-k_out[0], -k_out[1], -k_out[2]), 0j
-        for p in range(ins):
-            for q in range(outs):
-                e, g = _vec(arriving[p]), _vec(leaving[q])
+        _scatter(
+            out[i], scale, terms, wave, arriving, leaving, (k_in, k_out), normal, (ci, co), area[i], taper[i],
+            elements[i],
+        )  # fmt: skip
+
+
+@njit(cache=True)
+def _over_mirrors(  # type: ignore[no-untyped-def]
+    e, heading, first, stop, step, vertices, normals, kind, material, used, end, table, k
+):
+    """Send fields e (p, 3) over mirrors and layers first, first + step, ... short of stop, in place; return the
+    direction in which they leave the last."""
+    for j in range(first, stop, step):
+        c = _coefficients(table, material[j], heading, normals[j], k)
+        _passed(e, heading, _vec(normals[j]), c, kind[j] == TRANSMIT)
+        heading = _heading(vertices[j], vertices[j + step] if j + step < used else end)
+    return heading
+
+
+@njit(cache=True)
+def _coefficients(table, row, heading, normal, k):  # type: ignore[no-untyped-def]
+    """Return the Fresnel coefficients of a material for a wave that arrives along `heading`."""
+    kind, eps, thickness, roughness = table
+    return coefficients(kind[row], eps[row], thickness[row], roughness[row], _cosine(heading, normal), k)
+
+
+@njit(cache=True)
+def _couple(out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
+    """Write gains (q, p, ...) of a route without a footprint: fields arriving (p, 3) onto receiving (q, 3)."""
+    for p in range(len(arriving)):
+        for q in range(len(receiving)):
+            out[q, p, 0] = whole * dot(_vec(receiving[q]), _vec(arriving[p]))
+
+
+@njit(cache=True)
+def _scatter(  # type: ignore[no-untyped-def]
+    out, scale, terms, wave, arriving, leaving, directions, normal, fresnel, area, taper, elements
+):
+    """Add to gains (q, p, 1 or 3) what a footprint scatters, its three phase-integral terms weighted by the currents.
+
+    Source: physical optics, Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5; Ufimtsev 2014, ch. 1 (the two
+    waves of which its currents are the sum).
+    """
+    (k_in, k_out), (ci, co) = directions, fresnel
+    apart = out.shape[2] == 3
+    to, mean = (-k_out[0], -k_out[1], -k_out[2]), 0j
+    for p in range(len(arriving)):
+        for q in range(len(leaving)):
+            e, g = _vec(arriving[p]), _vec(leaving[q])
+            if wave == HUYGENS:
+                mean = area * huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
+            for c3 in range(3):
                 if wave == HUYGENS:
-                    mean = area[i] * huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
-                for c3 in range(3):
-                    if wave == HUYGENS:
-                        couple = mean * taper[i, c3]
-                    elif wave == REFLECTED:
-                        couple = reflected_wave(e, k_in, to, _vec(elements[i, c3]), ci[0], ci[1], g)
-                    else:
-                        couple = shadow_wave(e, k_in, to, _vec(elements[i, c3]), ci[2], ci[3], g)
-                    out[i, q, p, c3 if apart else 0] += scale * couple * terms[c3]
+                    couple = mean * taper[c3]
+                elif wave == REFLECTED:
+                    couple = reflected_wave(e, k_in, to, _vec(elements[c3]), ci[0], ci[1], g)
+                else:
+                    couple = shadow_wave(e, k_in, to, _vec(elements[c3]), ci[2], ci[3], g)
+                out[q, p, c3 if apart else 0] += scale * couple * terms[c3]
 
 
 @njit(cache=True)
@@ -198,9 +233,9 @@ def _passed(e, k, normal, c, through):  # type: ignore[no-untyped-def]
 
 
 def rates(routes: Routes, facets: Facets, tx_velocity: Floats, rx_velocity: Floats) -> Floats:
-    """Return range rates (n,) [m/s]: half the rate of each route's length, from the velocities of all its vertices.
+    """Return range rates (n,) [m/s]: half the rate of each route's length, from the velocities of its vertices.
 
-    Mirrors may slide in their plane without effect: the length is stationary there (Fermat).
+    A mirror that slides in its own plane has no effect: the length is stationary there (Fermat's principle).
     """
     return _rates(
         routes.tx, routes.rx, routes.vertices, routes.kind, routes.body, facets.velocity, facets.spin,

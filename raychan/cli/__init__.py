@@ -1,4 +1,4 @@
-"""The command line. Nothing heavy is imported until a command needs it."""
+"""The command line. Heavy modules are imported only when a command needs them."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from raychan.cli.study import study
 from raychan.cli.validate import validate
 from raychan.cli.view import view
 
-_HELP = """A street becomes a range-Doppler map, and every detection names the bodies it came from.
+_HELP = """Simulate a radar: from a scene to a range-Doppler map whose detections name the bodies they come from.
 
-A scene file (TOML) says which bodies stand where, of what they are made, how they move, and what radar looks at them. \
-raychan traces the waves over them, synthesises what the receiver samples, and processes it as a radar would.
+A scene file (TOML) gives the bodies with their places, materials and motion, and the radar. raychan traces the waves, \
+synthesises the receiver's samples, and processes them as a radar does.
 
 [bold]raychan info scenes/urban.toml[/]
-  [dim]what is in it, and what the radar can resolve[/]
+  [dim]bodies, link budget and resolutions[/]
 [bold]raychan run scenes/urban.toml --out out/urban[/]
   [dim]simulate: detections, files and pictures[/]
 [bold]raychan explain out/urban --range 25[/]
-  [dim]which paths made the return at 25 m[/]
+  [dim]the paths behind the detection at 25 m[/]
 [bold]raychan view out/urban --html scene.html[/]
-  [dim]the scene and its rays, to turn and to pick[/]
+  [dim]the scene and its rays, interactive[/]
 
-Ranges are in metres, speeds in m/s; a positive range rate recedes.
+Ranges are in metres, speeds in m/s; a positive range rate means receding.
 
 Exit code 0: done
-  1: validate found an unknown or a healed difference
-  2: the input is wrong, and the message says where
-  130: interrupted, 143: told to end (SIGTERM); it says what was written"""
+  1: validate found a difference that is not listed, or a listed one that is gone
+  2: wrong input; the message says where
+  130: interrupted, 143: ended by SIGTERM; the message says what was written"""
 
 _STOPPED = "interrupted; nothing was written"
 _ended: list[int] = []  # signals other than Ctrl-C that asked this process to end
@@ -84,13 +84,13 @@ def main(argv: list[str] | None = None) -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    """End as Ctrl-C does, but for the exit code: what was begun is put away."""
+    """End as Ctrl-C does, with another exit code: unfinished files are removed."""
     _ended.append(number)
     raise KeyboardInterrupt
 
 
 def _stopped(text: str) -> int:
-    """Say that the command was interrupted; return the exit code, 128 and the signal's number."""
+    """Print that the command was interrupted; return the exit code, 128 plus the signal's number."""
     return _fail(text, 128 + (_ended[-1] if _ended else signal.SIGINT))
 
 
@@ -103,7 +103,7 @@ def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
 
 
 def _interrupt() -> None:
-    """Send the interruption to the main thread again; a signal, unlike a mere note, also ends its waits."""
+    """Send the interruption to the main thread again, by a signal, which also ends its waits."""
     main_thread = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main_thread is not None:
         signal.pthread_kill(main_thread, signal.SIGINT)
@@ -146,7 +146,7 @@ def invoke(argv: list[str]) -> int:
 
 
 def _unprinted() -> int | None:
-    """Print what waits to be printed; return the exit code where standard output does not take it."""
+    """Flush standard output; return the exit code where it cannot be written."""
     if sys.stdout is None:  # closed by whoever started the command
         return None
     try:

@@ -1,4 +1,4 @@
-"""raychan explain: where a detection, or a cell of a map, came from."""
+"""raychan explain: the paths behind a detection or a map cell."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from raychan.run.explain import CellExplanation, CellPaths
 
-_COUNTS = 1e-3  # of the strongest wave in the cell: what is weaker is not listed
-_OTHERS = 5  # detections beside the one taken that are named
+_COUNTS = 1e-3  # of the strongest contribution to the cell: weaker paths are not listed
+_OTHERS = 5  # most other detections that are named
 
 
 def explain(
@@ -45,17 +45,17 @@ def explain(
     cell: Annotated[
         bool,
         typer.Option(
-            "--cell", help="The very map cell at --range and --speed (without --speed the strongest), no detection."
+            "--cell", help="The map cell at --range and --speed (without --speed the strongest) instead of a detection."
         ),
     ] = False,
     paths: Annotated[
-        int, typer.Option(help="Paths to list, the one that brings most first.", metavar="N", min=0)
+        int, typer.Option(help="Number of paths to list, strongest contribution first.", metavar="N", min=0)
     ] = 10,
 ) -> None:  # fmt: skip
-    """Say which paths, over which bodies, made a detection or a cell of the map, and what each brought.
+    """List the paths, with their bodies, that make a detection or a map cell, and the contribution of each.
 
-    A path's own power and phase (that of its amplitude, at the frame's start) stand beside what it brings to the cell,
-    where all paths add up as waves. Angles are azimuth and elevation in world axes.
+    The power and phase of each path itself (at the frame's start) are shown beside those of its contribution to the
+    cell, where all paths add coherently. Angles are azimuth and elevation in world axes.
     """
     from raychan.run.explain import explain as explain_result
     from raychan.run.output_files import StoreError
@@ -98,7 +98,7 @@ def _head(why: CellExplanation, searched: bool) -> list[str]:
 
 
 def _chains(why: CellExplanation) -> list[str]:
-    """Return a line for each chain, with the power and phase of what it brings to the cell."""
+    """Return a line for each chain, with the power and phase of its contribution to the cell."""
     import numpy as np
 
     from raychan.units import dbm

@@ -1,4 +1,4 @@
-"""raychan info: what is in a scene or a mesh, and what the radar can do with it."""
+"""raychan info: contents of a scene, an antenna or a mesh, and the figures of the radar."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ def info(
         ),
     ] = None,
 ) -> None:
-    """Say what is in a scene, an antenna or a mesh.
+    """Show what is in a scene, an antenna or a mesh.
 
-    Of a scene: bodies, parts, materials, link budget, resolutions, and the figures of its antennas; of an antenna its
-    figures, computed from its pattern, beside the published ones if its file has them; of a mesh its health.
-    """
+    For a scene: bodies, parts, materials, link budget, resolutions, and the figures of its antennas. For an antenna:
+    its figures, computed from its pattern, beside the published ones if its file has them. For a mesh: its size and
+    defects."""
     from raychan.world.bundled import found
     from raychan.world.mesh_io import SUFFIXES, load
 
@@ -79,7 +79,7 @@ def info(
 def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
     import numpy as np
 
-    from raychan.world.creases import folds_told
+    from raychan.world.creases import uncertain_folds
     from raychan.world.mesh_io import oddities
 
     low, high = mesh.bounds
@@ -97,7 +97,7 @@ def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
     screen.print(show.table(str(source), ("mesh", ""), facts, left=(0, 1)))
     parts = [(n, str(c), f"{a:.4g}") for n, c, a in zip(mesh.part_names, counts, areas, strict=True)]
     screen.print(show.table("", ("part", "facets", "area m2"), parts))
-    folds = folds_told(mesh, "crease_deg (raychan rcs: --crease)")
+    folds = uncertain_folds(mesh, "crease_deg (raychan rcs: --crease)")
     show.warn([*r.warnings(), *oddities(mesh, source, unit, up, "--"), *([folds] if folds else [])])
 
 

@@ -1,4 +1,4 @@
-"""What commands share: options that several take, and how their help reads."""
+"""Options that several commands share, and the format of their help."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from raychan.world.limits import Limit
 
 
 def within(limit: Limit, whole: bool = False) -> Callable[[Any], Any]:
-    """Return the check of an option's figure; one that is not given, or a command's own, passes."""
+    """Return the check of an option's number; one that is not given passes."""
 
     def check(value: Any) -> Any:
         if value is not None and (problem := limit.problem(value, whole)):
@@ -24,7 +24,7 @@ def within(limit: Limit, whole: bool = False) -> Callable[[Any], Any]:
 
 
 def meant(limit: Limit, option: str, value: Any, whole: bool = False) -> None:
-    """Raise typer.BadParameter where an option's figure cannot be meant."""
+    """Raise typer.BadParameter where an option's number is outside its limits."""
     try:
         limit.check(option, value, whole)
     except ValueError as error:
@@ -32,7 +32,7 @@ def meant(limit: Limit, option: str, value: Any, whole: bool = False) -> None:
 
 
 # typer takes [m] for a style of its own and swallows it: in help, units are words.
-_SCENE = "Scene file (TOML), or the name of one that comes with raychan, such as urban."
+_SCENE = "Scene file (TOML), or the name of a bundled one, such as urban."
 SceneFile = Annotated[Path, typer.Argument(help=_SCENE, metavar="SCENE", show_default=False)]
 Seed = Annotated[
     int,
@@ -41,7 +41,7 @@ Seed = Annotated[
 Tolerance = Annotated[
     float | None,
     typer.Option(
-        help="Error in dB to refine the tubes to; the scene's own if not given.",
+        help="Error in dB to which tubes are refined; the scene's own if not given.",
         metavar="DB",
         callback=within(limits.TOLERANCE_DB),
     ),
@@ -65,5 +65,5 @@ Changes = Annotated[
 
 
 def help_of(command: Callable[..., None]) -> str:
-    """Return a command's docstring with a line for each paragraph: typer would keep the line ends of the source."""
+    """Return a command's docstring with one line a paragraph: typer would keep the line ends of the source."""
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in (command.__doc__ or "").split("\n\n"))

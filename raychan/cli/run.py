@@ -1,4 +1,4 @@
-"""raychan run: a scene, or a sequence of its frames, becomes maps, detections, files and pictures."""
+"""raychan run: simulate a scene, or a sequence of its frames, and write maps, detections and pictures."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 def _directory(text: str) -> Path:
-    """Return a directory's path; an empty name, as of a variable that is not set, is none."""
+    """Return a directory's path. Raises: typer.BadParameter for an empty name, as of an unset variable."""
     if not str(text).strip():
-        raise typer.BadParameter("it is empty: where shall the results go?")
+        raise typer.BadParameter("it is empty: name the directory for the results")
     return Path(text)
 
 
@@ -56,10 +56,10 @@ def run(
 ) -> None:
     """Simulate a scene: paths, power-delay profile, I/Q cube, range-Doppler map, detections.
 
-    Without SCENE: list the scenes that come with raychan.
+    Without SCENE: list the bundled scenes.
 
-    Writes result.nc (netCDF-4: all of it), detections.csv, summary.json (timings, error reached, what was left out) and
-    three pictures. When all is ready they take the place of an earlier run's at once; other files in DIR stay.
+    Writes result.nc (netCDF-4: the whole result), detections.csv, summary.json (timings, error reached, unmodelled
+    effects) and three pictures. They replace those of an earlier run at once when all is done; other files in DIR stay.
 
     With --frames, DIR holds frame_0000, frame_0001, ..., each such a directory and written as soon as it is ready, and
     detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 is what a run without --frames gives.
@@ -73,7 +73,7 @@ def run(
         _list()
         return
     if out is None:
-        raise typer.BadParameter("it is missing: where shall the results go?", param_hint="--out")
+        raise typer.BadParameter("it is missing: name the directory for the results", param_hint="--out")
     loaded = Scene.load(scene).override(set_ or [])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
     check_demand(loaded)
@@ -85,13 +85,13 @@ def run(
 
 
 def _list() -> None:
-    """Print the scenes that come with raychan."""
+    """Print the bundled scenes."""
     from raychan.world import bundled
     from raychan.world.scene import Scene
 
     rows = [(name, Scene.load(name).title) for name in bundled.names()]
     screen = show.console()
-    screen.print(show.table("Scenes that come with raychan", ("name", ""), rows, left=(0, 1)))
+    screen.print(show.table("Bundled scenes", ("name", ""), rows, left=(0, 1)))
     screen.print("raychan run NAME --out DIR")
 
 
@@ -118,7 +118,7 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
     screen.print(f"{len(result.paths.delay)} paths in {took:.1f} s; seed {result.seed}")
     if pictures:
         screen.print("pictures: " + ", ".join(str(out / name) for name in PICTURES), soft_wrap=True)
-    screen.print(f"all of it: {out / 'result.nc'}, detections.csv and summary.json beside it", soft_wrap=True)
+    screen.print(f"results: {out / 'result.nc'}, detections.csv and summary.json beside it", soft_wrap=True)
 
 
 def _sequence(
@@ -134,8 +134,8 @@ def _sequence(
             for frame in frames(scene, count, interval, **options, progress=tell):
                 drawn: list[str] = []
                 store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
-                # A sequence says each warning once.
-                # What it tells of detections differs from frame to frame, which the line of a frame counts.
+                # A sequence prints each warning once. Lines on detections differ from frame to frame; each frame's own
+                # line counts them.
                 said = [] if frame.number == 0 else findings(frame.result)
                 new = [w for w in dict.fromkeys([*frame.result.warnings, *drawn]) if w not in told and w not in said]
                 told.update(new)
@@ -151,7 +151,7 @@ def _sequence(
     took = perf_counter() - start
     screen.print(f"{count} frame{'' if count == 1 else 's'} in {took:.1f} s; seeds from {options['seed']}")
     screen.print(
-        f"all of it: {out / 'frame_0000'} and on; detections of all frames: {out / 'detections.csv'}", soft_wrap=True
+        f"results: {out / 'frame_0000'} and on; detections of all frames: {out / 'detections.csv'}", soft_wrap=True
     )
 
 

@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from raychan.run.result import Result
 
 _COMPILING = "compiling"
-_LONG = 3.0  # s of compiling from which it is told where there is no bar
-_SOME = ("azimuth deg", "error dB", "folded: true m", "true m/s")  # columns of a table where a row has them
+_LONG = 3.0  # s of compiling from which a line says so where there is no progress bar
+_SOME = ("azimuth deg", "error dB", "folded: true m", "true m/s")  # columns shown only where a row has a value
 _WIDE = 150  # columns where the output is no terminal, so that no line is cut
 
 
 class Interrupted(Exception):
-    """Ctrl-C in a command that keeps what is ready; the message says what that is."""
+    """Ctrl-C in a command that keeps finished results; the message says which."""
 
 
 class _Console(Console):
     def on_broken_pipe(self) -> None:
-        """Leave it to the command line, where rich would end the process with 1."""
+        """Raise the error for the command line; rich would end the process with code 1."""
         raise BrokenPipeError
 
 
@@ -58,8 +58,7 @@ def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], left:
 
 
 def detections(result: Result) -> list[Table]:
-    """Return the detections of a result as a table, and those that are not converged as another; numbered together,
-    from 1."""
+    """Return the detections of a result as a table, and those not converged as another; numbered together from 1."""
     found = result.detections
     apart = [i for i, converged in enumerate(found.converged) if not converged]
     rest = [i for i in range(len(found.range)) if i not in apart]
@@ -77,7 +76,7 @@ def _s(things: Sized) -> str:
 
 
 def _detections(result: Result, rows: Sequence[int], title: str) -> Table:
-    """Return some detections as a table; columns that say nothing of them are left out."""
+    """Return some detections as a table without its empty columns."""
     from raychan.units import dbm
 
     d = result.detections
@@ -106,8 +105,8 @@ def _known(value: float, digits: str) -> str:
 
 @contextmanager
 def progress(quiet: bool = False, kernels: str = "run") -> Iterator[Callable[[str, float], None]]:
-    """Give a function to tell the progress to: bars on a terminal; elsewhere nothing, but a line where compiled code
-    must be made first. `kernels` names the list of what is compiled ahead."""
+    """Yield a function (stage, share done) that shows progress: bars on a terminal; elsewhere only a line where kernels
+    must be compiled first. Args: quiet shows nothing; kernels names the list of those compiled ahead."""
     from raychan.compile.ahead import helped
     from raychan.compile.progress import lost, missing
 
@@ -149,7 +148,7 @@ def _told(quiet: bool) -> Iterator[Callable[[str, float], None]]:
 
 
 def _line() -> Callable[[int, int, float], None]:
-    """Return what says in one line, the first time, that a command compiles for long."""
+    """Return a function that prints a line, once, when a command compiles for long."""
     said: list[float] = []
 
     def compiling(done: int, ahead: int, seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""raychan study: how accurate, how fast, where methods fail; and one body through many scenes."""
+"""raychan study: error against effort, stability, and sweeps over scenes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 study = typer.Typer(
     no_args_is_help=True,
-    help="Studies: error against effort; behaviour where methods fail; one body through varied scenes.",
+    help="Studies: error against effort; stability where methods fail; one body in varied scenes.",
 )
 
 
@@ -40,13 +40,16 @@ def tradeoff(
     beside: Annotated[
         Path | None,
         typer.Option(
-            "--beside", help="Draw the front of an earlier run into the summary.", metavar="OLD.csv", show_default=False
+            "--beside",
+            help="Also draw the Pareto front of an earlier run in the summary.",
+            metavar="OLD.csv",
+            show_default=False,
         ),
     ] = None,
 ) -> None:
     """Chart error against seconds and rays: five methods on six cases.
 
-    Writes tradeoff.csv, tradeoff_CASE.png for each case and tradeoff.png with the settings that none beats.
+    Writes tradeoff.csv, tradeoff_CASE.png for each case and tradeoff.png with the Pareto front of the settings.
     """
     from raychan.report.tradeoff_figures import case_picture, summary_picture
     from raychan.run.output_files import Contents, staging

@@ -1,4 +1,4 @@
-"""raychan study stability: how the simulator behaves where ray methods fail."""
+"""raychan study stability: the simulator in regimes where ray methods fail."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def stability(
         list[str] | None, typer.Option("--only", help="Try this regime only; may be repeated.", metavar="REGIME")
     ] = None,
 ) -> None:
-    """Try the regimes where ray methods fail, and say what was expected and what was seen.
+    """Run checks in regimes where ray methods fail, and list expected and computed values.
 
-    Writes stability.md, stability.csv and figures. What fails is told as failing; the exit code is 0 all the same.
+    Writes stability.md, stability.csv and figures. Failures are listed; the exit code is 0 nevertheless.
     """
     from raychan.report.stability_figures import FIGURES, pictures
     from raychan.run.output_files import Contents, staging

@@ -1,4 +1,4 @@
-"""raychan study sweep: one body over varied scenes or over time: hidden or not, detected or not."""
+"""raychan study sweep: occlusion and detection of one body over varied scenes or over time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def sweep(
     scene: SceneFile,
-    target: Annotated[str, typer.Option(help="The body to ask about.", metavar="BODY", show_default=False)],
+    target: Annotated[str, typer.Option(help="The body to follow.", metavar="BODY", show_default=False)],
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Directory for table and figure; made if missing.", metavar="DIR")
     ],
@@ -43,11 +43,10 @@ def sweep(
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,
 ) -> None:
-    """Follow one body through varied scenes: how much of it is hidden, by whom, and whether it is detected.
+    """Follow one body through varied scenes: how much of it is hidden, by which bodies, and whether it is detected.
 
-    Without --vary and --times the scene is taken as it is. The levels of the direct, the multipath and the diffracted
-    return of the body stand against the weakest that the radar reports. Writes sweep.csv and sweep.png.
-    """
+    Without --vary and --times the scene is simulated as it is. Levels of the direct, multipath and diffracted returns
+    of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png."""
     from raychan.report.sweep_figures import sweep_picture
     from raychan.run.output_files import Contents, staging
     from raychan.study import sweep as study

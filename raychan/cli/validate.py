@@ -1,4 +1,4 @@
-"""raychan validate: the study's tables and claims, theirs beside ours."""
+"""raychan validate: compare the tables and claims of a published study with the simulation."""
 
 from __future__ import annotations
 
@@ -47,11 +47,10 @@ def validate(
         ),
     ] = None,
 ) -> None:
-    """Hold every table and claim of the study against ours, and say what differs and why.
+    """Compare every table and claim of the study with the simulation, and list differences and their reasons.
 
-    Writes report.md, report.html and figures. Exit code 1 if something differs that known_differences.toml does not
-    name, or if a difference that it names has healed.
-    """
+    Writes report.md, report.html and figures. Exit code 1 if a difference is not listed in known_differences.toml, or
+    if a listed one is gone."""
     from raychan.report.validation_page import page
     from raychan.report.validation_report import markdown
     from raychan.run.output_files import Contents, staging, write_whole

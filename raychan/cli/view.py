@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from raychan.cli import show
+
+if TYPE_CHECKING:
+    from raychan.view.drawing import Drawing
 
 
 def view(
@@ -21,7 +24,7 @@ def view(
     ],
     screenshot: Annotated[Path | None, typer.Option(help="Write a picture.", metavar="FILE.png")] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Write a page to turn and pick in, for any browser.", metavar="FILE.html")
+        Path | None, typer.Option(help="Write an interactive page for any browser.", metavar="FILE.html")
     ] = None,
     range: Annotated[
         float | None,
@@ -42,14 +45,36 @@ def view(
 ) -> None:
     """Show a scene, and the rays of a result coloured by the power they bring.
 
-    Without --screenshot or --html a window opens, where a click on a ray prints its chain of bodies. With --range or
-    --detection only the rays behind one detection are shown (behind the map cell where none is within a cell), and
-    bodies that they do not meet are seen through. Rays of a detection that is not converged are dashed.
+    Without --screenshot or --html a window opens, where a click on a ray prints the bodies along it. With --range or
+    --detection only the rays of one detection are shown (those of the map cell where no detection is within a cell),
+    and bodies that they do not meet are transparent. Rays of a detection that is not converged are dashed.
     """
+    drawing = _drawing(source, range, speed, detection)
+    if screenshot is not None:
+        if screenshot.suffix.lower() != ".png":
+            raise typer.BadParameter(f"--screenshot {screenshot}: the name must end in .png")
+        from raychan.view.scene import scene_picture
+
+        show.warn(scene_picture(drawing, screenshot))
+        print(screenshot)
+    if html is not None:
+        from raychan.view.web import page
+
+        print(page(drawing, html))
+    if screenshot is None and html is None:
+        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise typer.BadParameter("there is no display here; ask for --screenshot FILE.png or --html FILE.html")
+        from raychan.view.render import window
+
+        window(drawing)
+
+
+def _drawing(source: Path, range: float | None, speed: float | None, detection: int | None) -> Drawing:
+    """Return the drawing of a scene file, or of a result and the rays asked for. Raises: typer.BadParameter."""
     from raychan.run.explain import explain
     from raychan.run.output_files import StoreError
     from raychan.run.storage import load_result
-    from raychan.view.scene import drawing_of, scene_picture
+    from raychan.view.scene import drawing_of
     from raychan.world.scene import Scene
 
     if speed is not None and range is None:
@@ -66,23 +91,7 @@ def view(
             raise typer.BadParameter(str(error)) from error
         if cell is not None and not cell.contributions:
             show.warn(["no path explains this cell: noise"])
-        drawing = drawing_of(result.scene, result, cell)
-    elif wanted:
+        return drawing_of(result.scene, result, cell)
+    if wanted:
         raise typer.BadParameter(f"{source} is a scene; a directory that `raychan run` wrote has cells to show")
-    else:
-        drawing = drawing_of(Scene.load(source))
-    if screenshot is not None:
-        if screenshot.suffix.lower() != ".png":
-            raise typer.BadParameter(f"--screenshot {screenshot}: the name must end in .png")
-        show.warn(scene_picture(drawing, screenshot))
-        print(screenshot)
-    if html is not None:
-        from raychan.view.web import page
-
-        print(page(drawing, html))
-    if screenshot is None and html is None:
-        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-            raise typer.BadParameter("there is no display here; ask for --screenshot FILE.png or --html FILE.html")
-        from raychan.view.render import window
-
-        window(drawing)
+    return drawing_of(Scene.load(source))

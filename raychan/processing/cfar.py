@@ -1,9 +1,9 @@
-"""CFAR: what a cell must exceed so that noise alone does it with a stated probability.
+"""CFAR: the threshold that noise alone exceeds in a cell with a stated probability.
 
-Training cells lie around the cell under test, beyond a guard, every second resolution cell, where windowed noise is
-nearly independent however much the transforms were padded; what correlation is left lowers the number of cells that
-the factor counts with. Rates wrap. Near an end of the range axis the cells that fall outside are taken from farther
-out on the other side, so that their number is the same everywhere.
+Training cells lie around the cell under test, beyond a guard, at every second resolution cell, where windowed noise is
+nearly independent for any zero padding; the remaining correlation lowers the effective number of cells. Rates wrap.
+Near an end of the range axis cells outside are replaced by ones farther out on the other side, so that their number is
+the same everywhere.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ Ints = NDArray[np.int64]
 
 METHODS = ("ca", "os")
 GUARD, TRAIN = (2, 2), (3, 3)
-"""Guard and training cells (rate, range) where none are asked for."""
+"""Default guard and training cells (rate, range)."""
 RANK = 0.5
-"""Share of the training cells below the ordered statistic: up to half of them may hold targets."""
-_STRIDE = 2  # resolution cells
-_GATHER = 1 << 22  # values gathered at a time
+"""Rank of the ordered statistic as a share of the training cells: up to half of them may contain targets."""
+_STRIDE = 2  # resolution cells between training cells
+_GATHER = 1 << 22  # values gathered at a time: bounds memory
 _TINY = 1e-300
-_FLAT = 8  # power of the substitution that crowds the knots of integration where low probabilities arise
+_FLAT = 8  # power of a substitution that concentrates integration knots where low probabilities arise
 
 
 @dataclass(frozen=True)
 class Grid:
-    """How a map's cells relate to its resolution."""
+    """Map cells and resolution cells of a map."""
 
     pad: tuple[int, int]
     """Map cells per resolution cell (rate, range)."""
@@ -52,18 +52,18 @@ class Grid:
 
 @dataclass(frozen=True)
 class Training:
-    """Where the training cells lie and how many independent ones they are worth."""
+    """The training cells, and their effective number."""
 
     offsets: Ints
     """Map cells (t, 2) from the cell under test (rate, range)."""
     reach: int
-    """Map cells by which an offset outside the range axis is moved outwards on the other side."""
+    """Map cells by which an offset that falls outside the range axis is moved outwards on the other side."""
     worth: float
-    """Number of independent cells."""
+    """Effective number of independent cells."""
 
 
 def _offsets(count: tuple[int, int], guard: tuple[int, int], train: tuple[int, int]) -> tuple[Ints, list[int]]:
-    """Return the training cells (t, 2) in resolution cells, and how many strides they reach along each axis."""
+    """Return the training cells (t, 2) in resolution cells, and their extent along each axis in strides."""
     steps = []
     for axis in (0, 1):
         # On half the axis at most, so that no cell is taken twice, neither wrapped nor moved to the other side.
@@ -77,8 +77,8 @@ def _offsets(count: tuple[int, int], guard: tuple[int, int], train: tuple[int, i
 def fitting_guard(
     count: tuple[int, int], guard: tuple[int, int] | None = None, train: tuple[int, int] | None = None
 ) -> tuple[int, int] | None:
-    """Return the guard (rate, range) nearest to the wanted one that leaves training cells on a map of so many
-    resolution cells, or None if none does; guard and train as for `training`, None for those of `detect`."""
+    """Return the largest guard (rate, range), up to the wanted one, that leaves training cells on a map of `count`
+    resolution cells; None if none does. Args: guard and train as for `training`, None for the defaults."""
     wanted, cells = guard or GUARD, train or TRAIN
     for less in range(max(wanted) + 1):
         some = max(0, wanted[0] - less), max(0, wanted[1] - less)
@@ -131,7 +131,7 @@ def factor(pfa: float, count: float, method: str = "ca", looks: int = 1) -> floa
 
 
 def bias(count: float, method: str, looks: int = 1) -> float:
-    """Return the mean of the statistic over the noise's mean power: 1 for ca."""
+    """Return the expected value of the statistic relative to the mean noise power: 1 for ca."""
     quantiles, weights = _ordered(count, looks)
     return 1.0 if method == "ca" else float(weights @ quantiles) / looks
 
@@ -146,7 +146,7 @@ def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Flo
         v = (part[:, :1] + ring.offsets[:, 0]) % rates
         off = ring.offsets[:, 1]
         r = part[:, 1:] + off
-        # Mirrored and moved on: beyond all cells that are there already.
+        # Mirrored and moved outwards, beyond all cells that are used already.
         r = np.where((r >= 0) & (r < ranges), r, part[:, 1:] - off - np.sign(off) * ring.reach) % ranges
         values = power[v, r]
         out[start : start + len(part)] = (
@@ -156,7 +156,7 @@ def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Flo
 
 
 def _ordered(count: float, looks: int) -> tuple[Floats, Floats]:
-    """Return quantiles and weights to average over the ordered statistic of `count` sums of `looks` exponentials."""
+    """Return quantiles and weights for averages over the ordered statistic of `count` sums of `looks` exponentials."""
     knots, weights = np.polynomial.legendre.leggauss(200)
     x = 0.5 * (knots + 1.0)
     rank = max(1.0, RANK * count)

@@ -1,4 +1,5 @@
-"""Detect: which cells of a range-Doppler map are echoes."""
+"""Detections in a range-Doppler map: local maxima over the CFAR threshold that are no side lobes, with sub-bin
+interpolation."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _MARGIN = 2.0  # side lobes of two equal echoes add in voltage: twice the sum of their powers
-_FLOOR = 1e-12  # below a peak by so much lie rounding errors of single precision and of the fast sum
-_SLACK = 0.25  # resolution cells by which peaks are pushed about by each other's side lobes
+_FLOOR = 1e-12  # of a peak: rounding errors of single precision and of the fast sum are below
+_SLACK = 0.25  # resolution cells by which side lobes of other echoes may shift a peak (not measured)
 _STEEP = 5.0  # Np of power: more than any window falls in half a resolution cell
 _TINY = 1e-300
 
@@ -36,13 +37,13 @@ def detect(
     waveform: Waveform | None = None,
     elements: Floats | None = None,
 ) -> Detections:
-    """Return the echoes of a map: local maxima over CFAR threshold and minimum SNR that are no one's side lobes.
+    """Return the detections of a map: local maxima over CFAR threshold and minimum SNR that are no side lobes.
 
     SNR is the power at the sub-bin peak over the thermal noise per cell, or, where that is unknown (0), over the noise
-    that the training cells show. Speed is rate plus ego_speed. A peak below the window's own response to the stronger
-    detections is dropped.
+    estimated from the training cells. Speed is rate plus ego_speed. Peaks below the window's response to stronger
+    detections are dropped.
     Args: method ca or os; guard [resolution cells], train [cells a side] and windows: all (rate, range), see
-    process.cfar. The waveform tells how far movers smear, and with `elements` (a, 3) [m] gives azimuths.
+    processing.cfar; waveform, for the range migration of movers and, with elements (a, 3) [m], for azimuths.
     Raises: ValueError on bad arguments.
     """
     grid = Grid.of(map)
@@ -82,12 +83,12 @@ def detect(
 
 
 def _within(rate: Floats, limit: float) -> Floats:
-    """Return rates as the one of their aliases that is not ambiguous: from -limit up to limit [m/s]."""
+    """Return the unambiguous aliases of rates, from -limit to limit [m/s]."""
     return np.where(np.abs(rate) <= limit, rate, (rate + limit) % (2.0 * limit) - limit)
 
 
 def _maxima(power: Floats, least: float) -> Ints:
-    """Return cells (c, 2) that no neighbour exceeds, both axes wrapped as the transforms are."""
+    """Return the local maxima (c, 2) of a map; both axes wrap as the transforms do."""
     top = (power >= maximum_filter(power, size=3, mode="wrap")) & (power > least)
     return np.argwhere(top)
 
@@ -98,7 +99,7 @@ def _refine(power: Floats, cells: Ints) -> tuple[Floats, Floats]:
     gain = np.zeros(len(cells))
     top = np.log(np.maximum(power[tuple(cells.T)], _TINY))
     for axis, size in enumerate(power.shape):
-        # A null beside a peak (unpadded, or without noise) must not bend the parabola beyond all measure.
+        # A null beside a peak (unpadded, or without noise) must not distort the parabola.
         below, above = (np.maximum(_beside(power, cells, axis, step), top - _STEEP) for step in (-1, 1))
         bend = below - 2.0 * top + above
         inside = (bend < 0.0) & (size > 2)
@@ -117,11 +118,10 @@ def _beside(power: Floats, cells: Ints, axis: int, step: int) -> Floats:
 
 
 def _own(place: Floats, power: Floats, smear: Floats, grid: Grid, windows: tuple[str, str]) -> NDArray[np.bool_]:
-    """Return which peaks (n,), strongest first, are more than side lobes of stronger ones.
+    """Return which peaks (n,), strongest first, are not explained by side lobes of stronger ones.
 
-    Args: place (n, 2) and smear (n,) in resolution cells; a mover that migrates over `smear` cells of range spreads
-    over as many of rate.
-    """
+    Args: place (n, 2) and smear (n,) in resolution cells; an echo that migrates over `smear` range cells spreads over
+    as many rate cells."""
     envelopes = [SideLobeEnvelope(name, n) for name, n in zip(windows, grid.count, strict=True)]
     lobes = np.zeros(len(power))
     kept = np.zeros(len(power), bool)

@@ -1,4 +1,4 @@
-"""Angle: where an echo comes from, by the phases along a line of receivers."""
+"""Direction of arrival from the phases along a uniform line of receivers."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ _FINE = 16  # points per beam of the coarse search
 def azimuth(snapshots: NDArray[np.complexfloating], elements: Floats, wavelength: float) -> Floats:
     """Return azimuths (n,) [rad] of echoes from their values (n, a) at receivers (a, 3) [m] in the antenna's frame.
 
-    The receivers form a uniform line along y; the strongest wave's direction cosine is the peak of their spectrum,
-    made exact by the phase step that is left from one to the next. NaN for receivers that are no such line and beyond
-    +-90 deg; arrival from elevation 0 is assumed, and a spacing above half a wavelength folds.
-    """
+    The receivers form a uniform line along y; the direction cosine of the strongest wave is the peak of their spatial
+    spectrum, refined by the remaining phase step between neighbours. NaN for other arrays and beyond +-90 deg;
+    elevation 0 is assumed, and a spacing above half a wavelength is ambiguous."""
     count = len(elements)
     if count < 2 or not len(snapshots):
         return np.full(len(snapshots), np.nan)

@@ -1,4 +1,4 @@
-"""Spectrum: dechirped samples become a range-Doppler map."""
+"""Range-Doppler processing: from dechirped samples to a map, by windows and two FFTs."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def range_doppler(
 ) -> RangeDoppler:
     """Return the map of a frame, scaled so that the peak of a lone path reads its received power.
 
-    Ranges and rates are those at the middle of the frame (Waveform.centre): a beat holds slope * delay plus the
-    Doppler shift, and the latter is taken out row by row (folded rates keep their alias's shift). With real sampling
-    the axis ends at half the range, and the spectrum is doubled for its lost image; noise per cell is then 3 dB higher.
-    Args: windows by name (radar.windows); pad, how many times longer the (range, rate) transforms are made.
+    Ranges and rates are those at the middle of the frame (Waveform.centre). A beat frequency is slope * delay plus the
+    Doppler shift, which is corrected row by row (folded rates keep the shift of their alias). With real sampling the
+    axis ends at half the range, and the spectrum is doubled for its lost image; noise per cell is then 3 dB higher.
+    Args: windows by name (radar.windows); pad, factors by which the (range, rate) transforms are zero-padded.
     Raises: ValueError if the cube does not fit the waveform, or on an unknown window or a bad pad.
     """
     _, chirps, samples = cube.samples.shape
@@ -48,7 +48,7 @@ def range_doppler(
     rows = scipy.fft.fftshift(rows, axes=1)
     doppler = (np.arange(cells_v) - cells_v // 2) / (cells_v * waveform.repetition)
     t = (np.arange(samples) - 0.5 * (samples - 1)) * waveform.chirp_duration / samples
-    # exp(-j2 pi f_d t) in a sample is undone, row by row, so that what remains is the beat of the delay alone.
+    # exp(-j2 pi f_d t) is removed row by row, so that the beat of the delay alone remains.
     undone = np.exp(2j * np.pi * doppler[:, None] * t) * (taper_r / taper_r.sum())
     rows *= undone.astype(np.complex64)
     spectrum = scipy.fft.ifft(rows, cells_r, axis=2, norm="forward", workers=workers, overwrite_x=True)

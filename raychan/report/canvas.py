@@ -1,4 +1,4 @@
-"""The one place that imports matplotlib: figures in one style, drawn without a display."""
+"""Figures by matplotlib, which is imported here only: one style, drawn without a display, and placement of labels."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MARKS = {"direct": ("o", "#ffffff"), "multipath": ("^", "#ffd54a"), "clutter": (
 PALETTE = (
     "#4477aa", "#44bb99", "#ee8866", "#66ccee", "#aa3377", "#228833", "#ccbb44", "#cc6677", "#882255", "#999933",
 )  # fmt: skip
-"""Paul Tol's bright and muted colours: told apart by colour-blind readers too."""
+"""Paul Tol's bright and muted colours, which colour-blind readers can distinguish too."""
 
 
 def figure(width: float, height: float, layout: Any = "constrained") -> Any:
@@ -60,7 +60,7 @@ def show_figure(width: float, height: float, layout: Any = "constrained") -> Any
 
 
 def on(axes: Any, width: float, height: float) -> tuple[Any, Any]:
-    """Return the figure of axes and them; without any, a figure of that size and its own."""
+    """Return the figure of axes and the axes; without axes, a new figure of that size and its own."""
     if axes is None:
         axes = figure(width, height).add_subplot()
     return axes.figure, axes
@@ -110,29 +110,30 @@ _ALONG = np.linspace(0.0, 1.0, 80)
 
 
 class Placer:
-    """Puts labels beside points so that they overlap neither each other nor what is already drawn there."""
+    """Places labels beside points so that they overlap neither each other nor what is already drawn."""
 
     def __init__(self, axes: Any) -> None:
         self.axes = axes
         self.taken = np.zeros((0, 4))  # boxes in pixels: left, bottom, right, top
 
-    def resolve_return_leg(self) -> None:
-        """Lay the figure out, so that data and pixels belong together; call when all else is drawn."""
+    def prepare(self) -> None:
+        """Lay the figure out, so that pixel positions are final; call when all else is drawn."""
         self.axes.figure.draw_without_rendering()
 
     def avoid(self, x: Floats, y: Floats, size: float) -> None:
-        """Keep labels and their lines off things of `size` points at data (x, y), each (n,)."""
+        """Keep labels and their lines away from marks of `size` points at data (x, y), each (n,)."""
         at = self.axes.transData.transform(np.column_stack([x, y]))
         half = 0.5 * size * self.axes.figure.dpi / 72.0
         self.taken = np.concatenate([self.taken, np.hstack([at - half, at + half])])
 
     def spare(self, artist: Any) -> None:
-        """Keep labels and their lines off something drawn, as a legend."""
+        """Keep labels and their lines away from an artist, such as a legend."""
         box = artist.get_window_extent(self.axes.figure.canvas.get_renderer()).extents
         self.taken = np.concatenate([self.taken, np.asarray(box, float)[None]])
 
     def label(self, x: float, y: float, text: str, above: bool = False, **style: Any) -> bool:
-        """Write `text` at the nearest free place round (or above) data (x, y), with a line to it; False if none is."""
+        """Write `text` at the nearest free place around (or above) data (x, y), with a line to it; False if none is
+        free."""
         from matplotlib.text import Text
 
         line = {"arrowstyle": "-", "lw": 0.6, "shrinkA": 0, "shrinkB": 3, "color": style.get("color", "black")}
@@ -145,7 +146,7 @@ class Placer:
         size = note.get_window_extent(renderer)
         point = self.axes.transData.transform((x, y))
         places = _places(0.5 * size.width / per_point, 0.5 * size.height / per_point, above)
-        for own in (8.0 * per_point, np.inf):  # if no line is free to run, it may cross what is there
+        for own in (8.0 * per_point, np.inf):  # if no line is free, it may cross what is drawn
             for place in places:
                 note.set_position(place)
                 note.update_positions(renderer)
@@ -158,7 +159,7 @@ class Placer:
         return False
 
     def _free(self, point: Floats, box: Floats, own: float) -> bool:
-        """Say whether a box, and the line to it beyond `own` pixels from its point, meet nothing."""
+        """Return whether a box, and the line to it beyond `own` pixels from its point, are free."""
         low, high = self.taken[:, :2], self.taken[:, 2:]
         if ((low < box[2:]) & (high > box[:2])).all(axis=1).any():
             return False

@@ -17,9 +17,9 @@ from raychan.units import dbm, watt
 
 Floats = NDArray[np.float64]
 
-_DYNAMIC_DB = 90.0
-_LABELS = 12
-_PEAKS = 10
+_DYNAMIC_DB = 90.0  # most that is drawn below the peak
+_LABELS = 12  # detections named at most
+_PEAKS = 10  # peaks of the profile named at most
 
 
 def rdmap_picture(result: Result, path: str | Path | None = None, axes: Any = None) -> Path | None:
@@ -96,14 +96,14 @@ def profile_picture(result: Result, path: str | Path | None = None, axes: Any = 
 
 
 def _reach(result: Result) -> float:
-    """Return the range up to which a picture is worth drawing [m]."""
+    """Return the range [m] up to which a picture is drawn."""
     found = result.detections.range
     end = float(result.rdmap.range[-1])
     return min(end, max(10.0, 1.2 * float(found.max()))) if len(found) else end
 
 
 def _rates(result: Result) -> tuple[float, float]:
-    """Return the range rates worth drawing: all detections and rest, with room, within the map."""
+    """Return the range rates [m/s] to draw: all detections and standing bodies, with a margin, within the map."""
     m = result.rdmap
     seen = np.concatenate([result.detections.rate, [0.0, -result.receiver.ego_speed]])
     room = max(3.0, 0.35 * float(np.ptp(seen)), 10.0 * m.rate_resolution)
@@ -111,7 +111,7 @@ def _rates(result: Result) -> tuple[float, float]:
 
 
 def _mark_detections(result: Result, axes: Any) -> None:
-    """Mark detections by their labels: full, but hollow where not converged; a square round those that are folded."""
+    """Mark detections by their labels: filled, hollow where not converged, with a square around folded ones."""
     d = result.detections
     for label, (mark, colour) in MARKS.items():
         mine = np.array([why.label == label for why in result.provenance], bool)
@@ -133,7 +133,7 @@ def _mark_detections(result: Result, axes: Any) -> None:
 def _name_detections(result: Result, axes: Any) -> None:
     d = result.detections
     placer = Placer(axes)
-    placer.resolve_return_leg()
+    placer.prepare()
     placer.avoid(d.range, d.rate, 9.0)
     placer.avoid(d.range[d.folded], d.rate[d.folded], 15.0)
     if (legend := axes.get_legend()) is not None:
@@ -159,7 +159,7 @@ def _name_peaks(result: Result, axes: Any, power: Floats, far: float) -> None:
     p = result.profile
     known, response = chains(result.paths, result.receiver.background), response_of(result.receiver)
     placer = Placer(axes)
-    placer.resolve_return_leg()
+    placer.prepare()
     end = int(np.searchsorted(p.range, far))
     dense = np.linspace(p.range[0], p.range[max(end - 1, 0)], 8 * max(end, 1))
     placer.avoid(dense, np.interp(dense, p.range, power), 2.0)
@@ -178,7 +178,7 @@ def _name_peaks(result: Result, axes: Any, power: Floats, far: float) -> None:
 
 
 def _truly(why: Explanation) -> str:
-    """Return where a folded echo is, as a line more of its label."""
+    """Return the true place of a folded echo, as a further line of its label."""
     if not why.folded:
         return ""
     rate = "" if math.isnan(why.true_rate) else f", {why.true_rate:+.1f} m/s"
@@ -186,7 +186,7 @@ def _truly(why: Explanation) -> str:
 
 
 def _short(why: Explanation) -> str:
-    """Return the bodies of the leading chain without their parts, repeats on one body drawn together."""
+    """Return the bodies of the leading chain without their parts and without repeats."""
     if not why.contributions:
         return "noise"
     bodies = [link.split(".")[0] for link in why.contributions[0].chain if not link.startswith("(")]

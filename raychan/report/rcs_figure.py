@@ -11,9 +11,9 @@ from raychan.report.canvas import PALETTE, drawn_as, figure, style
 
 Floats = NDArray[np.float64]
 
-_ROUNDING_DB = 20.0 * np.log10(np.finfo(float).eps)  # so far below its peak a pattern is but rounding: no return
+_ROUNDING_DB = 20.0 * np.log10(np.finfo(float).eps)  # below the peak: a pattern is only rounding error there
 MOST_CUTS = 8
-"""Cuts that are drawn as lines; more become a map."""
+"""Most cuts that are drawn as lines; more are drawn as a map."""
 
 
 def rcs_picture(
@@ -80,7 +80,7 @@ def _cuts(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Fl
 
 
 def _note(dbsm: Floats, error: Floats) -> str:
-    """Return what the band shows, and what can be neither line nor band."""
+    """Return the legend's title: the stated errors, and the counts of angles without one."""
     known = error[np.isfinite(error)]
     parts = []
     if known.size:
@@ -94,7 +94,7 @@ def _note(dbsm: Floats, error: Floats) -> str:
 
 
 def _limits(dbsm: Floats, error: Floats) -> tuple[float, float]:
-    """Return the span that holds every value and its band [dBsm]."""
+    """Return the span [dBsm] of all values with their error bands."""
     real = np.isfinite(dbsm)
     if not real.any():
         return -100.0, -90.0
@@ -105,7 +105,7 @@ def _limits(dbsm: Floats, error: Floats) -> tuple[float, float]:
 
 
 def _line(axes: Any, angle: Floats, dbsm: Floats, error: Floats, colour: str, label: str) -> None:
-    """Draw one cut over its band of error; crosses where the error is not known."""
+    """Draw one cut over its error band; crosses where the error is unknown."""
     dbsm = np.where(np.isfinite(dbsm), dbsm, np.nan)
     axes.fill_between(angle, dbsm - error, dbsm + error, color=colour, alpha=0.3, lw=0)
     axes.plot(angle, dbsm, color=colour, lw=1.1, label=label)

@@ -220,7 +220,7 @@ def _array(done: Validation, turns: list[Turn], path: Path) -> Path:
         axes.legend(loc="upper center", frameon=True, edgecolor="none", framealpha=0.9)
         axes.grid(alpha=0.25, lw=0.5)
         placer = Placer(axes)
-        placer.resolve_return_leg()
+        placer.prepare()
         placer.avoid(at, np.array([t.printed for t in turns]), 6.0)
         placer.avoid(at, np.array([t.printed if t.ours is None else t.ours for t in turns]), 6.0)
         for t, x in zip(turns, at, strict=True):

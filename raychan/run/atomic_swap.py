@@ -1,4 +1,4 @@
-"""How a folder changes at once: locks that die with their process, marks of what is being built, and the exchange."""
+"""Atomic replacement of folders: locks that end with their process, names of what is being built, and the exchange."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-MARK = ".raychan-"  # in the name of all that is being built
-UNFINISHED = ".raychan-unfinished"  # in a folder being built, and locked by its builder
+MARK = ".raychan-"  # part of the name of everything under construction
+UNFINISHED = ".raychan-unfinished"  # file in a folder under construction, locked by its process
 _HERE = -100  # AT_FDCWD
 _EXCHANGE = 2  # RENAME_EXCHANGE
 
 
-def held(path: str | Path, wait: bool = False) -> int | None:
-    """Lock a file or folder until `let_go` or the end of the process; None where another has it or none can be had."""
+def acquire(path: str | Path, wait: bool = False) -> int | None:
+    """Lock a file or folder until `release` or the end of the process; None where it is taken or not possible."""
     try:
         import fcntl
     except ImportError:
@@ -35,8 +35,8 @@ def held(path: str | Path, wait: bool = False) -> int | None:
     return handle
 
 
-def let_go(lock: int | None) -> None:
-    """End a lock that `held` gave."""
+def release(lock: int | None) -> None:
+    """Release a lock of `acquire`."""
     if lock is not None:
         os.close(lock)
 
@@ -44,17 +44,17 @@ def let_go(lock: int | None) -> None:
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Let one process at a time rename within a folder."""
-    lock = held(folder, wait=True)
+    lock = acquire(folder, wait=True)
     try:
         yield
     finally:
-        let_go(lock)
+        release(lock)
 
 
 def exchange(new: Path, old: Path) -> bool:
-    """Let two folders of one parent change names and return True; False, and nothing changed, where that cannot be.
+    """Exchange the names of two folders of one parent and return True; False, with nothing changed, if not possible.
 
-    At once on Linux; elsewhere by three renames, between which `old` is away for a moment.
+    Atomic on Linux; elsewhere by three renames, between which `old` is missing for a moment.
     """
     if _exchange_at_once(new, old):
         return True
@@ -81,20 +81,20 @@ def _exchange_at_once(new: Path, old: Path) -> bool:
 
 
 def stale_of(folder: Path, name: str) -> list[Path]:
-    """Return what killed processes left of building `name` in a folder; call with the folder locked."""
+    """Return what killed processes left behind while building `name` in a folder; call with the folder locked."""
     if not folder.is_dir():
         return []
     return [e for e in sorted(folder.iterdir()) if e.name.startswith(f".{name}{MARK}") and is_dead(e)]
 
 
 def is_mark(entry: Path) -> bool:
-    """Tell whether a name is one that something is being built under."""
+    """Return whether a name is that of something under construction."""
     return entry.name.startswith(".") and MARK in entry.name
 
 
 def is_dead(entry: Path) -> bool:
-    """Tell whether no process is building this any more."""
+    """Return whether no process is building this any more."""
     sign = entry / UNFINISHED if entry.is_dir() else entry
-    lock = held(sign)
-    let_go(lock)
+    lock = acquire(sign)
+    release(lock)
     return lock is not None or not sign.exists()

@@ -1,4 +1,5 @@
-"""Cells: what each of many echoes brings to one cell of a range-Doppler map, and their sums."""
+"""Kernels of the point-spread function: contributions of many echoes to cells of a range-Doppler map, and their
+sums."""
 
 from __future__ import annotations
 
@@ -12,11 +13,11 @@ from raychan.em.phasor import unit_phasor
 
 @njit(cache=True, nogil=True, forceinline=True)
 def _place(n, fine, cell):  # type: ignore[no-untyped-def]
-    """Return the point of a table below `cell`, the share of the next one, and the sign."""
+    """Return the table index below `cell`, the weight of the next entry, and the sign."""
     period = math.floor(cell / n)
     at = (cell - period * n) * fine
     low = min(int(at), n * fine - 1)
-    # One period on, a response counted from the middle of an even window has turned its sign.
+    # One period on, the response of an even window, with its phase counted from the middle, changes sign.
     return low, at - low, 1.0 - 2.0 * ((int(period) * (n - 1)) & 1)
 
 
@@ -35,7 +36,7 @@ def periodic(table, n, fine, cells):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
-    """Return the range [m] at which an echo stands mid frame, and its phase there."""
+    """Return the range [m] of an echo at mid frame, and its phasor there."""
     carrier, slope, centre, swept, _, _, _, light = ramp
     then = delay + 2.0 * rate * centre / light
     cosine, sine = unit_phasor(carrier * (then - delay) + swept * then - 0.5 * slope * then**2)
@@ -44,20 +45,20 @@ def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
-    """Return the response of both windows to an echo that stands at a range [m] mid frame."""
+    """Return the response of both windows to an echo at a range [m] at mid frame."""
     _, slope, _, _, middle, repetition, resolution, light = ramp
     samples, chirps, fine = sizes
     tables, middles = along
     off = rate - cell_rate
     # Doppler is measured at the middle sample of the sweep.
     apart = 2.0 * middle / light * off * chirps * repetition
-    # Each row of the map is freed of its own Doppler within the ramp, not of that of others.
+    # Each row of the map is corrected for its own Doppler within the ramp; other rates keep the difference.
     away = (at_range - cell_range + off * middle / slope) / resolution
     moved = rate * repetition / resolution
     total = 0j
     low, share, sign = _place(chirps, fine, apart)
     for k in range(len(middles)):
-        # Within a piece the range response runs along a straight line.
+        # Within a part of the frame the range response is linear.
         at, part, turned = _place(samples, fine, away + moved * (middles[k] - 0.5 * (chirps - 1)))
         held = tables[k, low, 0] + share * (tables[k, low + 1, 0] - tables[k, low, 0])
         late = tables[k, low, 1] + share * (tables[k, low + 1, 1] - tables[k, low, 1])
@@ -69,12 +70,12 @@ def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along): 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
-    """Return what echoes (n,) bring to a cell, and the ranges (n,) [m] at which they stand.
+    """Return the contributions (n,) of echoes to a cell, and their ranges (n,) [m] at mid frame.
 
     Args: cell range [m] and rate [m/s]; ramp carrier, slope, time of the frame's middle, swept half [Hz], middle
     frequency [Hz], repetition, range resolution [m], speed of light; sizes samples, chirps, fine; across (., 2) the
-    range response and its slope by cells; along (pieces, ., 2) the rate response of each piece of the frame and that
-    of its chirps' numbers, counted from its middle chirp, and these middles (pieces,).
+    range response and its derivative by cells; along (parts, ., 2) the rate response of each part of the frame with
+    weights 1 and with weights of the chirp number from its middle, and these middles (parts,).
     """
     waves, ranges = np.empty(delay.size, np.complex128), np.empty(delay.size)
     for i in range(delay.size):
@@ -96,7 +97,7 @@ def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type
 
 @njit(cache=True, forceinline=True)
 def _apart(cells, n):  # type: ignore[no-untyped-def]
-    """Return how far a response over n cells is from its peak, or that of a period on."""
+    """Return the distance in cells from the nearest peak of a response of period n cells."""
     if cells > n:
         cells -= n * math.floor(cells / n)
     return min(cells, n - cells)
@@ -106,10 +107,10 @@ def _apart(cells, n):  # type: ignore[no-untyped-def]
 def sums_in_cells(  # type: ignore[no-untyped-def]
     group, amplitude, delay, rate, cells, least, beyond, total, size, strongest, ramp, sizes, across, along
 ):
-    """Write the `cell_sums` (c, ...) of what echoes (n,) bring to each of several cells (c, 2).
+    """Write the `cell_sums` (c, ...) of the contributions of echoes (n,) to several cells (c, 2).
 
-    Args: least (c,) that an echo brings to a cell and counts; beyond (s,) and (2, m) the largest that range and rate
-    responses are so many cells from the peak and farther; else as for `cell_waves` and `cell_sums`.
+    Args: least (c,) contribution that counts; beyond (s,) and (2, m) upper bounds of the range and rate responses by
+    cells from the peak; else as for `cell_waves` and `cell_sums`.
     """
     samples, chirps, _ = sizes
     _, slope, _, _, middle, repetition, resolution, light = ramp
@@ -135,8 +136,8 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def cell_sums(group, count, waves, ranges, rates):  # type: ignore[no-untyped-def]
-    """Return sums of waves (1, g), sizes (1, 4, g): how many, their powers |wave|^2, and these times range and rate,
-    and which is the strongest (1, g) of each group, -1 if there is none.
+    """Return, by groups, sums of waves (1, g); sizes (1, 4, g): count, power |wave|^2, and power times range and rate;
+    and the strongest echo (1, g), -1 if there is none.
 
     Args: group (n,) of each echo, below `count`.
     """

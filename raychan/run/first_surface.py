@@ -1,4 +1,4 @@
-"""Bistatic: what the first surface scatters to another end: the reflected wave of all that is lit, and its shadow."""
+"""Bistatic scattering of the first surface: the reflected wave of all lit facets, and the shadow radiation."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Complexes = NDArray[np.complex128]
 def first_surface(
     geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, frequency: float, basis: FieldOf
 ) -> Complexes:
-    """Return what tubes on their first surface scatter to the end of `out` (2, 2), as `transfer` gives it.
+    """Return the gains (2, 2) of all tubes from their first surface to the end of `out`, as `transfer` computes them.
 
-    Physical optics has currents where a surface is lit, and they radiate everywhere. They are those of two waves: the
-    reflected one, which other bodies and other parts of this one may block, and the incident one's, the shadow
-    radiation, which cancels the incident wave behind the body: whatever stands there too is in a shadow already, so it
-    is never blocked. Source: Ufimtsev, Fundamentals of the Physical Theory of Diffraction, 2014, ch. 1.
+    Physical optics has currents on the lit surface that radiate in all directions, the sum of two parts: the reflected
+    wave, which other bodies and parts of this one may block, and the shadow radiation, which cancels the incident wave
+    behind the body. What stands there is in its shadow already, so the latter is never blocked.
+    Source: Ufimtsev, Fundamentals of the Physical Theory of Diffraction, 2014, ch. 1.
     """
     seen, corners, passed = resolve_return_leg(geometry, leg, out, tubes, found, True, which=LIT)
     total = _radiated(geometry, leg, out, seen, (corners, passed), frequency, basis, REFLECTED)
@@ -39,7 +39,7 @@ def _radiated(
     geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, way: tuple[Floats, NDArray[np.int32]], frequency: float,
     basis: FieldOf, wave: int,
 ) -> Complexes:  # fmt: skip
-    """Return what one of the two waves brings over a way out, its mirror points and layers."""
+    """Return the gains (2, 2) of one of the two parts over a return leg with its mirror points and layers."""
     if not len(tubes):
         return np.zeros((2, 2), complex)
     area = np.empty((len(tubes), 3, 3))

@@ -1,4 +1,4 @@
-"""Folding: whether a cell shows its echo where it is, or a whole number of ambiguities away, or mirrored."""
+"""Folding: whether an echo appears in a map at its place, at an alias of it, or as a mirror image of real sampling."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from raychan.run.point_spread import PointSpread
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_NEAR = 4.0  # resolution cells: beyond the main lobe of any window, whose side lobes do not tell what feeds a cell
-_EQUAL = 1.0 + 1e-6
+_NEAR = 4.0  # resolution cells: wider than the main lobe of any window; side lobes do not show what feeds a cell
+_EQUAL = 1.0 + 1e-6  # factor by which an unfolded place is preferred
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Truth:
     range: float = math.nan
     rate: float = math.nan
     folded: bool = False
-    """Whether that is another place than the one shown: ambiguities away, or the mirror image of real sampling."""
+    """Whether they appear elsewhere: at an alias, or as a mirror image of real sampling."""
 
 
 UNKNOWN = Truth()
@@ -33,7 +33,7 @@ UNKNOWN = Truth()
 
 @dataclass(frozen=True)
 class Shown:
-    """A cell of the map, range [m] and rate [m/s] (None for one of the profile), and the place reported for it."""
+    """A map cell, range [m] and rate [m/s] (None for a cell of the profile), and the place reported for it."""
 
     range: float
     rate: float | None
@@ -42,17 +42,16 @@ class Shown:
 
 
 def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown: Shown) -> Truth:
-    """Return where the paths of one chain that feed a cell are.
+    """Return the true place of the paths of one chain that feed a cell.
 
-    Args: rows of the chain's paths; strongest the row of the one that brings most to the cell.
-    Of all places that alias to the cell it is the one that brings most power; range and rate are the power-weighted
-    means of the paths there.
+    Of all places that alias to the cell it is the one with most power; range and rate are power-weighted means over the
+    paths there. Args: rows of the chain's paths; strongest, the row that contributes most to the cell.
     """
     found: list[tuple[float, Truth]] = []
     for mirrored in (False, True) if response.mirrors and shown.rate is not None else (False,):
         folds, near = _folds(paths, rows, response, shown, mirrored)
         taken = rows[near]
-        if not near.any():  # a side lobe: the strongest path says whose
+        if not near.any():  # a side lobe: that of the strongest path
             taken = np.array([strongest])
             folds, near = _folds(paths, taken, response, shown, mirrored)[0], np.ones(1, bool)
         power = _powers(paths, taken, response, shown, mirrored)
@@ -64,13 +63,13 @@ def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown
             if total > 0.0:
                 folded = mirrored or bool(whole.any())
                 found.append((total, Truth(float(weight @ at) / total, float(weight @ rate) / total, folded)))
-    # Of equal ones (a target at range 0 is its own mirror image) the place as shown.
+    # Of equal ones (a target at range 0 is its own mirror image) the unfolded place.
     return max(found, key=lambda one: one[0] * (1.0 if one[1].folded else _EQUAL), default=(0.0, UNKNOWN))[1]
 
 
 def aliased(at: Floats, shown: float, response: PointSpread) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return how far (n,) [m] the nearest alias of echoes at ranges `at` (n,) [m] is from a range shown [m], and
-    whether that alias is another place than theirs."""
+    """Return the distance (n,) [m] of the nearest alias of echoes at ranges `at` (n,) [m] from a range shown [m], and
+    whether that alias is folded."""
     period = response.periods[0]
     signs = np.array([[1.0], [-1.0]] if response.mirrors else [[1.0]])
     off = signs * at - shown
@@ -83,17 +82,17 @@ def aliased(at: Floats, shown: float, response: PointSpread) -> tuple[Floats, ND
 def _folds(
     paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool
 ) -> tuple[Ints, NDArray[np.bool_]]:
-    """Return the ambiguities (n, 2) of range and rate between paths and the place shown, and whether the paths stand
-    on the main lobe about it when these are taken out."""
+    """Return the ambiguity numbers (n, 2) of range and rate between paths and the place shown, and whether the paths
+    lie within the main lobe about it once these are removed."""
     at, rate = response.stands(paths.delay[rows], paths.range_rate[rows], shown.rate is not None)
     sign = -1.0 if mirrored else 1.0
     away, smear = np.zeros((len(rows), 2)), np.zeros(len(rows))
     away[:, 0] = sign * at - shown.at_range
     if shown.rate is not None:
-        # Each row of the map is freed of its own Doppler within the ramp, not of that of others.
+        # Each row of the map is corrected for its own Doppler within the ramp; other rates keep the difference.
         away[:, 0] += (sign * rate - shown.rate) * response.drift
         away[:, 1] = sign * rate - shown.at_rate
-        # A mover that migrates over cells of range spreads over as many of rate.
+        # An echo that migrates over range cells spreads over as many rate cells.
         smear = 0.5 * np.abs(rate) * response.waveform.frame_duration / response.resolutions[0]
     whole = np.rint(away / response.periods)
     rest = np.abs(away - whole * response.periods) / response.resolutions
@@ -101,7 +100,7 @@ def _folds(
 
 
 def _powers(paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool) -> Floats:
-    """Return what paths, or their mirror images, bring to the cell shown, as powers (n,)."""
+    """Return the powers (n,) that paths, or their mirror images, contribute to the cell shown."""
     delay = paths.delay[rows]
     if shown.rate is None:
         wave: Complexes = paths.amplitude[rows] * response.in_profile(delay, shown.range)[0]

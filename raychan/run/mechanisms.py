@@ -1,4 +1,4 @@
-"""`model.mode = "auto"`: which mechanisms a tolerance needs, found with a coarse launch of all of them."""
+"""Choice of mechanisms for `model.mode = "auto"`: those that a tolerance needs, found by a coarse launch with all."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from raychan.records import DIFFRACT, TRANSMIT, Paths
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 
-_LEVEL = 1e-4  # of the sum of all amplitudes: what levels of whole mechanisms are told to
+_LEVEL = 1e-4  # of the sum of all amplitudes: accuracy of the levels of whole mechanisms
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What the model shall hold, and why."""
+    """The mechanisms to model, and a line each on why."""
 
     bounces: int
     transmissions: int
@@ -35,13 +35,13 @@ class Choice:
 
 
 def interactions(paths: Paths) -> NDArray[np.int64]:
-    """Return the number of interactions (n,) of each path, thin layers passed not counted."""
+    """Return the number of interactions (n,) of each path, transmissions through thin layers not counted."""
     kind = paths.ways.kind
     return np.asarray(((kind > 0) & (kind != TRANSMIT)).sum(axis=1))[paths.way]
 
 
 def layers(paths: Paths) -> NDArray[np.int64]:
-    """Return the number of thin layers (n,) that each path passes."""
+    """Return the number of transmissions through thin layers (n,) of each path."""
     return np.asarray((paths.ways.kind == TRANSMIT).sum(axis=1))[paths.way]
 
 

@@ -1,4 +1,5 @@
-"""Tell: what a run says, a line each, of detections that are not converged or folded, and of what it left out."""
+"""Lines that a run prints and stores: on detections that are not converged or folded, on the tolerance, and on
+unmodelled effects above the weakest detection."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from raychan.tracing.solver import Stats
 from raychan.world.geometry import Geometry
 
 _NAMED = 5  # detections that a line names by their numbers
-_LEAST_DB = 0.5  # above the weakest detection: what a whole number of dB shows as more than 0
+_LEAST_DB = 0.5  # above the weakest detection: rounds to 1 dB or more
 
 
 def counts(found: ExplainedDetections, tolerance_db: float) -> dict[str, float]:
@@ -75,7 +76,7 @@ def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, l
 
 
 def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
-    """Return a line if launches had more tubes on some bodies than may be cut."""
+    """Return a line if launches needed to subdivide more tubes on a body than they may."""
     left = np.zeros(len(geometry.facets.role), np.int64)
     for stats in launches:
         left[: len(stats.uncut)] += stats.uncut
@@ -85,24 +86,24 @@ def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
     area = float(geometry.area[facets.body == worst].sum())
     body = f"body '{facets.body_names[worst]}': {int(left[worst]):,} tubes on its {area:.3g} m2"
     return (
-        f"{body} were left coarser than asked for, too many hide parts of each other or are too large: errors may "
-        "exceed those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit",
+        f"{body} are coarser than the tolerance asks for: too many are partly hidden or too large. Errors may exceed "
+        "those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit",
     )
 
 
 def notes(result: Result) -> list[str]:
-    """Return the lines of a result that stand below its table; its warnings hold them too."""
+    """Return the lines below a result's table; its warnings contain them too."""
     return noted(result.detections, float(result.stats.get("tolerance_db", math.inf)), result.ledger)
 
 
 def findings(result: Result) -> list[str]:
-    """Return all lines that are told of a result's detections."""
+    """Return all lines on a result's detections."""
     tolerance = float(result.stats.get("tolerance_db", math.inf))
     return told(result.detections, tolerance, result.rdmap, result.ledger)
 
 
 def marks(found: ExplainedDetections) -> str:
-    """Return how many detections are marked, as ', 2 not converged, 1 folded'; nothing where none is."""
+    """Return the counts of marked detections, as ', 2 not converged, 1 folded'; '' where there are none."""
     counted = {"not converged": int((~found.converged).sum()), "folded": int(found.folded.sum())}
     return "".join(f", {n} {word}" for word, n in counted.items() if n)
 

@@ -1,8 +1,8 @@
-"""Micro-Doppler: a frame in which bodies turn, from as few tracings as its error allows.
+"""Micro-Doppler: the samples of a frame in which bodies turn, from as few tracings as the tolerance allows.
 
-The scene is traced at some chirps. Between two of them the routes of both are carried on as their bodies turn (see
-channel.advance) and their samples are blended from one to the other. Another tracing is put in the middle as long as
-the two differ by more than the tolerance; what they differ by is the stated error.
+The scene is traced at some chirps, the keyframes. Between two of them the routes of both are extrapolated as their
+bodies turn (see channel.slow_time), and the samples are blended from one to the other. Another keyframe is put in the
+middle as long as the two differ by more than the tolerance; their difference is the stated error.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Samples = NDArray[np.complexfloating[Any, Any]]
 
-_CHIRPS = 48  # at most one more tracing for so many chirps
-_AT_ONCE = 64  # chirps whose routes are held at once
+# Single values not measured.
+_CHIRPS = 48  # chirps per keyframe at least: bounds the number of tracings
+_AT_ONCE = 64  # chirps whose routes are held in memory at once
 _FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
-_HELPS = 0.5  # share of the power of error that may be left by a tracing in between if it is to help
-_NEEDED = 1.0  # rad of bend over a frame from which `auto` traces again
+_HELPS = 0.5  # of the error power before: a keyframe in between that leaves more does not help
+_NEEDED = 1.0  # rad of phase that constant rates leave out over a frame, from which `auto` uses keyframes
 
 
 def turning(scene: Scene) -> NDArray[np.bool_]:
@@ -53,7 +54,7 @@ def moving(scene: Scene) -> NDArray[np.bool_]:
 
 
 def bend(scene: Scene, edge: float) -> float:
-    """Return the phase [rad] that paths at their rates leave out over a frame: along the turn of a body's outermost
+    """Return the phase [rad] over a frame that paths of constant rates leave out: by the turn of a body's outermost
     point, and across a tube of a given edge [m]."""
     wave, worst = scene.radar.waveform, 0.0
     k, half = 4.0 * np.pi / wave.wavelength, 0.5 * wave.frame_duration
@@ -69,7 +70,7 @@ def bend(scene: Scene, edge: float) -> float:
 
 
 def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
-    """Tell whether a frame is to be traced more than once."""
+    """Return whether a frame needs more than one tracing."""
     if retrace == 1 or scene.radar.waveform.n_chirps < 3:
         return False
     return bend(scene, edge) > _NEEDED if retrace == "auto" else bool(moving(scene).any())
@@ -88,15 +89,15 @@ def retraced(
     "auto" or the number of tracings, when bodies that only move are carried on too; first the paths at the frame's
     start, if they are known; progress is told the share done.
     """
-    work = _Work(scene, rule, model, progress)
+    work = _Frame(scene, rule, model, progress)
     last = scene.radar.waveform.n_chirps - 1
     if model.retrace == "auto":
         return work.adaptive(last, first)
     return work.even(last, first, int(model.retrace))
 
 
-class _Work:
-    """One frame being put together."""
+class _Frame:
+    """One frame as it is assembled from keyframes."""
 
     def __init__(self, scene: Scene, rule: PruneRule, model: Any, progress: Callable[[float], None] | None) -> None:
         self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
@@ -109,55 +110,55 @@ class _Work:
         self.reached = True
 
     def adaptive(self, last: int, first: Traced | None) -> Retraced:
-        """Return the frame with tracings put where those on both sides differ by more than the tolerance."""
-        keys = [self.key(0, first), self.key(last // 2), self.key(last)]
-        pieces = [self.piece(a, b) for a, b in pairwise(keys)]
-        power = sum(float((np.abs(p.blend()[0]) ** 2).sum()) for p in pieces) / self.chirps
+        """Return the frame, with keyframes added where those on both sides differ by more than the tolerance."""
+        keyframes = [self.keyframe(0, first), self.keyframe(last // 2), self.keyframe(last)]
+        segments = [self.segment(a, b) for a, b in pairwise(keyframes)]
+        power = sum(float((np.abs(s.blend()[0]) ** 2).sum()) for s in segments) / self.chirps
         limit = power * (10.0 ** (self.model.tolerance_db / 20.0) - 1.0) ** 2
-        # What each piece may be wrong by for a chirp, and what one twice as long was.
-        known = [(p, p.off(), np.inf) for p in pieces]
+        # Each segment with its error power per chirp, and that of the segment it was split from.
+        known = [(s, s.error_power(), np.inf) for s in segments]
         while len(self.times) < self.most:
             worst = max((k for k in known if _worth(*k, limit)), key=lambda k: k[1] * k[0].chirps, default=None)
             if worst is None:
                 break
             known.remove(worst)
-            known += [(half, half.off(), worst[1]) for half in self.halves(worst[0])]
-        self.reached = all(off <= limit for _, off, _ in known)
-        return self.done(sorted((p for p, _, _ in known), key=lambda p: p.start.chirp))
+            known += [(half, half.error_power(), worst[1]) for half in self.halves(worst[0])]
+        self.reached = all(error <= limit for _, error, _ in known)
+        return self.done(sorted((s for s, _, _ in known), key=lambda s: s.start.chirp))
 
-    def halves(self, piece: Segment) -> tuple[Segment, Segment]:
-        """Return a piece in two, with a tracing in its middle."""
-        start, end = piece.start, piece.end
-        key = self.key((start.chirp + end.chirp) // 2)
+    def halves(self, segment: Segment) -> tuple[Segment, Segment]:
+        """Return a segment split in two by a keyframe in its middle."""
+        start, end = segment.start, segment.end
+        key = self.keyframe((start.chirp + end.chirp) // 2)
         left, right = reach(key.chirp - start.chirp), reach(end.chirp - key.chirp)
         c = self.carried(key, key.chirp - left, key.chirp + right)
         return (
-            Segment(start, key, piece.a[:, :, : left + 1], c[:, :, : left + 1]),
-            Segment(key, end, c[:, :, left:], piece.b[:, :, -right - 1 :]),
+            Segment(start, key, segment.a[:, :, : left + 1], c[:, :, : left + 1]),
+            Segment(key, end, c[:, :, left:], segment.b[:, :, -right - 1 :]),
         )
 
     def even(self, last: int, first: Traced | None, count: int) -> Retraced:
-        """Return the frame from `count` tracings evenly spread."""
+        """Return the frame from `count` keyframes at equal distances."""
         at = np.unique(np.rint(np.linspace(0, last, count)).astype(int))
-        keys = [self.key(int(c), first if c == 0 else None) for c in at]
-        return self.done([self.piece(a, b) for a, b in pairwise(keys)])
+        keyframes = [self.keyframe(int(c), first if c == 0 else None) for c in at]
+        return self.done([self.segment(a, b) for a, b in pairwise(keyframes)])
 
-    def piece(self, start: Keyframe, end: Keyframe) -> Segment:
-        """Return the chirps between two tracings."""
+    def segment(self, start: Keyframe, end: Keyframe) -> Segment:
+        """Return the segment between two keyframes."""
         far = reach(end.chirp - start.chirp)
         a = self.carried(start, start.chirp, start.chirp + far)
         return Segment(start, end, a, self.carried(end, end.chirp - far, end.chirp))
 
-    def done(self, pieces: list[Segment]) -> Retraced:
-        """Return the frame of pieces in order."""
-        samples, error = joined([p.blend() for p in pieces]), joined([p.doubt() for p in pieces])
+    def done(self, segments: list[Segment]) -> Retraced:
+        """Return the frame of segments in order."""
+        samples, error = joined([s.blend() for s in segments]), joined([s.error() for s in segments])
         if not self.radar.waveform.complex_sampling:
             samples, error = samples.real.astype(complex), error.real.astype(complex)
         times = tuple(sorted(self.times))
         return Retraced(samples.sum(axis=0), samples[0], self.turns, error.sum(axis=0), times, self.rays, self.reached)
 
-    def key(self, chirp: int, known: Traced | None = None) -> Keyframe:
-        """Trace the scene at a chirp."""
+    def keyframe(self, chirp: int, known: Traced | None = None) -> Keyframe:
+        """Return the keyframe at a chirp, traced unless the tracing is known."""
         now = self.scene.at(chirp * self.step)
         self.times.append(chirp * self.step)
         carrier = self.radar.waveform.carrier
@@ -184,19 +185,19 @@ class _Work:
         )
 
     def touches(self, body: NDArray[np.signedinteger], kind: NDArray[np.signedinteger]) -> NDArray[np.bool_]:
-        """Tell which chains (n, d) meet a turning body."""
+        """Return which sequences of interactions (n, d) meet a turning body."""
         return np.asarray((self.turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))
 
     def carried(self, key: Keyframe, first: int, last: int) -> Samples:
-        """Return the samples (2, antenna, chirp, sample) of a tracing's paths carried over chirps first to last: those
-        that meet turning bodies, all others."""
+        """Return the samples (2, antenna, chirp, sample) of a keyframe's paths extrapolated to chirps first to last: of
+        those that meet turning bodies, and of all others."""
         wave = self.radar.waveform
         shape = (2, len(self.radar.elements), last - first + 1, wave.n_samples)
         out = np.zeros(shape, np.complex64)
-        growth = key.others.length_rate / C0 * (first - key.chirp) * self.step
+        delay_rate = key.others.length_rate / C0 * (first - key.chirp) * self.step
         late = key.others.replace(
-            length=key.others.length + C0 * growth,
-            amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * growth),
+            length=key.others.length + C0 * delay_rate,
+            amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
         out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame)).samples
@@ -205,7 +206,7 @@ class _Work:
             nearer = departures(routes)[1] @ self.radar.elements_world.T
             for start in range(first, last + 1, _AT_ONCE):
                 count = min(_AT_ONCE, last + 1 - start)
-                # One instant more than chirps: growth from chirp to chirp is what a path's rate is.
+                # One instant more than chirps: the rate is the change from chirp to chirp.
                 poses = self.poses(key, np.arange(start, start + count + 1))
                 lengths, amplitudes = carried(routes, strength, poses, wave.carrier)
                 rows = slice(start - first, start - first + count)
@@ -214,7 +215,7 @@ class _Work:
         return out
 
     def turn(self, nearer: Floats) -> Complexes:
-        """Return the carrier's turn and the transmitted amplitude [sqrt(W)] of ways shorter by [m]."""
+        """Return the transmitted amplitude [sqrt(W)] times the carrier phase of paths shorter by some lengths [m]."""
         wave = self.radar.waveform
         return np.asarray(np.sqrt(self.radar.power) * np.exp(2j * np.pi / wave.wavelength * nearer))
 
@@ -224,11 +225,11 @@ class _Work:
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
         length = lengths.reshape(count + 1, -1)[:, parts]
         delay = length / C0
-        growth, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
+        delay_rate, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
         strength = amplitudes.reshape(count + 1, -1)[:-1, parts]
         if len(parts) * wave.n_samples <= _FEW:
             step = wave.chirp_duration / wave.n_samples
-            rows = ramp_sums(strength, delay, growth, wave.carrier, wave.slope, step, wave.n_samples)
+            rows = ramp_sums(strength, delay, delay_rate, wave.carrier, wave.slope, step, wave.n_samples)
             return np.asarray(rows)
         here = np.zeros(3)
         one = dataclasses.replace(
@@ -237,12 +238,12 @@ class _Work:
         return np.stack(
             [
                 synthesize(echoes(*row, here), one).samples[0, 0]
-                for row in zip(length[:-1], strength, growth, strict=True)
+                for row in zip(length[:-1], strength, delay_rate, strict=True)
             ]
         )
 
     def poses(self, key: Keyframe, chirps: NDArray[np.signedinteger]) -> Poses:
-        """Return where bodies and radar are at chirps, as seen from a tracing."""
+        """Return the poses of bodies and radar at chirps, relative to a keyframe."""
         late = (chirps - key.chirp) * self.step
         motions, radar = [b.motion for b in key.scene.bodies], key.scene.radar
         turn = np.broadcast_to(np.eye(3), (len(late), len(motions), 3, 3)).copy()
@@ -257,6 +258,7 @@ class _Work:
         )
 
 
-def _worth(piece: Segment, off: float, before: float, limit: float) -> bool:
-    """Tell whether a tracing in the middle of a piece may help: where half the distance did not, launches differ."""
-    return off > limit and off <= _HELPS * before and piece.chirps >= 5
+def _worth(segment: Segment, error: float, before: float, limit: float) -> bool:
+    """Return whether a keyframe in the middle of a segment may help; not where the last split did not, for then the
+    random part of the launches dominates."""
+    return error > limit and error <= _HELPS * before and segment.chirps >= 5

@@ -1,6 +1,6 @@
-"""Writing files and folders so that either all of it is there or nothing changed.
+"""Atomic writing of files and folders: either all is written or nothing is changed.
 
-All is built beside its place and renamed into it at once. What a killed process left beside is put away by the next
+Everything is built beside its place and renamed into it. What a killed process left behind is removed by the next
 writer of the same place: everything under construction is locked by its process, so what is not locked is stale.
 """
 
@@ -18,7 +18,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from raychan.run.atomic_swap import MARK, UNFINISHED, exchange, held, is_dead, is_mark, let_go, locked, stale_of
+from raychan.run.atomic_swap import MARK, UNFINISHED, acquire, exchange, is_dead, is_mark, locked, release, stale_of
 
 
 class StoreError(OSError):
@@ -27,18 +27,17 @@ class StoreError(OSError):
 
 @dataclass(frozen=True)
 class Contents:
-    """What a command writes into a folder of its own, as patterns of names.
+    """Patterns of the names that a command writes into a folder of its own.
 
-    names: all that it may write; an earlier run's go away when a new one's come. signs: those of which at least one
-    stands in every such folder; in a folder without any, files of these names are someone else's and are not touched.
-    A pattern 'a_*/' is a folder that holds the same.
-    """
+    names: all that it may write; those of an earlier run are replaced. signs: at least one of these is in every such
+    folder; in a folder without any, files of these names belong to someone else and are not touched. A pattern 'a_*/'
+    is a folder with the same contents."""
 
     names: tuple[str, ...]
     signs: tuple[str, ...]
 
     def owns(self, entry: Path) -> bool:
-        """Tell whether a file, or a folder with all that it holds, has the name of something of ours."""
+        """Return whether a file, or a folder and all in it, has a name that the command writes."""
         if is_mark(entry):
             return is_dead(entry)
         if entry.is_dir() and not entry.is_symlink():
@@ -46,40 +45,40 @@ class Contents:
         return any(fnmatch(entry.name, name) for name in self.names)
 
     def nests(self, entry: Path) -> bool:
-        """Tell whether a folder within is one that holds the same."""
+        """Return whether an inner folder is one with the same contents."""
         return any(name.endswith("/") and fnmatch(entry.name, name[:-1]) for name in self.names)
 
     def signed(self, folder: Path) -> bool:
-        """Tell whether a folder is one that the command wrote."""
+        """Return whether the command wrote this folder."""
         return any(any(folder.glob(sign)) for sign in self.signs)
 
 
 @contextmanager
 def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
-    """Give a temporary directory; when the block ends well it becomes `out`, all at once.
+    """Yield a temporary directory that becomes `out` when the block ends without an error.
 
-    Whatever goes wrong inside, Ctrl-C included, the temporary directory goes away and `out` is as it was. Files in an
-    old `out` that are not ours stay there. Where `out` cannot be renamed (a mount, the current directory), the files
-    come into it one by one. Raises: StoreError where the disk refuses, or where a file of another's is in the way.
-    """
+    After any error, Ctrl-C included, the temporary directory is removed and `out` is unchanged. Files in an old `out`
+    that the command does not write stay there. Where `out` cannot be renamed (a mount, the current directory), files
+    are moved into it one by one. Raises: StoreError for errors of the disk, or where a file of someone else is in the
+    way."""
     out = Path(out).resolve()
     made = _make_parents(out.parent)
     try:
-        with _told(out):
+        with _disk_errors(out):
             _clear_stale(out, contents)
             _check(out, contents)
             room, stage, lock = _stage(out)
         try:
-            with _told(out, stage):
+            with _disk_errors(out, stage):
                 yield stage
-            with _told(out), locked(room):
+            with _disk_errors(out), locked(room):
                 _check(out, contents)
-                _come_in(stage, out, contents)
+                _replace(stage, out, contents)
             made = []
         finally:
-            let_go(lock)
+            release(lock)
             with locked(room):
-                _put_away(stage, out, contents)
+                _remove_stage(stage, out, contents)
     finally:
         for directory in made:
             if directory.is_dir() and not any(directory.iterdir()):
@@ -87,27 +86,27 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
 
 
 def write_whole(path: str | Path, content: bytes | memoryview) -> Path:
-    """Write a file so that it is there whole or as it was before. Raises: StoreError where the disk refuses."""
+    """Write a file completely or not at all. Raises: StoreError for errors of the disk."""
     write_together({Path(path): content})
     return Path(path)
 
 
 def write_together(files: Mapping[Path, bytes | memoryview]) -> None:
-    """Write several files whole, and none where the disk has no room for all. Raises: StoreError."""
+    """Write several files completely, or none where the disk has no room for all. Raises: StoreError."""
     with ExitStack() as ready:
         parts = [(ready.enter_context(_part(path.resolve(), content)), path) for path, content in files.items()]
         for part, path in parts:
-            with _told(path):
+            with _disk_errors(path):
                 if part is not None:
                     os.replace(part, path.resolve())
 
 
 @contextmanager
 def _part(path: Path, content: bytes | memoryview) -> Iterator[str | None]:
-    """Give a file's content beside it; None for a device or a pipe, which takes the bytes and is not replaced."""
+    """Yield the name of a temporary file with the content; None for a device or pipe, which is written to directly."""
     part, lock = None, None
     try:
-        with _told(path):
+        with _disk_errors(path):
             if path.is_dir():
                 raise StoreError(f"{path}: is a directory; a file is wanted")
             if path.exists() and not path.is_file():
@@ -116,27 +115,27 @@ def _part(path: Path, content: bytes | memoryview) -> Iterator[str | None]:
                 with locked(path.parent):
                     _sweep(path.parent, path.name)
                     handle, part = tempfile.mkstemp(prefix=f".{path.name}{MARK}", dir=path.parent)
-                    lock = held(part)
+                    lock = acquire(part)
                 with os.fdopen(handle, "wb") as file:
                     file.write(content)
                 os.chmod(part, 0o666 & ~_umask())
         yield part
     finally:
-        let_go(lock)
+        release(lock)
         if part is not None:
             Path(part).unlink(missing_ok=True)
 
 
 def csv_bytes(rows: Iterable[Iterable[Any]]) -> bytes:
-    """Return rows, the heads among them, as the bytes of a CSV file."""
+    """Return rows, the header included, as the bytes of a CSV file."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue().encode()
 
 
 @contextmanager
-def _told(path: Path, stage: Path | None = None) -> Iterator[None]:
-    """Turn what the disk says into a sentence that names the path, not the stage that is built in its stead."""
+def _disk_errors(path: Path, stage: Path | None = None) -> Iterator[None]:
+    """Turn errors of the disk into a StoreError that names the path, not the temporary folder."""
     try:
         yield
     except StoreError as error:
@@ -148,7 +147,7 @@ def _told(path: Path, stage: Path | None = None) -> Iterator[None]:
 
 
 def _check(out: Path, what: Contents) -> None:
-    """Refuse to touch what someone else put where our files would stand."""
+    """Raise StoreError where files of someone else are in the way."""
     if not out.is_dir():
         if out.exists():
             raise StoreError(f"{out}: is a file; a directory is wanted")
@@ -165,18 +164,18 @@ def _check(out: Path, what: Contents) -> None:
 
 
 def _stage(out: Path) -> tuple[Path, Path, int | None]:
-    """Make a folder to build in, beside `out` or, where that cannot be, within; return where, the folder, its lock."""
+    """Make a folder to build in, beside `out` or, if not possible, within; return its parent, the folder, its lock."""
     within = out.is_dir() and (os.path.ismount(out) or not os.access(out.parent, os.W_OK))
     room = out if within else out.parent
     with locked(room):
         stage = Path(tempfile.mkdtemp(prefix=f".{out.name}{MARK}", dir=room))
         stage.chmod(0o777 & ~_umask())
         (stage / UNFINISHED).touch()
-        return room, stage, held(stage / UNFINISHED)
+        return room, stage, acquire(stage / UNFINISHED)
 
 
-def _come_in(stage: Path, out: Path, what: Contents) -> None:
-    """Put a finished stage in the place of `out`; what was there is then in the stage's place."""
+def _replace(stage: Path, out: Path, what: Contents) -> None:
+    """Exchange a finished stage with `out`; the old contents are then in the stage's place."""
     if not out.exists():
         (stage / UNFINISHED).unlink()
         os.rename(stage, out)
@@ -187,13 +186,13 @@ def _come_in(stage: Path, out: Path, what: Contents) -> None:
 
 
 def _file_by_file(stage: Path, out: Path, what: Contents) -> None:
-    """Move the files of a stage into a folder that cannot be renamed; ours of an earlier run go first."""
+    """Move the files of a stage into a folder that cannot be renamed, after removing those of an earlier run."""
     _strip(out, what)
     _move(stage, out)
 
 
 def _strip(folder: Path, what: Contents) -> None:
-    """Remove what is ours from a folder, the signs first: without them it is no result."""
+    """Remove what the command wrote from a folder, the signs first: without them it is no result."""
     for old in sorted(folder.iterdir(), key=lambda e: not any(fnmatch(e.name, s) for s in what.signs)):
         if what.owns(old):
             _remove(old)
@@ -210,31 +209,31 @@ def _move(stage: Path, out: Path) -> None:
             os.replace(file, there)
 
 
-def _put_away(stage: Path, out: Path, what: Contents) -> None:
-    """Remove what is in a stage's place: one that came to nothing, or the folder that it replaced, whose foreign files
-    go on into the new one."""
+def _remove_stage(stage: Path, out: Path, what: Contents) -> None:
+    """Remove what is in a stage's place: a stage that failed, or the folder that was replaced, whose foreign files are
+    moved into the new one."""
     if not stage.is_dir():
         return
     if not (stage / UNFINISHED).exists():
         if not out.exists() and any(stage.iterdir()):
             os.rename(stage, out)  # a process was killed while it replaced the folder
             return
-        _carry(stage, out, what)
-    # The mark goes last: whoever is killed on the way leaves a folder that still says what it is.
+        _move_foreign(stage, out, what)
+    # The mark is removed last: a process killed on the way leaves a folder that is still recognised as stale.
     for entry in sorted(stage.iterdir(), key=lambda e: e.name == UNFINISHED):
         _remove(entry)
     stage.rmdir()
 
 
-def _carry(old: Path, new: Path, what: Contents) -> None:
-    """Move what is not ours from a folder that was replaced into the new one; mark what is left as worth nothing."""
+def _move_foreign(old: Path, new: Path, what: Contents) -> None:
+    """Move foreign files from a replaced folder into the new one; mark the rest as stale."""
     for entry in old.iterdir():
         there = new / entry.name
         if what.owns(entry):
             continue
         if entry.is_dir() and not entry.is_symlink() and what.nests(entry):
             there.mkdir(exist_ok=True)
-            _carry(entry, there, what)
+            _move_foreign(entry, there, what)
             continue
         while os.path.lexists(there):
             there = there.with_name(f"{there.name}.kept")
@@ -243,18 +242,18 @@ def _carry(old: Path, new: Path, what: Contents) -> None:
 
 
 def _clear_stale(out: Path, what: Contents) -> None:
-    """Put away what killed processes left of building `out`; a folder that one was about to replace comes back."""
+    """Remove what killed processes left while building `out`; restore a folder that one was about to replace."""
     with locked(out.parent):
         for stale in stale_of(out.parent, out.name):
             if stale.is_dir():
-                _put_away(stale, out, what)
+                _remove_stage(stale, out, what)
     if out.is_dir():
         (out / UNFINISHED).unlink(missing_ok=True)
         _sweep(out, out.name)
 
 
 def _sweep(folder: Path, name: str) -> None:
-    """Remove what killed processes left in a folder of building `name`."""
+    """Remove what killed processes left in a folder while building `name`."""
     for stale in stale_of(folder, name):
         _remove(stale)
 

@@ -1,4 +1,4 @@
-"""What a range-Doppler processor answers to a path, at any distance from its cell."""
+"""Point-spread function of the range-Doppler processor: its response in any map cell to a path anywhere."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 Sums = tuple[Complexes, Floats, NDArray[np.int64]]
 
 _FINE = 64  # points of the tabulated window response per resolution cell
-_LEAST = 1e-3  # of a cell's amplitude: what all paths that are left out may bring to it
-_STEP = 0.25  # range cells that a path may move within one piece of the frame
+_LEAST = 1e-3  # of a cell's amplitude: most that all paths left out may add to it
+_STEP = 0.25  # range cells that a path may move within one part of the frame
 
 
 class PointSpread:
-    """Response of both windows, side lobes and aliases included, 1 at the peak; migration by pieces of the frame.
+    """Response of both windows with side lobes and aliases, 1 at the peak; range migration by parts of the frame.
 
-    With real sampling each echo has a mirror image, its conjugate at minus its range and minus its rate, which shows
+    With real sampling each echo has a mirror image, its conjugate at minus its range and minus its rate, which appears
     where the range is folded.
     """
 
@@ -34,17 +34,17 @@ class PointSpread:
         self.waveform = waveform
         self._range = window(range_window, waveform.n_samples)
         self._rate = window(rate_window, waveform.n_chirps)
-        self._pieces: dict[int, tuple[Complexes, Floats]] = {}
+        self._by_parts: dict[int, tuple[Complexes, Floats]] = {}
 
     @cached_property
     def _range_tables(self) -> Complexes:
-        """The range response and its slope by range cells."""
+        """The range response and its derivative by range cells."""
         table = _table(self._range / self._range.sum())
         return np.stack([table, np.gradient(table, 1.0 / _FINE)], axis=1)
 
     def in_profile(self, delay: Floats, range: float) -> tuple[Complexes, Floats]:
-        """Return the response (n,) of the range window to paths of delays (n,) [s] at a range [m], their phase at mid
-        sweep of the frame's first ramp in, and the ranges (n,) [m] at which they stand."""
+        """Return the response (n,) at a range [m] to paths of delays (n,) [s], with their phase at mid sweep of the
+        frame's first ramp, and the ranges (n,) [m] of the paths."""
         wave, at = self.waveform, 0.5 * C0 * delay
         turn = wave.swept * delay - 0.5 * wave.slope * delay**2
         cells = np.ascontiguousarray((at - range) / wave.range_resolution)
@@ -53,7 +53,7 @@ class PointSpread:
     def in_cell(
         self, amplitude: Complexes, delay: Floats, rate: Floats, range: float, cell_rate: float
     ) -> tuple[Complexes, Floats]:
-        """Return what paths (n,) bring to a cell of the map, and the ranges (n,) [m] at which they stand mid frame.
+        """Return the contributions (n,) of paths to a map cell, and the ranges (n,) [m] of the paths at mid frame.
 
         Args: amplitude, delay [s] at the frame's start and rate [m/s] of paths; range [m] and rate [m/s] of the cell.
         """
@@ -65,18 +65,18 @@ class PointSpread:
     def image_in_cell(
         self, amplitude: Complexes, delay: Floats, rate: Floats, range: float, cell_rate: float
     ) -> tuple[Complexes, Floats]:
-        """Return what `in_cell` does, of the paths without their mirror images; the mirror images bring to a cell the
-        conjugate of what the paths bring to the cell at minus its range and minus its rate."""
+        """Return what `in_cell` returns, without mirror images. The contribution of a mirror image to a cell is the
+        conjugate of the path's own at minus the cell's range and minus its rate."""
         found: tuple[Complexes, Floats] = cell_waves(amplitude, delay, rate, (range, cell_rate), *self._tables(rate))
         return found
 
     def in_cells(
         self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
     ) -> Sums:
-        """Return the sums by groups of what paths (n,) bring to cells of the map: see run.cell_sums.cell_sums.
+        """Return the contributions of paths (n,) to map cells, summed by groups: see run.cell_sums.cell_sums.
 
-        Args: group (n,) of each path, below `count`; cells (c, 3), each range [m], rate [m/s] and amplitude: what all
-        paths together bring is known to 1e-3 of that at least; else as for `in_cell`.
+        Args: group (n,) of each path, below `count`; cells (c, 3), each range [m], rate [m/s] and amplitude, to 1e-3 of
+        which the sum over all paths is exact; else as for `in_cell`.
         """
         found = self._images_in_cells(group, count, amplitude, delay, rate, cells)
         if not self.mirrors:
@@ -106,12 +106,12 @@ class PointSpread:
         return total, size, strongest
 
     def _tables(self, rate: Floats) -> tuple[Any, ...]:
-        """Return ramp, sizes and tables for `cell_waves`, in as many pieces of the frame as the fastest path needs."""
+        """Return ramp, sizes and tables for `cell_waves`, for as many parts of the frame as the fastest path needs."""
         wave, count = self.waveform, len(self._rate)
         moved = float(np.abs(rate).max(initial=0.0)) * wave.repetition / wave.range_resolution * count
-        pieces = max(1, min(count, int(np.ceil(moved / _STEP))))
-        if pieces not in self._pieces:
-            self._pieces[pieces] = self._rate_tables(pieces)
+        parts = max(1, min(count, int(np.ceil(moved / _STEP))))
+        if parts not in self._by_parts:
+            self._by_parts[parts] = self._rate_tables(parts)
         ramp = (
             wave.carrier,
             wave.slope,
@@ -122,7 +122,7 @@ class PointSpread:
             wave.range_resolution,
             C0,
         )
-        return ramp, (len(self._range), count, _FINE), self._range_tables, self._pieces[pieces]
+        return ramp, (len(self._range), count, _FINE), self._range_tables, self._by_parts[parts]
 
     @property
     def mirrors(self) -> bool:
@@ -131,29 +131,29 @@ class PointSpread:
 
     @property
     def periods(self) -> tuple[float, float]:
-        """Ranges [m] and rates [m/s] after which the map repeats; with real sampling it shows half of the former."""
+        """Ranges [m] and rates [m/s] after which the map repeats; with real sampling it covers half of the former."""
         wave = self.waveform
         return wave.range_resolution * wave.n_samples, 0.5 * C0 / (wave.middle * wave.repetition)
 
     @property
     def resolutions(self) -> tuple[float, float]:
-        """Resolution cells of range [m] and rate [m/s]."""
+        """Resolution of range [m] and rate [m/s]."""
         return self.waveform.range_resolution, self.periods[1] / self.waveform.n_chirps
 
     @property
     def drift(self) -> float:
-        """Range by which a path shows too far for each m/s that it recedes faster than its cell [s]."""
+        """Range-Doppler coupling [s]: range error of a path for each m/s that it recedes faster than its cell."""
         return self.waveform.middle / self.waveform.slope
 
     def stands(self, delay: Floats, rate: Floats, mid_frame: bool) -> tuple[Floats, Floats]:
-        """Return the ranges (n,) [m] at which paths stand, mid frame or at its start, and their rates (n,) [m/s]."""
+        """Return the ranges (n,) [m] of paths, at mid frame or at its start, and their rates (n,) [m/s]."""
         return 0.5 * C0 * delay + (rate * self.waveform.centre if mid_frame else 0.0), rate
 
-    def _rate_tables(self, pieces: int) -> tuple[Complexes, Floats]:
-        """Return the rate response of each piece of the frame and that of its chirps' numbers, counted from its middle
-        (pieces, ., 2), and the middles (pieces,)."""
+    def _rate_tables(self, parts: int) -> tuple[Complexes, Floats]:
+        """Return, for each part of the frame, the rate response with weights 1 and with weights of the chirp number
+        from the part's middle (parts, ., 2), and the middles (parts,)."""
         chirps, tables, middles = np.arange(len(self._rate)), [], []
-        for part in np.array_split(chirps, pieces):
+        for part in np.array_split(chirps, parts):
             held = np.zeros(len(chirps))
             held[part] = self._rate[part] / self._rate.sum()
             tables.append(np.stack([_table(held), _table(held * (chirps - part.mean()))], axis=1))
@@ -162,7 +162,7 @@ class PointSpread:
 
 
 def _table(weights: Floats) -> Complexes:
-    """Return the response of weights over its period of len(weights) cells, _FINE points a cell."""
+    """Return the spectrum of weights over its period of len(weights) cells, _FINE points a cell."""
     n = len(weights)
     raw = np.fft.fft(weights, n * _FINE)
     # The phase is counted from the middle of the samples, where a symmetric window is real.
@@ -170,7 +170,7 @@ def _table(weights: Floats) -> Complexes:
 
 
 def _beyond(size: Floats) -> Floats:
-    """Return the largest that a response, given as a table of its sizes, is (s,) cells from the peak and farther."""
+    """Return the largest magnitude of a response at 0, 1, 2, ... cells from the peak and farther."""
     n = len(size) // _FINE
     by_cell = np.maximum.reduceat(size, np.arange(0, n * _FINE, _FINE))
     by_cell = np.maximum(by_cell, by_cell[::-1])[: n // 2 + 1]

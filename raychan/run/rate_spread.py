@@ -1,4 +1,5 @@
-"""Spread: what turning bodies bring to a map beyond the rates that their paths have at the frame's start."""
+"""Detections of turning bodies, whose echoes spread over rates: their paths have one rate each, at the frame's start,
+so the map cells that they fill later in the frame are explained from the retraced samples."""
 
 from __future__ import annotations
 
@@ -20,11 +21,11 @@ from raychan.signal.baseband import synthesize
 from raychan.units import db
 
 Floats = NDArray[np.float64]
-_UNEXPLAINED = 0.1  # a cell to which turning bodies bring less than this share of its power is noise
+_UNEXPLAINED = 0.1  # of a cell's power: a cell with less from turning bodies is noise (not measured)
 
 
 def meets(paths: Paths, turns: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which paths (n,) meet one of the bodies `turns` (b,)."""
+    """Return which paths (n,) meet one of the bodies `turns` (b,)."""
     body, kind = paths.ways.body, paths.ways.kind
     return np.asarray((turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))[paths.way]
 
@@ -36,7 +37,7 @@ def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
 
 
 def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: Radar) -> float:
-    """Return by which share of their power two launches differ in what turning bodies bring to the first ramp."""
+    """Return the relative power by which two launches differ in the echoes of turning bodies over the first ramp."""
     one = replace(radar, noise=False, waveform=replace(radar.waveform, n_chirps=1))
     a, b = (synthesize(take(p, meets(p, turns)), one).samples for p in (paths, others))
     power = float((np.abs(a) ** 2).sum())
@@ -46,8 +47,8 @@ def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: R
 def motion(turned: Retraced) -> Entry:
     """Return the ledger's entry of a frame that was traced more than once."""
     level = float(db(max(turned.level(), 1e-30)))
-    ends = "" if turned.reached else "; more of them do not bring it under the tolerance"
-    how = f"traced {len(turned.times)} times within the frame; what they differ by, against the whole frame{ends}"
+    ends = "" if turned.reached else "; further tracings do not reach the tolerance"
+    how = f"traced {len(turned.times)} times within the frame; their difference, against the whole frame{ends}"
     return Entry(level, "estimate", how)
 
 
@@ -55,11 +56,11 @@ def claimed(
     reasons: tuple[Explanation, ...], paths: Paths, turns: NDArray[np.bool_], power: Floats, error: Floats,
     detections: Detections, receiver: Receiver,
 ) -> tuple[Explanation, ...]:  # fmt: skip
-    """Return the explanations with those cells that no path explains given to the turning body that filled them, and
-    the error of all that turning bodies filled against what they brought.
+    """Return the explanations, with cells that no path explains assigned to a turning body, and with the error of all
+    cells of turning bodies relative to the power from these.
 
-    Args: turns (b,) which bodies turn; power, error (v, r) [W] of the map of what turning bodies brought, and how wrong
-    it may be. Of several such bodies it is the one whose paths come nearest in range.
+    Args: turns (b,) which bodies turn; power, error (v, r) [W] of the map of their echoes alone, and its error. Of
+    several turning bodies the one whose paths are nearest in range is taken.
     """
     rows = np.flatnonzero(meets(paths, turns))
     if not len(rows):
@@ -80,8 +81,8 @@ def claimed(
 
 
 def _given(why: Explanation, paths: Paths, rows: NDArray[np.int64], known: Chains, receiver: Receiver) -> Explanation:
-    """Return the explanation of a cell given to the chain, among `rows` of paths over turning bodies, that is strongest
-    at the cell's range; at which rate it turns there is not known."""
+    """Return the explanation of a cell assigned to the strongest chain at its range, among `rows` of paths over turning
+    bodies; the rate of that part of the body is not known."""
     at = 0.5 * paths.length[rows]
     away, folded = aliased(at, why.range, response_of(receiver))
     near = away <= away.min() + receiver.waveform.range_resolution

@@ -1,7 +1,7 @@
-"""What a run will ask of the machine, told before it starts: memory, refused beyond a share of it, and rough time.
+"""Memory and time that a run needs, estimated before it starts; a run that needs too much memory is refused.
 
-Both are sums of counts times constants measured on the project's machine (2 cores) over cubes of 3e4 to 2e7 samples,
-one to eight receivers and 1 to 64 map cells a sample; time, over those and the three scenes as well.
+Both are counts times constants, measured on a machine of 2 cores over cubes of 3e4 to 2e7 samples, one to eight
+receivers and 1 to 64 map cells a sample, the time over the three scenes as well (command not noted).
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ from raychan.units import C0
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
-_BYTES, _SAMPLE_BYTES, _CELL_BYTES = 2e6, 120.0, 64.0  # at the peak, as tracemalloc counts
+_BYTES, _SAMPLE_BYTES, _CELL_BYTES = 2e6, 120.0, 64.0  # peak memory: fixed, a sample, a map cell (tracemalloc)
 _SAMPLE_SECONDS, _CELL_SECONDS, _FACET_SECONDS = 1e-6, 1.3e-7, 5e-5  # of one core
-_TURN_SECONDS = 6e-7  # a sample, a radian by which ramps bend the echoes of what moves
-_SHARE = 0.5
-_MOST = 64e9
-_LONG = 60.0
+_TURN_SECONDS = 6e-7  # a sample and radian of `_bend`
+_SHARE = 0.5  # of the memory that a run may take
+_MOST = 64e9  # bytes a run may take at most
+_LONG = 60.0  # s from which the time is announced
 _CGROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
 @dataclass(frozen=True)
 class Demand:
-    """What a run needs: `memory` [bytes] for its samples and maps, and `seconds`, rough."""
+    """Estimated needs of a run: `memory` [bytes] for samples and maps, and `seconds`."""
 
     memory: float
     seconds: float
 
     @property
     def text(self) -> str:
-        """One line for people."""
+        """The estimate in words."""
         minutes = f"{self.seconds / 60.0:,.0f} min" if self.seconds >= 90.0 else f"{self.seconds:.0f} s"
         return f"roughly {minutes} and {_size(self.memory)} of memory"
 
 
 def demand(scene: Scene) -> Demand:
-    """Return what a run of a scene needs, roughly."""
+    """Return the estimated memory and time of a run."""
     wave = scene.radar.waveform
     samples = float(len(scene.radar.elements)) * wave.n_chirps * wave.n_samples
     cells = samples * scene.processing.pad[0] * scene.processing.pad[1]
@@ -58,8 +58,8 @@ def demand(scene: Scene) -> Demand:
 
 
 def _bend(scene: Scene) -> float:
-    """Return the phase [rad], if more than one, by which the echoes of bodies at different rates bend apart over a long
-    frame: grids and terms of the fast sum grow with it (see signal.keystone)."""
+    """Return the phase [rad], if above 1, by which echoes of different rates deviate from each other over a long frame:
+    grids and terms of the fast sum grow with it (see signal.keystone)."""
     wave, own = scene.radar.waveform, np.asarray(scene.radar.velocity, float)
     fastest = max((float(np.linalg.norm(body.motion.velocity - own)) for body in scene.bodies), default=0.0)
     turn = 2.0 * math.pi * wave.slope * (fastest / C0 * 0.5 * wave.frame_duration) ** 2
@@ -67,7 +67,7 @@ def _bend(scene: Scene) -> float:
 
 
 def allowed_memory() -> float:
-    """Return the memory [bytes] that a run may need: half of the machine's or of its container's, 64 GB at most."""
+    """Return the memory [bytes] that a run may take: half of the machine's or of its container's, 64 GB at most."""
     found = [2.0 * _MOST]
     if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
         found.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
@@ -80,9 +80,9 @@ def allowed_memory() -> float:
 
 
 def check_demand(scene: Scene) -> list[str]:
-    """Return what to tell of what a run asks for that its map cannot give.
+    """Return warnings on a map that is small for the detector.
 
-    Raises: SceneError where it needs more memory than it may have, or where its map is too small for the detector.
+    Raises: SceneError where the run needs more memory than it may take, or where its map is too small for the detector.
     """
     need, may = demand(scene), allowed_memory()
     if need.memory > may:
@@ -91,14 +91,14 @@ def check_demand(scene: Scene) -> list[str]:
 
 
 def long_run(scene: Scene, frames: int = 1) -> list[str]:
-    """Return a line on how long a run of so many frames takes, if that is long."""
+    """Return a line on the time of a run of so many frames, if it is long."""
     need = demand(scene)
     seconds = need.seconds * frames
     return [f"this takes {Demand(need.memory, seconds).text}"] if seconds > _LONG else []
 
 
 def _refused(scene: Scene, need: float, may: float) -> SceneError:
-    """Return what says by which key a scene needs too much, and how far to go down with it."""
+    """Return the error that names the key by which a scene needs too much memory, and the value that is possible."""
     wave, pad, receivers = scene.radar.waveform, scene.processing.pad, len(scene.radar.elements)
     plain = float(wave.n_chirps) * wave.n_samples * (_SAMPLE_BYTES + _CELL_BYTES)
     key: str
@@ -121,7 +121,7 @@ def _refused(scene: Scene, need: float, may: float) -> SceneError:
 
 
 def _detector(scene: Scene) -> list[str]:
-    """Return a line where the map is so small that the CFAR's guard must be smaller than asked for."""
+    """Return a line where the map is so small that the CFAR's guard must be smaller than set."""
     wave, asked = scene.radar.waveform, scene.processing
     count = wave.n_chirps, wave.n_samples if wave.complex_sampling else wave.n_samples // 2
     guard, train = (sizes and sizes[::-1] for sizes in (asked.guard, asked.train))

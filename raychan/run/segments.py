@@ -1,4 +1,5 @@
-"""Pieces of a frame from one tracing to the next, told by both and blended from one to the other; the whole of them."""
+"""Segments of a frame between two keyframes (tracings): the samples extrapolated from both, blended, and their
+error."""
 
 from __future__ import annotations
 
@@ -19,21 +20,21 @@ Samples = NDArray[np.complexfloating[Any, Any]]
 
 @dataclass(frozen=True)
 class Retraced:
-    """Samples of a frame with turning bodies, without noise."""
+    """Noise-free samples of a frame with turning bodies, from several tracings."""
 
     samples: Samples
     """(antenna, chirp, sample) [sqrt(W)]."""
     turning: Samples
-    """The part of them that turning bodies brought."""
+    """The part of them that comes from turning bodies."""
     turns: NDArray[np.bool_]
     """Which bodies (b,) those are."""
     error: Samples
-    """How wrong they may be, as neighbouring tracings differ."""
+    """Their error, from the difference of neighbouring tracings."""
     times: tuple[float, ...]
     """When the scene was traced [s]."""
     rays: int
     reached: bool
-    """Whether the error came under the tolerance."""
+    """Whether the error is under the tolerance."""
 
     @property
     def cube(self) -> Cube:
@@ -48,7 +49,7 @@ class Retraced:
 
 @dataclass(frozen=True)
 class Traced:
-    """What one tracing of a scene gives."""
+    """Paths and routes of one tracing of a scene."""
 
     paths: Paths
     routes: tuple[Routes | DiffractedRoutes, ...]
@@ -56,7 +57,7 @@ class Traced:
 
 @dataclass(frozen=True)
 class Keyframe:
-    """One tracing: the routes that meet turning bodies, and the paths that do not."""
+    """One tracing at a chirp: the routes that meet turning bodies, with their strengths, and the paths that do not."""
 
     chirp: int
     scene: Scene
@@ -66,14 +67,15 @@ class Keyframe:
 
 
 def reach(chirps: int) -> int:
-    """Return how far a tracing is carried towards the next: both overlap over the middle half."""
+    """Return over how many chirps a keyframe is extrapolated towards the next: both overlap in the middle half."""
     return -(-3 * chirps // 4)
 
 
 @dataclass(frozen=True)
 class Segment:
-    """The chirps from one tracing to the next, both included: `a` and `b` (2, antenna, chirp, sample) are what both
-    tell of the first and the last three quarters: bodies that turn, all others."""
+    """The chirps from one keyframe to the next, both included. `a` and `b` (2, antenna, chirp, sample) are the samples
+    extrapolated from the first over three quarters of them, and from the last backwards: of bodies that turn, and of
+    all others."""
 
     start: Keyframe
     end: Keyframe
@@ -82,47 +84,46 @@ class Segment:
 
     @property
     def chirps(self) -> int:
-        """How many there are."""
+        """Number of chirps."""
         return self.end.chirp - self.start.chirp + 1
 
-    def off(self) -> float:
-        """Return the power of the error of a chirp, of bodies that turn."""
-        return float((np.abs(self.doubt()[0]) ** 2).sum()) / self.chirps
+    def error_power(self) -> float:
+        """Return the power of the error per chirp, of bodies that turn."""
+        return float((np.abs(self.error()[0]) ** 2).sum()) / self.chirps
 
     def blend(self) -> Samples:
-        """Return samples (2, antenna, chirp, sample) that go from a to b over the chirps that both tell of."""
+        """Return the samples (2, antenna, chirp, sample), going from a to b over the chirps of both."""
         count = self.chirps
-        told, out = self.a.shape[2], np.zeros((*self.a.shape[:2], count, self.a.shape[3]), complex)
-        share = np.clip((np.arange(count) - (count - told)) / max(2 * told - count - 1, 1), 0.0, 1.0)[:, None]
-        out[:, :, :told] = (1.0 - share[:told]) * self.a
-        out[:, :, -told:] += share[-told:] * self.b
+        known, out = self.a.shape[2], np.zeros((*self.a.shape[:2], count, self.a.shape[3]), complex)
+        share = np.clip((np.arange(count) - (count - known)) / max(2 * known - count - 1, 1), 0.0, 1.0)[:, None]
+        out[:, :, :known] = (1.0 - share[:known]) * self.a
+        out[:, :, -known:] += share[-known:] * self.b
         return out
 
-    def doubt(self) -> Samples:
-        """Return how wrong that may be: by as much as both differ, told of the chirps where both are known, for the
-        power of the whole piece.
+    def error(self) -> Samples:
+        """Return the error of the blend: the difference of a and b where both are known, scaled to the whole segment.
 
-        What comes into sight at an instant between two tracings is wrong for 0.42 of the piece at most; what is chance
-        in each launch differs from a tracing of every chirp by 0.92 of the power by which a and b differ.
+        An echo that appears between two keyframes is wrong over 0.42 of the segment at most. The random part of each
+        launch differs from tracing every chirp by 0.92 of the power of the difference of a and b.
         """
         count = self.chirps
-        told, out = self.a.shape[2], np.zeros((*self.a.shape[:2], count, self.a.shape[3]), complex)
-        both = 2 * told - count
-        out[:, :, count - told : told] = np.sqrt(count / both) * (self.a[:, :, count - told :] - self.b[:, :, :both])
+        known, out = self.a.shape[2], np.zeros((*self.a.shape[:2], count, self.a.shape[3]), complex)
+        both = 2 * known - count
+        out[:, :, count - known : known] = np.sqrt(count / both) * (self.a[:, :, count - known :] - self.b[:, :, :both])
         return out
 
 
 def joined(parts: list[Samples]) -> Samples:
-    """Return one stretch of samples (2, antenna, chirp, sample) of stretches that share the chirps they meet at."""
+    """Return samples (2, antenna, chirp, sample) joined in chirps; neighbours share the chirp at which they meet."""
     return np.concatenate([x[:, :, min(i, 1) :] for i, x in enumerate(parts)], axis=2)
 
 
-def echoes(length: Floats, amplitude: Complexes, growth: Floats, place: Floats) -> Paths:
-    """Return paths without a history, whose delays grow by `growth` [s/s]."""
+def echoes(length: Floats, amplitude: Complexes, delay_rate: Floats, place: Floats) -> Paths:
+    """Return paths without a history, whose delays grow by `delay_rate` [s/s]."""
     n = len(length)
     none, look = np.full((n, 1), -1, np.int16), np.zeros((n, 3))
     return Paths.of(
-        length=length, amplitude=amplitude, length_rate=C0 * growth, departure=look, arrival=look, body=none, part=none,
+        length=length, amplitude=amplitude, length_rate=C0 * delay_rate, departure=look, arrival=look, body=none, part=none,
         kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32), body_names=(), part_names=(),
         tx=place, rx=place,
     )  # fmt: skip

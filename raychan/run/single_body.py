@@ -1,4 +1,4 @@
-"""A body by itself: its mesh, from wherever it comes, and its facets at the origin of its own frame."""
+"""A body by itself: its mesh from a file or object, and its facets at the origin of its own frame."""
 
 from __future__ import annotations
 

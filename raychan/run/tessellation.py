@@ -1,4 +1,4 @@
-"""Tessellation: what it may change that a mesh's facets stand for a smooth surface, by how deep that bends them."""
+"""Effect of smoothing facets on the strongest echo of a body: an entry of the ledger of unmodelled effects."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from raychan.records import BLOCKER, Paths
 from raychan.run.mechanisms import peak
 from raychan.world.geometry import Geometry
 
-_OPPOSED = 2.0  # of a field: the most that a phase can change it by
+_OPPOSED = 2.0  # of a field: largest change by a phase, at pi
 
 
 def strongest_bend(
     paths: Paths, geometry: Geometry, names: Collection[str], radar: Radar, settings: Any
 ) -> tuple[str, float, float]:
-    """Return of the bodies named the one whose strongest cell the surface between its facets may change most: its name,
-    its phase [rad] and the change [W]; '' where none of them is bent or returns.
+    """Return, among named bodies, the one whose strongest cell changes most if its smoothed facets are flat: its name,
+    the phase [rad] and the change [W]; '' where none is curved or returns an echo.
 
-    Smooth facets lie off the flat ones by their sag, a quarter of the bulge of an edge, and the way there and back by
-    2 k times that: the rms over the body's area is how far the field of flat facets is off.
+    A smooth facet deviates from the flat one by its sag, a quarter of the edge curvature, and the two-way phase by 2 k
+    times that; the rms over the body's area is the relative error of the field of flat facets.
     """
     f, k = geometry.facets, 2.0 * np.pi / radar.waveform.wavelength
     found = ("", 0.0, 0.0)

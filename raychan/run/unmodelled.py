@@ -1,4 +1,4 @@
-"""The ledger: what a run left out, each as a level against its weakest detection, or the word 'unknown'."""
+"""The ledger of unmodelled effects: an estimate or bound of each against the weakest detection, or 'unknown'."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Floats = NDArray[np.float64]
 
 UNKNOWN = "unknown"
 NOTHING = "none"
-"""Level of a mechanism that the scene does not have, or that is not left out."""
+"""Level of an effect that the scene does not have, or that is modelled."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One mechanism: `level_db` against the weakest detection, 'unknown' where no estimate is had, 'none' where
-    nothing is; `kind` 'estimate', 'bound' or 'exact', and `how` it was found."""
+    """One effect: `level_db` [dB] against the weakest detection, 'unknown' where there is no estimate, 'none' where
+    there is no effect; `kind` 'estimate', 'bound', 'exact' or 'none'; `how` it was found."""
 
     level_db: float | str
     kind: str
@@ -46,9 +46,9 @@ def ledger(
     weakest: float,
     bodies: Collection[Body] = (),
 ) -> dict[str, Any]:
-    """Return what was left out, by mechanism, against the weakest detection's power [W].
+    """Return the unmodelled effects by name, each against the weakest detection's power [W].
 
-    Args: settings, model the scene's processing and what was modelled; bodies those of the scene.
+    Args: settings, the scene's processing; model, what was modelled; bodies of the scene.
     """
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
@@ -78,6 +78,7 @@ _NAMES = (
 
 
 def _further(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
+    """Return the entry of further bounces, extrapolated by the ratio of the last two orders."""
     met = interactions(paths)
     last, before = (peak(paths, met == n, radar, settings) for n in (bounces, bounces - 1))
     if last == 0.0 or before == 0.0:
@@ -88,6 +89,7 @@ def _further(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: f
 
 
 def _transmission(paths: Paths, radar: Radar, settings: Any, weakest: float) -> Entry:
+    """Return the entry of transmissions through further layers, extrapolated by the ratio of the last two orders."""
     passes = layers(paths)
     most = int(passes.max(initial=0))
     if most == 0:
@@ -109,8 +111,8 @@ def _gain(radar: Radar, points: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
-    """Edges' fringe currents: a straight edge of length L seen broadside returns at most L^2/pi (Ross 1966; Knott
-    2004)."""
+    """Return the entry of fringe currents of edges: an edge of length L seen broadside has an RCS of at most L^2 / pi
+    (Ross, IEEE Trans. AP 14(3), 1966; Knott, Shaeffer, Tuley 2004)."""
     edges = geometry.plane_edges
     if not len(edges):
         return Entry(NOTHING, "exact", "no surface has an edge")
@@ -118,7 +120,7 @@ def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     look, r, gain = _gain(radar, middle)
     span = edges[:, 1] - edges[:, 0]
     wavelength = radar.waveform.wavelength
-    # Only one Fresnel zone of a long edge is in phase; off broadside its ends are left: sinc^2.
+    # Only one Fresnel zone of a long edge adds in phase; off broadside a pattern sinc^2 remains.
     length = np.linalg.norm(span, axis=1)
     zone = np.minimum(length, np.sqrt(0.5 * wavelength * r))
     along = np.einsum("ij,ij->i", span, look) * zone / np.where(length > 0, length, 1.0)
@@ -131,7 +133,7 @@ def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
 
 
 def _around(geometry: Geometry, points: Points, radar: Radar, settings: Any, model: Any, weakest: float) -> Entry:
-    """What reaches targets given by their RCS over one wedge in, out or both."""
+    """Return the entry of diffraction at single wedges on the way to targets given by their RCS."""
     if not len(points.body):
         return Entry(NOTHING, "exact", "no target is given by its RCS")
     if model.diffraction:
@@ -144,7 +146,8 @@ def _around(geometry: Geometry, points: Points, radar: Radar, settings: Any, mod
 
 
 def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
-    """What roughness takes from the mirror, sent out by Lambert's law from one range cell of the surface."""
+    """Return the entry of diffuse scattering: the power that roughness takes from the specular reflection, radiated by
+    Lambert's law, of the strongest range cell."""
     f = geometry.facets
     m = f.materials
     rough = m.roughness[f.material] > 0.0
@@ -152,9 +155,7 @@ def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
         return Entry(UNKNOWN, "none", "no material states a roughness")
     rng = np.random.default_rng(0)
     rows = np.flatnonzero(rough)
-    # Points over the rough facets, a ring of the ground at a time: near ground first.
-    at = _samples(geometry, rows, np.asarray(radar.position), rng)
-    points, facet, weight = at
+    points, facet, weight = _samples(geometry, rows, np.asarray(radar.position), rng)
     look, r, gain = _gain(radar, points)
     cosine = np.abs(np.einsum("ij,ij->i", look, geometry.normal[facet]))
     row = f.material[facet]
@@ -176,8 +177,8 @@ def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
 def _samples(
     geometry: Geometry, rows: NDArray[np.int64], eye: Floats, rng: np.random.Generator
 ) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Return points on facets, their facet and the area [m^2] each stands for; the ground is sampled by its
-    distance."""
+    """Return points on facets, their facets and the area [m^2] that each represents; the ground is sampled in rings
+    about the radar, denser nearby."""
     f = geometry.facets
     ground = np.isin(f.body[rows], np.flatnonzero(f.role == MIRROR))
     points, facet, weight = [], [], []
@@ -203,7 +204,7 @@ def _samples(
 def _tessellation(
     paths: Paths, geometry: Geometry, bodies: Collection[Body], radar: Radar, settings: Any, weakest: float
 ) -> Entry:
-    """Facets that were taken for smooth, if they are flat."""
+    """Return the entry of smoothed facets, if the body is truly flat-faced."""
     estimated = {b.name for b in bodies if b.geometry.crease_deg is not None}
     if not estimated:
         return Entry(NOTHING, "exact", "every body knows its surface")
@@ -215,8 +216,8 @@ def _tessellation(
 
 
 def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
-    """Change of rate within a frame: what crosses the line of sight, or turns, bends its phase by k a T^2 / 4 at
-    most."""
+    """Return the entry of changes of rate within a frame: for crossing and turning bodies the phase deviates by at most
+    k a T^2 / 4, a being the radial acceleration."""
     frame = radar.waveform.frame_duration
     if not len(paths.delay):
         return Entry(NOTHING, "exact", "no path")

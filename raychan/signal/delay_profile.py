@@ -1,4 +1,4 @@
-"""Profile: power against delay, as one ramp of the waveform resolves it at the start of a frame."""
+"""Power-delay profile: power against delay, as resolved by one ramp of the waveform at the start of a frame."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from raychan.radar.side_lobes import SideLobeEnvelope
 from raychan.radar.waveform import Waveform
 from raychan.records import Paths, Profile
 
-_PAD = 4
-_ABOVE_DB = 10.0
-_SIDE_LOBES_DB = 60.0
-_EPS = 1e-7
+_PAD = 4  # zero padding of the transform
+_ABOVE_DB = 10.0  # least level of a peak over noise
+_SIDE_LOBES_DB = 60.0  # most of a peak under the strongest one
+_EPS = 1e-7  # accuracy of the non-uniform transform
 
 
 def profile(
@@ -27,18 +27,18 @@ def profile(
 ) -> Profile:
     """Return the power-delay profile of a channel in the waveform's band.
 
-    The channel's response to one ramp, transformed, without motion and without noise samples; scaled so that a lone
-    path reads its received power. Ranges c tau/2 reach to n_samples range cells; later paths fold as they do in the
-    radar. Args: power [W] transmitted; noise_power [W] a sample, gives Profile.noise, the noise a cell of a single ramp
-    would hold. Peaks: local maxima over one range cell, 10 dB above that noise and within 60 dB of the strongest, that
-    are no side lobes of stronger ones.
+    It is the transform of the channel's response to one ramp, without motion and noise samples, scaled so that a lone
+    path reads its received power. Ranges c tau/2 reach to n_samples range cells; later paths fold as in the radar.
+    Peaks are local maxima over one range cell, 10 dB above noise and within 60 dB of the strongest, that are no side
+    lobes.
+    Args: power [W] transmitted; noise_power [W] a sample, from which Profile.noise, the noise in a cell of one ramp.
     """
     return profile_of(response(paths, waveform, power, window), waveform, noise_power, window)
 
 
 def response(paths: Paths, waveform: Waveform, power: float = 1.0, window: str = "hann") -> NDArray[np.complex128]:
-    """Return the windowed response (n_samples,) [sqrt(W)] of a channel at the frequencies of one ramp; those of several
-    sets of paths add up. Args as for `profile`."""
+    """Return the windowed frequency response (n_samples,) [sqrt(W)] of a channel over one ramp; responses of several
+    sets of paths add. Args as for `profile`."""
     n = waveform.n_samples
     taper = windows.window(window, n)
     weight = np.sqrt(power) * paths.amplitude / taper.sum()
@@ -51,12 +51,12 @@ def response(paths: Paths, waveform: Waveform, power: float = 1.0, window: str =
     return np.asarray(finufft.nufft1d1(at, weight, n, eps=_EPS, isign=-1, nthreads=1) * taper)
 
 
-def profile_of(told: NDArray[np.complex128], waveform: Waveform, noise_power: float, window: str) -> Profile:
+def profile_of(spectrum: NDArray[np.complex128], waveform: Waveform, noise_power: float, window: str) -> Profile:
     """Return the power-delay profile of a channel's response (see `response`); args as for `profile`."""
     n = waveform.n_samples
     taper = windows.window(window, n)
     length = _PAD * n
-    received = np.abs(scipy.fft.ifft(told, length, norm="forward")) ** 2
+    received = np.abs(scipy.fft.ifft(spectrum, length, norm="forward")) ** 2
     noise = noise_power / windows.processing_gain(taper)
     around = np.stack([np.roll(received, s) for s in range(-_PAD, _PAD + 1)])
     floor = max(noise * 10.0 ** (0.1 * _ABOVE_DB), received.max() * 10.0 ** (-0.1 * _SIDE_LOBES_DB))
@@ -71,7 +71,7 @@ def profile_of(told: NDArray[np.complex128], waveform: Waveform, noise_power: fl
 
 
 def _own(peaks: NDArray[np.int64], power: NDArray[np.float64], envelope: SideLobeEnvelope) -> NDArray[np.int64]:
-    """Return the peaks, strongest first, that are more than side lobes of stronger ones."""
+    """Return the peaks, strongest first, that are not explained by side lobes of stronger ones."""
     lobes = np.zeros(len(peaks))
     kept = np.zeros(len(peaks), bool)
     for i, peak in enumerate(peaks):

@@ -1,15 +1,15 @@
-"""Keystone: the samples of many echoes that move through range cells, by one pair of transforms.
+"""Fast sum of the beat signals of many moving echoes: two non-uniform transforms over a keystone time axis.
 
-With T = M + t counted from the middle sample, M over chirps and t within one, an echo of delay tau and growth b there
-turns by
+With T = M + t counted from the middle sample, M over chirps and t within one, an echo of delay tau and delay rate b
+there has the beat phase [turns]
 
     S tau t + b T (F + S t - S off) - S b^2 T^2 / 2,    off = tau - tau_0,  F = carrier + S t_0 - S tau_0.
 
-Its Doppler shift n = b (F - S off) makes this (S tau + n) t + n u + B T t + A T^2, with u = M (1 + S t / F) +
-S t^2 / F, B = S off b S / F and A = -S b^2 / 2: every sample sees all shifts at one stretched time u, whatever the echo
-(the keystone transform of radar imaging). So a transform over beat frequencies and one over shifts, read off at u, sum
-all echoes. The rest, below 1e-2 as a rule, is a series in B and A, each term one more pair of transforms; no term of
-the phase is dropped that the tolerance would show.
+With its Doppler shift n = b (F - S off) this is (S tau + n) t + n u + B T t + A T^2, where u = M (1 + S t / F) +
+S t^2 / F, B = S off b S / F and A = -S b^2 / 2. At a given sample u is the same for all echoes (the keystone transform,
+Perry, DiPietro, Fante, IEEE Trans. AES 35(1), 1999), so one transform over beat frequencies and one over Doppler
+shifts, read off at u, sum all echoes with their range migration. The rest, as a rule below 1e-2, is a series in B and
+A, each term one more pair of transforms, cut where the tolerance allows.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from raychan.radar.waveform import Waveform
-from raychan.signal.dechirp import sources, stretched
+from raychan.signal.keystone_kernels import place_samples, place_sources
 from raychan.signal.nufft import (
     OVER,
-    exchange,
-    fold,
-    kernel_pieces,
-    order_of,
-    read,
+    add_transposed,
+    counting_sort,
+    deconvolution_polynomial,
+    interpolate,
+    kernel_polynomials,
+    kernel_transform,
+    kernel_weights,
     spread,
-    target_factor,
-    transform,
-    weigh,
+    wrap_margins,
 )
 from raychan.units import C0
 
@@ -45,14 +45,15 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 Each = Callable[..., Iterable[Any]]
 
-_SINGLE = 1e-6  # tolerance down to which transforms in single precision, and a kernel of 8 cells, do
-_STRIPES = 4  # parts of the echoes that are gridded side by side
-_BLOCK = 64  # samples of a chirp whose transforms over shifts are made at a time
-_ROOM = 1 << 28  # bytes of a grid
-_CHUNK = 1 << 18  # echoes gridded at a time
-_BOX = 8, 8
-_READ, _READY = 4.0, 4  # cells transformed in the time that a sample is read off a plane; planes, that it is laid out
-_CROWD = 64  # echoes in a box of cells up to which they are added up in single precision: 3e-7 of them
+# Sizes trade memory against threads at work; other values were not measured.
+_SINGLE = 1e-6  # tolerance down to which single precision and a kernel of 8 cells suffice
+_STRIPES = 4  # parts of the echoes that are spread in parallel
+_BLOCK = 64  # samples of a chirp whose transforms over Doppler shift are made at a time
+_ROOM = 1 << 28  # bytes of a grid: beyond, the echoes are split over several grids
+_CHUNK = 1 << 18  # echoes spread at a time
+_BOX = 8, 8  # rows and columns of a box by which echoes are sorted, so that neighbours share cells in the cache
+_READ, _READY = 4.0, 4  # cost of reading a sample off a plane, in cells transformed; planes that setting it up costs
+_CROWD = 64  # echoes in a box up to which they are summed in single precision: it errs by 3e-7 of their sum
 
 
 @dataclass(frozen=True)
@@ -60,45 +61,49 @@ class Echoes:
     """Echoes at the middle sample of a frame; rows (n,)."""
 
     delay: Floats
-    growth: Floats
+    """[s]"""
+    delay_rate: Floats
+    """Change of the delay per time, 2 v / c."""
     amplitude: Complexes
     arrival: Floats
-    """Directions (n, 3)."""
+    """Unit directions (n, 3) to which the receiver looks."""
 
     def __getitem__(self, rows: Any) -> Echoes:
-        return Echoes(self.delay[rows], self.growth[rows], self.amplitude[rows], self.arrival[rows])
+        return Echoes(self.delay[rows], self.delay_rate[rows], self.amplitude[rows], self.arrival[rows])
 
 
 def middle(wave: Waveform) -> tuple[float, float, float]:
-    """Return when the middle sample is, from the frame's start and from its ramp's, and the sample step [s]."""
+    """Return the time of the middle sample from the start of the frame and of its ramp, and the sample step [s]."""
     step = wave.chirp_duration / wave.n_samples
     t = (wave.n_samples // 2) * step
     return (wave.n_chirps // 2) * wave.repetition + t, t, step
 
 
 class Keystone:
-    """The grid for some echoes, and how it is read off; the same for all receivers."""
+    """The grid of one set of echoes, and how samples are read off it; the same for all receivers."""
 
     def __init__(self, echoes: Echoes, wave: Waveform, tolerance: float, reach: float) -> None:
-        """Args: echoes, one at least; tolerance against the sum of their |amplitude|; reach [s] by how much less or
-        more a receiver's delays may be."""
+        """Size the grid. Args: echoes, one at least; tolerance relative to the sum of their |amplitude|; reach [s], the
+        most by which a receiver's delays differ from those of the array's origin."""
         self.then, self.t, self.step = middle(wave)
         self.wave, slope = wave, wave.slope
         chirps, samples = wave.n_chirps, wave.n_samples
         self.single = tolerance >= _SINGLE
         self.width = 8 if self.single else 16
         self.delays = float(echoes.delay.min()), float(echoes.delay.max())
-        self.growths = float(echoes.growth.min()), float(echoes.growth.max())
+        self.delay_rates = float(echoes.delay_rate.min()), float(echoes.delay_rate.max())
         self.delay = 0.5 * sum(self.delays)
         self.frequency = wave.carrier + slope * (self.t - self.delay)
         self.stretch = slope / self.frequency
 
         off = echoes.delay - self.delay
-        fastest = max(map(abs, self.growths))
-        shift = echoes.growth * (self.frequency - slope * off)
+        fastest = max(map(abs, self.delay_rates))
+        shift = echoes.delay_rate * (self.frequency - slope * off)
         self.shift, span = _middle(shift, fastest * slope * reach)
-        far, far_span = _middle(echoes.growth * off * (slope * self.stretch), fastest * reach * slope * self.stretch)
-        late, late_span = _middle(-0.5 * slope * echoes.growth**2, 0.0)
+        far, far_span = _middle(
+            echoes.delay_rate * off * (slope * self.stretch), fastest * reach * slope * self.stretch
+        )
+        late, late_span = _middle(-0.5 * slope * echoes.delay_rate**2, 0.0)
         t, m = (samples // 2) * self.step, (chirps // 2) * wave.repetition
         far_turn, late_turn = 2.0 * np.pi * far_span * (m + t) * t, 2.0 * np.pi * late_span * (m + t) ** 2
         small = 0.3 * tolerance
@@ -120,54 +125,55 @@ class Keystone:
 
     @property
     def turns(self) -> float:
-        """How far the power series must reach [rad]."""
+        """Phase [rad] that the series in B and A must reproduce."""
         return sum(self.rest_turn)
 
     @property
     def cells(self) -> int:
-        """Cells that are transformed."""
+        """Number of cells that are transformed."""
         return self.planes * (self.rows * self.columns + self.length * self.wave.n_samples)
 
     @property
     def work(self) -> float:
-        """What it costs, about, in cells that are transformed."""
+        """Approximate cost, in cells that are transformed."""
         return self.cells + _READ * float(self.planes + _READY) * self.wave.n_chirps * self.wave.n_samples
 
     @property
-    def room(self) -> int:
-        """How many factors `prepared` lays out."""
+    def factors(self) -> int:
+        """Number of factors that `prepared` writes."""
         return self.planes * self.wave.n_chirps * self.wave.n_samples
 
-    def prepared(self, echoes: Echoes, room: Complexes) -> Echoes:
-        """Return the echoes by row, and lay out how the grid is read off, in a room for as many numbers at least."""
+    def prepared(self, echoes: Echoes, buffer: Complexes) -> Echoes:
+        """Return the echoes sorted by row, and set up how samples are read off; the `factors` go into the buffer."""
         wave = self.wave
-        shift = echoes.growth * (self.frequency - wave.slope * (echoes.delay - self.delay))
+        shift = echoes.delay_rate * (self.frequency - wave.slope * (echoes.delay - self.delay))
         turn = (wave.slope * echoes.delay + shift) * self.step
-        # In boxes of some rows and columns, so that what is added to lies near by: rows first, for the stripes.
+        # Sorted by boxes, so that neighbours add to cells that are in the cache: rows first, for the stripes.
         box = ((shift - self.shift) * self.dense + 0.5 * self.rows).astype(np.int64) // _BOX[0]
         across = self.columns // _BOX[1] + 1
         box = box * across + ((turn - np.floor(turn)) * self.columns).astype(np.int64) // _BOX[1]
-        self.pieces = kernel_pieces(self.width)
+        self.polynomials = kernel_polynomials(self.width)
         k, s = np.arange(self.rows) - self.rows // 2, np.arange(wave.n_samples) - wave.n_samples // 2
         # The sign moves the transform's middle to the middle of its length: nothing is read across its end.
-        self.over = (1.0 - 2.0 * (k % 2)) / transform(self.width, k / self.length)
-        self.along = 1.0 / transform(self.width, s / self.columns)
+        self.over = (1.0 - 2.0 * (k % 2)) / kernel_transform(self.width, k / self.length)
+        self.along = 1.0 / kernel_transform(self.width, s / self.columns)
         shape = wave.n_chirps, wave.n_samples
-        place, self.factor = np.empty(shape), room[: self.room].reshape(self.planes, *shape)
+        place, self.factor = np.empty(shape), buffer[: self.factors].reshape(self.planes, *shape)
         frame = np.array([wave.repetition, self.step, self.stretch, self.shift, self.dense, OVER, self.length])
-        stretched(place, self.factor, frame, self.rest, self.terms, target_factor(self.width))
-        # What all receivers share.
+        place_samples(place, self.factor, frame, self.rest, self.terms, deconvolution_polynomial(self.width))
         self.first = np.empty(shape, np.int64)
         self.weight = np.empty((*shape, self.width), np.float32 if self.single else np.float64)
-        weigh(self.first, self.weight, place, self.pieces)
-        order, most = order_of(box, (self.rows // _BOX[0] + 1) * across)
-        # Where many echoes add up in one cell, single precision would round too often.
+        kernel_weights(self.first, self.weight, place, self.polynomials)
+        order, most = counting_sort(box, (self.rows // _BOX[0] + 1) * across)
+        # Where many echoes add up in one cell, single precision would round too coarsely.
         self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
         return echoes[order]
 
     def add(self, out: Complexes, echoes: Echoes, element: Floats, each: Each) -> None:
-        """Add to out (chirps, samples) what a receiver at `element` (3,) [m] gets from the `prepared` echoes; `each`
-        is `map` or that of a pool."""
+        """Add to out (chirps, samples) the beat signal of the `prepared` echoes at a receiver at `element` (3,) [m].
+
+        Args: each, `map` or that of a thread pool.
+        """
         count, samples, half = len(echoes.delay), self.wave.n_samples, self.width // 2
         ramp = np.array([self.wave.carrier, self.wave.slope, self.then, self.t, self.step])
         grid = np.array(
@@ -180,65 +186,68 @@ class Keystone:
             later = (some.arrival @ element) * (-1.0 / C0)
             x, y = np.empty(len(later)), np.empty(len(later))
             strength = np.empty((len(later), self.planes), self.sort)
-            sources(x, y, strength, some.amplitude, some.delay, some.growth, later, ramp, grid, self.rest, self.terms)
+            waves = some.amplitude, some.delay, some.delay_rate, later
+            place_sources(x, y, strength, *waves, ramp, grid, self.rest, self.terms)
             first, end = math.ceil(x.min() - half), math.ceil(x.max() + half)
             cells = np.zeros((self.planes, end - first, self.columns + 2 * half), self.sort)
             flat = cells.view(cells.real.dtype).reshape(-1)
-            spread(cells, flat, x - first, y, strength, self.pieces.astype(flat.dtype))
-            fold(cells, half)
+            spread(cells, flat, x - first, y, strength, self.polynomials.astype(flat.dtype))
+            wrap_margins(cells, half)
             return first, scipy.fft.fft(cells[:, :, half:-half], axis=2, overwrite_x=True)
 
         stripes = min(count, max(_STRIPES, -(-count // _CHUNK)))
         bounds = np.linspace(0, count, stripes + 1).astype(int)
-        held = list(each(gridded, [slice(a, b) for a, b in pairwise(bounds)]))
+        spectra_rows = list(each(gridded, [slice(a, b) for a, b in pairwise(bounds)]))
 
-        def told(start: int) -> None:
+        def read_block(start: int) -> None:
             end = min(start + _BLOCK, samples)
             spectra = np.zeros((self.planes, end - start, self.length), np.complex64 if self.single else np.complex128)
             real = spectra.real.dtype
             along, column = self.along[start:end].astype(real), (start - samples // 2) % self.columns
-            for first, rows in held:
+            for first, rows in spectra_rows:
                 over = self.over[first : first + rows.shape[1]].astype(real)
-                exchange(spectra, rows, first - self.rows // 2, column, over, along)
+                add_transposed(spectra, rows, first - self.rows // 2, column, over, along)
             spectra = scipy.fft.fft(spectra, axis=2, overwrite_x=True)
             part, factor = np.s_[:, start:end], self.factor[:, :, start:end]
-            read(out[part], spectra, self.first[part], self.weight[part], factor)
+            interpolate(out[part], spectra, self.first[part], self.weight[part], factor)
 
-        for _ in each(told, range(0, samples, _BLOCK)):
+        for _ in each(read_block, range(0, samples, _BLOCK)):
             pass
 
 
 def keystones(echoes: Echoes, wave: Waveform, tolerance: float, reach: float) -> list[tuple[Keystone, Echoes]]:
-    """Return grids for echoes, each with its own; one, but where they differ so much that several cost less."""
+    """Return grids, each with its own echoes: one for all, or several where these cost less, as for echoes whose delays
+    or rates differ much."""
     grid = Keystone(echoes, wave, tolerance, reach)
     large = 16 * grid.planes * grid.rows * grid.columns > _ROOM
     if not large and grid.turns <= 1.0:
         return [(grid, echoes)]
-    spans = grid.growths[1] - grid.growths[0], grid.delays[1] - grid.delays[0]
-    fastest = max(map(abs, grid.growths))
+    spans = grid.delay_rates[1] - grid.delay_rates[0], grid.delays[1] - grid.delays[0]
+    fastest = max(map(abs, grid.delay_rates))
     if large:
-        by_growth = spans[0] * grid.frequency >= fastest * wave.slope * spans[1]
+        by_rate = spans[0] * grid.frequency >= fastest * wave.slope * spans[1]
     else:
-        by_growth = grid.rest_turn[1] >= grid.rest_turn[0]
-    values, limits = (echoes.growth, grid.growths) if by_growth else (echoes.delay, grid.delays)
+        by_rate = grid.rest_turn[1] >= grid.rest_turn[0]
+    values, limits = (echoes.delay_rate, grid.delay_rates) if by_rate else (echoes.delay, grid.delays)
     below = values <= 0.5 * sum(limits)
     if below.all() or not below.any():
         return [(grid, echoes)]
     parts = [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach)]
-    # More terms of the series may cost less than one more grid to read off for every sample.
+    # More terms of the series may cost less than reading every sample off one more grid.
     return parts if large or sum(part.work for part, _ in parts) < grid.work else [(grid, echoes)]
 
 
 def _middle(values: Floats, margin: float) -> tuple[float, float]:
+    """Return the middle of some values and half their range plus a margin."""
     low, high = float(values.min()), float(values.max())
     return 0.5 * (low + high), 0.5 * (high - low) + margin
 
 
 def _terms(far: float, late: float, tolerance: float) -> Ints:
-    """Return for each order (j,) of the late term's series the last order of the far one's that goes with it.
+    """Return for each order (j,) of the series in A the last order of the series in B that goes with it.
 
-    The series of exp(j turn x) in Chebyshev polynomials has terms 2 J_n(turn) < 2 (turn / 2)^n / n!; all products of
-    two that are left out add up to less than the tolerance.
+    The series of exp(j turn x) in Chebyshev polynomials has terms 2 J_n(turn) < 2 (turn / 2)^n / n! (Jacobi-Anger,
+    Abramowitz & Stegun 9.1.44 and 9.1.62); the products of two that are left out add up to less than the tolerance.
     """
     sizes = [_sizes(turn, tolerance) for turn in (late, far)]
     products = np.outer(*sizes)
@@ -249,7 +258,7 @@ def _terms(far: float, late: float, tolerance: float) -> Ints:
 
 
 def _sizes(turn: float, tolerance: float) -> Floats:
-    """Return bounds (n,) on the terms of a series, none above the one before, until they no longer matter."""
+    """Return bounds (n,) on the terms of a series, not increasing, down to where they are negligible."""
     found = [1.0]
     if turn > 0.0:
         while found[-1] > 1e-3 * tolerance or len(found) < turn:
@@ -260,4 +269,5 @@ def _sizes(turn: float, tolerance: float) -> Floats:
 
 
 def _fast(least: float) -> int:
+    """Return the next even length whose transform is fast."""
     return 2 * int(scipy.fft.next_fast_len(math.ceil(0.5 * least)))

@@ -1,7 +1,9 @@
-"""Gridding: sources at any frequency onto a regular grid and back, by a Kaiser-Bessel kernel `width` cells wide.
+"""Kernels of a non-uniform FFT: sources at any frequency are spread onto a regular grid, and values between the cells
+of a transform are interpolated, both with a Kaiser-Bessel kernel `width` cells wide.
 
-Source: Jackson et al. 1991; Beatty, Nishimura & Pauly 2005 (the kernel and its shape); Barnett et al. 2019 (pieces of
-polynomials).
+Sources: Jackson et al., IEEE Trans. Med. Imaging 10(3), 1991; Beatty, Nishimura, Pauly, IEEE Trans. Med. Imaging 24(6),
+2005 (the kernel and its shape); Barnett, Magland, af Klinteberg, SIAM J. Sci. Comput. 41(5), 2019 (the kernel as
+piecewise polynomials).
 """
 
 from __future__ import annotations
@@ -19,20 +21,20 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 OVER = 2.0
-"""Grid cells per cell that is used: with it a kernel of 8 is good for 2e-7, one of 16 for 1e-14."""
-_ROWS = 64  # chirps that are read at a time
+"""Oversampling: grid cells per cell that is used. At 2 a kernel of 8 cells errs by 2e-7, one of 16 by 1e-14."""
+_ROWS = 64  # chirps that are interpolated at a time: their spectra stay in the cache (other sizes not measured)
 _SHAPE = 0.99  # of the shape at which the kernel's transform reaches zero where the first alias begins
 
 
-def transform(width: int, frequency: Floats) -> Floats:
+def kernel_transform(width: int, frequency: Floats) -> Floats:
     """Return the kernel's Fourier transform at frequencies [cycles per grid cell], up to 1 / (2 OVER)."""
     shape = _shape(width)
     root = np.sqrt(shape**2 - (np.pi * width * frequency) ** 2)
     return np.asarray(width * np.sinh(root) / (root * i0(shape)))
 
 
-def kernel_pieces(width: int) -> Floats:
-    """Return coefficients (d, width), highest power first, of the kernel's pieces, each over -1 to 1."""
+def kernel_polynomials(width: int) -> Floats:
+    """Return coefficients (d, width), highest power first, of the kernel: a polynomial a cell, each over -1 to 1."""
 
     def kernel(x: Floats) -> Floats:
         at = (x + 1.0 + 2.0 * np.arange(width)) / width - 1.0
@@ -41,33 +43,36 @@ def kernel_pieces(width: int) -> Floats:
     return _fitted(kernel, width // 2 + 4)
 
 
-def target_factor(width: int) -> Floats:
-    """Return coefficients (d,), highest power first, of 1 / `transform` over the square of its argument, the square
-    going from 0 to its largest as -1 to 1."""
-    return _fitted(lambda x: 1.0 / transform(width, np.sqrt(0.5 * (x + 1.0)) / (2.0 * OVER)), width // 2 + 6)[:, 0]
+def deconvolution_polynomial(width: int) -> Floats:
+    """Return coefficients (d,), highest power first, of 1 / `kernel_transform` as a polynomial of the squared
+    frequency, scaled so that 0 to its largest value become -1 to 1."""
+    return _fitted(lambda x: 1.0 / kernel_transform(width, np.sqrt(0.5 * (x + 1.0)) / (2.0 * OVER)), width // 2 + 6)[
+        :, 0
+    ]
 
 
 def _fitted(function: Callable[[Floats], Floats], degree: int) -> Floats:
-    """Return coefficients (degree + 1, f), highest power first, of polynomials over -1 to 1 that follow functions
-    (x, f) of a column of points."""
+    """Return coefficients (degree + 1, f), highest power first, of the polynomials over -1 to 1 that interpolate f
+    functions at Chebyshev points; `function` takes a column of points and returns (x, f)."""
     knots = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     return np.ascontiguousarray(np.linalg.solve(np.vander(knots), function(knots[:, None])))
 
 
 def _shape(width: int) -> float:
+    """Return the shape parameter of the Kaiser-Bessel kernel (Beatty et al. 2005, eq. 5, for wide kernels)."""
     return _SHAPE * math.pi * width * (1.0 - 0.5 / OVER)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def spread(grid, flat, x, y, strengths, pieces):  # type: ignore[no-untyped-def]
+def spread(grid, flat, x, y, strengths, polynomials):  # type: ignore[no-untyped-def]
     """Add sources to a grid (p, rows, columns), each over as many cells as the kernel is wide.
 
-    Args: flat, the grid's real and imaginary parts in a row; x (n,) rows, y (n,) columns where they stand, at least
-    half a kernel from the edge; strengths (n, p); pieces of the kernel, whose width is a multiple of 8. All of one
-    precision, but for the places.
+    Args: flat, the grid's real and imaginary parts in one row; x (n,) rows and y (n,) columns of the sources, at least
+    half a kernel from the edge; strengths (n, p); polynomials of the kernel, whose width is a multiple of 8. All but
+    the places are of one precision.
     """
     planes, rows, columns = grid.shape
-    width = pieces.shape[1]
+    width = polynomials.shape[1]
     over, along, part = np.empty(width, flat.dtype), np.empty(width, flat.dtype), np.empty(2 * width, flat.dtype)
     at = np.empty(2, flat.dtype)
     for i in range(x.size):
@@ -75,9 +80,9 @@ def spread(grid, flat, x, y, strengths, pieces):  # type: ignore[no-untyped-def]
         at[0], at[1] = 2.0 * (row - x[i]) + width - 1.0, 2.0 * (column - y[i]) + width - 1.0
         at_x, at_y = at[0], at[1]
         for j in range(width):
-            over[j] = along[j] = pieces[0, j]
-        for d in range(1, len(pieces)):
-            coefficients = pieces[d]
+            over[j] = along[j] = polynomials[0, j]
+        for d in range(1, len(polynomials)):
+            coefficients = polynomials[d]
             for j in range(width):
                 over[j] = over[j] * at_x + coefficients[j]
                 along[j] = along[j] * at_y + coefficients[j]
@@ -87,18 +92,23 @@ def spread(grid, flat, x, y, strengths, pieces):  # type: ignore[no-untyped-def]
                 part[2 * j], part[2 * j + 1] = along[j] * re, along[j] * im
             start = 2 * ((p * rows + int(row)) * columns + int(column))
             for k in range(width):
-                weight = over[k]
-                # Slices of a length known to the compiler: no test of each index, and the loop is laid out flat.
-                for b in range(0, 2 * width, 16):
-                    cells, some = flat[start + b : start + b + 16], part[b : b + 16]
-                    for j in range(16):
-                        cells[j] += weight * some[j]
+                _add_row(flat, start, part, over[k], width)
                 start += 2 * columns
 
 
+@njit(cache=True, nogil=True, fastmath=True, forceinline=True)
+def _add_row(flat, start, part, weight, width):  # type: ignore[no-untyped-def]
+    """Add weight times one row of a source's kernel to the grid, from number `start` of its row of numbers on."""
+    # Slices whose length the compiler knows: no test of each index, and the inner loop is unrolled.
+    for b in range(0, 2 * width, 16):
+        cells, some = flat[start + b : start + b + 16], part[b : b + 16]
+        for j in range(16):
+            cells[j] += weight * some[j]
+
+
 @njit(cache=True, nogil=True, fastmath=True)
-def fold(grid, margin):  # type: ignore[no-untyped-def]
-    """Add the margins of a grid (p, rows, columns), which stand for its other end, to that."""
+def wrap_margins(grid, margin):  # type: ignore[no-untyped-def]
+    """Add the margins of a periodic grid (p, rows, columns) to the columns at its other end that they stand for."""
     planes, rows, columns = grid.shape
     period = columns - 2 * margin
     for p in range(planes):
@@ -109,10 +119,10 @@ def fold(grid, margin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def exchange(out, rows, first, column, over, along):  # type: ignore[no-untyped-def]
-    """Add rows (p, r, c) to out (p, s, l) with rows and columns exchanged, row r at (first + r) wrapped to l.
+def add_transposed(out, rows, first, column, over, along):  # type: ignore[no-untyped-def]
+    """Add rows (p, r, c) to out (p, s, l) with rows and columns exchanged; row r goes to (first + r) modulo l.
 
-    Args: column, the one that s = 0 takes, wrapped; over (r,) and along (s,) factors.
+    Args: column, the one that s = 0 takes, columns being periodic; over (r,) and along (s,) factors.
     """
     planes, count, period = rows.shape
     length = out.shape[2]
@@ -129,18 +139,18 @@ def exchange(out, rows, first, column, over, along):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def weigh(first, weight, place, pieces):  # type: ignore[no-untyped-def]
+def kernel_weights(first, weight, place, polynomials):  # type: ignore[no-untyped-def]
     """Write for places (m, s) the first of the cells under the kernel, and its values (m, s, width) there."""
-    width = pieces.shape[1]
+    width = polynomials.shape[1]
     value = np.empty(width)
     for m in range(place.shape[0]):
         for s in range(place.shape[1]):
             start = math.ceil(place[m, s] - 0.5 * width)
             at = 2.0 * (start - place[m, s]) + width - 1.0
             for j in range(width):
-                value[j] = pieces[0, j]
-            for d in range(1, len(pieces)):
-                coefficients = pieces[d]
+                value[j] = polynomials[0, j]
+            for d in range(1, len(polynomials)):
+                coefficients = polynomials[d]
                 for j in range(width):
                     value[j] = value[j] * at + coefficients[j]
             first[m, s] = start
@@ -149,11 +159,11 @@ def weigh(first, weight, place, pieces):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def read(out, spectra, first, weight, factor):  # type: ignore[no-untyped-def]
-    """Add to out (m, s) what spectra (p, s, l) hold under kernels (from `weigh`), times factors (p, m, s)."""
+def interpolate(out, spectra, first, weight, factor):  # type: ignore[no-untyped-def]
+    """Add to out (m, s) the spectra (p, s, l) interpolated by `kernel_weights`, times factors (p, m, s)."""
     planes, steps = spectra.shape[:2]
     width = weight.shape[2]
-    # In blocks: what a column of a long frame steps over would otherwise come from memory again for each sample.
+    # In blocks of chirps, so that what neighbouring samples share of a long frame is still in the cache.
     for block in range(0, len(out), _ROWS):
         for s in range(steps):
             for m in range(block, min(block + _ROWS, len(out))):
@@ -170,9 +180,9 @@ def read(out, spectra, first, weight, factor):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def order_of(box, count):  # type: ignore[no-untyped-def]
-    """Return the order (n,) that sorts whole numbers (n,) below `count`, equal ones as they come, and how many at most
-    are equal."""
+def counting_sort(box, count):  # type: ignore[no-untyped-def]
+    """Return the order (n,) that sorts whole numbers (n,) below `count`, equal ones in the order given, and how many
+    are equal at most."""
     start = np.zeros(count + 1, np.int64)
     for i in range(box.size):
         start[box[i] + 1] += 1

@@ -1,4 +1,4 @@
-"""Cases of the trade-off: targets and a scene whose answer is known, and from where it is known."""
+"""Cases of the trade-off study: targets and a scene with reference values and their sources."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from raychan.poses import direction, theta_phi
 from raychan.records import Facets
-from raychan.run.rcs import facets_of, refinements, scattering
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
 from raychan.study.ray_lattice import Window, echoes
 from raychan.tracing.legs import Leg
 from raychan.units import C0
@@ -29,8 +31,8 @@ WAVENUMBER = 2.0 * np.pi * FREQUENCY / C0
 
 @dataclass(frozen=True)
 class Target:
-    """A conducting body seen from some places: `views` (n, 3) azimuth and elevation [deg] and distance [m]; `fine` is
-    meshed so finely that flat facets do (for methods that know no curvature); `truth` (n,) RCS [m^2] by `source`."""
+    """A conducting body seen from several places: `views` (n, 3) azimuth and elevation [deg] and distance [m]; `fine`,
+    a mesh fine enough for methods of flat facets; `truth` (n,) reference RCS [m^2] and its `source`."""
 
     name: str
     title: str
@@ -41,12 +43,12 @@ class Target:
     truth: Floats
     source: str
     around_deg: float = 45.0
-    """Azimuths on either side of +x from which the body is met, for its mean."""
+    """Azimuths on either side of +x over which the mean RCS is taken."""
     heavy: bool = False
     hard: bool = False
-    """Whether point samples converge so late that finer ones than elsewhere are tried."""
+    """Whether point samples converge so slowly that finer ones than elsewhere are tried."""
     truth_db: float = 0.05
-    """How well the truth itself is known [dB]."""
+    """Error of the reference [dB]."""
 
     def ends(self) -> Floats:
         """Return where the radar stands (n, 3) [m]."""
@@ -55,7 +57,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Street:
-    """A scene file; its truth is the range-Doppler map of a converged run."""
+    """A scene file; its reference is the range-Doppler map of a converged run."""
 
     name: str
     title: str
@@ -63,11 +65,11 @@ class Street:
     source: str
     tolerance_db: float
     truth_db: float = 0.0
-    """How well the truth is known [dB], which its making tells."""
+    """Return the error of the reference [dB], found when it is computed."""
 
 
 def plate() -> Target:
-    """Square plate of 1.5 m in its near field at 12 m, head-on and turned; truth: quadrature."""
+    """Square plate of 1.5 m in its near field at 12 m, broadside and turned; reference: quadrature."""
     mesh = build("plate", {"width": 1.5, "height": 1.5})
     views = np.array([[0.0, 0.0, 12.0], [1.3, 0.4, 12.0], [2.7, 1.1, 12.0]])
     truth = np.array([_plate_near(1.5, *v) for v in views])
@@ -85,7 +87,7 @@ def plate() -> Target:
 
 
 def sphere() -> Target:
-    """Sphere of 0.5 m radius at 12 m; truth: high-frequency limit with the near-field factor."""
+    """Sphere of 0.5 m radius at 12 m; reference: high-frequency limit with the near-field factor."""
     mesh, fine = build("sphere", {"radius": 0.5}), build("sphere", {"radius": 0.5, "max_sag": 2e-5})
     views = np.array([[7.0, 3.0, 12.0], [33.0, 11.0, 12.0], [61.0, -8.0, 12.0]])
     truth = np.full(len(views), np.pi * 0.25 * (12.0 / 11.5) ** 2)
@@ -104,7 +106,7 @@ def sphere() -> Target:
 
 
 def dihedral() -> Target:
-    """Dihedral of 0.1 m on boresight, far off; truth: its aperture, and the echo of each face by itself."""
+    """Dihedral of 0.1 m on boresight, far field; reference: its aperture, plus the echo of each face alone."""
     size = 0.1
     mesh = build("dihedral", {"size": size, "height": size})
     views = np.array([[0.0, 0.0, _FAR]])
@@ -115,16 +117,17 @@ def dihedral() -> Target:
     amplitude = WAVENUMBER / (2.0 * np.pi) * (np.sqrt(2.0) * size**2 - faces)
     truth = np.full(1, 4.0 * np.pi * abs(amplitude) ** 2)
     source = "8 pi a^2 b^2 / lambda^2, and each face by itself"
-    # A wave from 1 km is plane to this.
+    # At 1 km the wave is plane to this error.
     return Target("dihedral", "dihedral 0.1 m, boresight", mesh, mesh, views, 2, truth, source, truth_db=2e-4)
 
 
 def trihedral() -> Target:
-    """Triangular trihedral of 0.2 m on and off boresight; truth on it is closed, off it the lit aperture's."""
+    """Triangular trihedral of 0.2 m on and off boresight; reference: converged uniform tubes, closed form on
+    boresight."""
     mesh = build("trihedral", {"size": 0.2})
     views = np.array([[0.0, 0.0, _FAR], [7.0, 4.0, _FAR], [-11.0, 6.0, _FAR]])
-    # Another method than the one under test: a million uniform tubes a view, on two lattices. On boresight a test holds
-    # it to the closed form.
+    # A method other than the one under test: a million uniform tubes a view, on two lattices. A test compares it with
+    # the closed form on boresight.
     facets = facets_of(mesh, "pec", FREQUENCY)
     ends = [direction(*np.radians(v[:2])) * v[2] for v in views]
     found = np.array([[_uniform(facets, end, n) for end in ends] for n in (600_000, 1_100_000)])
@@ -139,10 +142,10 @@ def trihedral() -> Target:
 
 
 def car(quick: bool = False) -> Target:
-    """Parametric car at 12 m, all metal; truth: a converged run."""
+    """Parametric car at 12 m, all metal; reference: a converged run."""
     mesh, fine = build("car"), build("car", {"max_sag": 1e-4})
     views = np.array([[15.0, 0.0, 12.0], [70.0, 0.0, 12.0]])
-    # Never the launches under test, which would meet themselves: a lattice of cuts of its own, and the next step finer.
+    # Not the launches under test, which would be compared with themselves: another lattice of cuts, and a finer rule.
     geometry = Geometry(facets_of(mesh, "pec", FREQUENCY))
     rules = [replace(r, jitter=0.21) for r in refinements(geometry, FREQUENCY)][0 if quick else 1 : 2 if quick else 3]
     found = []
@@ -156,7 +159,7 @@ def car(quick: bool = False) -> Target:
 
 
 def urban(path: Path | None = None, quick: bool = False) -> Street:
-    """The urban scene; truth: its map by a finer run on another lattice of cuts."""
+    """The urban scene; reference: its map by a finer run on another lattice of cuts."""
     here = path or Path(__file__).parents[2] / "scenes" / "urban.toml"
     fine = 0.5 if quick else 0.2
     return Street("urban", "urban scene", here, f"tubes cut for {fine:g} dB, another lattice of cuts", fine)

@@ -1,6 +1,6 @@
-"""The competing methods, each a function (case, effort) -> Run: what it answers, and for how many rays and seconds.
+"""The methods of the trade-off study, each a function (case, effort) -> Run: its result, rays and seconds.
 
-Seconds run from the mesh to the answer: building Embree's tree is in them, reading the mesh is not.
+Seconds count from the mesh to the result: building Embree's tree is included, reading the mesh is not.
 """
 
 from __future__ import annotations
@@ -13,7 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.poses import direction
-from raychan.run.rcs import facets_of, rcs, refinements, scattering
+from raychan.run.rcs import rcs
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
 from raychan.study.cases import FREQUENCY, WAVENUMBER, Target, vertical
 from raychan.study.ray_lattice import Window, echoes
 from raychan.study.specular_points import glints
@@ -31,12 +34,12 @@ POINT, UNIFORM, ADAPTIVE, MIRRORS, POINTS = (
 METHODS = (ADAPTIVE, UNIFORM, POINT, MIRRORS, POINTS)
 DEFAULT_TOLERANCE_DB = 0.25
 """The default of `raychan.rcs`."""
-_MOST_POINTS = 2_000_000  # a view, for hard targets
+_MOST_POINTS = 2_000_000  # point samples a view, for targets that converge slowly
 
 
 @dataclass(frozen=True)
 class Run:
-    """An answer: `value` RCS by view [m^2] or a map [W]; `rays` cast and `seconds` of wall time over all views."""
+    """A result: `value`, RCS by view [m^2] or a map [W]; `rays` cast and `seconds` of wall time over all views."""
 
     value: Floats
     rays: float
@@ -44,7 +47,7 @@ class Run:
 
 
 def lattice(target: Target, rays: int, tubes: bool) -> Run:
-    """Return the RCS by rays on a lattice, the phase constant over each or linear over its tube."""
+    """Return the RCS by rays on a lattice, with the phase constant over each ray or linear over its tube."""
     since = perf_counter()
     tracer = RayCaster(facets_of(target.fine, "pec", FREQUENCY))
     out = []
@@ -69,7 +72,7 @@ def adaptive(target: Target, tolerance_db: float) -> Run:
 
 
 def launched(target: Target, step: int) -> Run:
-    """Return the RCS by one launch of adaptive tubes, the `step`-th that `raychan.rcs` would try; no error stated."""
+    """Return the RCS by one launch of adaptive tubes, by rule number `step` of `raychan.rcs`; it states no error."""
     since = perf_counter()
     geometry = Geometry(facets_of(target.mesh, "pec", FREQUENCY))
     rule = list(refinements(geometry, FREQUENCY))[step]
@@ -82,7 +85,7 @@ def launched(target: Target, step: int) -> Run:
 
 
 def mirrors(target: Target, finely: float) -> Run:
-    """Return the RCS by the specular points of one reflection alone, on the plain (0) or the fine (1) mesh."""
+    """Return the RCS by the specular points of single reflections, on the plain (0) or the fine (1) mesh."""
     since = perf_counter()
     tracer = RayCaster(facets_of(target.fine if finely else target.mesh, "pec", FREQUENCY))
     out = []
@@ -93,9 +96,9 @@ def mirrors(target: Target, finely: float) -> Run:
 
 
 def as_points(target: Target, aspects: float) -> Run:
-    """Return the RCS of a point with the mean over `aspects` directions about; its table is made beforehand.
+    """Return the RCS of a point target with the mean RCS over `aspects` directions, from a table made beforehand.
 
-    Time and rays are those of its use: a look-up and one ray of sight a view.
+    Time and rays are those of its use: a look-up and one visibility ray a view.
     """
     around = target.around_deg
     table = mean_rcs(target.mesh, int(aspects), float(target.views[0, 2]), target.bounces, around)
@@ -128,8 +131,8 @@ class Effort:
 
 
 def efforts(quick: bool, heavy: bool = False, hard: bool = False) -> list[Effort]:
-    """Return all settings of all methods for targets; fewer when quick, fewer fine ones when the target is heavy, more
-    point samples when it is hard."""
+    """Return all settings of all methods for targets; fewer when quick or when the target is heavy, more point samples
+    when it is hard."""
     counts = (1_000, 16_000, 128_000) if quick else (1_000, 4_000, 16_000, 64_000, 256_000, 700_000)
     tolerances = (DEFAULT_TOLERANCE_DB,) if quick or heavy else (1.0, DEFAULT_TOLERANCE_DB, 0.1)
     made = []

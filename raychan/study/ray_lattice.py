@@ -1,14 +1,15 @@
-"""Rays on a regular lattice over directions, as peers shoot them: phase constant over a ray, or linear over its tube.
+"""Shooting and bouncing rays from a regular lattice of directions, as other simulators launch them, for comparison: the
+phase is constant over a ray, or linear over its tube.
 
-All rays share the physics of the rest: Fresnel reflection with polarisation, physical optics at every hit, shadow
-rays back to the receiver. They see flat facets, so curved bodies are given to them finely meshed.
-Sources: Ling, Chou, Lee, IEEE Trans. AP 37(2), 1989 (shooting and bouncing rays); design 4.2 (tubes).
+The physics is that of the package: Fresnel reflection with polarisation, physical optics at every hit, shadow rays back
+to the receiver. Facets are flat here, so curved bodies must be meshed finely.
+Source: Ling, Chou, Lee, IEEE Trans. AP 37(2), 1989.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +27,12 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 FieldOf = Callable[[Floats], Complexes]
 
-_CHUNK = 1 << 16
+_CHUNK = 1 << 16  # rays at a time: bounds memory (other sizes not measured)
 
 
 @dataclass(frozen=True)
 class Window:
-    """Directions q = axis + u across + v up, u and v within limits; all that the targets fill."""
+    """Directions q = axis + u across + v up with u and v within limits, which hold all targets."""
 
     axis: Floats
     across: Floats
@@ -62,8 +63,8 @@ class Window:
 
 @dataclass(frozen=True)
 class Echo:
-    """What came back of some rays: field over the free wave `amplitude` (n,), `length` [m], `rate` [m/s], `away` and
-    `look` (n, 3) unit directions of departure and arrival."""
+    """Echoes (n,) of some rays: `amplitude`, `length` [m] there and back, range rate `rate` [m/s], `away` and `look`
+    (n, 3) unit directions of departure and to which the receiver looks."""
 
     amplitude: Complexes
     length: Floats
@@ -86,61 +87,111 @@ def echoes(
 ) -> Iterator[Echo]:
     """Yield the echoes of a lattice of rays from outs[0].end, chunk by chunk.
 
-    Args: outs the ways back, straight first, at most one mirror each; fields of the antennas (n, 3); rays of the
-    first flight; tubes: integrate the phase over each ray's footprint, one sinc an axis, else take it constant.
+    Args: outs the return legs, the straight one first, at most one mirror each; fields of the antennas (n, 3); rays in
+    the lattice; tubes: integrate the phase over each ray's footprint, one sinc an axis, instead of taking it constant.
     """
-    f, k = tracer.facets, 2.0 * np.pi * frequency / C0
-    end, own = np.asarray(outs[0].end, float), np.zeros(3) if velocity is None else np.asarray(velocity, float)
-    (du, dv), nu, nv = window.lattice(rays)
-    m = f.materials
+    k = 2.0 * np.pi * frequency / C0
+    own = np.zeros(3) if velocity is None else np.asarray(velocity, float)
+    step, nu, nv = window.lattice(rays)
+    end = np.asarray(outs[0].end, float)
     for start in range(0, nu * nv, _CHUNK):
-        index = np.arange(start, min(start + _CHUNK, nu * nv))
-        u = window.low[0] + (index // nv + 0.5) * du
-        v = window.low[1] + (index % nv + 0.5) * dv
-        q = window.axis + u[:, None] * window.across + v[:, None] * window.up
-        qu, qv = np.tile(window.across, (len(q), 1)), np.tile(window.up, (len(q), 1))
-        d = q / np.linalg.norm(q, axis=1)[:, None]
-        away, e = d.copy(), np.ascontiguousarray(tx_field(d), np.complex128)
-        p, length, rate = np.tile(end, (len(q), 1)), np.zeros(len(q)), -d @ own
-        skip = np.full(len(q), -1, np.int32)
+        front = _launched(window, np.arange(start, min(start + _CHUNK, nu * nv)), step, nv, end, own, tx_field)
         for bounce in range(1, bounces + 1):
-            hit, t = tracer.cast(p, d, skip)
-            ok = np.flatnonzero((hit >= 0) & np.isfinite(t))
-            if not len(ok):
+            front, hit = _advanced(tracer, front)
+            if not len(hit):
                 break
-            q, qu, qv, d, away, e = q[ok], qu[ok], qv[ok], d[ok], away[ok], e[ok]
-            hit, length, rate = hit[ok], length[ok] + t[ok], rate[ok]
-            p = p[ok] + t[ok, None] * d
-            n = tracer.normal[hit]
-            n = np.where((np.einsum("ij,ij->i", n, d) > 0.0)[:, None], -n, n)
-            material, body = f.material[hit].astype(np.int64), f.body[hit]
-            speed = f.velocity[body]
-            for out in outs:
-                rows = np.flatnonzero((f.role[body] == SCATTERER) & (bounce + len(out.mirrors) <= bounces))
-                rows = _seen(tracer, out, p, n, hit, rows, bounce)
-                if not len(rows):
-                    continue
-                along, back = out.rays(p[rows])
-                along, (look, g) = np.ascontiguousarray(along), _receiver(tracer, out, p[rows], rx_field, k)
-                amplitude = np.empty(len(rows), np.complex128)
-                _scatter(
-                    q[rows], qu[rows], qv[rows], d[rows], length[rows], n[rows], e[rows], along, back, g,
-                    material[rows], m.kind, m.eps, m.thickness, m.roughness, k, du, dv, tubes, amplitude,
-                )  # fmt: skip
-                last = own - 2.0 * (own @ out.mirrors[0].normal) * out.mirrors[0].normal if out.mirrors else own
-                change = np.einsum("ij,ij->i", speed[rows], d[rows] + along) - along @ last
-                yield Echo(amplitude, length[rows] + back, 0.5 * (rate[rows] + change), away[rows], look)
+            for out in (leg for leg in outs if bounce + len(leg.mirrors) <= bounces):
+                found = _returned(tracer, front, hit, out, own, rx_field, k, step, tubes, bounce)
+                if found is not None:
+                    yield found
             if bounce < bounces:
-                before = d.copy()
-                _turn(q, qu, qv, d, n, e, material, m.kind, m.eps, m.thickness, m.roughness, k)
-                rate = rate + np.einsum("ij,ij->i", speed, before - d)
-                skip = hit
+                front = _reflected(tracer, front, hit, k)
+
+
+@dataclass(frozen=True)
+class _Front:
+    """Rays on their way: points p and unit directions d (n, 3); the unnormalised direction q and its derivatives qu, qv
+    in u and v; directions of departure, fields e, length [m] so far, range rate so far, the facet left (-1: none)."""
+
+    q: Floats
+    qu: Floats
+    qv: Floats
+    d: Floats
+    away: Floats
+    e: Complexes
+    p: Floats
+    length: Floats
+    rate: Floats
+    left: NDArray[np.int32]
+    normal: Floats
+    """Normals (n, 3) of the facets hit, towards the rays."""
+
+
+def _launched(
+    window: Window, index: NDArray[np.int64], step: Floats, nv: int, end: Floats, own: Floats, tx_field: FieldOf
+) -> _Front:
+    """Return the rays of some numbers of a lattice as they leave the transmitter."""
+    u = window.low[0] + (index // nv + 0.5) * step[0]
+    v = window.low[1] + (index % nv + 0.5) * step[1]
+    q = window.axis + u[:, None] * window.across + v[:, None] * window.up
+    qu, qv = np.tile(window.across, (len(q), 1)), np.tile(window.up, (len(q), 1))
+    d = q / np.linalg.norm(q, axis=1)[:, None]
+    e = np.ascontiguousarray(tx_field(d), np.complex128)
+    p, left = np.tile(end, (len(q), 1)), np.full(len(q), -1, np.int32)
+    return _Front(q, qu, qv, d, d.copy(), e, p, np.zeros(len(q)), -d @ own, left, np.zeros_like(d))
+
+
+def _advanced(tracer: RayCaster, front: _Front) -> tuple[_Front, NDArray[np.int32]]:
+    """Return the rays that hit a facet, at their hit points, and these facets."""
+    hit, t = tracer.cast(front.p, front.d, front.left)
+    ok = np.flatnonzero((hit >= 0) & np.isfinite(t))
+    d, hit, t = front.d[ok], hit[ok], t[ok]
+    n = tracer.normal[hit]
+    n = np.where((np.einsum("ij,ij->i", n, d) > 0.0)[:, None], -n, n)
+    p, length = front.p[ok] + t[:, None] * d, front.length[ok] + t
+    q, qu, qv, away = (x[ok] for x in (front.q, front.qu, front.qv, front.away))
+    return _Front(q, qu, qv, d, away, front.e[ok], p, length, front.rate[ok], front.left[ok], n), hit
+
+
+def _returned(
+    tracer: RayCaster, front: _Front, hit: NDArray[np.int32], out: Leg, own: Floats, rx_field: FieldOf, k: float,
+    step: Floats, tubes: bool, bounce: int,
+) -> Echo | None:  # fmt: skip
+    """Return what the facets hit scatter back over a return leg; None where the receiver sees none of them."""
+    f, m = tracer.facets, tracer.facets.materials
+    body, n, d = f.body[hit], front.normal, front.d
+    rows = np.flatnonzero(f.role[body] == SCATTERER)
+    rows = _seen(tracer, out, front.p, n, hit, rows, bounce)
+    if not len(rows):
+        return None
+    along, back = out.rays(front.p[rows])
+    along, (look, g) = np.ascontiguousarray(along), _receiver(tracer, out, front.p[rows], rx_field, k)
+    amplitude = np.empty(len(rows), np.complex128)
+    _scatter(
+        front.q[rows], front.qu[rows], front.qv[rows], d[rows], front.length[rows], n[rows], front.e[rows], along, back,
+        g, f.material[hit].astype(np.int64)[rows], m.kind, m.eps, m.thickness, m.roughness, k, step[0], step[1], tubes,
+        amplitude,
+    )  # fmt: skip
+    last = own - 2.0 * (own @ out.mirrors[0].normal) * out.mirrors[0].normal if out.mirrors else own
+    change = np.einsum("ij,ij->i", f.velocity[body][rows], d[rows] + along) - along @ last
+    return Echo(amplitude, front.length[rows] + back, 0.5 * (front.rate[rows] + change), front.away[rows], look)
+
+
+def _reflected(tracer: RayCaster, front: _Front, hit: NDArray[np.int32], k: float) -> _Front:
+    """Return the rays as they leave the facets hit."""
+    f, m = tracer.facets, tracer.facets.materials
+    q, qu, qv, d = (x.copy() for x in (front.q, front.qu, front.qv, front.d))
+    e = front.e.copy()
+    material = f.material[hit].astype(np.int64)
+    _reflect(q, qu, qv, d, front.normal, e, material, m.kind, m.eps, m.thickness, m.roughness, k)
+    rate = front.rate + np.einsum("ij,ij->i", f.velocity[f.body[hit]], front.d - d)
+    return replace(front, q=q, qu=qu, qv=qv, d=d, e=e, rate=rate, left=hit)
 
 
 def _seen(
     tracer: RayCaster, out: Leg, p: Floats, n: Floats, hit: NDArray[np.int32], rows: NDArray[np.int64], bounce: int
 ) -> NDArray[np.int64]:
-    """Return those of `rows` whose points face the end of `out` and see it."""
+    """Return those of `rows` whose points face the end of the leg and see it."""
     along, _ = out.rays(p[rows])
     rows = rows[np.einsum("ij,ij->i", along, n[rows]) < 0.0]
     if bounce == 1 and not out.mirrors:
@@ -167,7 +218,7 @@ def _receiver(tracer: RayCaster, out: Leg, p: Floats, rx_field: FieldOf, k: floa
         row = int(tracer.facets.material[mirror.facet])
         mirrored = np.tile(mirror.normal, (len(p), 1))
         spare = look.copy()
-        _turn(
+        _reflect(
             spare.copy(), spare.copy(), spare.copy(), spare, mirrored, g, np.full(len(p), row, np.int64),
             m.kind, m.eps, m.thickness, m.roughness, k,
         )  # fmt: skip
@@ -220,7 +271,7 @@ def _scatter(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _turn(q, qu, qv, d, n, e, material, kind, eps, thickness, rough, k):  # type: ignore[no-untyped-def]
+def _reflect(q, qu, qv, d, n, e, material, kind, eps, thickness, rough, k):  # type: ignore[no-untyped-def]
     """Reflect directions and fields at planes of normal n, in place."""
     for i in range(len(d)):
         normal, k_in = _three(n[i]), _three(d[i])

@@ -1,4 +1,4 @@
-"""What every regime of the stability study hands back, and the closed forms it is held against."""
+"""Records of the stability study, helpers that its regimes share, and closed forms for comparison."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from raychan.poses import direction
 from raychan.records import Facets
-from raychan.run.rcs import facets_of, refinements, scattering
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.geometry import Geometry
@@ -27,8 +29,8 @@ K = 2.0 * np.pi / LAMBDA
 
 @dataclass(frozen=True)
 class Row:
-    """One check: `expected` (or, where `bound`, the most allowed), `seen`, `tolerance`, all in `unit`; `truth` says
-    where the expectation comes from, `note` why it failed or what else to know."""
+    """One check: `expected` (or, where `bound`, the most allowed), `seen` and `tolerance` in `unit`; `truth`, the
+    source of the expected value; `note`, the cause of a failure or a remark."""
 
     name: str
     expected: float
@@ -41,14 +43,14 @@ class Row:
 
     @property
     def off(self) -> float:
-        """By how much it is off [unit]; infinite where nothing finite was seen."""
+        """Deviation [unit]; infinite where the value seen is not finite."""
         if not np.isfinite(self.seen):
             return float("inf")
         return max(0.0, self.seen - self.expected) if self.bound else abs(self.seen - self.expected)
 
     @property
     def share(self) -> float:
-        """How far off it is in what is allowed: at most 1 where it passed."""
+        """Deviation over tolerance: at most 1 where the check passed."""
         if self.bound and self.expected > 0.0 and np.isfinite(self.seen):
             return max(self.seen, 0.0) / self.expected
         if self.tolerance > 0.0:
@@ -57,13 +59,13 @@ class Row:
 
     @property
     def passed(self) -> bool:
-        """Whether what was seen lies within the tolerance."""
+        """Whether the value seen is within the tolerance."""
         return self.off <= self.tolerance
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a regime found: its rows, and arrays by name for the figures."""
+    """Results of a regime: its rows, and arrays by name for the figures."""
 
     rows: list[Row]
     curves: dict[str, Any] = field(default_factory=dict)
@@ -71,7 +73,8 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Regime:
-    """A situation in which ray methods fail: `key` for files, `title` for people, `run` (quick) that tries it."""
+    """A situation in which ray methods fail: `key` for files, `title` for people, `run` (quick) that runs its
+    checks."""
 
     key: str
     title: str
@@ -170,7 +173,7 @@ def plate_near(width: float, height: float, distance: float) -> float:
             cycles = 2.0 * (np.hypot(0.5 * edge, distance) - distance) / LAMBDA
             panels = int(np.ceil(finer * (1.5 * cycles + 0.5 * edge / distance + 2)))
             x, w = np.polynomial.legendre.leggauss(16)
-            # Finer towards the rim, where the phase runs; r ds is even in s.
+            # Finer towards the rim, where the phase varies faster; r ds is even in s.
             start = np.sqrt(np.linspace(0.0, 1.0, panels + 1)) if cycles > 4 else np.linspace(0.0, 1.0, panels + 1)
             half = 0.5 * np.diff(start)[:, None]
             s = (start[:-1, None] + half * (1 + x)).ravel() * 0.5 * edge

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.error import stated_error
 from raychan.em.fresnel import coefficients
 from raychan.poses import rotation
 from raychan.records import LAYER, PEC, Facets, Materials, Paths, Points
-from raychan.run.rcs import stated_error
 from raychan.run.solver import solve
 from raychan.study.regimes_base import FREQUENCY, Complexes, Floats, K, Outcome, Regime, Row, rectangle, same_db
 from raychan.tracing.settings import refinement

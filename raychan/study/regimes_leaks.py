@@ -1,4 +1,4 @@
-"""Regime of leaks: rays aimed at shared edges, at vertices, and where the corner rays of tubes go."""
+"""Leaks of the ray caster: rays aimed at shared edges, at vertices, and where the corner rays of tubes go."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from raychan.world.shapes import SHAPES, build
 Ints = NDArray[np.int64]
 
 _CHUNK = 1 << 17
-_SLANT = 0.02  # least cosine of incidence
+_SLANT = 0.02  # least cosine of the angle of incidence
 _TARGETS = ("edges", "vertices", "corner rays of tubes")
 
 
 @dataclass
 class _Count:
-    """Rays cast, those that passed between faces, and those that float32 had moved off all faces beforehand."""
+    """Counts of rays cast, of leaks between faces, and of rays that rounding to float32 moved off all faces."""
 
     rays: int = 0
     leaks: int = 0
@@ -29,11 +29,11 @@ class _Count:
 
 
 def leaks(quick: bool) -> Outcome:
-    """Aim rays from outside at edges that two faces share, at vertices, and 2 % off them; count those that get through.
+    """Aim rays from outside at edges that two faces share, at vertices, and 2 % off them; count those that pass
+    through.
 
-    A ray that comes too far is held in float64, as float32 made it, against every face: if it does meet one nearer by,
-    the tracer leaked; if not, rounding had moved it past an outline.
-    """
+    A ray that goes too far, rounded to float32, is intersected with every face in float64: if it meets a nearer one,
+    the ray caster leaked; if not, rounding had moved it past a silhouette edge."""
     total = 100_000 if quick else 10_000_000
     rng = np.random.default_rng(7)
     rows: list[Row] = []
@@ -65,7 +65,7 @@ def _row(name: str, target: str, c: _Count) -> Row:
 
 
 def _leaks(geometry: RayCaster, mesh: Mesh, target: str, count: int, rng: np.random.Generator) -> _Count:
-    """Return what became of rays from outside at targets (see _TARGETS) whose faces all show the same side."""
+    """Return the counts for rays from outside at targets (see _TARGETS) whose faces all show the same side."""
     f, v = mesh.faces.astype(np.int64), mesh.vertices
     start, end = f.ravel(), np.roll(f, -1, axis=1).ravel()
     a, b = _shared(start, end, len(v))
@@ -86,7 +86,7 @@ def _leaks(geometry: RayCaster, mesh: Mesh, target: str, count: int, rng: np.ran
         d = aim - origin
         length = np.linalg.norm(d, axis=1)
         d /= length[:, None]
-        # A ray past an outline may miss with right: all faces round the point must show the same side.
+        # A ray past a silhouette edge may rightly miss: all faces round the point must show the same side.
         ca = np.einsum("ij,ij->i", geometry.normal[a[e] // 3], d)
         cb = np.einsum("ij,ij->i", geometry.normal[b[e] // 3], d)
         ok = np.abs(ca) > _SLANT
@@ -99,7 +99,7 @@ def _leaks(geometry: RayCaster, mesh: Mesh, target: str, count: int, rng: np.ran
         if not len(rows):
             return out
         hit, dist = geometry.cast(origin[rows], d[rows], np.full(len(rows), -1, np.int32))
-        # Embree's float32 moves a ray sideways by some 1e-7 of its coordinates; the slant makes that 50 times.
+        # Embree's float32 shifts a ray sideways by about 1e-7 of its coordinates; slant incidence makes that 50 times.
         slack = 1e-6 * size / _SLANT
         late = rows[(hit < 0) | (dist > length[rows] + slack)]
         real = [_meets(geometry.facets.vertices, origin[i], d[i], length[i] + slack) for i in late]
@@ -120,7 +120,8 @@ def _shared(start: Ints, end: Ints, count: int) -> tuple[Ints, Ints]:
 
 
 def _meets(corners: Floats, origin: Floats, d: Floats, limit: float) -> bool:
-    """Tell whether a ray, rounded to float32 about the corners' centre as the tracer does, meets a face by `limit` [m].
+    """Return whether a ray, rounded to float32 about the corners' centre as in the caster, meets a face within `limit`
+    [m].
 
     Source: Moller, Trumbore 1997, in float64.
     """
@@ -139,7 +140,7 @@ def _meets(corners: Floats, origin: Floats, d: Floats, limit: float) -> bool:
 
 
 class _Fan:
-    """The faces round each vertex."""
+    """The faces around each vertex."""
 
     def __init__(self, faces: Ints, count: int) -> None:
         vertex = faces.ravel()

@@ -1,4 +1,4 @@
-"""Specular points only (geometrical optics): where a surface turns its normal to the radar, with its curvature."""
+"""Geometrical optics: specular points of single reflections, where the surface normal points to the radar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Complexes = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Glints:
-    """Specular points seen: `point` (n, 3) [m], `facet` (n,), `field` (n,) [1/m] of unit field at 1 m, phase in."""
+    """Visible specular points: `point` (n, 3) [m], `facet` (n,), scattered `field` (n,) [1/m] for unit field at 1 m."""
 
     point: Floats
     facet: NDArray[np.int64]
@@ -45,7 +45,7 @@ def glints(tracer: RayCaster, end: Floats, wavenumber: float) -> Glints:
     if not len(rows):
         return Glints(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, complex))
     st = np.linalg.solve(turn[rows], -c[rows, 0][..., None])[..., 0]
-    # Half-open, so that a point on the edge of two facets counts once.
+    # Half-open intervals, so that a point on the edge of two facets counts once.
     inside = (st[:, 0] >= 0.0) & (st[:, 1] >= 0.0) & (st.sum(axis=1) < 1.0)
     rows, st = rows[inside], st[inside]
     point = v[rows, 0] + st[:, :1] * a[rows] + st[:, 1:] * b[rows]

@@ -1,4 +1,4 @@
-"""The stability study: every regime in turn, and its table as Markdown and CSV."""
+"""The stability study: all regimes in which ray methods fail, with tables as Markdown and CSV."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ HEADS = ("regime", "case", "expected", "seen", "tolerance", "unit", "passed", "t
 
 @dataclass(frozen=True)
 class Tried:
-    """A regime that was tried: its outcome and the time it took [s]."""
+    """The outcome of a regime, and the time it took [s]."""
 
     regime: Regime
     outcome: Outcome
@@ -52,9 +52,10 @@ class Tried:
 
 
 def stability(quick: bool = False, only: Sequence[str] = (), progress: Progress | None = None) -> list[Tried]:
-    """Try all regimes, or those whose keys are in `only`; one that raises is a failing row, not an end.
+    """Run all regimes, or those whose keys are in `only`; one that raises an error counts as a failing row.
 
-    Args: quick leaves out the largest cases; progress is told (title, share done). Raises: ValueError on unknown keys.
+    Args: quick leaves out the largest cases; progress is called with (title, share done).
+    Raises: ValueError on unknown keys.
     """
     known = [r.key for r in REGIMES]
     unknown = [key for key in only if key not in known]
@@ -68,7 +69,7 @@ def stability(quick: bool = False, only: Sequence[str] = (), progress: Progress 
         since = perf_counter()
         try:
             outcome = regime.run(quick)
-        except Exception as error:  # a regime that breaks the code is what the study looks for
+        except Exception as error:  # errors are findings of the study
             note = f"{type(error).__name__}: {error}"
             outcome = Outcome([Row("runs to its end", 1.0, 0.0, 0.0, "", "no exception", note)])
         done.append(Tried(regime, outcome, perf_counter() - since))

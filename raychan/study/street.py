@@ -1,4 +1,4 @@
-"""The scene case of the trade-off: each method's paths through the same receiver, noiseless, to a map."""
+"""The scene of the trade-off study: the paths of each method through the same noise-free receiver to a map."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from raychan.world.scene import Scene
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-_FINE_SAG = 1e-4  # m: flat facets of the lattice methods lie this close to the true surface
-_NEAR = 3.0  # m: nearer (and, as ranges wrap, at the far end) the map shows the ground under the radar, not a target
-_OWN = "ego"  # bodies of this name carry the radar
+_FINE_SAG = 1e-4  # m: largest distance of flat facets from the surface, for the lattice methods
+_NEAR = 3.0  # m: nearer (and, as ranges wrap, at the far end) the map holds ground clutter only
+_OWN = "ego"  # prefix of bodies that carry the radar
 
 
 class Road:
-    """A loaded scene, its facets, and the receiver that turns paths into a map."""
+    """A loaded scene, its facets, and the receiver."""
 
     def __init__(self, case: Street) -> None:
         self.scene = Scene.load(case.path)
@@ -66,7 +66,7 @@ class Road:
         return np.asarray(found.power[:, (found.range > _NEAR) & (found.range < found.range[-1] - _NEAR)])
 
     def paths_of(self, parts: list[Echo]) -> Paths:
-        """Return echoes as paths; what they met is not kept."""
+        """Return echoes as paths without a record of what they met."""
         wave = C0 / self.frequency / (4.0 * np.pi)
         columns = {f.name: np.concatenate([getattr(e, f.name) for e in parts]) for f in dataclasses.fields(Echo)}
         keep = columns["amplitude"] != 0.0
@@ -88,13 +88,14 @@ class Road:
         )
 
     def targets(self, facets: Facets) -> Bools:
-        """Return which facets belong to bodies that scatter, the radar's carrier excepted."""
+        """Return which facets belong to bodies that scatter, without the radar's own vehicle."""
         own = np.array([name.startswith(_OWN) for name in facets.body_names])
         return (facets.role[facets.body] == SCATTERER) & ~own[facets.body]
 
 
 def tubes(road: Road, tolerance_db: float, checked: bool = True) -> Run:
-    """Return the map by adaptive tubes as `raychan run` does: cut for a tolerance, and once more to state the error."""
+    """Return the map by adaptive tubes as `raychan run` does: refined for a tolerance, and launched again for the
+    error."""
     since = perf_counter()
     f, s, points, geometry = road.frequency, road.radar, road.scene.points(0.0), Geometry(road.facets)
     cell = C0 / s.waveform.bandwidth
@@ -106,7 +107,7 @@ def tubes(road: Road, tolerance_db: float, checked: bool = True) -> Run:
 
 
 def converged(road: Road, tolerance_db: float) -> Floats:
-    """Return the map of a launch on a lattice of cuts of its own: never that of a method."""
+    """Return the reference map, by a launch on a lattice of cuts that no method uses."""
     cell = C0 / road.radar.waveform.bandwidth
     rule = refinement(road.frequency, tolerance_db, road.floor, jitter=0.2, cell=cell)
     paths, _ = solve(road.facets, road.scene.points(0.0), road.radar, road.frequency, rule, road.bounces)
@@ -135,7 +136,7 @@ def lattice(road: Road, rays: int, phased: bool) -> Run:
 
 
 def specular(road: Road, fine: int) -> Run:
-    """Return the map by specular points of one reflection alone, the bodies conducting."""
+    """Return the map by specular points of single reflections, with conducting bodies."""
     since = perf_counter()
     facets = road.fine if fine else road.facets
     tracer = RayCaster(facets)
@@ -147,7 +148,7 @@ def specular(road: Road, fine: int) -> Run:
 
 
 def as_points(road: Road, aspects: int) -> Run:
-    """Return the map with each body a point of its mean RCS at the place nearest to the radar; tables made before."""
+    """Return the map with each body as a point of its mean RCS at its nearest place; tables are made beforehand."""
     facets = road.facets
     mine = road.targets(facets)
     places, sigma, speed = [], [], []
@@ -179,8 +180,8 @@ def _direct(road: Road, point: Floats, field: Any, velocity: Floats) -> Echo:
 
 
 def error_db(value: Floats, truth: Floats, depth_db: float = 30.0) -> float:
-    """Return the rms error [dB] of map cells within `depth_db` of the true peak; cells a method leaves dark count 90 dB
-    below the peak."""
+    """Return the rms error [dB] of map cells within `depth_db` of the true peak; cells without power count 90 dB below
+    the peak."""
     rows = truth > truth.max() * 10.0 ** (-depth_db / 10.0)
     floor = truth.max() * 1e-9
     return float(np.sqrt(np.mean((10.0 * np.log10(np.maximum(value[rows], floor) / truth[rows])) ** 2)))

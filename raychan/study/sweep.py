@@ -1,4 +1,4 @@
-"""One body over a path of scenes: keys of the scene file varied, or time that goes on; each step simulated."""
+"""One body over a series of scenes, with keys of the scene file or the time varied; each step is simulated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from raychan.world.scene import Scene
 Progress = Callable[[str, float], None]
 
 MOST = 100_000
-"""Steps of a sweep, so that a slip of the finger does not fill the memory."""
+"""Most steps of a sweep, against typing errors."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"(?<![\w.:])({_NUMBER}):({_NUMBER}):(\d+)(?![\w.:])")
@@ -35,7 +35,7 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """What a sweep varies: a key of the scene file, its values, and the text of each change; time has no changes."""
+    """A varied quantity: key of the scene file, its values, and the text of each change; time has no changes."""
 
     key: str
     values: tuple[float, ...]
@@ -43,13 +43,13 @@ class Axis:
 
     @property
     def unit(self) -> str:
-        """Unit of the values, by the end of the key; empty where that does not tell."""
+        """Unit of the values, by the end of the key; '' where it is not known."""
         key = re.sub(r"\.[xyz]$", "", self.key)
         return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
 
     @property
     def label(self) -> str:
-        """The key with its unit, as an axis of a figure has it."""
+        """The key with its unit, as the label of an axis."""
         return f"{self.key} [{self.unit}]" if self.unit else self.key
 
     @staticmethod
@@ -90,7 +90,7 @@ def _values(text: str, start: str, stop: str, steps: str) -> list[float]:
 
 @dataclass(frozen=True)
 class Seen:
-    """The detection that speaks for the body: its direct one before a multipath one, the strongest of these."""
+    """The detection of the body: direct before multipath, the strongest of these."""
 
     range: float
     rate: float
@@ -104,18 +104,18 @@ class Seen:
 
 @dataclass(frozen=True)
 class Step:
-    """One scene of a sweep: the values varied, and what the radar can know of the body."""
+    """One scene of a sweep: its values, and the visibility of the body."""
 
     values: tuple[float, ...]
     seen: Seen | None
     found: Visibility
     noise_db: float
-    """The level that is just reported, over thermal noise [dB]: what a margin of 0 dB is as an SNR."""
+    """SNR [dB] of a margin of 0 dB: the least that is reported."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """All steps; those of two axes in rows, the last axis fastest."""
+    """All steps; with two axes in rows, the last axis fastest."""
 
     title: str
     target: str
@@ -132,10 +132,10 @@ def sweep(
     max_bounces: int | None = None,
     progress: Progress | None = None,
 ) -> Sweep:
-    """Simulate a scene at each value of an axis, or at each pair of values of two, and say what is known of a body.
+    """Simulate a scene at each value of an axis, or at each pair of values of two, and return a body's visibility.
 
     Args: scene from a file or from tables; target a body's name; axes at most two, none for the scene as it is; seed,
-    tolerance_db [dB] and max_bounces as for `simulate`; progress is told ('sweep', share done).
+    tolerance_db [dB] and max_bounces as for `simulate`; progress is called with ('sweep', share done).
     Raises: SceneError for a change that makes no scene, ValueError for a body that is no target or too many axes.
     """
     if len(axes) > 2:
@@ -145,7 +145,7 @@ def sweep(
     places = list(product(*(range(len(a.values)) for a in axes)))
     if len(places) > MOST:
         raise ValueError(f"{len(places)} steps; at most {MOST} are allowed")
-    # The first and the last scene must stand before hours go into those between.
+    # The first and the last scene are checked before hours go into those between.
     for place in (places[0], places[-1]):
         check_target(_scene(scene, axes, place), target)
     tell = progress or (lambda stage, share: None)

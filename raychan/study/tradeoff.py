@@ -1,4 +1,4 @@
-"""Error against effort: every method at several settings on every case, with the front of those that none beats."""
+"""The trade-off study: error against effort of every method at several settings on every case, with Pareto fronts."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ from raychan.study.cases import TARGETS, Street, Target
 Progress = Callable[[str, float], None]
 
 WORST_DB = 60.0
-"""Errors beyond count as this."""
-_PATIENCE = 0.5  # s of runs after which none is repeated
+"""Larger errors [dB] count as this."""
+_PATIENCE = 0.5  # s: longer runs are not repeated for timing
 
 
 @dataclass(frozen=True)
 class Row:
-    """One setting of one method on one case; `front_*`: no other is at once as cheap and better, or as good and
-    cheaper."""
+    """One setting of one method on one case; `front_*`: on the Pareto front of error against rays or seconds."""
 
     case: str
     title: str
@@ -44,8 +43,8 @@ class Row:
 def tradeoff(names: Sequence[str] = (), quick: bool = False, progress: Progress | None = None) -> list[Row]:
     """Run the study and return its rows, case by case.
 
-    Args: names of cases, all if none; progress is told (case, share done). Raises: ValueError for an unknown case.
-    """
+    Args: names of cases, all if none; progress is called with (case, share done). Raises: ValueError for an unknown
+    case."""
     unknown = [n for n in names if n not in TARGETS]
     if unknown:
         raise ValueError(f"case '{unknown[0]}' is not known: must be one of {', '.join(TARGETS)}")
@@ -65,9 +64,9 @@ def tradeoff(names: Sequence[str] = (), quick: bool = False, progress: Progress 
 
 
 def overall(rows: Sequence[Row]) -> list[Row]:
-    """Return each setting that ran on every target, with its worst error and its whole cost: nobody knows beforehand
-    which setting a target needs. The scene, whose settings are its own, is left out; none for fewer than two targets.
-    """
+    """Return each setting that ran on every target, with its worst error and total cost, since it is not known
+    beforehand which setting a target needs. The scene, with settings of its own, is left out; empty for fewer than two
+    targets."""
     mine = [r for r in rows if r.case != "urban"]
     count = len({r.case for r in mine})
     groups: dict[tuple[str, str], list[Row]] = {}
@@ -99,7 +98,7 @@ def _target(case: Target, quick: bool, tell: Progress) -> list[Row]:
     for i, e in enumerate(settings):
         runs.append(_timed(e, case))
         tell(case.name, (i + 1) / len(settings))
-    # Settings that come to the same work have the same cost: their seconds differ by chance alone.
+    # Settings with the same work have the same cost: their seconds differ by chance only.
     work = [(e.method, run.rays, run.value.tobytes()) for e, run in zip(settings, runs, strict=True)]
     rows = []
     for e, run, key in zip(settings, runs, work, strict=True):
@@ -111,7 +110,7 @@ def _target(case: Target, quick: bool, tell: Progress) -> list[Row]:
 
 
 def _timed(e: Any, case: Target) -> methods.Run:
-    """Return a run, the quickest of up to three within a second: short ones would be ranked by chance."""
+    """Return a run, the quickest of up to three within a second: times of short runs vary by chance."""
     since = perf_counter()
     run: methods.Run = e.run(case)
     for _ in range(2):
@@ -144,7 +143,7 @@ def _row(case: Target | Street, e: Any, run: methods.Run, error: float) -> Row:
 
 
 def marked(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows of one case with their places on the fronts; errors below the truth's own count as that."""
+    """Return the rows of one case marked by fronts; errors below that of the reference count as equal to it."""
     error = np.array([max(r.error_db, r.truth_db) for r in rows])
     out = list(rows)
     for key in ("rays", "seconds"):
@@ -198,7 +197,7 @@ def read_csv(path: Path) -> list[Row]:
 
 
 def _warm() -> None:
-    """Compile and load everything once, so that no method pays for it."""
+    """Compile and load everything once, so that it is in no method's time."""
     case = cases.dihedral()
     for e in methods.efforts(quick=True):
         e.run(case)

@@ -1,4 +1,5 @@
-"""What the trade-off says of the default setting: on the front or beaten by whom, and how far point samples are."""
+"""Conclusions of the trade-off study: whether default settings are on the Pareto front, and the gain over point
+samples."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from raychan.study.tradeoff import Row, beaten_by
 
 EQUAL_DB = {"sphere": 0.5, "car": 1.0}
 """Errors at which the default and point samples are compared [dB]."""
-_NAMED = 3  # of those that beat the default
+_NAMED = 3  # most settings named that are better than the default
 
 
 def verdicts(rows: Sequence[Row]) -> list[str]:
@@ -27,7 +28,7 @@ def _cost(r: Row) -> str:
 
 def _place(rows: Sequence[Row], row: Row, key: str) -> str:
     better = sorted(beaten_by(rows, row, key), key=lambda r: (r.error_db, getattr(r, key)))
-    # One launch of our own is half of the default: it gives the value, but cannot say how wrong it is.
+    # A single launch is half of the default: it gives the value, but no error.
     halves = [r for r in better if r.method == row.method and "launch" in r.setting]
     others = [r for r in better if r not in halves]
     if others:
@@ -39,7 +40,7 @@ def _place(rows: Sequence[Row], row: Row, key: str) -> str:
 
 
 def _named(rows: Sequence[Row], r: Row) -> str:
-    """Return a setting with its cost, and where it fails: nobody knows beforehand which setting a target needs."""
+    """Return a setting in words, with its cost and the case on which it fails."""
     same = [o for o in rows if (o.method, o.setting) == (r.method, r.setting) and o.case not in (r.case, "all")]
     worst = max(same, key=lambda o: o.error_db, default=None)
     fails = f", but {worst.error_db:.2f} dB off on {worst.case}" if worst and worst.error_db > 2.0 * r.error_db else ""
@@ -47,7 +48,7 @@ def _named(rows: Sequence[Row], r: Row) -> str:
 
 
 def _gain(rows: Sequence[Row], case: str, level: float) -> str:
-    """Return how many times the rays and seconds of the default point samples need to come and stay within `level`."""
+    """Return in words the rays and seconds, relative to the default, that point samples need to stay within `level`."""
     ours = next(r for r in rows if r.case == case and r.default)
     points = sorted((r for r in rows if r.case == case and r.method == POINT), key=lambda r: r.rays)
     kept = next((i for i in range(len(points)) if all(r.error_db <= level for r in points[i:])), None)

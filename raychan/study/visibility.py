@@ -1,4 +1,5 @@
-"""What a radar can know of one body: how much of it is hidden, by whom, and what its returns are worth."""
+"""Visibility of one body to the radar: the share of it that is hidden, by which bodies, and the levels of its
+returns."""
 
 from __future__ import annotations
 
@@ -25,25 +26,25 @@ from raychan.world.scene import Scene
 DIFFRACTED = "diffracted"
 WAYS = (DIRECT, MULTIPATH, DIFFRACTED)
 
-_FINE = 4  # zero padding by which the strongest cell is within 0.2 dB of the peak
-_SLOTS = 8  # of a diffracted chain
+_FINE = 4  # zero padding with which the strongest cell is within 0.2 dB of the peak
+_SLOTS = 8  # most interactions of a diffracted path
 
 
 @dataclass(frozen=True)
 class Level:
-    """What the returns of one kind would show in a map without noise or other bodies."""
+    """Level of the returns of one kind in a map without noise and other bodies."""
 
     power: float
-    """Of the strongest cell [W]; 0 where there is no such path."""
+    """Power of the strongest cell [W]; 0 where there is no such path."""
     margin_db: float | None
-    """Over the weakest power that is reported (the minimum SNR over thermal noise) [dB]; None without noise."""
+    """Level over the weakest reported power (minimum SNR over thermal noise) [dB]; None without noise."""
     range: float | None
-    """Of that cell [m]."""
+    """Range of that cell [m]."""
 
 
 @dataclass(frozen=True)
 class Visibility:
-    """One body as one radar sees it."""
+    """Visibility of one body to one radar."""
 
     target: str
     occlusion: Occlusion
@@ -54,9 +55,9 @@ class Visibility:
 
 
 def visibility(result: Result, target: str) -> Visibility:
-    """Return what a simulated radar can know of a body.
+    """Return the visibility of a body to the radar of a result.
 
-    Args: result of a run whose scene is at hand; target a body's name. A path counts as direct or multipath by the
+    Args: result of a run with its scene; target a body's name. A path counts as direct or multipath by the
     rule for the labels of detections; as diffracted where it met an edge, by the scene's model or, where that leaves
     diffraction out, by single wedges (UTD).
     Raises: ValueError for an unknown body, the ground, or the radar's own carrier.
@@ -76,7 +77,7 @@ def check_target(scene: Scene | None, target: str) -> Scene:
         raise ValueError(f"no body '{target}'; there are {', '.join(names) or 'none'}")
     body = scene.bodies[names.index(target)]
     if is_background(body):
-        raise ValueError(f"'{target}' is the ground or the radar's own carrier, which is no target")
+        raise ValueError(f"'{target}' is the ground or the radar's own vehicle, which is no target")
     return scene
 
 
@@ -109,7 +110,7 @@ def _levels(result: Result, facets: Facets, points: Points, radar: Radar, target
 
 
 def ways_of(result: Result, known: Chains, target: str) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Return the place in WAYS of each path (n,) by which it met a body; -1 where it did not."""
+    """Return the index in WAYS of the way by which each path (n,) met a body; -1 where it did not."""
     paths, size = result.paths, np.abs(result.paths.amplitude)
     kind = np.full(len(known.names), -1, np.int64)
     order = np.lexsort((-size, known.part))

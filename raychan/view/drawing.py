@@ -1,4 +1,4 @@
-"""What there is to draw of a scene and its rays, as plain arrays: every way of drawing starts here."""
+"""The drawing of a scene and its rays as plain arrays, for all renderers."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class Shape:
 
 @dataclass(frozen=True)
 class Ray:
-    """A way through the scene: points (k, 3) [m] from radar to radar, and the power it brings [dBm]."""
+    """A ray through the scene: points (k, 3) [m] from radar to radar, and its received power [dBm]."""
 
     name: str
     points: Floats
     power: float
     label: str
     converged: bool = True
-    """Whether the stated error of the detection that it feeds is a figure."""
+    """Whether the detection that it contributes to is converged."""
 
     @property
     def text(self) -> str:
@@ -59,11 +59,11 @@ class Ray:
         return f"{self.name}: {self.power:.1f} dBm {self.label}{'' if self.converged else ', not converged'}"
 
     def strokes(self, dash: float) -> list[Floats]:
-        """Return the lines to draw, (k, 3) [m] each: the whole way, or dashes [m] of it where it is not converged."""
+        """Return the lines to draw, (k, 3) [m] each: the whole ray, or dashes [m] of it where it is not converged."""
         if self.converged:
             return [self.points]
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
-        # Even about the middle, so that the way back does not fill the gaps of the way there.
+        # Symmetric about the middle, so that the return leg does not fill the gaps of the outgoing one.
         middle, made = 0.5 * along[-1], []
         count = int(middle // (2.0 * dash)) + 1
         for start in middle + 2.0 * dash * np.arange(-count, count + 1) - 0.5 * dash:
@@ -130,9 +130,9 @@ def draw(
     result: Result | None,
     cell: Explanation | None = None,
 ) -> Drawing:
-    """Return the drawing of a scene at one instant; with a result, the ways that fed its detections too.
+    """Return the drawing of a scene at one instant; with a result, also the rays of its detections.
 
-    Args: cell the one cell of the map whose ways alone are drawn; bodies that they do not meet are seen through.
+    Args: cell, the map cell whose rays alone are drawn; bodies that they do not meet are transparent.
     """
     rays: tuple[Ray, ...] = ()
     if result is not None:
@@ -174,7 +174,7 @@ def draw(
 
 
 def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
-    """Return the strongest path of each chain that fed a detection, weakest first; without any, of each chain."""
+    """Return the strongest path of each chain of a detection, weakest first; without detections, of each chain."""
     paths, known = result.paths, chains(result.paths, result.receiver.background)
     size = np.abs(paths.amplitude)
     index = {chain: i for i, chain in enumerate(known.names)}
@@ -199,7 +199,7 @@ def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
 
 
 def rays_in(result: Result, cell: Explanation) -> tuple[Ray, ...]:
-    """Return the strongest path of each chain that makes a cell of the map, there and not elsewhere, weakest first."""
+    """Return the strongest path of each chain in a map cell, weakest first."""
     paths, known = result.paths, chains(result.paths, result.receiver.background)
     size = np.abs(waves_in(paths, response_of(result.receiver), cell.range, cell.rate)[0])
     index = {chain: i for i, chain in enumerate(known.names)}

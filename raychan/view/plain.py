@@ -1,4 +1,4 @@
-"""The same drawing by matplotlib, where there is no OpenGL: surfaces may hide wrongly, places are right."""
+"""The drawing by matplotlib, where there is no OpenGL: places are right, but surfaces may overlap wrongly."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MOST = 6000  # triangles drawn of a shape; matplotlib sorts and paints them one
 
 
 def _largest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest triangles, for small ones hide nothing and cost as much."""
+    """Return the largest triangles: small ones hide little and cost as much."""
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     return triangles[np.argsort(-np.linalg.norm(cross, axis=1), kind="stable")[:_MOST]]
 

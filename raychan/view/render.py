@@ -1,5 +1,5 @@
-"""The one place that imports pyvista. `python -m raychan.view.render DRAWING.npz PICTURE.png` draws in a process of its
-own, so that a crash of an OpenGL driver costs the picture and not the run.
+"""Drawings by pyvista, which is imported here only. `python -m raychan.view.render DRAWING.npz PICTURE.png` draws in a
+process of its own, so that a crash of an OpenGL driver loses the picture and not the run.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def screenshot(drawing: Drawing, path: str | Path) -> None:
 
 
 def window(drawing: Drawing) -> None:
-    """Show a drawing in a window; a click on a ray prints its chain and power."""
+    """Show a drawing in a window; a click on a ray prints its bodies and power."""
     plotter = _plotter(drawing, off_screen=False)
     plotter.enable_mesh_picking(_tell, left_clicking=True, show=False, show_message=False)
     plotter.show(title=drawing.title)
@@ -73,7 +73,7 @@ def _plotter(drawing: Drawing, off_screen: bool) -> Any:
 
 
 def _rings(drawing: Drawing, plotter: Any, pv: Any) -> None:
-    """Draw arcs of equal range on the ground, so that the picture can be measured."""
+    """Draw arcs of equal range on the ground as a scale."""
     ground = [s for s in drawing.shapes if s.name == "ground"]
     if not ground:
         return

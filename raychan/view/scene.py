@@ -30,9 +30,9 @@ def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | Non
 
 
 def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:
-    """Draw into a PNG and return warnings: none, or why matplotlib had to do it.
+    """Draw into a PNG and return warnings: empty, or why matplotlib drew it.
 
-    pyvista runs in a process of its own: a driver that crashes or hangs is then a warning too.
+    pyvista runs in a process of its own, so that a driver that crashes or hangs is only a warning.
     """
     trouble = _rendered(drawing, Path(path))
     if trouble is None:

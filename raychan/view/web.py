@@ -1,4 +1,4 @@
-"""A drawing as one HTML page that needs no network and no library: turn, zoom, pick a ray."""
+"""A drawing as one self-contained interactive HTML page: turn, zoom, pick a ray."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Backed: thin layers that lie upon something opaque; of two surfaces in one place the opaque one counts."""
+"""Thin layers that lie on an opaque surface: of two surfaces in one place only the opaque one counts."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from scipy.spatial import cKDTree
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-_TURN = 1e-5  # of unit normals that count as parallel
+_TURN = 1e-5  # difference of unit normals up to which facets count as parallel
 
 
 def backed(v: Floats, normal: Floats, area: Floats, layer: Bools, touch: float) -> Bools:
-    """Tell which facets (n,) are thin layers upon whose plane, and about whose place, an opaque facet lies.
+    """Return which facets (n,) are thin layers with an opaque facet in their plane and at their place.
 
-    Args: v (n, 3, 3) [m] corners about some near origin; normal (n, 3), area (n,) of them; layer (n,) which let waves
-    through; touch [m] within which surfaces lie on each other.
+    Args: v (n, 3, 3) [m] corners about an origin nearby; their normal (n, 3) and area (n,); layer (n,) which facets let
+    waves through; touch [m] distance within which surfaces lie on each other.
     """
     out = np.zeros(len(v), bool)
     rows, solid = np.flatnonzero(layer & (area > 0.0)), np.flatnonzero(~layer & (area > 0.0))
@@ -27,7 +27,7 @@ def backed(v: Floats, normal: Floats, area: Floats, layer: Bools, touch: float) 
     solid = solid[inside.all(axis=1)]
     if not len(solid):
         return out
-    # A plane by its normal either way and its height; heights weigh so that `touch` counts as much as `_TURN`.
+    # Planes as points: normal (of either sign) and height, scaled so that `touch` counts as much as `_TURN`.
     scale = _TURN / touch
     height = np.einsum("ij,ij->i", normal, v.mean(axis=1)) * scale
     plane = np.column_stack([normal, height])

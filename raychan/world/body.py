@@ -14,7 +14,7 @@ import numpy as np
 from raychan.records import Role
 from raychan.units import undb
 from raychan.world import limits, shapes
-from raychan.world.creases import folds_told
+from raychan.world.creases import uncertain_folds
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import Limit
 from raychan.world.material import Material
@@ -175,7 +175,7 @@ class Body:
         said = list(mesh.report.warnings())
         file = self.mesh if isinstance(self.mesh, str | Path) else ""
         said += oddities(mesh, file, self.unit, self.up if file else "z", key)
-        folds = folds_told(mesh, f"{key}crease_deg")
+        folds = uncertain_folds(mesh, f"{key}crease_deg")
         said += [folds] if folds else []
         bare = [] if mesh.part_materials or self.material or self.rcs_dbsm is not None else self._bare_parts()
         if bare:

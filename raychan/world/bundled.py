@@ -1,4 +1,4 @@
-"""The scenes and antennas that come with raychan, by name: in the wheel beside the code, in a checkout above it."""
+"""The scenes and antennas that ship with raychan, by name: in a wheel beside the code, in a checkout above it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _CODE = Path(__file__).resolve().parents[1]
 
 
 def folder() -> Path | None:
-    """Return the folder of the scenes that come with raychan; None where they were left out."""
+    """Return the folder of the bundled scenes; None where they are not installed."""
     if (_CODE / "scenes").is_dir():
         return _CODE / "scenes"
     above = _CODE.parent
@@ -16,13 +16,13 @@ def folder() -> Path | None:
 
 
 def names() -> list[str]:
-    """Return the names of the scenes that come with raychan."""
+    """Return the names of the bundled scenes."""
     there = folder()
     return sorted(file.stem for file in there.glob("*.toml")) if there else []
 
 
 def found(path: str | Path, within: Path | None = None) -> Path:
-    """Return a file as it is given, or the one of that name that comes with raychan where there is no such file.
+    """Return a file as given, or, where there is none, the bundled one of that name.
 
     Args: path of a file, or a name such as 'urban' or 'antennas/patch'; within, the folder that `path` refers to.
     """

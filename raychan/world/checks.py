@@ -1,4 +1,5 @@
-"""What only the whole scene shows: a radar inside a body, targets that fold in range or range rate."""
+"""Checks of a whole scene: a radar inside a body or in the plane of a facet, targets beyond the unambiguous range or
+range rate."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
         place = place_of(mesh.corners, local)
         if place != Place.OUTSIDE:
             where = "inside" if place == Place.INSIDE else "on the surface of"
-            # A mesh in the wrong unit swallows the radar.
+            # A mesh in the wrong unit may enclose the radar.
             allowed = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
             problem = f"radar is {where} '{body.name}'"
             raise SceneError(problem, key="radar.position", value=at.tolist(), allowed=allowed)
@@ -59,7 +60,7 @@ def nearest_point(body: Body, at: Floats) -> Floats:
 
 
 def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> list[str]:
-    """Return a warning for each body whose nearest point reads a folded range or range rate, and what it will read."""
+    """Return a warning for each body beyond the unambiguous range or range rate, with the value at which it appears."""
     said = []
     at, own = np.array(radar.position), np.array(radar.velocity_mps)
     limit, top = waveform.unambiguous_range, waveform.unambiguous_rate * waveform.carrier / waveform.middle
@@ -86,7 +87,7 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
 
 
 def _near_and_slow(body: Body, at: Floats, own: Floats, limit: float, top: float) -> bool:
-    """Tell whether no point of a body is farther than `limit` [m] from a radar, or faster than `top` [m/s] to it."""
+    """Return whether all points of a body are within `limit` [m] of a radar and slower than `top` [m/s] towards it."""
     low, high = body.geometry.bounds
     places = [low, high] if body.rcs_dbsm is None else [low, high, body.target_point()]
     middle = 0.5 * (low + high)

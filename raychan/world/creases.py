@@ -1,4 +1,9 @@
-"""What a mesh leaves open: which of its folds are edges of the body, and where the smooth surface behind it turns."""
+"""Folds of a mesh that may be edges of the body or part of a smooth surface, and the other surfaces it may stand for.
+
+A mesh does not say which of its folds are edges. Those under the crease angle are taken as smooth, and corner normals
+are estimated over them. For the stated error of a cross-section the alternatives are computed as well: other normals,
+uncertain smooth folds as edges, and uncertain edges as smooth folds.
+"""
 
 from __future__ import annotations
 
@@ -15,70 +20,70 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_EVEN = 0.0  # power of the distance in the other fit: neighbours far and near weigh alike
-_BEND = 1e-5  # rad: less is flat
-_WIDE = 0.5  # of the crease angle: folds between it and the crease angle itself may be edges
-_STRIPS = 0.125  # of the crease angle: the same where the surface bends one way only, as prisms and cones do
-_ONE_WAY = 0.02  # of a patch's bending: as much across, and it bends both ways
-_UNEVEN = 0.17  # of facets about an edge: how far their heights may differ, over their sum
-_FEW = 4  # folds: fewer tell nothing of a tessellation
+_EVEN = 0.0  # power of the distance in the alternative fit of normals: all neighbours weigh alike
+_BEND = 1e-5  # rad: folds below it are flat
+# Shares trade missed edges (a stated error too small) against smooth bodies stated too uncertain; chosen on the shapes
+# of tests/truth/shapes.py, single values not measured.
+_WIDE = 0.5  # of the crease angle: mean folds above this may be edges
+_STRIPS = 0.125  # of the crease angle: the same on singly curved patches, as prisms and cones are
+_ONE_WAY = 0.02  # of a patch's bending: with more across it, the patch is doubly curved
+_UNEVEN = 0.17  # difference over sum of the heights of two facets about an edge: with more, no regular tessellation
+_FEW = 4  # folds: fewer are no evidence of a tessellation
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
-    """Other readings of a mesh whose corner normals were estimated.
-
-    Fields: fitted (f, 3, 3) corner normals by another fit where no fold is doubtful, creased those with the doubtful
-    folds as edges, rounded those with the folds above the crease angle smooth that look like a tessellation's; None
-    where they would be the same.
-    """
+class Alternatives:
+    """Corner normals (f, 3, 3) of the other surfaces that a mesh with estimated normals may stand for; None where they
+    equal the mesh's own."""
 
     fitted: Floats | None = None
+    """By another fit, where no fold is uncertain."""
     creased: Floats | None = None
+    """With the uncertain smooth folds as edges."""
     rounded: Floats | None = None
+    """With those folds above the crease angle as smooth that look like a tessellation."""
 
 
-def readings(mesh: Mesh) -> Readings:
-    """Return what else a mesh may stand for.
+def alternatives(mesh: Mesh) -> Alternatives:
+    """Return the other surfaces that a mesh may stand for.
 
-    Folds may be edges on patches that turn by more than half the crease angle from facet to facet (an eighth where
-    they bend one way only: a prism of 36 sides is a body of its own as much as a cylinder), and where the facets are
-    no tessellation of a smooth surface: those of grids, of subdivided solids and of sections are alike on both sides
-    of an edge, those of a hull around points are not. Folds above the crease angle may be smooth where they look like
-    a tessellation (see `tessellation`).
+    Smooth folds may be edges on patches that turn by more than half the crease angle from facet to facet (an eighth on
+    singly curved ones: a prism of 36 sides is as plausible as a cylinder), and where the facets are no regular
+    tessellation: facets of grids, subdivided solids and sections are alike on both sides of an edge, those of a convex
+    hull of points are not. Folds above the crease angle may be smooth where they look like a tessellation (see
+    world.tessellation).
     """
-    if "readings" not in mesh.kept:
-        mesh.kept["readings"] = _found(mesh)
-    found: Readings = mesh.kept["readings"]
+    if "alternatives" not in mesh.memo:
+        mesh.memo["alternatives"] = _alternatives(mesh)
+    found: Alternatives = mesh.memo["alternatives"]
     return found
 
 
-def _found(mesh: Mesh) -> Readings:
+def _alternatives(mesh: Mesh) -> Alternatives:
     if mesh.crease_deg is None:
-        return Readings()
-    pair, _, doubt = _folds(mesh)
-    hard, _ = _hard_folds(mesh)
-    round_ = smoothed(mesh.vertices, mesh.faces, np.concatenate([_soft_folds(mesh)[0], hard])) if len(hard) else None
+        return Alternatives()
+    pair, _, uncertain = _folds(mesh)
+    hard, _ = _uncertain_edges(mesh)
+    round_ = smoothed(mesh.vertices, mesh.faces, np.concatenate([_smooth_folds(mesh)[0], hard])) if len(hard) else None
     if not len(pair):
-        return Readings(rounded=round_)
+        return Alternatives(rounded=round_)
     fitted = smoothed(mesh.vertices, mesh.faces, pair, _EVEN)
-    # Where the folds themselves are in doubt, that is told by the other reading.
-    fitted[pair[doubt] // 3] = mesh.normals[pair[doubt] // 3]
-    creased = smoothed(mesh.vertices, mesh.faces, pair[~doubt]) if doubt.any() else None
-    return Readings(fitted if np.abs(fitted - mesh.normals).max() > _BEND else None, creased, round_)
+    # At uncertain folds `creased` is the alternative.
+    fitted[pair[uncertain] // 3] = mesh.normals[pair[uncertain] // 3]
+    creased = smoothed(mesh.vertices, mesh.faces, pair[~uncertain]) if uncertain.any() else None
+    return Alternatives(fitted if np.abs(fitted - mesh.normals).max() > _BEND else None, creased, round_)
 
 
-def folds_told(mesh: Mesh, key: str) -> str:
-    """Return a sentence about folds that were taken for smooth and may be edges, or for edges and may be smooth, and
-    the key that decides; else ''."""
-    _, fold, doubt = _folds(mesh)
-    _, hard = _hard_folds(mesh)
+def uncertain_folds(mesh: Mesh, key: str) -> str:
+    """Return a sentence on folds that were taken as smooth and may be edges, or as edges and may be smooth, with the
+    key that decides; '' if there are none."""
+    _, fold, uncertain = _folds(mesh)
+    _, hard = _uncertain_edges(mesh)
     said = []
-    if doubt.any():
+    if uncertain.any():
         smooth, largest = int((fold > _BEND).sum()), float(np.degrees(fold.max()))
-        said.append(
-            f"{smooth} folds of up to {largest:.3g} deg are taken for smooth; {int(doubt.sum())} of them may be edges"
-        )
+        edges = int(uncertain.sum())
+        said.append(f"{smooth} folds of up to {largest:.3g} deg are taken for smooth; {edges} of them may be edges")
     if len(hard):
         low, high = np.degrees([hard.min(), hard.max()])
         span = f"{low:.4g}" if high - low < 0.01 else f"{low:.4g} to {high:.4g}"
@@ -87,23 +92,24 @@ def folds_told(mesh: Mesh, key: str) -> str:
 
 
 def _folds(mesh: Mesh) -> tuple[Ints, Floats, Bools]:
-    """Return the soft edges of a mesh as half edges (e, 2), their folds (e,) [rad] and which of them may be edges."""
-    pair, fold = _soft_folds(mesh)
+    """Return the smooth folds of a mesh as half edges (e, 2), their angles (e,) [rad] and which of them may be
+    edges."""
+    pair, fold = _smooth_folds(mesh)
     bent = fold > _BEND
     if not bent.any():
         return pair[:0], fold[:0], bent[:0]
-    return pair, fold, bent & _doubted(mesh, pair, np.where(bent, fold, 0.0))
+    return pair, fold, bent & _may_be_edges(mesh, pair, np.where(bent, fold, 0.0))
 
 
-def _soft_folds(mesh: Mesh) -> tuple[Ints, Floats]:
-    """Return the half edges (e, 2) over which a mesh was smoothed, and their folds (e,) [rad]."""
+def _smooth_folds(mesh: Mesh) -> tuple[Ints, Floats]:
+    """Return the half edges (e, 2) over which a mesh was smoothed, and their angles (e,) [rad]."""
     pair, fold = _all_folds(mesh)
     soft = fold < crease_angle(mesh.crease_deg or 0.0)
     return pair[soft], fold[soft]
 
 
-def _hard_folds(mesh: Mesh) -> tuple[Ints, Floats]:
-    """Return the half edges (e, 2) of folds above the crease angle that may be smooth, and these folds (e,) [rad]."""
+def _uncertain_edges(mesh: Mesh) -> tuple[Ints, Floats]:
+    """Return the half edges (e, 2) of folds above the crease angle that may be smooth, and their angles (e,) [rad]."""
     pair, fold = _all_folds(mesh)
     if not mesh.crease_deg or not len(pair):
         return pair[:0], fold[:0]
@@ -112,7 +118,7 @@ def _hard_folds(mesh: Mesh) -> tuple[Ints, Floats]:
 
 
 def _all_folds(mesh: Mesh) -> tuple[Ints, Floats]:
-    """Return the half edges (e, 2) that two facets walk in opposite ways, and their folds (e,) [rad]."""
+    """Return the half edges (e, 2) that two facets share in opposite directions, and their folds (e,) [rad]."""
     pair = mesh.topology.pair
     corner = mesh.faces.astype(np.int64).ravel()
     pair = pair[corner[pair[:, 0]] != corner[pair[:, 1]]]
@@ -120,7 +126,7 @@ def _all_folds(mesh: Mesh) -> tuple[Ints, Floats]:
 
 
 def _outward(mesh: Mesh, pair: Ints) -> Floats:
-    """Return 1 (e,) where the facets of a pair bend away from the side they face, -1 where towards it."""
+    """Return 1 (e,) where the facets of a pair make a convex fold, -1 where a concave one."""
     c, (one, other) = mesh.corners, pair.T
     a = c[one // 3]
     normal = np.cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 0])
@@ -128,13 +134,13 @@ def _outward(mesh: Mesh, pair: Ints) -> Floats:
     return np.where(np.einsum("ij,ij->i", normal, tip) > 0.0, -1.0, 1.0)
 
 
-def _doubted(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
-    """Return which soft edges (e,) are of a patch that folds by much or whose facets are uneven, both in the mean over
-    its edges by how much it bends there."""
+def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
+    """Return which smooth folds (e,) may be edges: those of patches that fold strongly or whose facets are uneven, in
+    the mean over the patch weighted by fold times length."""
     one, other = pair.T
     span = _spans(mesh, pair)
     weight = fold * np.linalg.norm(span, axis=1)
-    # Heights over one edge go by the areas.
+    # Heights over a shared edge are as the areas.
     a, b = mesh.areas[one // 3], mesh.areas[other // 3]
     of_facet = components(pair // 3, len(mesh.faces))
     patch, crease = of_facet[one // 3], crease_angle(mesh.crease_deg or 0.0)
@@ -143,15 +149,18 @@ def _doubted(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
         return np.asarray(np.bincount(patch, weight * x) / np.maximum(np.bincount(patch, weight), 1e-300))
 
     wide = crease * np.where(_one_way(mesh, pair, fold, of_facet)[: patch.max() + 1], _STRIPS, _WIDE)
-    doubtful = (mean(np.abs(a - b) / (a + b)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
-    return np.asarray(doubtful[patch])
+    uncertain = (
+        (mean(np.abs(a - b) / (a + b)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
+    )
+    return np.asarray(uncertain[patch])
 
 
 def _one_way(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> Bools:
-    """Return which patches bend one way only, facet for facet, given the patch (f,) of each facet.
+    """Return which patches are singly curved, given the patch (f,) of each facet.
 
-    A facet bends across each of its edges by the fold times the edge's length; the tensor of that has one direction.
-    Source: Cohen-Steiner, Morvan, Restricted Delaunay triangulations and normal cycle, 2003.
+    A facet bends across each of its edges by the fold times the edge's length; on a singly curved patch the tensor of
+    that has one nonzero eigenvalue. Source: Cohen-Steiner, Morvan, Restricted Delaunay triangulations and normal cycle,
+    Proc. SCG 2003.
     """
     span = _spans(mesh, pair)
     length = np.linalg.norm(span, axis=1)

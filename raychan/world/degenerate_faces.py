@@ -1,4 +1,4 @@
-"""Raw triangles: what of them can be a surface at all."""
+"""First checks of raw triangles: finite vertices, existing indices, welding, faces of zero area and duplicates."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from raychan.world.errors import SceneError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
 
-_WELD = 1e-9  # of the mesh's size
-_SIZES = (1e-6, 1e6)  # m: smaller than any wave's length, larger than any radar's range
+_WELD = 1e-9  # of the mesh's size: vertices nearer to each other are one
+_SIZES = (1e-6, 1e6)  # m: least and largest size that is not a mistake of unit or scale
 
 
 def used(v: Floats, f: Ints) -> tuple[Floats, Ints]:
-    """Return the vertices that faces name, and the faces. Raises: SceneError for vertices that are not finite, that are
-    named and not there, or that span no size a radar can see."""
+    """Return the vertices that faces use, and the faces.
+
+    Raises: SceneError for vertices that are not finite or are missing, and for a size that no radar can resolve.
+    """
     if not np.isfinite(v).all():
         bad = int((~np.isfinite(v)).any(axis=1).sum())
         raise SceneError(f"{bad} vertices hold NaN or infinity", value=bad, allowed="finite coordinates")
@@ -38,7 +40,7 @@ def used(v: Floats, f: Ints) -> tuple[Floats, Ints]:
 
 
 def weld(v: Floats, f: Ints) -> tuple[Floats, Ints]:
-    """Return vertices of which no two are at one place, and the faces."""
+    """Return vertices of which no two coincide, and the faces with their numbers."""
     if not len(v):
         return v, f
     step = max(float(np.ptp(v, axis=0).max()), 1e-300) * _WELD
@@ -51,11 +53,11 @@ def weld(v: Floats, f: Ints) -> tuple[Floats, Ints]:
 
 
 def alive(v: Floats, f: Ints) -> tuple[NDArray[np.bool_], int, int]:
-    """Return which faces have an area and are the first of their kind, and the counts of the others."""
+    """Return which faces to keep, and how many have no area and how many are duplicates."""
     c = v[f]
     longest = np.linalg.norm(np.roll(c, -1, axis=1) - c, axis=2).max(axis=1, initial=0.0)
     flat = np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1) <= 1e-12 * longest**2
     _, first = np.unique(np.sort(f, axis=1), axis=0, return_index=True)
-    cached = np.zeros(len(f), bool)
-    cached[first] = True
-    return cached & ~flat, int(flat.sum()), int((~cached & ~flat).sum())
+    unique = np.zeros(len(f), bool)
+    unique[first] = True
+    return unique & ~flat, int(flat.sum()), int((~unique & ~flat).sum())

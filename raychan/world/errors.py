@@ -1,4 +1,4 @@
-"""What is wrong with a scene, where, and what is allowed."""
+"""The error that scenes and meshes raise: what is wrong, where, and what is allowed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class SceneError(ValueError):
-    """A scene or mesh that cannot be used; says what is wrong, where, and what is allowed.
+    """A scene or mesh that cannot be used; the message says what is wrong, where, and what is allowed.
 
     Attributes: file (path or None), key (dotted, '' where none applies), value (what was given), allowed (text).
     """

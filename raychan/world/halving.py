@@ -1,4 +1,5 @@
-"""Halving: the edges of facets halved on the cubic curves through their corner normals, one facet into four.
+"""Subdivision of curved facets: each into four, with edge midpoints on the cubic curves that fit the corner normals (PN
+triangles). It shows how much the quadratic patches of the simulation deviate from a smoother surface.
 
 Everywhere: v, n (f, 3, 3) corners [m] and corner normals of facets.
 """
@@ -12,8 +13,8 @@ from raychan.world.topology import point_numbers
 
 Floats = NDArray[np.float64]
 
-_STEEP = 0.25  # of an edge's square: a tangent that has less of it along the edge stands at more than 60 deg to it
-_AT = (0.25, 0.5, 0.75)  # of an edge: where curves are compared
+_STEEP = 0.25  # least part of a tangent along its edge, of the edge squared: below, they differ by more than 60 deg
+_AT = (0.25, 0.5, 0.75)  # points of an edge, as shares of it, at which the curves are compared
 
 
 def halved(v: Floats, n: Floats) -> tuple[Floats, Floats]:
@@ -35,14 +36,15 @@ def halved(v: Floats, n: Floats) -> tuple[Floats, Floats]:
 
 
 def cubic_off(v: Floats, n: Floats, bulge: Floats) -> Floats:
-    """Return how far (f,) [m] the cubic edges of facets stand off the quadratic ones, which bulge by (f, 3, 3) [m]."""
+    """Return the largest distance (f,) [m] of the cubic edges of facets from the quadratic ones, whose edge curvature
+    is bulge (f, 3, 3) [m]."""
     p, q = _tangents(v, n)
     after, turned = np.roll(v, -1, axis=1), np.roll(n, -1, axis=1)
     most = np.zeros(len(v))
     for t in _AT:
         apart = _cubic(v, after, p, q, t) - ((1.0 - t) * v + t * after - t * (1.0 - t) * bulge)
         along = after - v - (1.0 - 2.0 * t) * bulge
-        # Within the surface both are one and the same.
+        # Deviation along the surface does not count: only the part along the normal.
         up = (1.0 - t) * n + t * turned
         up -= along * (_dot(up, along) / np.maximum(_dot(along, along), 1e-300))[..., None]
         size = np.maximum(np.linalg.norm(up, axis=2), 1e-300)
@@ -51,8 +53,8 @@ def cubic_off(v: Floats, n: Floats, bulge: Floats) -> Floats:
 
 
 def _tangents(v: Floats, n: Floats) -> tuple[Floats, Floats]:
-    """Return the edges (f, 3, 3) [m] as they lie in the tangent planes of their starts and of their ends, as far along
-    the edge as it is itself: a parabola's are so."""
+    """Return the edges (f, 3, 3) [m] projected into the tangent planes at their starts and at their ends, scaled to the
+    same length along the edge, as the tangents of a parabola have."""
     edge = np.roll(v, -1, axis=1) - v
     squared = np.maximum(_dot(edge, edge), 1e-300)
     found = []
@@ -63,13 +65,13 @@ def _tangents(v: Floats, n: Floats) -> tuple[Floats, Floats]:
 
 
 def _cubic(a: Floats, b: Floats, p: Floats, q: Floats, t: float) -> Floats:
-    """Return the points at t of curves from a to b with tangents p and q there (Hermite)."""
+    """Return the points at parameter t of cubic Hermite curves from a to b with tangents p and q."""
     s = 1.0 - t
     return np.asarray(s * s * (1.0 + 2.0 * t) * a + t * t * (3.0 - 2.0 * t) * b + s * s * t * p - t * t * s * q)
 
 
 def _shared(v: Floats, middle: Floats) -> Floats:
-    """Return the middles of edges, those of one edge at their mean."""
+    """Return the edge midpoints, averaged over the facets that share an edge."""
     ends = point_numbers(v.reshape(-1, 3)).reshape(-1, 3)
     after = np.roll(ends, -1, axis=1)
     edge = np.unique(

@@ -1,6 +1,6 @@
-"""What figures may be: physical limits with unit and reason, the same for scene files, flags and Python arguments.
+"""Physical limits of numbers with unit and reason, the same for scene files, options and Python arguments.
 
-A figure beyond them is a slip (a wrong unit, a digit too many) or asks for physics that is not modelled here.
+A number beyond them is a mistake (a wrong unit, a digit too many) or asks for physics that is not modelled.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Limit:
-    """Lowest and highest value that can be meant, with unit and reason; `above`: the lowest itself is not allowed."""
+    """Lowest and highest plausible value, with unit and reason; `above`: the lowest itself is not allowed."""
 
     low: float
     high: float
@@ -20,7 +20,7 @@ class Limit:
     above: bool = False
 
     def allows(self, value: float) -> bool:
-        """Tell whether a value lies within; NaN does not."""
+        """Return whether a value lies within the limits; NaN does not."""
         return (self.low < value if self.above else self.low <= value) and value <= self.high
 
     @property

@@ -1,7 +1,7 @@
-"""Faces that were cut in a plane, made whole again: a mesh and its subdivision are then the same body.
+"""Coplanar neighbouring faces are merged and triangulated anew, so that a mesh and its subdivision are the same body.
 
-Without this the normals of a curved surface, which are found at the vertices, would change with every cut of its
-facets.
+Without this the corner normals of a curved surface, which are estimated at the vertices, would change with every
+subdivision of its facets.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_PLANE = 1.0 - 1e-9  # cosine within which neighbours share a plane
-_STRAIGHT = 1e-6  # sine under which a corner of an outline is none
+_PLANE = 1.0 - 1e-9  # cosine between normals from which neighbours are coplanar
+_STRAIGHT = 1e-6  # sine of a turn below which an outline is straight at a vertex
 
 
 def merge_flat(
     v: Floats, f: Ints, part: Ints, pairs: Callable[[Any], Any], components: Callable[[Any, Any, int], Ints]
 ) -> tuple[Ints, Ints]:
-    """Return faces and their parts with convex plane pieces triangulated anew from their true corners.
+    """Return faces and their parts with convex coplanar pieces triangulated anew from their corners.
 
     Args: v (v, 3) [m], f (f, 3), part (f,); pairs, components the mesh's own edge pairs and connected components. A
     vertex is dropped only if no piece about it has a corner there, so that no edge gets a vertex in its middle.
@@ -39,7 +39,7 @@ def merge_flat(
     edges = np.flatnonzero(rim)
     owner, start = piece[edges // 3], f[edges // 3, edges % 3]
     stop = f[edges // 3, (edges % 3 + 1) % 3]
-    # Chain each outline: the edge that follows starts where this one stops, in the same piece.
+    # Link each outline: the next edge starts where this one stops, in the same piece.
     size = np.int64(v.shape[0])
     order = np.argsort(owner * size + start, kind="stable")
     key = (owner * size + start)[order]
@@ -56,7 +56,7 @@ def merge_flat(
     kept = np.zeros(len(v), bool)
     kept[stop[is_corner | concave]] = True
     while True:
-        # A piece whose outline keeps a vertex that is no corner of its own stays as it is, with all its vertices.
+        # A piece that must keep a vertex which is no corner of its outline stays as it is, with all its vertices.
         stuck = broken.copy()
         stuck[owner[kept[stop] & ~is_corner]] = True
         stuck &= count > 1
@@ -90,15 +90,15 @@ def _loop(mine: Ints, following: Ints, stop: Ints, is_corner: NDArray[np.bool_])
 
 
 def _first(corners: Floats) -> int:
-    """Return the corner (c, 3) [m] at which a fan begins: however an outline was cut or stands in space, it is fanned
-    alike. It is told by the lengths of the edges from it on, of equal ones by where it stands."""
+    """Return the number of the corner, of (c, 3) [m], at which a triangle fan begins, independent of how the outline
+    was subdivided or turned: chosen by the lengths of the edges that follow, of equal ones by position."""
     length = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-    told = [tuple(row) for row in np.round(length / length.max(), 6)[_round(len(length))]]
-    return min(range(len(corners)), key=lambda i: (tuple(-x for x in told[i]), tuple(corners[i])))
+    lengths = [tuple(row) for row in np.round(length / length.max(), 6)[_round(len(length))]]
+    return min(range(len(corners)), key=lambda i: (tuple(-x for x in lengths[i]), tuple(corners[i])))
 
 
 def _round(n: int) -> Ints:
-    """Return the numbers 0 to n - 1 from each on, in a ring (n, n)."""
+    """Return the cyclic sequences (n, n) of 0 to n - 1, one starting at each number."""
     return (np.arange(n)[:, None] + np.arange(n)) % n
 
 

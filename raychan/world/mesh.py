@@ -1,4 +1,5 @@
-"""Triangle meshes: welded, freed of dead faces, wound outward, with the normals of the surface they stand for."""
+"""Triangle meshes of bodies: vertices welded, degenerate faces dropped, faces wound outward, and the corner normals of
+the surface that the mesh stands for."""
 
 from __future__ import annotations
 
@@ -22,12 +23,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
 
 CREASE_DEG = 20.0
-_ALIKE = 5e-4  # of the crease angle: folds of one angle are read alike, though a file rounds its vertices
+"""Crease angle [deg] where none is given: sections of a cylinder are smooth from 19 on (not measured against
+others)."""
+_ALIKE = 5e-4  # of the crease angle: equal folds are treated equally although files round their vertices
 
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What was found in a mesh and what was done to it."""
+    """What was found in a mesh, and what was mended."""
 
     vertices: int
     faces: int
@@ -59,8 +62,8 @@ class Mesh:
     """Triangles in a body's own frame.
 
     Fields: vertices (v, 3) [m]; faces (f, 3), counter-clockwise seen from outside; part (f,) index into part_names;
-    normals (f, 3, 3) unit normals of the true surface at the corners; part_materials names by part, or (); crease_deg
-    the fold [deg] under which edges were taken for smooth and normals estimated, None where they are known.
+    normals (f, 3, 3) unit normals of the surface at the corners; part_materials names by part, or (); crease_deg
+    the angle [deg] under which folds were taken as smooth to estimate normals, None where normals are known.
     """
 
     vertices: Floats
@@ -74,13 +77,13 @@ class Mesh:
 
     @cached_property
     def topology(self) -> MeshTopology:
-        """How the faces hang together."""
+        """Which faces share edges and vertices, and which edges are open."""
         return mesh_topology(point_numbers(self.vertices)[self.faces], self.part, self.corners, self.normals)
 
     def inner_spheres(self, opaque: tuple[bool, ...]) -> tuple[Floats, Floats]:
-        """Return centres (k, 3) [m] and radii (k,) [m] of balls inside, whose shadow the mesh's own holds.
+        """Return centres (k, 3) [m] and radii (k,) [m] of spheres inside, whose shadows lie within the mesh's shadow.
 
-        Args: opaque: which parts let nothing through.
+        Args: opaque: which parts let no wave through.
         """
         if opaque not in self._cores:
             solid = closed_pieces(self.topology, np.array(opaque, bool)[self.part])
@@ -88,8 +91,8 @@ class Mesh:
         return self._cores[opaque]
 
     @cached_property
-    def kept(self) -> dict[str, Any]:
-        """What others found out about it, once."""
+    def memo(self) -> dict[str, Any]:
+        """Results derived from the mesh that are computed once, by name."""
         return {}
 
     @cached_property
@@ -117,7 +120,10 @@ class Mesh:
         return float(np.einsum("ij,ij->", c[:, 0], np.cross(c[:, 1], c[:, 2])) / 6.0)
 
     def winding(self, point: Floats) -> float:
-        """Return how often the faces surround a point (3,): 1 inside a closed body, 0 outside."""
+        """Return the winding number of the faces about a point (3,): 1 inside a closed body, 0 outside.
+
+        Source: Van Oosterom, Strackee, IEEE Trans. Biomed. Eng. 30(2), 1983 (solid angle of a triangle).
+        """
         a, b, c = np.moveaxis(self.corners - np.asarray(point, float), 1, 0)
         la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
         dots = [np.einsum("ij,ij->i", *p) for p in ((a, b), (b, c), (c, a))]
@@ -136,12 +142,11 @@ def make_mesh(
     crease_deg: float = CREASE_DEG,
     part_materials: tuple[str, ...] = (),
 ) -> Mesh:
-    """Return a checked Mesh of raw triangles: welded, dead faces dropped, closed pieces wound outward.
+    """Return a checked Mesh of raw triangles: vertices welded, degenerate faces dropped, closed pieces wound outward.
 
-    Args: vertices (v, 3) [m]; faces (f, 3); part (f,), normals (f, 3, 3) exact corner normals, or None to smooth over
-    edges that bend less than crease_deg (the faces' winding is then made consistent too).
-    Raises: SceneError for a mesh that is empty, holds NaN or faces of vertices that are not there, or is of no size
-    that radar can see.
+    Args: vertices (v, 3) [m]; faces (f, 3); part (f,); normals (f, 3, 3) exact corner normals, or None to estimate them
+    over folds of less than crease_deg (the faces' winding is then made consistent, too).
+    Raises: SceneError for a mesh that is empty, has NaN or faces of missing vertices, or a size that no radar resolves.
     """
     v, f = np.asarray(vertices, float).reshape(-1, 3), np.asarray(faces, np.int64).reshape(-1, 3)
     v, f = degenerate_faces.used(v, f)
@@ -167,14 +172,14 @@ def make_mesh(
 
 
 def creased(mesh: Mesh, crease_deg: float) -> Mesh:
-    """Return a mesh with its normals estimated by another crease angle [deg]; itself where they are known."""
+    """Return a mesh with its normals estimated by another crease angle [deg]; the same mesh where they are known."""
     if mesh.crease_deg in (None, crease_deg):
         return mesh
     return replace(mesh, normals=smooth_normals(mesh.vertices, mesh.faces, crease_deg), crease_deg=crease_deg)
 
 
 def opposed_pairs(faces: Ints) -> tuple[Ints, Ints]:
-    """Return the two faces (e,) of each edge that exactly two of them walk, in opposite ways."""
+    """Return the two faces (e,) of each edge that exactly two faces share, in opposite directions."""
     a, b, _, _, opposed = _edge_pairs(faces)
     return a[opposed], b[opposed]
 
@@ -185,7 +190,7 @@ def crease_angle(crease_deg: float) -> float:
 
 
 def smooth_normals(vertices: Floats, faces: Ints, crease_deg: float = CREASE_DEG) -> Floats:
-    """Return corner normals (f, 3, 3), smoothed over edges that bend less than crease_deg (see `smoothing`)."""
+    """Return corner normals (f, 3, 3), smoothed over folds of less than crease_deg (see world.vertex_normals)."""
     a, b, ea, eb, opposed = _edge_pairs(faces)
     pair = np.stack([3 * a + ea, 3 * b + eb], axis=1)[opposed]
     return smoothed(vertices, faces, pair[folds(vertices, faces, pair) < crease_angle(crease_deg)])
@@ -196,7 +201,7 @@ def _cross(v: Floats, f: Ints) -> Floats:
 
 
 def _edges(f: Ints) -> tuple[Ints, NDArray[np.bool_], Ints]:
-    """Return the order that sorts the 3 f half-edges by their ends, their sense, and the number of each one's edge."""
+    """Return the order that sorts the 3 f half edges by their ends, their direction, and the edge number of each."""
     start, end = f.ravel().astype(np.int64), np.roll(f, -1, axis=1).ravel().astype(np.int64)
     key = np.minimum(start, end) * (int(f.max(initial=0)) + 1) + np.maximum(start, end)
     order = np.argsort(key, kind="stable")
@@ -205,7 +210,7 @@ def _edges(f: Ints) -> tuple[Ints, NDArray[np.bool_], Ints]:
 
 
 def _edge_pairs(f: Ints) -> tuple[Ints, Ints, Ints, Ints, NDArray[np.bool_]]:
-    """Return for edges of exactly two faces: the faces, their local edges, whether they walk it in opposite ways."""
+    """Return, for edges of exactly two faces, the faces, their local edges, and whether the directions are opposite."""
     order, sense, run = _edges(f)
     twice = np.flatnonzero(np.bincount(run) == 2)
     first = np.searchsorted(run, twice)
@@ -219,16 +224,16 @@ def _components(a: Ints, b: Ints, n: int) -> Ints:
 
 
 def _wind(v: Floats, f: Ints) -> tuple[Ints, int]:
-    """Wind neighbours alike and closed pieces outward; return the faces and how many were turned."""
+    """Wind neighbours consistently and closed pieces outward; return the faces and how many were turned."""
     n = len(f)
     a, b, _, _, opposed = _edge_pairs(f)
-    # Double cover: node f is the face as it is, node n + f the face turned; neighbours that agree share a component.
+    # Graph of 2 n nodes: f is the face as it is, n + f the face turned; consistent neighbours share a component.
     turn = np.where(opposed, 0, n)
     cover = _components(np.concatenate([a, a + n]), np.concatenate([b + turn, b + n - turn]), 2 * n)
     piece = _components(a, b, n)
     _, root = np.unique(piece, return_index=True)
     flip = cover[:n] != cover[root][piece]
-    # The least change: most faces of a piece keep their winding.
+    # The smallest change: most faces of a piece keep their winding.
     count = np.bincount(piece)
     flip ^= (2 * np.bincount(piece, flip) > count)[piece]
     out = np.where(flip[:, None], f[:, ::-1], f)

@@ -11,9 +11,9 @@ from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
 
-_SIZES = 0.01, 150.0  # m: what a body of a scene measures as a rule
-_USUAL = 3.0  # m
-_FARTHEST = 1e12  # in the unit of a file; beyond lies only what was read wrong
+_SIZES = 0.01, 150.0  # m: sizes outside are warned of
+_USUAL = 3.0  # m: typical size, for guessing the unit
+_FARTHEST = 1e12  # in the unit of the file: coordinates beyond are errors of the file or of its reader
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "ft": 0.3048}
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 _STL_HEAD, _STL_FACET = 84, 50  # bytes
@@ -49,7 +49,7 @@ def load(
     try:
         import trimesh
 
-        # Corners at infinity are told below, not by the reader's arithmetic.
+        # Infinite coordinates are reported below, not as warnings of the reader.
         with np.errstate(all="ignore"):
             scene = trimesh.load_scene(str(file), process=False)
         return from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
@@ -81,16 +81,17 @@ def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[s
 
 
 def unit_hint(size: float, unit: str = "m") -> str:
-    """Return the unit that would make a thing of a size [m], read in `unit`, one of a few metres; '' if none would."""
+    """Return the unit in which a body of a size [m], read in `unit`, would be a few metres large; '' if there is
+    none."""
     sizes = {name: size / UNITS[unit] * metres for name, metres in UNITS.items() if name != unit}
     best = min(sizes, key=lambda name: abs(np.log(sizes[name] / _USUAL)))
     return f'unit = "{best}" makes it {sizes[best]:.3g} m' if 0.1 <= sizes[best] / _USUAL <= 10.0 else ""
 
 
 def oddities(mesh: Mesh, path: str | Path, unit: str = "m", up: str | None = None, key: str = "") -> list[str]:
-    """Return a line each on what a file does not say and was guessed, where the guess looks wrong: unit and up axis.
+    """Return a line each on unit and up axis, which files do not say, where the assumption looks wrong.
 
-    Args: `key` goes before the names of the keys that mend it, as 'bodies.car.'.
+    Args: key, prefix of the names of the keys that correct it, as 'bodies.car.'.
     """
     said, size = [], max(mesh.report.size)
     if not _SIZES[0] <= size <= _SIZES[1]:
@@ -102,7 +103,7 @@ def oddities(mesh: Mesh, path: str | Path, unit: str = "m", up: str | None = Non
         stands = np.abs(low) <= 0.02 * extent
         length, width, height = extent
         facts = f"{length:.3g} x {width:.3g} x {height:.3g} m (x forward, y left, z up)"
-        # What stands on the plane through its origin shows by which axis it was meant to stand.
+        # A body that stands on a coordinate plane shows which axis is up.
         if not stands[2] and stands[:2].sum() == 1 and extent[stands].min() > 0.0:
             meant = (ahead, "xyz".replace(taken, "").replace(ahead, ""))[int(np.argmax(stands[:2]))]
             said.append(f'{taken} was taken as up, but it stands on {meant} = 0: {facts}; {key}up = "{meant}" turns it')
@@ -135,7 +136,7 @@ def from_trimesh(source: Any, crease_deg: float = CREASE_DEG, matrix: Floats | N
 
 
 def _possible(v: Floats) -> None:
-    """Raise SceneError where corners (n, 3) in the file's unit are no places."""
+    """Raise SceneError where corners (n, 3), in the unit of the file, are not finite or far beyond any size."""
     wrong = int((~np.isfinite(v)).any(axis=1).sum())
     if wrong:
         raise SceneError(f"{wrong} vertices hold NaN or infinity", value=wrong, allowed="finite coordinates")
@@ -145,7 +146,7 @@ def _possible(v: Floats) -> None:
 
 
 def _sized(mesh: Mesh) -> Mesh:
-    """Return a mesh that is no larger than a body can be."""
+    """Return the mesh; raise SceneError where it is larger than a body can be."""
     size = max(mesh.report.size)
     if not WIDTH.allows(size):
         raise SceneError(f"the mesh is {size:.4g} m across", key="unit", value=size, allowed=WIDTH.allowed)

@@ -1,5 +1,5 @@
-"""Where a body is and how it moves: constant velocity, constant turn about the vertical through its own origin, and
-constant spin about an axis of its own, as of a wheel or a rotor."""
+"""Pose and motion of a body: constant velocity, constant turn rate about the vertical through its origin, and constant
+spin about an axis of its own, as of a wheel or a rotor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How bodies stand to each other and to the radar: which overlap, and whether any is in view. Told, not mended."""
+"""Warnings on the layout of a scene: bodies that overlap, and whether any body is in view of the radar."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from raychan.records import MIRROR
 from raychan.world.body import Body
 from raychan.world.mesh import Floats
 
-_SAMPLES = 400  # places on a body's surface
-_TESTS = 48  # of these, asked whether they lie inside another body
-_WORK = 1_000_000  # facets times places
-_DEPTH = 1e-3  # m: bodies that only touch, or are rounded into each other, do not overlap
-_INSIDE = 0.75  # of a turn: 1 inside a closed body, 1/2 on its surface, 0 outside
-_BEAM = 1e-6  # of the peak, both ways: -60 dB
+_SAMPLES = 400  # points on a body's surface
+_TESTS = 48  # most of these that are tested against another body
+_WORK = 1_000_000  # most facets times points: bounds the time (not measured)
+_DEPTH = 1e-3  # m: bodies that only touch, within rounding, do not overlap
+_INSIDE = 0.75  # winding number: 1 inside a closed body, 1/2 on its surface, 0 outside
+_BEAM = 1e-6  # of the two-way peak gain, -60 dB: below, a body is outside the beam
 
 
 def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Floats:
-    """Return places (count, 3) [m], world axes, spread over a body's surface, `depth` [m] below it; always the same."""
+    """Return points (count, 3) [m], world axes, spread over a body's surface, `depth` [m] below it; always the same."""
     mesh, rng = body.geometry, np.random.default_rng(0)
     share = np.cumsum(mesh.areas)
     face = np.minimum(np.searchsorted(share, rng.random(count) * share[-1]), len(share) - 1)
@@ -34,9 +34,9 @@ def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Flo
 
 
 def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
-    """Return a line for each pair of bodies that reach into each other, and each body hidden inside another.
+    """Return a line for each pair of bodies that overlap, and for each body hidden inside another.
 
-    Args: opaque: which bodies let nothing through. A body that is wholly inside one that lets waves in is meant so.
+    Args: opaque: which bodies let no wave through. A body wholly inside one that lets waves in is intended.
     """
     said = []
     solid = [i for i, body in enumerate(bodies) if body.kind != MIRROR]
@@ -71,7 +71,7 @@ def _box(body: Body) -> Floats:
 
 
 def _inside(body: Body, other: Body) -> float:
-    """Return about what share of a body's surface lies inside another one."""
+    """Return the approximate share of a body's surface that lies inside another body."""
     size = min(max(body.geometry.report.size), max(other.geometry.report.size))
     places = other.motion.to_body(surface_sample(body, depth=min(_DEPTH, 0.01 * size)))
     low, high = other.geometry.bounds
@@ -109,7 +109,7 @@ def _two_way(radar: Any, look: Floats) -> Floats:
 
 
 def _around() -> Floats:
-    """Return directions (n, 3) ahead, finer than any beam of use."""
+    """Return a grid of directions (n, 3) ahead, 2 deg apart, finer than practical beams."""
     azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 91.0, 2.0)), np.radians(np.arange(-60.0, 61.0, 2.0)))
     level = np.cos(elevation.ravel())
     return np.stack(

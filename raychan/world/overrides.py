@@ -1,4 +1,4 @@
-"""TOML text to tables, and single keys of tables changed from outside."""
+"""Scene tables read from TOML text, and single keys of them overridden, as `--set` does."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from raychan.world.errors import SceneError, nearest
 from raychan.world.mesh_io import SUFFIXES
 
 LATER = "# later by [s]: "
-"""Begins the line with which the text of a scene says that it is taken at another time than that of its poses."""
+"""Begins the line in a scene's text that says at which later time the scene is taken."""
 
 _XYZ = ("x", "y", "z")
 _VECTORS = ("position", "velocity_mps", "rcs_point")
@@ -86,7 +86,7 @@ def _step(at: Any, word: str, key: str, file: Any) -> Any:
 
 
 def _value(text: str) -> Any:
-    """Return a TOML value; what is none is text."""
+    """Return the TOML value of a text; the text itself where it is none."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
     except (ValueError, RecursionError):

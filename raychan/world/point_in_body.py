@@ -1,4 +1,4 @@
-"""Inside: where a point stands to a body's surface: outside, inside, on it, or in the plane of a facet."""
+"""Point-in-body test: whether a point is outside a surface, inside it, on it, or in the plane of a facet."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from raychan.geometry.triangles import planes_of
 Floats = NDArray[np.float64]
 
 _ON = 1e-6  # m: a point nearer to a facet than this is on it
-_WHOLE = 0.01  # how far a winding number may be from a whole one: about a point in an open body it is not whole
+_WHOLE = 0.01  # deviation of a winding number from an integer: in an open body it is no integer
 
 
 class Place(IntEnum):
-    """Where a point stands to a surface."""
+    """Position of a point relative to a surface."""
 
     OUTSIDE = 0
     INSIDE = 1
@@ -25,7 +25,8 @@ class Place(IntEnum):
 
 
 def place_of(corners: Floats, point: Floats) -> Place:
-    """Return where a point (3,) [m] stands to a surface of facets (n, 3, 3) [m]; an open one has no inside."""
+    """Return the position of a point (3,) [m] relative to a surface of facets (n, 3, 3) [m]; an open one has no
+    inside."""
     point = np.asarray(point, float)
     if not len(corners):
         return Place.OUTSIDE
@@ -40,7 +41,7 @@ def place_of(corners: Floats, point: Floats) -> Place:
 
 
 def in_plane_of(corners: Floats, point: Floats) -> int:
-    """Return of how many facets (n, 3, 3) [m] the plane holds a point (3,) [m], which then sees them edge-on."""
+    """Return the number of facets, of (n, 3, 3) [m], whose plane contains a point (3,) [m]: it sees them edge-on."""
     normal, area = planes_of(np.ascontiguousarray(corners))
     off = np.asarray(point, float) - corners[:, 0]
     height = np.abs(np.einsum("ij,ij->i", off, normal))

@@ -1,4 +1,4 @@
-"""The figures of a scene file by what they are: numbers with the limits of raychan.world.limits."""
+"""Types of the numbers in a scene file, checked against the limits of raychan.world.limits."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from raychan.world.limits import Limit
 
 
 def _within(limit: Limit) -> AfterValidator:
-    """Return the check that a figure is one that can be meant."""
+    """Return the check that a number lies within a limit."""
 
     def check(value: float) -> float:
         if not limit.allows(value):
@@ -23,7 +23,7 @@ def _within(limit: Limit) -> AfterValidator:
 
 
 def _window(name: str) -> str:
-    """Check that a window is known by its name; those that most scenes have need no numbers for that."""
+    """Check the name of a window; the two most common names need no import of numpy."""
     if name not in ("rect", "hann"):
         from raychan.radar.windows import window
 

@@ -1,4 +1,4 @@
-"""Tables checked by their schema: what pydantic found, said in the words of a scene file."""
+"""Tables checked by their schema, with pydantic's errors translated into the keys of a scene file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from raychan.world.errors import SceneError, nearest, shown
 
 
 def checked(kind: type[Any], data: Any, file: Any = None) -> Any:
-    """Return `data` checked as a table of `kind`; SceneError for the first thing that is wrong."""
+    """Return `data` checked as a table of `kind`. Raises: SceneError for the first error."""
     try:
         return kind.model_validate(data)
     except ValidationError as e:

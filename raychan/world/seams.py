@@ -1,4 +1,4 @@
-"""Seams: a curved surface that is drawn as several bodies is one surface, and its normals go on across their seams."""
+"""Normals across the seams of bodies: a curved surface drawn as several bodies is smoothed as one surface."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ from raychan.world.mesh import Floats, Ints, opposed_pairs, smooth_normals
 def over_seams(bodies: Sequence[Body]) -> tuple[Body, ...]:
     """Return bodies with their estimated normals smoothed over the edges that they share.
 
-    Bodies that move as one and share edges under the crease angle are read as one mesh is: it is the same surface
-    whether drawn as one body or as several. Bodies of known normals stay as they are.
-    """
+    Bodies that move as one and share edges that fold by less than the crease angle get the normals that one mesh of
+    them all would have. Bodies with known normals stay as they are."""
     groups: dict[Any, list[int]] = {}
     for i, body in enumerate(bodies):
         mesh = body.geometry
@@ -43,7 +42,7 @@ def over_seams(bodies: Sequence[Body]) -> tuple[Body, ...]:
 
 
 def _moves(body: Body) -> tuple[Any, ...]:
-    """Return what bodies have alike that move as one."""
+    """Return the motion parameters that are equal for bodies that move as one."""
     m = body.motion
     turns = bool(m.turn_rate) or any(m.own_spin)
     return (*m.velocity, m.turn_rate, *m.own_spin, *((m.position, m.yaw, m.pitch, m.roll) if turns else ()))

@@ -1,4 +1,4 @@
-"""Tessellation: which folds above the crease angle look like those of a curved surface cut into flat facets.
+"""Folds above the crease angle that look like a curved surface tessellated into flat facets, and may be smooth.
 
 Everywhere: pair (e, 2) half edges of both sides of an edge; fold (e,) [rad], positive where the facets bend outward.
 """
@@ -18,26 +18,26 @@ Ints = NDArray[np.signedinteger[Any]]
 Bools = NDArray[np.bool_]
 
 BAND = 2.05
-"""Of the crease angle: folds up to this may be meant as smooth. At 20 deg a cylinder of nine sections (folds of
-40 deg) may, a prism of eight sides (45 deg) is an edge each."""
-_MOST = np.radians(41.0)  # whatever the crease angle: no square, hexagonal or octagonal bar is meant as round
-_ALONE = 0.75  # of a panel's bending across a fold: one that has more of it does not go on to the next panel
-_UNEVEN = 0.17  # of two panels about a fold: how far their widths may differ, over their sum
-_FEW = 4  # folds: fewer tell nothing of a tessellation
+"""Times the crease angle: larger folds are always edges. With 20 deg a cylinder of nine sections (folds of 40 deg) may
+be smooth, a prism of eight sides (45 deg) has edges."""
+_MOST = np.radians(41.0)  # for any crease angle: square, hexagonal and octagonal bars have edges
+# Shares as in world.creases; single values not measured.
+_ALONE = 0.75  # of a panel's bending across a fold: with more, the curvature does not continue to the next panel
+_UNEVEN = 0.17  # difference over sum of the widths of two panels about a fold: with more, no regular tessellation
+_FEW = 4  # folds: fewer are no evidence of a tessellation
 
 
 def band(crease: float) -> tuple[float, float]:
-    """Return the least and largest fold [rad] that may be meant as smooth though it is above the crease angle [rad]."""
+    """Return the least and largest fold [rad] above the crease angle [rad] that may be smooth."""
     return crease, min(BAND * crease, _MOST)
 
 
 def rounded(topology: MeshTopology, corners: Floats, pair: Ints, fold: Floats, crease: float) -> Bools:
-    """Return which edges (e,) above the crease angle [rad] may be meant as smooth.
+    """Return which edges (e,) above the crease angle [rad] may be smooth.
 
-    Such folds go on from panel to panel by much the same angle and in the same sense, four or more of them, and the
-    panels are alike in width: sections of a cylinder, rings of a globe; not two sheets that meet at a ridge, a
-    chamfer, or the facets of a hull around points. Args: corners (f, 3, 3) [m] of the facets.
-    """
+    Such folds continue from panel to panel in the same sense and by similar angles, four or more of them, and the
+    panels are of similar width, as sections of a cylinder or rings of a globe; not two sheets that meet at a ridge, a
+    chamfer, or the facets of a convex hull of points. Args: corners (f, 3, 3) [m] of the facets."""
     low, high = band(crease)
     among = (np.abs(fold) >= low) & (np.abs(fold) < high)
     found = np.zeros(len(pair), bool)
@@ -64,14 +64,14 @@ def rounded(topology: MeshTopology, corners: Floats, pair: Ints, fold: Floats, c
 
 
 def _panels(topology: MeshTopology, pair: Ints, fold: Floats, low: float) -> Ints:
-    """Return the panel (f,) of each facet: its plane, or itself and the neighbour to which both bend least, as the two
-    halves of a quadrilateral that is not plane do."""
+    """Return the panel number (f,) of each facet: the facets of one plane, or two facets that bend least towards each
+    other, the halves of a quadrilateral that is not plane."""
     facet, n = pair // 3, len(topology.plane)
     single = np.bincount(topology.plane)[topology.plane] == 1
     usable = np.flatnonzero((np.abs(fold) < low) & single[facet].all(axis=1))
     order = usable[np.argsort(np.abs(fold[usable]), kind="stable")]
     least = np.full(n, -1)
-    # The last written stays: backwards, that is the least fold.
+    # The last value written counts: going backwards, that is the least fold.
     for side in (0, 1):
         back = order[::-1]
         here = facet[back, side]
@@ -98,8 +98,8 @@ def _across(corners: Floats, pair: Ints) -> tuple[Floats, Floats]:
 
 
 def _alone(panel: Ints, bend: Floats, across: Floats) -> Floats:
-    """Return of the bending of each edge's panels (e, 2) across it the share (e,) that the panel beside it has, on the
-    side where that is less: 1 where the fold does not go on, a half on a strip of equal folds."""
+    """Return the share (e,) that each fold has of its panels' (e, 2) bending in that direction, on the side where it is
+    less: 1 where the curvature ends at the fold, a half on a strip of equal folds."""
     n = int(panel.max()) + 1
     key = np.unique(np.sort(panel, axis=1) @ np.array([n, 1]), return_inverse=True)[1].ravel()
     tensors = bend[:, None, None, None] * across[..., :, None] * across[..., None, :]
@@ -115,11 +115,12 @@ def _alone(panel: Ints, bend: Floats, across: Floats) -> Floats:
 
 
 def _apart(size: Floats, both: Ints) -> Floats:
+    """Return difference over sum (e,) of the sizes of two things (e, 2)."""
     a, b = size[both[:, 0]], size[both[:, 1]]
     return np.asarray(np.abs(a - b) / np.maximum(a + b, 1e-300))
 
 
 def _pairs(panel: Ints, patch: Ints, n: int) -> Ints:
-    """Return how many pairs of panels (e, 2) each of n patches holds."""
+    """Return the number of different pairs of panels (e, 2) in each of n patches."""
     rows = np.unique(np.column_stack([patch, np.sort(panel, axis=1)]), axis=0)
     return np.bincount(rows[:, 0], minlength=n)

@@ -1,4 +1,4 @@
-"""Normals of the smooth surface that a mesh stands for, estimated at its corners from the facets around them.
+"""Corner normals of the smooth surface that a mesh stands for, estimated from the facets around each vertex.
 
 Everywhere: vertices (v, 3) [m]; faces (f, 3); pair (e, 2) half edges of both sides of an edge, half edge 3 f + k runs
 from corner k of facet f to the next.
@@ -18,13 +18,13 @@ Ints = NDArray[np.signedinteger[Any]]
 Bools = NDArray[np.bool_]
 
 NEAR = 4.0
-"""Power of the distance by which neighbours weigh less in a fit."""
-_UNKNOWNS = 9
-_LEAST_PIVOT = 1e-4  # of equations scaled to a diagonal of ones: below it the neighbours do not determine a surface
-_FITTED = 0.3  # of the neighbours' rms height: what a fit to a smooth surface may leave of it
-_HUB = 30  # neighbours: the pole of a globe, whose other neighbours are too many and too far
-_CANCELLED = 1e-9  # of their sum of sizes: weighted normals that leave no direction
-_CHUNK = 8192  # vertices fitted at once
+"""Weights of neighbours in a fit fall with this power of their distance (other powers not measured)."""
+_UNKNOWNS = 9  # coefficients of the cubic surface
+_LEAST_PIVOT = 1e-4  # pivot of the equations scaled to a unit diagonal: below, neighbours do not determine the surface
+_FITTED = 0.3  # of the neighbours' rms height: largest residual of a fit that is taken
+_HUB = 30  # most neighbours whose own neighbours are used too: the pole of a globe has too many, too far away
+_CANCELLED = 1e-9  # of the sum of their sizes: weighted normals that cancel leave no direction
+_CHUNK = 8192  # vertices fitted at once: bounds memory
 
 
 def folds(vertices: Floats, faces: Ints, pair: Ints) -> Floats:
@@ -36,16 +36,16 @@ def folds(vertices: Floats, faces: Ints, pair: Ints) -> Floats:
 
 
 def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> Floats:
-    """Return corner normals (f, 3, 3), smoothed over the edges given, which the facets walk in opposite ways.
+    """Return corner normals (f, 3, 3), smoothed over the given edges.
 
-    Each face weighs by the sine of its corner over both edge lengths, which is exact for vertices on a sphere: an
-    angle of 0.1 degrees is 0.1 rad of two-way phase at 77 GHz over a 2 cm facet. On other bodies it is off by the
-    unevenness of the facets; where the neighbours determine a cubic surface, its gradient takes that out.
+    Faces are weighted by the sine of their corner over both edge lengths, which is exact for vertices on a sphere; an
+    error of 0.1 degrees is 0.1 rad of two-way phase at 77 GHz over a 2 cm facet. On other bodies uneven facets cause an
+    error; where the neighbours determine a cubic surface, its gradient corrects it.
     Sources: Max (1999), J. Graphics Tools 4(2); Cazals, Pouget (2005), Computer Aided Geometric Design 22, 121.
     """
     n = len(faces)
     one, other = pair.T
-    # Edge e runs from corner e to e + 1; its neighbour walks it the other way.
+    # Edge e runs from corner e to e + 1; its neighbour runs the opposite way.
     links = np.concatenate([[one, _next(other)], [_next(one), other]], axis=1)
     group = components(links.T, 3 * n)
     c = vertices[faces]
@@ -54,7 +54,7 @@ def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> 
     weighted = (np.cross(to_next, to_last) / np.maximum(squares, 1e-300)[..., None]).reshape(-1, 3)
     count = int(group.max()) + 1
     total = _sums(group, weighted, count)
-    # About a point where a surface is folded on itself no normal is smooth: each facet keeps its own.
+    # Where a surface is folded back on itself there is no smooth normal: each facet keeps its own.
     whole = np.bincount(group, np.linalg.norm(weighted, axis=1), count)
     lost = np.linalg.norm(total, axis=1) <= _CANCELLED * whole
     total = _unit(total)
@@ -69,7 +69,7 @@ def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> 
 
 
 def components(links: Ints, n: int) -> NDArray[np.int64]:
-    """Return the number (n,) of the set that each of n things hangs together with by links (e, 2)."""
+    """Return the number (n,) of the connected component of each of n nodes with links (e, 2)."""
     a, b = links.T
     graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
     return connected_components(graph, directed=False)[1].astype(np.int64)
@@ -86,7 +86,7 @@ def _corrected(place: Floats, first: Floats, rows: Ints, near: csr_matrix, power
     x, y, z = (np.einsum("ij,ij->i", d, axis[at]) for axis in (u, w, normal))
     sx, sy = (_rms(c, at, len(rows)) for c in (x, y))
     s, t, zx, zy = x / sx[at], y / sy[at], z / sx[at], z / sy[at]
-    # Heights over the square of the distance in space, not in the plane: a sphere is met exactly.
+    # Quadratic terms use the distance in space instead of that in the plane: a sphere is then fitted exactly.
     basis = np.stack([s, t, s * s + zx * zx, s * t, t * t + zy * zy, s**3, s * s * t, s * t * t, t**3], axis=1)
     weight = np.maximum(s * s + t * t, 1e-12) ** (-0.5 * power)
     solved, able = _least_squares(basis, weight, z, at, len(rows))
@@ -94,7 +94,7 @@ def _corrected(place: Floats, first: Floats, rows: Ints, near: csr_matrix, power
     rest, all_ = (np.bincount(at, weight * c * c, len(rows)) for c in (left, z))
     able &= (np.diff(near.indptr) >= _UNKNOWNS) & (rest < _FITTED**2 * all_)
     slope = solved[:, :2] / np.stack([sx, sy], axis=1)
-    # No first estimate is off by as much as the surface turns on the way to its neighbours.
+    # A correction larger than the turn of the surface over its neighbours is not plausible.
     able &= np.linalg.norm(slope, axis=1) < _rms(z, at, len(rows)) / np.hypot(sx, sy)
     slope[~able] = 0.0
     return _unit(normal - slope[:, :1] * u - slope[:, 1:] * w)
@@ -102,7 +102,7 @@ def _corrected(place: Floats, first: Floats, rows: Ints, near: csr_matrix, power
 
 def _least_squares(basis: Floats, weight: Floats, z: Floats, at: Ints, n: int) -> tuple[Floats, Bools]:
     """Return the weighted least-squares fits (n, k) of z (m,) in a basis (m, k), grouped by at (m,), and which of them
-    the rows determine. Cholesky's method, all fits at once."""
+    are determined; by Cholesky factorisation, all fits at once."""
     k = basis.shape[1]
     m, scaled = np.empty((n, k, k)), basis * weight[:, None]
     for i in range(k):
@@ -124,7 +124,7 @@ def _least_squares(basis: Floats, weight: Floats, z: Floats, at: Ints, n: int) -
 
 
 def _frame(normal: Floats, d: Floats, at: Ints) -> tuple[Floats, Floats]:
-    """Return two axes (n, 3) across each normal, the first along which its neighbours d (m, 3) reach farthest."""
+    """Return two axes (n, 3) across each normal, the first in which its neighbours d (m, 3) extend farthest."""
     u = _unit(np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])))
     w = np.cross(normal, u)
     x, y = np.einsum("ij,ij->i", d, u[at]), np.einsum("ij,ij->i", d, w[at])
@@ -135,7 +135,7 @@ def _frame(normal: Floats, d: Floats, at: Ints) -> tuple[Floats, Floats]:
 
 
 def _neighbours(corners: NDArray[np.int64], n: int) -> csr_matrix:
-    """Return which of n smooth vertices are neighbours over two rings, given the facets' corners (f, 3)."""
+    """Return which of n vertices are neighbours, over two rings of facets, given the facets' corners (f, 3)."""
     a, b = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     one = coo_matrix((np.ones(2 * len(a), np.int32), (np.append(a, b), np.append(b, a))), shape=(n, n)).tocsr()
     few = np.flatnonzero(np.diff(one.indptr) <= _HUB)
