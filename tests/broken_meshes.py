@@ -36,7 +36,7 @@ def _duplicate(rng, v, f):
 
 
 def _copy(rng, v, f):
-    """The same again with vertices of its own, a hair beside."""
+    """Add a copy with vertices of its own, displaced by less than 0.1 mm."""
     return np.concatenate([v, v + 10.0 ** rng.uniform(-12, -4)]), np.concatenate([f, f + len(v)])
 
 
@@ -77,7 +77,7 @@ def _junctions(rng, v, f):
 
 
 def _through(rng, v, f):
-    """The same turned, through itself."""
+    """Add a copy, rotated, that passes through the mesh."""
     turn = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
     return np.concatenate([v, v @ turn.T]), np.concatenate([f, f + len(v)])
 
@@ -114,7 +114,7 @@ HOW = (
 
 
 def broken_mesh(seed: int) -> trimesh.Trimesh:
-    """A primitive that one to four things have gone wrong with."""
+    """Return a primitive with one to four faults."""
     rng = np.random.default_rng(seed)
     solid = _primitive(rng)
     v, f = np.array(solid.vertices, float), np.array(solid.faces)

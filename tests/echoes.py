@@ -16,6 +16,7 @@ SMALL = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128)
 
 
 def make_radar(waveform: Waveform, **changes) -> Radar:
+    """Return an isotropic radar at the origin, without noise unless asked for."""
     given = {"position": np.zeros(3), "power": 1.0, "noise_figure_db": 15.0, "noise": False} | changes
     return Radar(tx=Isotropic(), rx=Isotropic(), waveform=waveform, **given)
 

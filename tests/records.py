@@ -43,12 +43,15 @@ def paths(ranges, rates, amplitudes, chains) -> Paths:
 
 
 def receiver(window: str = "hann") -> Receiver:
+    """Return what is known of the receiver of `WAVE`, of one window in range and rate."""
     return Receiver(WAVE, window, window, power=1.0, ego_speed=7.0, background=("ground",))
 
 
 def result(p: Paths, where, text: str = "", differ=0.01) -> Result:
-    """A result whose map is empty but for its detections at `where`, rows of (range, rate, power); two launches differ
-    by the share `differ` of the power, one or one a detection."""
+    """Return a result whose map is empty but for its detections at `where`, rows of (range, rate, power).
+
+    Two launches differ by the share `differ` of the power: one number, or one per detection.
+    """
     where = np.asarray(where, float).reshape(-1, 3)
     ranges = np.arange(128) * WAVE.range_resolution
     rates = (np.arange(64) - 32) * WAVE.rate_resolution

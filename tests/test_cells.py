@@ -12,7 +12,7 @@ RADAR = {"power_dbm": 40.0, "waveform": {"bandwidth_mhz": 600.0, "chirp_us": 40.
 
 
 def echoes(yaw):
-    """Sums of the amplitudes of one, two and three bounces of a corner and a box behind a post, in a turned world."""
+    """Return sums of amplitudes by bounces, one to three, of a corner and a box behind a post, in a turned world."""
     c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
 
     def at(x, y):

@@ -72,7 +72,7 @@ def test_near_field_polarisation_and_material_are_passed_on(plate, tmp_path, cap
 
 
 def drawn(monkeypatch, dbsm, error, polar=False, azimuth=None, elevation=(0.0,)):
-    """The axes of a picture of RCS against angle."""
+    """Return the axes of a picture of RCS against angle."""
     from raychan.report import rcs_figure
 
     made = []
@@ -226,7 +226,7 @@ def test_what_further_bounces_may_change_is_told_where_it_matters(capsys):
 
 
 def test_further_db_is_what_one_more_bounce_like_the_last_would_change():
-    """sigma by two and by three bounces tells the third one's amplitude, at most; a box has none."""
+    """Sigma by two and by three bounces tells the third one's amplitude, at most; a box has none."""
     mesh = build("trihedral")
     two, three = (rcs(mesh, 77e9, 5.0, 5.0, max_bounces=n) for n in (2, 3))
     third = abs(three.amplitude[0, 0] - two.amplitude[0, 0]) / abs(three.amplitude[0, 0])

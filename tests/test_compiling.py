@@ -37,7 +37,7 @@ _KINDS = ["int8", "int32", "float32", "float64"]
 
 
 def command(folder: Path, code: str, **flags: str) -> subprocess.Popen[str]:
-    """A process that runs code beside the toy kernels, whose compiled code is in `folder`/cache."""
+    """Start a process that runs code beside the toy kernels, whose compiled code is in `folder`/cache."""
     (folder / "toy.py").write_text(_TOY)
     env = {k: v for k, v in os.environ.items() if k != "NUMBA_BOUNDSCHECK"} | flags
     env |= {"PYTHONPATH": os.pathsep.join([str(folder), *sys.path]), "NUMBA_CACHE_DIR": str(folder / "cache")}

@@ -14,7 +14,7 @@ from raychan.units import C0, db
 
 
 def formula(paths, wave: Waveform) -> np.ndarray:
-    """Samples straight from the convention of radar.waveform."""
+    """Return samples straight from the convention of radar.waveform."""
     m, s = np.arange(wave.n_chirps)[:, None], np.arange(wave.n_samples)
     t = s * wave.chirp_duration / wave.n_samples
     total = np.zeros((wave.n_chirps, wave.n_samples), complex)

@@ -16,7 +16,7 @@ BODY = '\n[[bodies]]\nname = "it"\nmesh = "it{end}"\nposition = [{x}, {x}, 0.0]\
 
 
 def block(*size, low=True):
-    """A closed box that stands on z = 0, or is centred."""
+    """Return a closed box that stands on z = 0, or is centred."""
     made = trimesh.creation.box(size)
     if low:
         made.apply_translation((0.0, 0.0, 0.5 * size[2]))
@@ -24,7 +24,7 @@ def block(*size, low=True):
 
 
 def told(tmp_path, mesh, end=".ply", more='material = "pec"', x=6.0):
-    """The lines of a scene with a mesh in it that name the mesh's body."""
+    """Return the lines of a scene with a mesh in it that name the mesh's body."""
     mesh.export(tmp_path / f"it{end}")
     file = tmp_path / "scene.toml"
     file.write_text(PLATE.replace("9.0, 0.0, 1.0", "90.0, 9.0, 1.0") + BODY.format(end=end, more=more, x=x))

@@ -19,7 +19,7 @@ CELL = 0.149896  # of records.WAVE
 
 @pytest.fixture(scope="module", params=["I/Q", "real"])
 def ran(request, tmp_path_factory):
-    """A ghost scene without noise, a house nearer than the fold and, with real sampling, one mirrored."""
+    """Return a ghost scene without noise, a house nearer than the fold and, with real sampling, one mirrored."""
     folder = tmp_path_factory.mktemp("cell")
     text = ISOTROPIC.replace("power_dbm = 30.0", "power_dbm = 30.0\nnoise = false")
     if request.param == "real":

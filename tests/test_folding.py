@@ -32,7 +32,7 @@ LINE = 2.0 * TOP / SMALL.n_chirps
 
 
 def seen(wave, ranges, rates, amplitudes=1e-5, window="hann"):
-    """Detections, by the receiver and explained, of point echoes by their ranges at mid frame [m] and rates [m/s]."""
+    """Return detections, plain and explained, of point echoes at ranges [m] at mid frame with rates [m/s]."""
     r, v, a = np.broadcast_arrays(np.atleast_1d(np.asarray(ranges, float)), rates, amplitudes)
     p = paths(r - v * wave.centre, v, a, [[(SUV, SCATTER)]] * len(r))
     rdmap = range_doppler(synthesize(p, make_radar(wave)), wave, window, window)

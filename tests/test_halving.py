@@ -48,7 +48,7 @@ def test_halved_facets_share_every_edge_even_where_normals_part():
 
 
 def parabola(a):
-    """A facet of z = a x^2 with one edge across, one along and one askew."""
+    """Return a facet of z = a x^2 with one edge across, one along and one askew."""
     v = np.array([[[-0.1, 0.0, 0.01 * a], [0.1, 0.0, 0.01 * a], [-0.1, 0.3, 0.01 * a]]])
     n = np.stack([-2.0 * a * v[..., 0], 0.0 * v[..., 0], np.ones((1, 3))], axis=2)
     return v, n / np.linalg.norm(n, axis=2, keepdims=True)

@@ -37,14 +37,14 @@ def split(sheets):
 
 
 def joined(f: Facets) -> Facets:
-    """The same facets as parts of one body."""
+    """Return the same facets as parts of one body."""
     one = {name: getattr(f, name)[:1] for name in ("role", "origin", "velocity", "spin")}
     names = tuple(f"part{i}" for i in range(len(f.role)))
     return f.replace(body=0 * f.body, part=f.body, body_names=("all",), part_names=names, **one)
 
 
 def walls(size, at=(0.0, 0.0, 0.0)):
-    """The six sides of a box as quads, each facing outward: the first looks to -x."""
+    """Return the six sides of a box as quads, each facing outward: the first looks to -x."""
     a, b, c = 0.5 * np.asarray(size, float)
     p = np.array([[x, y, z] for x in (-a, a) for y in (-b, b) for z in (-c, c)]) + at
     return [quad(p[list(side)]) for side in SIDES]

@@ -56,7 +56,7 @@ def scene():
 
 @pytest.fixture
 def builds(monkeypatch):
-    """Counts how many tracers are made."""
+    """Count how many tracers are made."""
     made = []
     init = RayCaster.__init__
     monkeypatch.setattr(RayCaster, "__init__", lambda self, f, *a: (made.append(len(f.body)), init(self, f, *a))[1])
@@ -148,7 +148,7 @@ def test_a_moving_radar_has_one_beam(scene):
 
 
 def wanted(geometry, leg, bodies):
-    """The facets that could be met over a leg, each looked at by itself."""
+    """Return the facets that could be met over a leg, each judged by itself."""
     f = geometry.facets
     rows = np.flatnonzero(bodies[f.body])
     k, _ = leg.rays(f.vertices[rows])

@@ -28,7 +28,7 @@ def scene(tmp_path):
 
 
 def figures(annotation, metadata=()):
-    """The metadata of each number within an annotation."""
+    """Return the metadata of each number within an annotation."""
     metadata = (*metadata, *getattr(annotation, "__metadata__", ()))
     annotation = getattr(annotation, "__origin__", annotation) if metadata else annotation
     if annotation in (int, float):

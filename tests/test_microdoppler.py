@@ -40,7 +40,7 @@ def scene(rpm=200.0, *more, model=None, **radar):
 
 
 def every_chirp(scene):
-    """The truth, slow and obvious: the scene moved to each chirp, traced, and one ramp synthesised."""
+    """Return the truth, slow and obvious: the scene moved to each chirp, traced, and one ramp synthesised."""
     wave = scene.radar.waveform
     rule = refinement(wave.carrier, scene.model.tolerance_db, 0.0, scene.model.max_transmissions)
     rows = []

@@ -9,7 +9,7 @@ from raychan.parallel import Stopped, parallel_for, run_pair
 
 
 def threads_of(n: int) -> set[int]:
-    """The threads on which rows are worked on."""
+    """Return the threads on which rows are worked on."""
     seen: set[int] = set()
     parallel_for(n, lambda rows: seen.add(threading.get_ident()) if len(range(n)[rows]) else None, 2)
     return seen

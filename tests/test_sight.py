@@ -19,7 +19,7 @@ RULE = Refinement(wavenumber=1600.0)
 
 
 def across(x, low, high):
-    """A rectangle in a plane x, facing the origin."""
+    """Return a rectangle in a plane x, facing the origin."""
     (a, b), (c, d) = low, high
     return quad([[x, a, b], [x, a, d], [x, c, d], [x, c, b]])
 
@@ -33,7 +33,7 @@ def hidden(points, end=(0.0, 0.0, 0.0)):
 
 
 def street(floor, least):
-    """The rectangle, a plate behind it whose lower edge is at a height, and a floor."""
+    """Return the rectangle, a plate behind it whose lower edge is at a height, and a floor."""
     plate = across(8.0, (-2.0, least), (2.0, 2.0))
     return Geometry(facets([across(4.0, LOW, HIGH), plate, ground(20.0, floor)]))
 

@@ -43,7 +43,7 @@ def bodies():
 
 @pytest.fixture(params=["still", "rigid", "both"])
 def scene(request, monkeypatch):
-    """A scene of which the truck is kept, or the drum in its own frame, or both."""
+    """Return a scene of which the truck is kept, or the drum in its own frame, or both."""
     monkeypatch.setattr(static_geometry, "MANY", 2000)
     all_ = bodies()
     picked = {"still": [0, 1, 3, 4], "rigid": [0, 2, 3, 4], "both": [0, 1, 2, 3, 4]}[request.param]
@@ -110,7 +110,7 @@ def test_what_is_kept_is_what_is_made_anew(scene):
 
 
 def rebuilt(scene):
-    """The same scene without anything that is kept."""
+    """Return the same scene without anything that is kept."""
     return scene.bare()
 
 

@@ -33,7 +33,7 @@ def run(request):
 
 
 def led_by(result, body):
-    """Detections whose leading path meets the body."""
+    """Return the detections whose leading path meets the body."""
     return [i for i, w in enumerate(result.provenance) if body in w.bodies.replace(" > ", ".").split(".")]
 
 

@@ -16,7 +16,7 @@ make = trimesh.creation
 
 
 def prism(outline, height=0.3):
-    """A bar over an outline (n, 2) [m] that its middle sees all of."""
+    """Return a bar over an outline (n, 2) [m] that its middle sees all of."""
     p, n = np.asarray(outline, float), len(outline)
     rings = [np.column_stack([p, np.full(n, z)]) for z in (0.0, height)]
     middles = [[*p.mean(axis=0), z] for z in (0.0, height)]
@@ -27,7 +27,7 @@ def prism(outline, height=0.3):
 
 
 def sheet(height, n=40):
-    """A square sheet of n by n quadrilaterals over heights (n + 1, n + 1) [m]."""
+    """Return a square sheet of n by n quadrilaterals over heights (n + 1, n + 1) [m]."""
     x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, n + 1)], indexing="ij")
     a = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
     faces = np.concatenate([np.stack([a, a + n + 1, a + n + 2], 1), np.stack([a, a + n + 2, a + 1], 1)])
@@ -54,7 +54,7 @@ def lens(n=60, rings=20, tilt_deg=13.0):
 
 
 def half(mesh):
-    """The wall of a cylinder on one side, wound the other way round: a trough."""
+    """Return the wall of a cylinder on one side, wound the other way round: a trough."""
     kept = (np.abs(mesh.face_normals[:, 2]) < 0.5) & (mesh.triangles_center[:, 0] > 0.01)
     return trimesh.Trimesh(mesh.vertices, mesh.faces[kept][:, ::-1])
 
@@ -138,7 +138,7 @@ def test_a_coarse_cylinder_lies_within_the_stated_error_of_both_readings(sides):
 
 @pytest.mark.parametrize("mesh", [make.uv_sphere(0.12, count=[9, 30]), make.icosphere(1, 0.12)], ids=["globe", "ball"])
 def test_a_coarse_ball_lies_within_the_stated_error(mesh):
-    """sigma = pi r^2; where the reading decides all, no figure is stated."""
+    """Test against sigma = pi r^2; where the reading decides all, no figure is stated."""
     got = rcs(mesh, shapes.F, np.linspace(3.0, 80.0, 6), 10.0)
     error = np.abs(10.0 * np.log10(got.sigma / (np.pi * 0.12**2)))
     assert (error <= got.error_db)[got.converged].all()

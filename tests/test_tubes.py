@@ -189,7 +189,7 @@ CLOSED = {
 
 
 def fronts(normals, rng):
-    """A unit direction against normals (n, 3) at more than 80 deg from none of them, or None if none was found."""
+    """Return a unit direction against all normals (n, 3), 8 deg off grazing or more, or None if none was found."""
     for _ in range(20):
         d = rng.normal(size=3)
         d /= np.linalg.norm(d)

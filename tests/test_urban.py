@@ -32,7 +32,7 @@ def run():
 
 @pytest.fixture(scope="module", params=range(5))
 def detected(run, request):
-    """Detections with their explanations, for five seeds of the noise over the same paths."""
+    """Return detections with their explanations for five seeds of the noise over the same paths."""
     if request.param == 0:
         return run.detections, run.provenance
     scene = run.scene

@@ -195,7 +195,7 @@ def test_formulas_are_those_of_the_books(formulas):
 
 @pytest.fixture(scope="module")
 def patterns(study):
-    """A bench of which only the antennas are asked."""
+    """Return a bench of which only the antennas are used."""
     return Bench(study, TOLERANCE_DB, 0, lambda stage, share: None)
 
 
@@ -273,7 +273,7 @@ def test_every_ghost_is_explained_by_a_path_as_long_to_a_range_bin(bench, run):
 
 @pytest.fixture
 def data(tmp_path):
-    """A copy of the data that a test may spoil; the scenes beside it are the checkout's."""
+    """Return a copy of the data that a test may spoil; the scenes beside it are the checkout's."""
     copy = tmp_path / "checkout" / "validation"
     copy.mkdir(parents=True)
     for file in HERE.glob("*.toml"):

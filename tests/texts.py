@@ -40,17 +40,17 @@ tolerance_db = 3.0
 
 
 def but_compiling(said: str) -> str:
-    """What a command said, but that it compiles: only the first of all tests need do so."""
+    """Return what a command printed, without the line that it compiles: only the first of all tests does."""
     return "".join(line for line in said.splitlines(True) if not line.startswith("compiling, once"))
 
 
 def upright(name: str, x: float, y: float) -> str:
-    """A plate of 3 m by 3 m that faces the radar."""
+    """Return a plate of 3 m by 3 m that faces the radar."""
     size = "params = { width = 3.0, height = 3.0 }"
     return f'[[bodies]]\nname = "{name}"\nshape = "plate"\n{size}\nposition = [{x}, {y}, 1.0]\nyaw_deg = 180.0\n'
 
 
 def walker(x: float, y: float) -> str:
-    """A box of a person's size that returns as a point of 0 dBsm; more of its keys may follow."""
+    """Return a box of a person's size that returns as a point of 0 dBsm; more of its keys may follow."""
     size = "params = { length = 0.2, width = 0.5, height = 1.8 }"
     return f'[[bodies]]\nname = "walker"\nshape = "box"\n{size}\nposition = [{x}, {y}, 0.1]\nrcs_dbsm = 0.0\n'
