@@ -72,7 +72,7 @@ def njit(**options):
 
 import raychan.compile.jit, raychan.parallel
 raychan.compile.jit.njit = njit
-raychan.parallel.in_two = lambda n, work, least=0: work(slice(0, n))
+raychan.parallel.parallel_for = lambda n, work, least=0: work(slice(0, n))
 
 import raychan
 from helpers import quad

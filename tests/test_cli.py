@@ -126,11 +126,11 @@ def python(code):
 
 _BESIDE = """
 import threading, time
-from raychan.parallel import in_two
+from raychan.parallel import parallel_for
 def launched(here):
     # One launch is interrupted, the one beside it goes on and on.
     while threading.current_thread() is not threading.main_thread():
-        in_two(1, lambda rows: time.sleep(0.01))
+        parallel_for(1, lambda rows: time.sleep(0.01))
     here()
 """
 _STOPPED = (
