@@ -7,7 +7,11 @@ BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
 # Tests of the kernels, which `make test` also runs with bounds checked; the rest of the suite: make test-bounds.
-BOUNDS := $(addprefix tests/test_,bounds.py cores.py cut.py diffract.py jit.py shapes.py sight.py spectrum.py utd.py)
+BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py world/test_shapes.py \
+	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
+# Tests of the kernels that are cheap enough as plain Python; marked `compiled`: what is not, each with its reason.
+NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_doppler.py signal \
+	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
 .PHONY: help demo test test-bounds fuzz signatures bench clean
