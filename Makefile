@@ -14,12 +14,14 @@ NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_dopple
 	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: help demo test test-bounds fuzz signatures bench clean
+.PHONY: help demo test test-bounds test-nojit coverage fuzz signatures bench clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
 	@echo "make test   ruff, ruff format, mypy, pytest; the three scenes and the kernels' tests with bounds checked"
 	@echo "make test-bounds   all tests with the bounds of every array in compiled code checked"
+	@echo "make test-nojit   the kernels' tests with the compiler off, where that takes no minutes"
+	@echo "make coverage   which lines tests reach, the kernels' as plain Python (some minutes)"
 	@echo "make fuzz   random scene files, meshes and flags for half an hour (FUZZ=--help: more)"
 	@echo "make signatures   list anew what a cold run compiles, for its second process (some minutes)"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
@@ -37,6 +39,14 @@ test: $(VENV)/.installed-dev
 
 test-bounds: $(VENV)/.installed-dev
 	NUMBA_BOUNDSCHECK=1 $(PYTEST)
+
+test-nojit: $(VENV)/.installed-dev
+	NUMBA_DISABLE_JIT=1 $(PYTEST) $(NOJIT)
+
+# Kernels count where they run as plain Python.
+coverage: $(VENV)/.installed-dev
+	NUMBA_DISABLE_JIT=1 $(PYTEST) $(NOJIT) --cov --cov-report=
+	$(PYTEST) --cov --cov-append --cov-report=term:skip-covered
 
 fuzz: $(VENV)/.installed-dev
 	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.compiled(reason="it is about compiled code")
+
 _CALLEE = """
 from raychan.compile.jit import njit
 {constant}

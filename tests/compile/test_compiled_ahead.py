@@ -12,6 +12,8 @@ from signatures import write_type
 from raychan.compile import ahead
 from raychan.compile.jit import Kernel
 
+pytestmark = pytest.mark.compiled(reason="it is about compiled code")
+
 LISTS = ahead.lists()
 ROWS = [(name, *row) for name, rows in LISTS.items() for row in rows]
 

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from support.places import SCENES
 
+pytestmark = pytest.mark.compiled(reason="it is about compiled code")
+
 _TOY = """
 from raychan.compile.jit import njit
 

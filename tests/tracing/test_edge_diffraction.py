@@ -67,6 +67,7 @@ def test_total_field_is_continuous_across_the_boundary_of_a_box():
     assert np.abs(np.diff(level)).max() < 0.02
 
 
+@pytest.mark.compiled(reason="minutes as plain Python")
 def test_a_hidden_target_returns_over_the_edge_with_the_same_way_both_ways():
     wall = box((8, 0, -20), (8.5, 12, 20))
     f = facets([wall, box((19.9, 0.4, 0.0), (20.1, 0.6, 1.0))], role=[0, 2])

@@ -107,6 +107,7 @@ def test_what_stands_before_a_solid_body_or_about_it_stays():
     np.testing.assert_array_equal(seed_facets(geometry, leg, bodies), facing_facets(geometry, leg, bodies))
 
 
+@pytest.mark.compiled(reason="minutes as plain Python")
 def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_at(monkeypatch):
     def paths():
         bodies = [
