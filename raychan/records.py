@@ -166,6 +166,31 @@ class Routes(Record):
 
 
 @dataclass(frozen=True)
+class DiffractedRoutes(Record):
+    """Where waves went to point targets over the edges of wedges, no field yet; n routes of two legs each, d slots.
+
+    A leg (axis 2: in, then out) is straight, or runs over one wedge.
+    """
+
+    end: Floats = column("3", unit="m", doc="the radar")
+    vertices: Floats = column("n d 3", unit="m", doc="vertices in order; unused slots repeat the radar")
+    body: Ints = column("n d", np.int16)
+    part: Ints = column("n d", np.int16)
+    kind: Ints = column("n d", np.int8)
+    target: Floats = column("n 3", unit="m", doc="the point target")
+    target_velocity: Floats = column("n 3", unit="m/s")
+    sigma: Floats = column("n", unit="m2", doc="its RCS from the one leg to the other")
+    leaves: Floats = column("n 2 3", doc="unit direction of the leg at the radar, outward")
+    arrives: Floats = column("n 2 3", doc="unit direction of the leg at the target, inward")
+    near: Floats = column("n 2", unit="m", doc="from the radar to the edge; all of a straight leg")
+    far: Floats = column("n 2", unit="m", doc="from the edge to the target; 0 for a straight leg")
+    faces: Ints = column("n 2 2", np.int32, doc="facets of face 0 and face n of the wedge, -1 for a straight leg")
+    edge: Floats = column("n 2 3", doc="unit vector along the edge")
+    normals: Floats = column("n 2 2 3", doc="unit normals of face 0 and face n")
+    wedge_n: Floats = column("n 2", doc="open angle of the wedge over pi")
+
+
+@dataclass(frozen=True)
 class Ways(Record):
     """Where paths went; a row a way, d slots a chain."""
 

@@ -1,35 +1,28 @@
-"""Paths of routes: what each carries for a radar, and its delay and rate; footprints long in range give a path a
-corner."""
+"""Paths of routes: the gain, delay and rate of each for a radar. A footprint long in range gives one path for each of
+its three corners."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.edge_diffraction import diffracted_paths
+from raychan.channel.ends import RadarEnds
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
-from raychan.records import SCATTER, Facets, Paths, Routes, Ways
+from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Ways
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
 
 
-class RadarEnds(Protocol):
-    """What the solver asks of a radar (see radar.sensor.Sensor)."""
-
-    @property
-    def position(self) -> Floats: ...
-    @property
-    def velocity(self) -> Floats: ...
-    def tx_field(self, direction_world: Floats) -> Any: ...
-    def rx_field(self, direction_world: Floats) -> Any: ...
-
-
-def paths_of(routes: Routes, facets: Facets, radar: RadarEnds, frequency: float) -> Paths:
-    """Return what routes carry for a radar; footprints that run in range become three paths, one a corner."""
+def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float) -> Paths:
+    """Return what routes carry for a radar at a frequency [Hz]; a footprint long in range becomes three paths."""
+    if isinstance(routes, DiffractedRoutes):
+        return diffracted_paths(routes, facets, radar, frequency)
     a = transfer(
         routes,
         facets,

@@ -27,6 +27,11 @@ class Choice:
     diffraction: bool
     why: tuple[str, ...]
 
+    def applied_to(self, model: Any) -> Any:
+        """Return the model settings with what was chosen."""
+        kept = {"max_bounces": self.bounces, "max_transmissions": self.transmissions, "diffraction": self.diffraction}
+        return model.model_copy(update=kept)
+
 
 def interactions(paths: Paths) -> NDArray[np.int64]:
     """Return the number of interactions (n,) of each path, thin layers passed not counted."""

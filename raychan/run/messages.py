@@ -10,8 +10,8 @@ import numpy as np
 
 from raychan.records import RangeDoppler
 from raychan.run.result import ExplainedDetections, Result
-from raychan.run.solver import Stats
 from raychan.run.unmodelled import Entry
+from raychan.tracing.solver import Stats
 from raychan.world.geometry import Geometry
 
 _NAMED = 5  # detections that a line names by their numbers

@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.paths import join
 from raychan.channel.slow_time import Poses, carried, strengths
 from raychan.channel.transfer import departures
 from raychan.radar.radar import Radar
-from raychan.records import DIFFRACT, Routes, take
+from raychan.records import DIFFRACT, Paths, Routes, take
 from raychan.run.segments import Keyframe, Retraced, Segment, Traced, echoes, joined, reach
-from raychan.run.solver import solve
+from raychan.run.solver import Batch, solve_into
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import ramp_sums
-from raychan.tracing.tubes import Refinement
+from raychan.tracing.settings import PruneRule
 from raychan.units import C0
 from raychan.world.geometry import geometry_of, surface_at
 from raychan.world.scene import Scene
@@ -75,16 +76,16 @@ def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
 
 def retraced(
     scene: Scene,
-    rule: Refinement,
+    rule: PruneRule,
     model: Any,
     first: Traced | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Retraced:
     """Return the samples of a frame in which bodies turn.
 
-    Args: rule how finely what does not turn is cut; model the scene's, whose `retrace` is "auto" or the number of
-    tracings, when bodies that only move are carried on too; first the paths at the frame's start, if they are known;
-    progress is told the share done.
+    Args: rule by which each tracing is pruned, from where the radar is then; model the scene's, whose `retrace` is
+    "auto" or the number of tracings, when bodies that only move are carried on too; first the paths at the frame's
+    start, if they are known; progress is told the share done.
     """
     work = _Work(scene, rule, model, progress)
     last = scene.radar.waveform.n_chirps - 1
@@ -96,7 +97,7 @@ def retraced(
 class _Work:
     """One frame being put together."""
 
-    def __init__(self, scene: Scene, rule: Refinement, model: Any, progress: Callable[[float], None] | None) -> None:
+    def __init__(self, scene: Scene, rule: PruneRule, model: Any, progress: Callable[[float], None] | None) -> None:
         self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
         self.turns = turning(scene) if model.retrace == "auto" else moving(scene)
         self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
@@ -161,15 +162,14 @@ class _Work:
         carrier = self.radar.waveform.carrier
         geometry = surface_at(now) if known is None else geometry_of(now)
         if known is None:
-            found: list[Routes] = []
-            paths, stats = solve(
-                geometry, now.points(), now.radar, carrier, self.rule, self.model.max_bounces, None,
-                self.model.diffraction, found.append,
-            )  # fmt: skip
+            found: list[Batch] = []
+            parts: list[Paths] = []
+            rule = dataclasses.replace(self.rule, position=np.asarray(now.radar.position, float))
+            stats = solve_into(parts.append, geometry, now.points(), now.radar, carrier, rule, keep=found.append)
             self.rays += stats.rays
-            known = Traced(paths, tuple(found))
-        parts = [take(r, self.touches(r.body, r.kind)) for r in known.routes]
-        routes = tuple(r for r in parts if len(r.kind))
+            known = Traced(join(parts), tuple(found))
+        turned = [take(r, self.touches(r.body, r.kind)) for r in known.routes if isinstance(r, Routes)]
+        routes = tuple(r for r in turned if len(r.kind))
         ways = known.paths.ways
         rest = ~self.touches(ways.body, ways.kind) | (ways.kind == DIFFRACT).any(axis=1)
         if self.progress:

@@ -1,5 +1,5 @@
-"""Gather: the paths of a launch as they come. What is too much to keep goes into samples at once, and the strongest
-paths stay for those who ask where a return came from."""
+"""The paths of a launch as they come, batch by batch. Where they are too many to keep, they are added to the samples at
+once, and the strongest stay to explain detections."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from raychan.records import Cube, Paths
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import response
 
-_MOST = 1 << 19  # ways held at once, some 300 bytes each
-_KEPT = 1 << 18  # of those that were too many
+_MOST = 1 << 19  # routes held at once, some 300 bytes each: less memory against more sums
+_KEPT = 1 << 18  # strongest routes that stay where there are more than that
 
 
 @dataclass(frozen=True)
@@ -29,42 +29,49 @@ class Launched:
     radar: Radar
     window: str
     """Along range, for the profile."""
-    told: tuple[Any, Any] | None = None
-    """Samples and response of all paths, where they are known already: always if `paths` are not all."""
+    sums: tuple[Any, Any] | None = None
+    """Samples and profile response of all paths, where they are known already: always if `paths` are not all."""
 
     @cached_property
     def quiet(self) -> Cube:
         """The samples of all receivers and chirps, without noise."""
-        if self.told is None:
+        if self.sums is None:
             return synthesize(self.paths, self.radar)
-        return Cube(samples=self.told[0].astype(np.complex64), noise_power=0.0)
+        return Cube(samples=self.sums[0].astype(np.complex64), noise_power=0.0)
 
     @cached_property
     def response(self) -> NDArray[np.complex128]:
-        """The channel's response to one ramp (see channel.profile)."""
-        return _response(self.paths, self.radar, self.window) if self.told is None else self.told[1]
+        """The channel's response to one ramp (see signal.delay_profile)."""
+        return _response(self.paths, self.radar, self.window) if self.sums is None else self.sums[1]
 
     @property
     def whole(self) -> bool:
         """Whether `paths` are all."""
         return len(self.paths.delay) == self.count
 
+    def notes(self) -> list[str]:
+        """Return what to tell of a launch that had more paths than a result can hold."""
+        if self.whole:
+            return []
+        kept = len(self.paths.delay)
+        return [f"{self.count:,} paths: all are in the samples, the {kept:,} strongest are kept to explain them"]
+
     def moved(self, shift: NDArray[np.float64]) -> Launched:
         """Return the same for a scene that has moved on as one, by a shift (3,) [m]."""
         paths = self.paths
         ways = paths.ways.replace(vertices=(paths.ways.vertices + shift).astype(np.float32))
         there = paths.replace(ways=ways, tx=paths.tx + shift, rx=paths.rx + shift)
-        return replace(self, paths=there, told=(self.quiet.samples, self.response))
+        return replace(self, paths=there, sums=(self.quiet.samples, self.response))
 
 
 class PathStream:
-    """Paths of a launch for a sensor, whose profile has a window along range: `add` each batch, then `done`."""
+    """Paths of a launch for a radar, whose profile has a window along range: `add` each batch, then `done`."""
 
     def __init__(self, radar: Radar, window: str) -> None:
         self._sensor, self._window = replace(radar, noise=False), window
         self._held: list[Paths] = []
         self._kept: list[Paths] = []
-        self._told: tuple[Any, Any] | None = None
+        self._sums: tuple[Any, Any] | None = None
         self._ways = self._count = 0
 
     def add(self, paths: Paths) -> None:
@@ -73,23 +80,23 @@ class PathStream:
         self._count += len(paths.delay)
         self._ways += len(paths.ways.kind)
         if self._ways > _MOST:
-            self._tell()
+            self._flush()
 
-    def _tell(self) -> None:
-        """Put what is held into samples and response, and keep the strongest."""
+    def _flush(self) -> None:
+        """Add the paths held to the sums of samples and response, and keep the strongest."""
         every = join(self._held)
         brought = synthesize(every, self._sensor).samples, _response(every, self._sensor, self._window)
-        before = self._told or (np.zeros(brought[0].shape, np.complex128), 0.0)
-        self._told = before[0] + brought[0], before[1] + brought[1]
+        before = self._sums or (np.zeros(brought[0].shape, np.complex128), 0.0)
+        self._sums = before[0] + brought[0], before[1] + brought[1]
         self._kept = [strongest(join([*self._kept, every]), _KEPT)]
         self._held, self._ways = [], 0
 
     def done(self) -> Launched:
-        """Return what all batches, of which there must be one, bring."""
-        if self._told is not None and self._held:
-            self._tell()
+        """Return the paths of all batches; there must be at least one."""
+        if self._sums is not None and self._held:
+            self._flush()
         paths = join(self._kept or self._held)
-        return Launched(paths, self._count, self._sensor, self._window, self._told)
+        return Launched(paths, self._count, self._sensor, self._window, self._sums)
 
 
 def _response(paths: Paths, radar: Radar, window: str) -> NDArray[np.complex128]:

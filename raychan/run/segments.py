@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import Cube, Paths, Routes
+from raychan.records import Cube, DiffractedRoutes, Paths, Routes
 from raychan.units import C0
 from raychan.world.scene import Scene
 
@@ -51,7 +51,7 @@ class Traced:
     """What one tracing of a scene gives."""
 
     paths: Paths
-    routes: tuple[Routes, ...]
+    routes: tuple[Routes | DiffractedRoutes, ...]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from raychan.run.clock import Clock, Progress
 from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
-from raychan.run.simulate import Channel, Clock, Progress, result_of, trace
+from raychan.run.simulate import Channel, channel_of, result_of
 from raychan.run.storage import COLUMNS, CONTENTS, rows, save_result
 from raychan.world.geometry import geometry_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED
@@ -75,7 +76,7 @@ def _frames(
         if first is not None and cached:
             channel = _carried_on(first, now, time)
         else:
-            channel = trace(now, tolerance_db, max_bounces, clock)
+            channel = channel_of(now, tolerance_db, max_bounces, clock)
             first = channel if cached else None
         result = result_of(now, channel, seed + k, clock)
         # What was built for this frame goes before the next builds its own.

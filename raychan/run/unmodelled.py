@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.paths import join
 from raychan.em.fresnel import coefficients_array
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
 from raychan.run.mechanisms import interactions, layers, peak
+from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import strongest_bend
-from raychan.tracing.edge_diffraction import diffracted_paths
-from raychan.tracing.legs import Leg
 from raychan.units import C0, db
 from raychan.world.body import Body
 from raychan.world.geometry import Geometry
@@ -138,10 +136,9 @@ def _around(geometry: Geometry, points: Points, radar: Radar, settings: Any, mod
         return Entry(NOTHING, "exact", "no target is given by its RCS")
     if model.diffraction:
         return Entry(NOTHING, "exact", "modelled: single wedges, UTD")
-    parts = diffracted_paths(geometry, points, radar, radar.waveform.carrier, 8, [Leg(end=np.asarray(radar.position))])
-    if not parts:
+    found = paths_over_wedges(geometry, points, radar, radar.waveform.carrier)
+    if not len(found.delay):
         return Entry(NOTHING, "estimate", "no wedge stands near the way to a target")
-    found = join(parts)
     level = peak(found, np.ones(len(found.delay), bool), radar, settings)
     return Entry(float(db(max(level, 1e-40) / weakest)), "estimate", "strongest cell of the diffracted returns (UTD)")
 

@@ -11,8 +11,9 @@ from raychan.em.fresnel import coefficients
 from raychan.frames import rotation
 from raychan.records import LAYER, PEC, Facets, Materials, Paths, Points
 from raychan.run.rcs import stated_error
-from raychan.run.solver import refinement, solve
+from raychan.run.solver import solve
 from raychan.study.regimes_base import FREQUENCY, Complexes, Floats, K, Outcome, Regime, Row, rectangle, same_db
+from raychan.tracing.settings import refinement
 from raychan.units import C0
 
 _GLASS, _THICK = 6.27 - 0.35j, 4e-3

@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 
 from raychan.processing.range_doppler import range_doppler
 from raychan.records import MIRROR, SCATTERER, Facets, Paths
-from raychan.run.simulate import noise_equivalent_amplitude
-from raychan.run.solver import refinement, solve
+from raychan.run.receiver import noise_equivalent_amplitude
+from raychan.run.solver import solve
 from raychan.signal.baseband import synthesize
 from raychan.study.cases import Street
 from raychan.study.methods import ADAPTIVE, MIRRORS, POINT, POINTS, UNIFORM, Run, mean_rcs
 from raychan.study.ray_lattice import Echo, Window, echoes
 from raychan.study.specular_points import glints
 from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.settings import refinement
 from raychan.units import C0
 from raychan.world.geometry import Geometry
 from raychan.world.ray_caster import RayCaster

@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from raychan.channel.paths import join
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points, take
 from raychan.run.labels import Chains, chains, label_of
+from raychan.run.receiver import noise_of_cell
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
-from raychan.run.simulate import noise_of_cell
+from raychan.run.solver import paths_over_wedges
 from raychan.signal.baseband import synthesize
-from raychan.tracing.edge_diffraction import diffracted_paths
-from raychan.tracing.legs import Leg
 from raychan.tracing.occlusion import Occlusion, occlusion
 from raychan.units import db, undb
 from raychan.world.geometry import Geometry
@@ -131,9 +129,8 @@ def _diffracted(
     if not mine.any():
         return None
     row = {f: getattr(points, f)[mine] for f in ("position", "velocity", "body", "sigma", "heading")}
-    straight = [Leg(end=np.asarray(radar.position))]
-    parts = diffracted_paths(Geometry(facets), replace(points, **row), radar, radar.waveform.carrier, _SLOTS, straight)
-    return _level(join(parts), radar, settings, weakest) if parts else _strength(0.0, None, weakest)
+    paths = paths_over_wedges(Geometry(facets), replace(points, **row), radar, radar.waveform.carrier)
+    return _level(paths, radar, settings, weakest)
 
 
 def _level(paths: Paths, radar: Radar, settings: Any, weakest: float) -> Level:

@@ -87,10 +87,10 @@ def _step(
         span, whole = np.empty((2, len(tubes)))
         ways = geometry.first, geometry.normal, out.image, out.far, rule.wavenumber
         ahead_of(*(tubes.points, way, tubes.length, mid, ahead, *ways, span, whole))
-        matters = area > found.doubt(whole) * (1.0 + 0.5 * span)
+        matters = area > found.prune_threshold(whole) * (1.0 + 0.5 * span)
     else:
-        matters = area > found.doubt(whole)
-    matters &= not found.spent(geometry)
+        matters = area > found.prune_threshold(whole)
+    matters &= not found.budget.spent(geometry)
     # Beside a centre that meets nothing no corner is cast: the outline of a body there runs through the tube.
     hit, t = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     agree = mid >= 0
@@ -100,7 +100,7 @@ def _step(
     agreeing(rows, hit, geometry.plane, geometry.smooth, geometry.normal, _ALIKE, agree)
     side = _edges(geometry, leg, tubes, points, way, hit, t, np.flatnonzero(matters))
     mixed = (~agree & (mid >= 0)) | side.any(axis=1)
-    split = found.affords(geometry, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _LIGHT)
+    split = found.budget.affords(geometry, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _LIGHT)
     ready = np.flatnonzero(~split & (mid >= 0))
     landed.append(_land(geometry, leg, tubes, ready, way, hit, agree, flight.through, rule))
     parts, rows = divide(geometry, leg, tubes, np.flatnonzero(split), side, first, rule.jitter)

@@ -1,4 +1,4 @@
-"""Found: how much field a launch has found so far, by length of way; what is let go is weighed against it."""
+"""Contributions: upper bounds of tubes are weighed against the field that a launch has found at the same length."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_MANY = 4096  # tubes under which letting some go saves nothing
+_MANY = 4096  # tubes; to prune fewer saves nothing
 _THREADS = 1000  # tubes from which on a second thread pays
 _NOTHING = 1e-100  # 1/m
 _DEPTH = 1e-2  # of the strongest cell: weaker ones are no finer than such a one, should there be no noise
-_SHARE = 0.3  # of the doubt: what all that is let go may add up to in phase
+_SHARE = 0.3  # of the prune threshold: what all pruned tubes of a cell may add up to in phase
 
 
-class Contributions:
-    """The scattered field [1/m] found within each stretch of two-way length, `rule.cell` long."""
+class Budget:
+    """How often a launch may still cut tubes, and the tubes that were left coarser than asked for."""
 
     def __init__(self, rule: Refinement) -> None:
         self.rule = rule
-        self._level = np.zeros(1)
         self._tubes, self._cuts, self._rays = 0, 0.0, -1
         self.uncut = np.zeros(0, np.int64)
         """Tubes (bodies,) that budgets kept from being cut."""
@@ -59,12 +58,30 @@ class Contributions:
         geometry.uncut += int(np.count_nonzero(wanted))
         return np.zeros_like(wanted)
 
+
+class Contributions:
+    """The scattered field [1/m] of a launch so far, in each stretch `rule.cell` [m] of two-way length.
+
+    A tube whose upper bound is small against it is not cut further, or pruned.
+    """
+
+    def __init__(self, rule: Refinement, budget: Budget | None = None) -> None:
+        self.rule = rule
+        self.budget = budget or Budget(rule)
+        self._level = np.zeros(1)
+
+    def forked(self) -> Contributions:
+        """Return a copy that starts from the field found so far and goes on by itself, within the same budget."""
+        other = Contributions(self.rule, self.budget)
+        other._level = self._level.copy()
+        return other
+
     def _cell(self, length: Floats) -> NDArray[np.int64]:
         return np.asarray(np.maximum(length / self.rule.cell, 0.0), np.int64)
 
-    def doubt(self, length: Floats) -> Floats:
-        """Return the bound [1/m] under which doubtful tubes of two-way lengths (n,) [m] are left as they are; about a
-        hundred such add up to `rule.relative` of what was found there."""
+    def prune_threshold(self, length: Floats) -> Floats:
+        """Return the contribution [1/m] below which tubes of two-way lengths (n,) [m] are not cut further; about a
+        hundred such tubes add up to `rule.relative` of the field found there."""
         at = np.minimum(self._cell(length), len(self._level) - 1)
         level = np.maximum(self._level[at], _DEPTH * self._level.max())
         return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * level)
@@ -92,11 +109,11 @@ class Contributions:
             self._level = self._level[:1]
 
     def that_count(self, bound: Floats, length: Floats, many: int = _MANY) -> NDArray[np.intp]:
-        """Return the tubes to keep: of `many` or more, the weakest of each cell are let go while all these in phase
-        stay under 0.3 of the doubt."""
+        """Return the tubes to keep: of `many` or more, the weakest of each cell are pruned while their sum in phase
+        stays under 0.3 of the prune threshold."""
         if len(bound) < many:
             return np.arange(len(bound))
-        share = bound / self.doubt(length)
+        share = bound / self.prune_threshold(length)
         # The weakest few are enough: none that alone exceeds the sum is looked at.
         weak = np.flatnonzero(share < _SHARE)
         cell = self._cell(length[weak])

@@ -1,62 +1,60 @@
-"""Diffracted ways to point targets: once over a wedge in, out, or both (UTD)."""
+"""Ways to point targets over the edges of wedges: once in, out, or both, by the law of edge diffraction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise, product
-from typing import Any
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.em.diffraction import diffract, edge_point
-from raychan.em.fresnel import coefficients
-from raychan.records import DIFFRACT, POINT, Paths, Points
-from raychan.tracing.legs import Leg
+from raychan.em.diffraction import edge_point
+from raychan.records import DIFFRACT, POINT, DiffractedRoutes, Points
 from raychan.tracing.point_targets import bistatic_sigma
-from raychan.units import C0
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 _LONGEST_DETOUR = 2.0  # m beyond the straight line
 _SHORTEST = 10.0  # wavelengths: an edge shorter than this is not a wedge to the wave
+_STRAIGHT = np.zeros(3), np.zeros((2, 3)), 0.0
 
 
 @dataclass(frozen=True)
-class Way:
-    """One way between an end and a point: the field there (3,) per unit wave [1/m], phase in, its length [m], unit
-    direction of departure, unit direction at the point, and the wedge met (facet -1: straight)."""
+class WedgeLeg:
+    """A leg between the radar and a point target: straight (`faces` -1), or over one wedge at `spot`."""
 
-    field: Complexes
-    length: float
+    near: float
+    far: float
     leaves: Floats
     arrives: Floats
     spot: Floats
-    facet: int
+    faces: tuple[int, int]
+    edge: Floats
+    normals: Floats
+    wedge_n: float
+
+    @property
+    def over(self) -> bool:
+        """Whether it runs over a wedge."""
+        return self.faces[0] >= 0
 
 
-def ways(
-    geometry: Geometry, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
-) -> list[Way]:
-    """Return the straight way, where it is free, and those over one wedge each.
+def wedge_legs(geometry: Geometry, end: Floats, point: Floats, body: int, k: float) -> list[WedgeLeg]:
+    """Return the straight leg, where it is free, and those over one wedge each.
 
-    Args: end, point (3,) [m]; body in which the point stands; field_of directions (n, 3) -> antenna vectors (n, 3); k
-    [rad/m].
-    Source: Keller 1962 (law of edge diffraction); Kouyoumjian and Pathak 1974.
+    Args: end, point (3,) [m]; body in which the point stands; k wavenumber [rad/m].
+    Source: Keller 1962 (law of edge diffraction).
     """
     found = []
     gap = float(np.linalg.norm(point - end))
     straight = (point - end) / gap
     if _free(geometry, end, point, -1, body):
-        wave = np.asarray(field_of(straight[None]))[0] / gap * np.exp(-1j * k * gap)
-        found.append(Way(wave, gap, straight, straight, point, -1))
+        found.append(WedgeLeg(gap, 0.0, straight, straight, point, (-1, -1), *_STRAIGHT))
     for w in _candidates(geometry, end, point, body, gap, k):
-        way = _over(geometry, w, end, point, body, field_of, k)
-        if way is not None:
-            found.append(way)
+        leg = _over(geometry, w, end, point, body)
+        if leg is not None:
+            found.append(leg)
     return found
 
 
@@ -70,9 +68,8 @@ def _candidates(geometry: Geometry, end: Floats, point: Floats, body: int, gap: 
     return np.flatnonzero((size * k > 2.0 * np.pi * _SHORTEST) & (detour < _LONGEST_DETOUR) & ~own)
 
 
-def _over(
-    geometry: Geometry, w: int, end: Floats, point: Floats, body: int, field_of: Callable[[Floats], Any], k: float
-) -> Way | None:
+def _over(geometry: Geometry, w: int, end: Floats, point: Floats, body: int) -> WedgeLeg | None:
+    """Return the leg over wedge w, None where its edge is missed, hidden or too far off."""
     start, stop = geometry.wedge[w]
     size = float(np.linalg.norm(stop - start))
     edge = (stop - start) / size
@@ -80,43 +77,17 @@ def _over(
     if not 0.0 < at < size:
         return None
     spot = start + at * edge
-    s_in, s_out = float(np.linalg.norm(spot - end)), float(np.linalg.norm(point - spot))
-    if s_in + s_out - np.linalg.norm(point - end) > _LONGEST_DETOUR:
+    near, far = float(np.linalg.norm(spot - end)), float(np.linalg.norm(point - spot))
+    if near + far - np.linalg.norm(point - end) > _LONGEST_DETOUR:
         return None
     face, other = (int(f) for f in geometry.wedge_facet[w])
-    k_in, k_out = (spot - end) / s_in, (point - spot) / s_out
-    normal = geometry.normal[face]
     # Both ends see the edge from the open side of one of its faces; the rays themselves graze those faces.
-    lift = 1e-4 * (normal + geometry.normal[other])
+    normals = geometry.normal[[face, other]]
+    lift = 1e-4 * (normals[0] + normals[1])
     if not (_free(geometry, end, spot + lift, face, -1) and _free(geometry, point, spot + lift, face, body)):
         return None
-    e = np.asarray(field_of(k_in[None]))[0] / s_in * np.exp(-1j * k * s_in)
-    r_0, r_n = (_reflection(geometry, f, k_in, k_out, k) for f in (face, other))
-    field: Any = tuple(complex(x) for x in e)
-    vector = diffract(
-        field,
-        tuple(k_in),
-        tuple(k_out),
-        tuple(edge),
-        tuple(normal),
-        float(geometry.wedge_n[w]),
-        k,
-        s_in,
-        s_out,
-        r_0,
-        r_n,
-    )
-    wave = np.array(vector) * np.exp(-1j * k * s_out)
-    return Way(wave, s_in + s_out, k_in, k_out, spot, face)
-
-
-def _reflection(geometry: Geometry, facet: int, k_in: Floats, k_out: Floats, k: float) -> tuple[complex, complex]:
-    m = geometry.facets.materials
-    row = geometry.facets.material[facet]
-    normal = geometry.normal[facet]
-    cosine = max(abs(float(k_in @ normal)), abs(float(k_out @ normal)))
-    c = coefficients(m.kind[row], complex(m.eps[row]), m.thickness[row], m.roughness[row], cosine, k)
-    return c[0], c[1]
+    leaves, arrives = (spot - end) / near, (point - spot) / far
+    return WedgeLeg(near, far, leaves, arrives, spot, (face, other), edge, normals, float(geometry.wedge_n[w]))
 
 
 def _free(geometry: Geometry, start: Floats, stop: Floats, facet: int, body: int) -> bool:
@@ -129,59 +100,42 @@ def _free(geometry: Geometry, start: Floats, stop: Floats, facet: int, body: int
     return bool(reached[0])
 
 
-def diffracted_paths(
-    geometry: Geometry, points: Points, radar: Any, frequency: float, slots: int, legs: list[Leg]
-) -> list[Paths]:
-    """Return the paths to point targets over at least one wedge; the straight way in or out may be the other half.
+def diffracted_routes(geometry: Geometry, points: Points, end: Floats, k: float, slots: int) -> DiffractedRoutes | None:
+    """Return the routes from the radar at `end` (3,) [m] to point targets and back over at least one wedge.
 
-    Args: legs the mirror-free leg first (its end is the radar). Each pair of ways is one path.
+    Each pair of legs is a route; one leg of it may be straight. None where there is no such route.
     """
-    k = 2.0 * np.pi * frequency / C0
-    end, f = np.asarray(legs[0].end, float), geometry.facets
-    out: list[Paths] = []
+    pairs: list[tuple[int, WedgeLeg, WedgeLeg]] = []
     for p in range(len(points.body)):
-        at, body = points.position[p], int(points.body[p])
-        there = ways(geometry, end, at, body, radar.tx_field, k)
-        back = ways(geometry, end, at, body, radar.rx_field, k)
-        rows = [(i, o) for i, o in product(there, back) if i.facet >= 0 or o.facet >= 0]
-        if not rows:
-            continue
-        n = len(rows)
-        body_of, part_of = np.full((n, slots), -1), np.full((n, slots), -1)
-        kinds, vertices = np.zeros((n, slots), np.int8), np.broadcast_to(end, (n, slots, 3)).copy()
-        amplitude, rate, length = np.zeros(n, complex), np.zeros(n), np.zeros(n)
-        away, look = np.zeros((n, 3)), np.zeros((n, 3))
-        for r, (i, o) in enumerate(rows):
-            chain = [(x.facet, x.spot, DIFFRACT) for x in (i,) if x.facet >= 0]
-            chain += [(-1, at, POINT)] + [(x.facet, x.spot, DIFFRACT) for x in (o,) if x.facet >= 0]
-            speed = [np.asarray(radar.velocity)]
-            for c, (facet, spot, kind) in enumerate(chain):
-                body_of[r, c] = f.body[facet] if facet >= 0 else body
-                part_of[r, c] = f.part[facet] if facet >= 0 else -1
-                kinds[r, c], vertices[r, c] = kind, spot
-                speed.append(f.velocity[body_of[r, c]] if facet >= 0 else points.velocity[p])
-            speed.append(np.asarray(radar.velocity))
-            stops = [end, *(c[1] for c in chain), end]
-            steps = [(b - a) / np.linalg.norm(b - a) for a, b in pairwise(stops)]
-            rate[r] = 0.5 * sum(float((speed[j + 1] - speed[j]) @ d) for j, d in enumerate(steps))
-            sigma = bistatic_sigma(points, p, -i.arrives, -o.arrives)
-            amplitude[r] = 0.5 / k * np.sqrt(sigma / (4.0 * np.pi)) * (i.field @ o.field)
-            length[r], away[r], look[r] = i.length + o.length, i.leaves, o.leaves
-        out.append(
-            Paths.of(
-                delay=length / C0,
-                amplitude=amplitude,
-                rate=rate,
-                departure=away,
-                arrival=look,
-                body=body_of.astype(np.int16),
-                part=part_of.astype(np.int16),
-                kind=kinds,
-                vertices=vertices.astype(np.float32),
-                body_names=f.body_names,
-                part_names=f.part_names,
-                tx=end,
-                rx=end,
-            )
-        )
-    return out
+        legs = wedge_legs(geometry, end, points.position[p], int(points.body[p]), k)
+        pairs += [(p, i, o) for i, o in product(legs, legs) if i.over or o.over]
+    if not pairs:
+        return None
+    n, f = len(pairs), geometry.facets
+    body, part = np.full((n, slots), -1), np.full((n, slots), -1)
+    kind, vertices = np.zeros((n, slots), np.int8), np.broadcast_to(end, (n, slots, 3)).copy()
+    for r, (p, i, o) in enumerate(pairs):
+        stops = [(i.faces[0], i.spot, DIFFRACT)] if i.over else []
+        stops += [(-1, points.position[p], POINT)] + ([(o.faces[0], o.spot, DIFFRACT)] if o.over else [])
+        for c, (facet, spot, what) in enumerate(stops):
+            body[r, c] = f.body[facet] if facet >= 0 else points.body[p]
+            part[r, c] = f.part[facet] if facet >= 0 else -1
+            kind[r, c], vertices[r, c] = what, spot
+    of = [p for p, _, _ in pairs]
+    both = [(i, o) for _, i, o in pairs]
+    columns = {
+        name: np.array([[getattr(leg, name) for leg in legs] for legs in both])
+        for name in ("leaves", "arrives", "near", "far", "faces", "edge", "normals", "wedge_n")
+    }
+    sigma = np.array([bistatic_sigma(points, p, -i.arrives, -o.arrives) for p, i, o in pairs])
+    return DiffractedRoutes(
+        end=end,
+        vertices=vertices,
+        body=body,
+        part=part,
+        kind=kind,
+        target=points.position[of],
+        target_velocity=points.velocity[of],
+        sigma=sigma,
+        **columns,
+    )

@@ -98,7 +98,7 @@ def _cut_for_phase(
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
         edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
-        more = found.affords_phase(geometry, facet, edge >= 0)
+        more = found.budget.affords_phase(geometry, facet, edge >= 0)
         ready = ~more
         if held + np.count_nonzero(ready) > _BATCH:
             yield _joined(done)
@@ -133,8 +133,8 @@ def _cut_for_sight(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: 
     # a wall.
     view = centres(geometry, leg, tubes, True, rule)
     found.add(ph.take(view.seen))
-    ready = geometry.convex_alone or found.spent(geometry)
-    matters = (ph.bound > found.doubt(ph.length)) & (not ready)
+    ready = geometry.convex_alone or found.budget.spent(geometry)
+    matters = (ph.bound > found.prune_threshold(ph.length)) & (not ready)
     keep(view, view.seen & ~matters)
     known: View | None = view.take(matters)
     tubes, matters = tubes.take(matters), matters[matters]
@@ -142,12 +142,12 @@ def _cut_for_sight(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: 
         if not len(tubes):
             break
         s = sight(geometry, leg, tubes, matters, True, rule, level < GAPS, known)
-        split = found.affords(geometry, tubes.facet, s.mixed & matters & (level < rule.levels))
+        split = found.budget.affords(geometry, tubes.facet, s.mixed & matters & (level < rule.levels))
         keep(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)
         tubes, _ = divide(geometry, leg, tubes, rows, s.side, True, rule.jitter)
         ph = phases_of(geometry, leg, out, tubes, rule)
-        known, matters = None, ph.bound > found.doubt(ph.length)
+        known, matters = None, ph.bound > found.prune_threshold(ph.length)
     return Tubes.join(kept)
 
 

@@ -48,7 +48,7 @@ def resolve_return_leg(
             left = found.that_count(RUNNING * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
-        matters = (ph.bound > found.doubt(ph.length)) & (not found.spent(geometry))
+        matters = (ph.bound > found.prune_threshold(ph.length)) & (not found.budget.spent(geometry))
         # Of what little a scene sees of them, currents beyond the horizon are asked for by their centres alone.
         asked = matters if which == LIT else matters & facing
         view = sight(geometry, out, tubes, asked, first, rule, level < GAPS, beyond=~facing)
@@ -58,7 +58,7 @@ def resolve_return_leg(
         how = facing, view.centre.seen, view.some, view.mixed, ph.rough
         what = sort_out(*how, cut)
         wanted = (what == BENT) | (what == SHADED)
-        cut &= ~wanted | found.affords(geometry, tubes.facet, wanted)
+        cut &= ~wanted | found.budget.affords(geometry, tubes.facet, wanted)
         what = sort_out(*how, cut)
         ready, bent, shaded = (np.flatnonzero(what == w) for w in (READY, BENT, SHADED))
         kept.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))

@@ -1,4 +1,4 @@
-"""Shoot: tubes from launch to last bounce, over every way in and out, as Routes."""
+"""Shooting and bouncing rays: tubes from their launch to their last bounce, out over every leg, as Routes."""
 
 from __future__ import annotations
 
@@ -33,10 +33,11 @@ def tube_routes(
     so_far: Contributions | None = None,
     first: Callable[[Tubes, Contributions], None] | None = None,
 ) -> Iterator[Routes]:
-    """Yield the routes of tubes launched over `leg`, bounce by bounce and way out by way out.
+    """Yield the routes of tubes launched over `leg`, one batch for each bounce and outgoing leg.
 
-    Args: pieces (p,) which may carry the first bounce; so_far what launches over other legs have found; first is given
-    the tubes on their first surface, whose own routes are then not among those yielded.
+    Args: outs the outgoing legs, the direct one first; pieces (p,) that may carry the first bounce; bounces the most
+    interactions, both legs counted; so_far contributions to prune against; first is given the tubes on their first
+    surface, whose own routes are then not yielded.
     """
     direct = outs[0]
     found = so_far or Contributions(rule.for_depth(bounces))
@@ -59,15 +60,17 @@ def _followed(
     found: Contributions,
     single: bool,
 ) -> Iterator[Routes]:
-    """Yield the routes of tubes on their first surface, bounce by bounce and way out by way out; `single`: those of the
-    first surface too."""
+    """Yield the routes of tubes that stand on their first surface, and of all later bounces; without `single` those of
+    the first surface are left out."""
     f, first = geometry.facets, True
     while len(tubes):
         count = int(tubes.bounces[0])
-        # Ground has no return of its own here.
+        # Mirrors such as the ground return by their exact foot points, not by tubes.
         own = f.role[f.body[tubes.facet]] != MIRROR
         by_image = images.returns(geometry, leg, tubes, first)
-        for out in outs if single or not first else []:
+        # What returns by the leg that it came by counts first: the order of the others then does not matter.
+        every = sorted(outs, key=lambda out: out is not leg) if first else outs
+        for out in every if single or not first else []:
             if count + len(out.mirrors) > bounces:
                 continue
             twice = by_image & (not first or images.over(geometry, out))
@@ -86,7 +89,8 @@ def _followed(
 def _returned(
     geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, own: Bools, first: bool, veiled: bool, found: Contributions
 ) -> Iterator[Routes]:
-    """Yield the routes of those tubes, of `own` (n,), that are seen over a way out, or seen through a layer."""
+    """Yield the routes of tubes, of those chosen by `own` (n,), that an outgoing leg sees; `veiled`: only those that
+    it sees through a layer."""
     rule, piece = found.rule, geometry.piece[tubes.facet]
     may = reachable(geometry, out).copy()
     may[out.pieces(geometry)] = False
@@ -110,10 +114,10 @@ def _returned(
 
 @dataclass(frozen=True)
 class _Images:
-    """What returns by its image in a mirror must not return by tubes too: `planes` (p,) that are mirrors of legs.
+    """Returns that legs over mirrors carry already and tubes must not carry again; `planes` (p,) are those mirrors.
 
-    Over several such mirrors in a row a wave scatters at the last. No leg leads through a layer before its last
-    stretch, though: such ways are the tubes'.
+    Over several such mirrors in a row a wave scatters at the last one. Legs pass layers on their last stretch only:
+    routes through a layer before it are left to the tubes.
     """
 
     planes: Bools
@@ -125,20 +129,19 @@ class _Images:
         return _Images(np.isin(np.arange(geometry.plane.max(initial=-1) + 1), list(used)))
 
     def over(self, geometry: Geometry, out: Leg) -> bool:
-        """Tell whether a way out leads over a mirror that may be the last to scatter."""
+        """Tell whether an outgoing leg has a mirror that also scatters (the ground does not)."""
         return any(geometry.facets.role[m.body] != MIRROR for m in out.mirrors)
 
     def returns(self, geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> Bools:
-        """Tell of tubes (n,) whether they stand on a mirror that has their returns by its image: on their first
-        surface those that leave over other mirrors, later all that came from another piece."""
+        """Tell which tubes (n,) stand on a mirror whose image carries their return: on their first surface those that
+        leave over other mirrors, later all that came from another piece."""
         mirror = self.planes[geometry.plane[tubes.facet]]
         if first:
             return mirror & (tubes.slots == len(leg.mirrors))
         return mirror & (geometry.piece[tubes.came_from()] != geometry.piece[tubes.facet])
 
     def carry(self, geometry: Geometry, tubes: Tubes) -> Bools:
-        """Tell of tubes (n,) whether a leg over the mirror on which they stood first leads to the piece where they
-        landed."""
+        """Tell which tubes (n,) a leg covers: it leads over the mirror where they bounced first to where they are."""
         before = tubes.came_from()
         moved = geometry.piece[before] != geometry.piece[tubes.facet]
         return self.planes[geometry.plane[before]] & moved & ~tubes.history.veiled(tubes.last)

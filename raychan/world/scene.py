@@ -193,7 +193,7 @@ class Scene(Told):
         if self.radar_table is not None:
             there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
             moved.radar = self.radar_table.model_copy(update={"position": there.tolist()})
-            moved.__dict__["sensor"] = self.radar_at(time)
+            moved.__dict__["radar"] = self.radar_at(time)
         moved.__dict__.pop("warnings", None)
         moved.text, moved._data = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
         try:

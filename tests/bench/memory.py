@@ -36,8 +36,12 @@ tubes = rc.simulate(scene, tolerance_db={tolerance!r}).stats["tubes"]
 _TUBES = """
 import dataclasses
 import raychan as rc
-from raychan.run.solver import refinement, solve_into
-from raychan.run.path_stream import Gather
+from raychan.run.solver import solve_into
+from raychan.tracing.settings import refinement
+from raychan.run.path_stream import PathStream
+from raychan.run.solver import PruneRule
+from raychan.radar.beam_table import beam_of
+from raychan.world.geometry import Geometry
 scene = rc.Scene(
     bodies=[rc.Body("wall", shape="plate", params=dict(width=10.0, height=10.0), position=(8, 0, 0), yaw_deg=180.0)],
     radar=dict(position=[0.0, 0.0, 0.0], waveform=dict(bandwidth_mhz=500.0, chirp_us=30.0, chirps=64, samples=128)),
@@ -45,8 +49,9 @@ scene = rc.Scene(
 start = time.perf_counter()
 rule = refinement(77e9, 0.5)
 rule = dataclasses.replace(rule, max_edge=10.0 * ({tubes} / 2.0) ** -0.5, max_tubes=10 * {tubes})
-gather = Gather(scene.sensor, "hann")
-tubes = solve_into(gather.add, scene.facets(), scene.points(), scene.sensor, 77e9, rule, 1).tubes
+gather, radar = PathStream(scene.radar, "hann"), scene.radar
+rule = PruneRule(radar.position, beam_of(radar), rule, 1)
+tubes = solve_into(gather.add, Geometry(scene.facets()), scene.points(), radar, 77e9, rule).tubes
 gather.done().quiet
 """
 

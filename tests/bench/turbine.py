@@ -11,9 +11,11 @@ import numpy as np
 
 import raychan as rc
 from bench.measure import Row, barred, paired, seconds
+from raychan.radar.beam_table import beam_of
 from raychan.run.micro_doppler import retraced
-from raychan.run.solver import refinement, solve
+from raychan.run.solver import solve
 from raychan.signal.baseband import synthesize
+from raychan.tracing.settings import PruneRule, refinement
 
 _CHIRPS = 256
 
@@ -30,7 +32,8 @@ def turbine(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
         rows: list[Any] = []
 
         def ours(scene: rc.Scene = scene, rule: Any = rule, few: list[Any] = few) -> None:
-            few.append(retraced(scene, rule, scene.model))
+            prune = PruneRule(scene.radar.position, beam_of(scene.radar), rule, scene.model.max_bounces)
+            few.append(retraced(scene, prune, scene.model))
 
         def every(scene: rc.Scene = scene, rule: Any = rule, rows: list[Any] = rows, at: Any = at) -> None:
             rows[:] = [_chirp(scene, rule, int(m)) for m in at]

@@ -8,9 +8,12 @@ from support.places import SCENES
 
 import raychan as rc
 from raychan.channel.error import stated_error
-from raychan.run.simulate import Clock, noise_equivalent_amplitude, noise_of_cell, quiet_map, result_of, trace
-from raychan.run.solver import refinement, solve
+from raychan.run.clock import Clock
+from raychan.run.receiver import noise_equivalent_amplitude, noise_of_cell, quiet_map
+from raychan.run.simulate import channel_of, result_of
+from raychan.run.solver import solve
 from raychan.signal.baseband import synthesize
+from raychan.tracing.settings import refinement
 from raychan.units import C0
 
 
@@ -18,7 +21,7 @@ from raychan.units import C0
 def test_a_maps_stated_error_covers_the_true_one_in_most_cells(name):
     scene = rc.Scene.load(SCENES / f"{name}.toml")
     radar, settings, wave = scene.radar, scene.processing, scene.radar.waveform
-    channel = trace(scene, 1.0, 2, Clock())
+    channel = channel_of(scene, 1.0, 2, Clock())
     fine = refinement(
         wave.carrier,
         0.25,

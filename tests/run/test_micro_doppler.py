@@ -10,12 +10,14 @@ import trimesh
 
 import raychan as rc
 from raychan.processing.range_doppler import range_doppler
+from raychan.radar.beam_table import beam_of
 from raychan.records import Cube
 from raychan.run.micro_doppler import bend, needed, retraced
 from raychan.run.sequence import frames
 from raychan.run.simulate import simulate
-from raychan.run.solver import refinement, solve
+from raychan.run.solver import solve
 from raychan.signal.baseband import synthesize
+from raychan.tracing.settings import PruneRule, refinement
 from raychan.units import C0
 
 WAVE = {"bandwidth_mhz": 300.0, "chirp_us": 30.0, "chirps": 64, "samples": 64}
@@ -49,7 +51,8 @@ def every_chirp(scene):
         paths, _ = solve(now.facets(), now.points(), now.radar, wave.carrier, rule, scene.model.max_bounces)
         one = dataclasses.replace(now.radar, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
         rows.append(synthesize(paths, one).samples)
-    return np.concatenate(rows, axis=1), rule
+    radar = scene.radar
+    return np.concatenate(rows, axis=1), PruneRule(radar.position, beam_of(radar), rule, scene.model.max_bounces)
 
 
 def energy_db(part, whole):

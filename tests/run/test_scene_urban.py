@@ -12,7 +12,8 @@ from support.places import SCENES
 from support.study_tables import table
 
 from raychan.run.labels import provenance
-from raychan.run.simulate import background, received, simulate
+from raychan.run.receiver import detections_in, map_of
+from raychan.run.simulate import background, simulate
 from raychan.signal.baseband import synthesize
 from raychan.units import C0, EPS0
 from raychan.world.scene import Scene
@@ -37,7 +38,8 @@ def detected(run, request):
         return run.detections, run.provenance
     scene = run.scene
     rng = np.random.default_rng(np.random.SeedSequence(request.param).spawn(1)[0])
-    rdmap, found = received(synthesize(run.paths, scene.radar, rng), scene.radar, scene.processing)
+    rdmap = map_of(synthesize(run.paths, scene.radar, rng), scene.radar, scene.processing)
+    found = detections_in(rdmap, scene.radar, scene.processing)
     return found, provenance(run.paths, rdmap, found, run.receiver, run.error.power)
 
 

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 import raychan as rc
 from raychan.cli import app
-from raychan.run import solver
 from raychan.run.resources import demand
 from raychan.run.single_body import facets_of
+from raychan.tracing import solver
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
@@ -32,11 +32,11 @@ def test_a_launch_cuts_as_often_as_it_may_and_counts_the_rest():
     facet = np.zeros(10, np.int32)
     found = Contributions(Refinement(wavenumber=1.0, max_cuts=7))
     every = np.ones(10, bool)
-    assert found.affords(geometry, facet[:4], every[:4]).all()
-    assert found.affords(geometry, facet, every).sum() == 3
-    assert found.spent(geometry)
-    assert not found.affords(geometry, facet, every).any()
-    assert found.uncut.tolist() == [17]
+    assert found.budget.affords(geometry, facet[:4], every[:4]).all()
+    assert found.budget.affords(geometry, facet, every).sum() == 3
+    assert found.budget.spent(geometry)
+    assert not found.budget.affords(geometry, facet, every).any()
+    assert found.budget.uncut.tolist() == [17]
 
 
 def test_a_mesh_of_facets_through_each_other_keeps_to_the_rays_that_it_may_cast():
@@ -107,7 +107,7 @@ import time, raychan.run.simulate, raychan.cli
 def trace(*a):
     print("ready", flush=True)
     time.sleep(60.0)
-raychan.run.simulate.trace = trace
+raychan.run.simulate.channel_of = trace
 raychan.cli.main(["run", "occluded_pedestrian", "--out", {out!r}])
 """
 

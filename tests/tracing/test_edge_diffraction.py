@@ -7,10 +7,12 @@ import pytest
 from support.facets import box, facets, quad
 from support.points import point, radar
 
+from raychan.channel.edge_diffraction import leg_field
 from raychan.frames import theta_phi
 from raychan.records import DIFFRACT
-from raychan.run.solver import refinement, solve
-from raychan.tracing.edge_diffraction import ways
+from raychan.run.solver import solve
+from raychan.tracing.edge_diffraction import wedge_legs
+from raychan.tracing.settings import refinement
 from raychan.units import C0
 from raychan.world.geometry import Geometry
 
@@ -32,8 +34,9 @@ def field(geometry, y, x=20.0):
     The mean of soft and hard diffraction is what scalar theory gives.
     """
     at, scale = np.array([x, y, 0.0]), np.hypot(x, y) * np.exp(1j * K * np.hypot(x, y))
-    v = sum(w.field for w in ways(geometry, np.zeros(3), at, -1, vertical, K))
-    h = sum(w.field for w in ways(geometry, np.zeros(3), at, -1, horizontal, K))
+    legs = wedge_legs(geometry, np.zeros(3), at, -1, K)
+    v = sum(leg_field(leg, geometry.facets, vertical, K) for leg in legs)
+    h = sum(leg_field(leg, geometry.facets, horizontal, K) for leg in legs)
     straight = at / np.linalg.norm(at)
     return 0.5 * scale * (v @ theta_phi(straight[None])[0][0] + h @ theta_phi(straight[None])[1][0])
 

@@ -13,8 +13,9 @@ from truth import slab
 
 import raychan as rc
 from raychan.records import HALF_SPACE, LAYER, PEC, Facets
-from raychan.run.solver import refinement, solve
+from raychan.run.solver import solve
 from raychan.run.specular_paths import jones, specular_routes
+from raychan.tracing.settings import refinement
 from raychan.units import C0
 from raychan.world.backed_layers import backed
 from raychan.world.geometry import Geometry, geometry_of

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from raychan.processing.range_doppler import range_doppler
 from raychan.records import TRANSMIT, Paths, take
+from raychan.run.clock import STAGES
+from raychan.run.receiver import noise_of_cell
 from raychan.run.result import MULTIPATH, Result
-from raychan.run.simulate import STAGES, background, noise_of_cell, simulate
+from raychan.run.simulate import background, simulate
 from raychan.signal.baseband import synthesize
 from raychan.study.validation.data import POINT, Study, Target
 from raychan.units import C0, db

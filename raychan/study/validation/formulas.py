@@ -13,7 +13,7 @@ from raychan.processing.cfar import factor
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.pattern import gain_dbi
 from raychan.records import Paths, RangeDoppler
-from raychan.run.simulate import noise_of_cell
+from raychan.run.receiver import noise_of_cell
 from raychan.signal.baseband import synthesize
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure

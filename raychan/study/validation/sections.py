@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from raychan.run.receiver import noise_of_cell
 from raychan.run.result import MULTIPATH
-from raychan.run.simulate import noise_of_cell
 from raychan.study.validation.bench import Bench, over
 from raychan.study.validation.data import POINT, Item
 from raychan.study.validation.formulas import ARRAY, PATCH, both_ways, link_snr

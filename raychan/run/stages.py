@@ -1,0 +1,94 @@
+"""The stages of a run as functions: trace, transfer, synthesize, range_doppler, detect. `simulate` uses the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from raychan.channel.paths import join, nothing, paths_of
+from raychan.radar.radar import Radar
+from raychan.records import Cube, Detections, Paths, RangeDoppler
+from raychan.run.receiver import detections_in, map_of
+from raychan.run.rules import asked, check_rule, fine_rule, rule_of
+from raychan.run.solver import Batch
+from raychan.signal.baseband import synthesize as samples_of
+from raychan.tracing.settings import PruneRule
+from raychan.tracing.solver import Stats, launch_routes
+from raychan.units import C0
+from raychan.world.geometry import Geometry, geometry_of
+from raychan.world.limits import SEED
+from raychan.world.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class SceneRoutes:
+    """The routes of one launch over a scene: where waves go, no field yet.
+
+    `geometry` of the scene at the start of a frame, `rule` by which they were pruned, the routes in `batches`, and what
+    they cost (`stats`). They serve any radar within the rule.
+    """
+
+    geometry: Geometry
+    rule: PruneRule
+    batches: tuple[Batch, ...]
+    stats: Stats
+
+    def __len__(self) -> int:
+        return sum(len(batch.kind) for batch in self.batches)
+
+    def __repr__(self) -> str:
+        return f"SceneRoutes({len(self):,} routes in {len(self.batches)} batches, {self.stats.rays:,} rays)"
+
+
+def trace(
+    scene: Scene, tolerance_db: float | None = None, max_bounces: int | None = None, check: bool = False
+) -> SceneRoutes:
+    """Return the routes of a scene from its radar and back.
+
+    Args: tolerance_db [dB] and max_bounces override the scene's; check: those of the coarser launch on another lattice,
+    which `simulate` holds against the fine one to state its error.
+    With `model.mode = "auto"` all mechanisms of the scene are traced. Where bodies turn within a frame, `simulate`
+    traces several instants; these are the routes of its start.
+    Raises: ValueError on a tolerance or a number of bounces out of range.
+    """
+    model = asked(scene, tolerance_db, max_bounces)
+    rule = (check_rule if check else fine_rule)(scene.radar, scene.processing, model)
+    geometry, stats = geometry_of(scene), Stats()
+    batches = tuple(launch_routes(geometry, scene.points(0.0), rule, stats))
+    return SceneRoutes(geometry, rule, batches, stats)
+
+
+def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
+    """Return what routes carry for a radar: gain, delay and rate of each path.
+
+    Raises: ValueError for a radar that the routes were not traced for: elsewhere, of another carrier, of less noise, of
+    more bandwidth, or with antennas that reach farther. Its polarisation, power and motion are free.
+    """
+    carrier = radar.waveform.carrier
+    own = replace(routes.rule.refinement, wavenumber=2.0 * np.pi * carrier / C0, cell=C0 / radar.waveform.bandwidth)
+    problem = routes.rule.refusal(rule_of(radar, radar.processing, own, routes.rule.bounces))
+    if problem:
+        raise ValueError(f"these routes do not serve this radar: {problem}")
+    facets = routes.geometry.facets
+    return join([nothing(facets, radar), *(paths_of(batch, facets, radar, carrier) for batch in routes.batches)])
+
+
+def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
+    """Return the dechirped samples of a frame, with the radar's noise.
+
+    Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
+    """
+    SEED.check("seed", seed, whole=True)
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    return samples_of(paths, radar, rng)
+
+
+def range_doppler(cube: Cube, radar: Radar) -> RangeDoppler:
+    """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`."""
+    return map_of(cube, radar, radar.processing)
+
+
+def detect(rdmap: RangeDoppler, radar: Radar) -> Detections:
+    """Return what the radar's detector finds in a map, by the CFAR of `radar.processing`."""
+    return detections_in(rdmap, radar, radar.processing)

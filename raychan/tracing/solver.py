@@ -1,0 +1,121 @@
+"""One launch: the routes of a scene from a radar and back, over every leg."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
+from raychan.tracing.contributions import Contributions
+from raychan.tracing.edge_diffraction import diffracted_routes
+from raychan.tracing.legs import Leg
+from raychan.tracing.mirrors import legs_over, reachable
+from raychan.tracing.point_targets import point_routes
+from raychan.tracing.settings import PruneRule
+from raychan.tracing.shooting import tube_routes
+from raychan.tracing.tubes import Refinement
+from raychan.world.geometry import Geometry
+
+Ints = NDArray[np.int64]
+Progress = Callable[[str, float], None]
+
+# A launch beyond these limits cuts no more and says so.
+_TUBES = 10_000_000  # cut for phase: a quarter of a minute of one core; urban streets at 0.1 dB take a million
+_CUTS, _CUTS_A_FACET = 40_000, 4  # cuts for visibility; urban streets at 0.1 dB take 13,000
+
+
+@dataclass
+class Stats:
+    """What a launch cost and what it left coarser than asked for."""
+
+    rays: int = 0
+    tubes: int = 0
+    legs: int = 0
+    uncut: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Tubes (bodies,) that were too many to be cut as finely as asked for."""
+
+
+def launch_routes(
+    geometry: Geometry, points: Points, rule: PruneRule, stats: Stats, progress: Progress | None = None
+) -> Iterator[Routes | DiffractedRoutes]:
+    """Yield the routes of a scene, batch by batch.
+
+    Args: geometry, which serves many launches; points the targets given by their RCS; rule what may be left out; stats
+    is filled; progress is told ("trace", share done).
+    """
+    refined, bounces, before = rule.refinement, rule.bounces, geometry.rays
+    legs = legs_over(geometry, np.asarray(rule.position, float), bounces - 1, rule.beam)
+    stats.legs = len(legs)
+    found = point_routes(geometry, points, legs, legs, bounces, refined.slots, refined.layers)
+    if found is not None:
+        yield found
+    if rule.diffraction:
+        over = diffracted_routes(geometry, points, legs[0].end, refined.wavenumber, refined.slots)
+        if over is not None:
+            yield over
+    found = _foot_points(geometry, legs, refined)
+    if found is not None:
+        yield found
+    cuts = _CUTS + _CUTS_A_FACET * len(geometry.facets.vertices)
+    limited = replace(refined.for_depth(bounces), max_tubes=min(refined.max_tubes, _TUBES), max_cuts=cuts)
+    # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not matter.
+    direct = Contributions(limited)
+    for i, leg in enumerate(legs):
+        if progress:
+            progress("trace", i / len(legs))
+        pieces = reachable(geometry, leg)
+        if not pieces.any():
+            continue
+        for routes in tube_routes(geometry, leg, legs, pieces, refined, bounces, direct if i == 0 else direct.forked()):
+            stats.tubes += len(routes.kind)
+            yield routes
+    stats.rays, stats.uncut = geometry.rays - before, direct.budget.uncut
+    if progress:
+        progress("trace", 1.0)
+
+
+def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Routes | None:
+    """Return the exact routes to the ground's foot points and back: a plane mirror too large for tubes."""
+    f = geometry.facets
+    rows = []
+    for leg in legs:
+        if len(leg.mirrors) != 1 or f.role[leg.mirrors[0].body] != MIRROR:
+            continue
+        m = leg.mirrors[0]
+        height = float((leg.end - m.point) @ m.normal)
+        foot = leg.end - height * m.normal
+        hit, _ = geometry.cast(leg.end[None], -m.normal[None], np.array([-1], np.int32))
+        if hit[0] >= 0 and geometry.plane[hit[0]] == geometry.plane[m.facet]:
+            rows.append((foot, m, height))
+    if not rows:
+        return None
+    n, d = len(rows), rule.slots
+    vertices = np.broadcast_to(legs[0].end, (n, d, 3)).copy()
+    normals, facet = np.zeros((n, d, 3)), np.full((n, d), -1, np.int32)
+    kind, body = np.zeros((n, d), np.int8), np.full((n, d), -1, np.int16)
+    for i, (foot, m, _) in enumerate(rows):
+        vertices[i, 0], normals[i, 0], facet[i, 0], kind[i, 0], body[i, 0] = foot, m.normal, m.facet, REFLECT, m.body
+    length = np.array([2.0 * h for _, _, h in rows])
+    return Routes(
+        tx=legs[0].end,
+        rx=legs[0].end,
+        far=False,
+        vertices=vertices,
+        normals=normals,
+        facet=facet,
+        body=body,
+        kind=kind,
+        scatter=np.full(n, -1, np.int8),
+        points=np.zeros((n, 6, 3)),
+        lengths=np.repeat(length[:, None], 6, axis=1),
+        length=length,
+        taper=np.ones((n, 3)),
+        area=np.zeros(n),
+        spread_in=1.0 / length,
+        spread_out=np.ones(n),
+        caustics=np.zeros(n, np.int8),
+        sigma=np.zeros(n),
+    )
