@@ -9,6 +9,7 @@ from support.facets import box, facets, ground, quad
 from support.points import no_points, point, radar
 from truth import slab, tworay
 
+from raychan.frames import theta_phi
 from raychan.records import HALF_SPACE, PEC
 from raychan.run.solver import solve
 from raychan.tracing.settings import refinement
