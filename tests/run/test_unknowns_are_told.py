@@ -18,7 +18,7 @@ from raychan.cli import invoke, show
 from raychan.records import REFLECT
 from raychan.records import SCATTER as SCATTERS
 from raychan.report.canvas import figure as drawing
-from raychan.report.figures import _mark_detections, rdmap_picture
+from raychan.report.figures import rdmap_picture
 from raychan.run.convergence import figure
 from raychan.run.messages import counts, marks, noted, warned
 from raychan.run.storage import load_result, save_result, summary
@@ -134,8 +134,8 @@ def test_the_table_lists_apart_what_is_not_converged_and_numbers_all(half, capsy
 def test_the_map_marks_them_hollow_and_the_legend_says_so(half, tmp_path):
     axes = drawing(3.0, 3.0).add_subplot()
     far = half.detections.replace(folded=[True, False])
-    _mark_detections(dataclasses.replace(half, detections=far), axes)
-    lines = {str(line.get_label()): line for line in axes.lines}
+    rdmap_picture(dataclasses.replace(half, detections=far), axes=axes)
+    lines = {str(line.get_label()): line for line in axes.lines if not str(line.get_label()).startswith("_")}
     assert set(lines) == {"direct (1)", "multipath, not converged (1)", "folded, truly elsewhere (1)"}
     assert lines["multipath, not converged (1)"].get_markerfacecolor() == "none"
     assert lines["direct (1)"].get_markerfacecolor() != "none"
