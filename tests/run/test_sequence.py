@@ -96,8 +96,8 @@ def test_the_command_writes_a_directory_a_frame_and_one_list_of_detections(file,
     assert invoke([*command, "--frames", "3"]) == 0
     assert {p.name for p in out.iterdir()} == {"detections.csv", "frame_0000", "frame_0001", "frame_0002"}
     assert invoke(["run", str(file), "--out", str(tmp_path / "one"), "--no-pictures"]) == 0
-    whole = list(csv.DictReader((out / "detections.csv").open()))
-    alone = list(csv.DictReader((tmp_path / "one" / "detections.csv").open()))
+    whole = list(csv.DictReader((out / "detections.csv").read_text().splitlines()))
+    alone = list(csv.DictReader((tmp_path / "one" / "detections.csv").read_text().splitlines()))
     first = [{k: v for k, v in row.items() if k not in ("frame", "time_s")} for row in whole if row["frame"] == "0"]
     assert first == alone
     assert {(row["frame"], row["time_s"]) for row in whole} <= {(str(k), f"{0.1 * k:.6f}") for k in range(3)}
