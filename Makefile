@@ -7,14 +7,15 @@ BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
 # Tests of the kernels, which `make test` also runs with bounds checked; the rest of the suite: make test-bounds.
-BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py world/test_shapes.py \
+BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py \
+	world/test_shapes.py \
 	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
 # Tests of the kernels that are cheap enough as plain Python; marked `compiled`: what is not, each with its reason.
 NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_doppler.py signal \
 	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: help demo test test-bounds test-nojit coverage fuzz signatures bench clean
+.PHONY: help demo test test-bounds test-nojit coverage fuzz signatures bench docs clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
@@ -25,6 +26,7 @@ help:
 	@echo "make fuzz   random scene files, meshes and flags for half an hour (FUZZ=--help: more)"
 	@echo "make signatures   list anew what a cold run compiles, for its second process (some minutes)"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
+	@echo "make docs   the pages of docs/ and the API reference into out/docs; warnings are errors"
 	@echo "make clean  remove $(VENV), out and caches"
 
 demo: $(VENV)/.installed
@@ -57,6 +59,9 @@ signatures: $(VENV)/.installed-dev
 bench: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
+docs: $(VENV)/.installed-docs
+	$(BIN)/python docs/build.py out/docs
+
 # A stamp younger than pyproject.toml says that the environment is up to date.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
@@ -64,6 +69,10 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 
 $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@ $(VENV)/.installed
 
 $(BIN)/python:

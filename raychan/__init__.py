@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 _PLACES = (os.path.dirname(__file__), os.path.expanduser("~"))
 if "NUMBA_CACHE_DIR" not in os.environ and not any(os.access(place, os.W_OK) for place in _PLACES):
@@ -21,10 +21,22 @@ if "NUMBA_CACHE_DIR" not in os.environ and not any(os.access(place, os.W_OK) for
 
 _HOME = {
     "Scene": "raychan.world.scene",
-    "Body": "raychan.world.scene",
-    "SceneError": "raychan.world.scene",
+    "Body": "raychan.world.body",
+    "SceneError": "raychan.world.errors",
     "Material": "raychan.world.material",
     "PEC": "raychan.world.material",
+    "Radar": "raychan.radar.radar",
+    "Waveform": "raychan.radar.waveform",
+    "Antenna": "raychan.radar.antenna",
+    "IsotropicAntenna": "raychan.radar.antenna",
+    "CosineAntenna": "raychan.radar.antenna",
+    "ArrayAntenna": "raychan.radar.antenna",
+    "MeasuredAntenna": "raychan.radar.pattern",
+    "load_antenna": "raychan.world.radar_mount",
+    "Processing": "raychan.radar.processing",
+    "Paths": "raychan.records",
+    "SpecularPaths": "raychan.records",
+    "InteractionType": "raychan.kinds",
     "simulate": "raychan.run.simulate",
     "trace": "raychan.run.stages",
     "transfer": "raychan.run.stages",
@@ -32,6 +44,7 @@ _HOME = {
     "range_doppler": "raychan.run.stages",
     "detect": "raychan.run.stages",
     "SceneRoutes": "raychan.run.stages",
+    "frames": "raychan.run.sequence",
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
     "load_result": "raychan.run.storage",
@@ -39,11 +52,41 @@ _HOME = {
     "specular_paths": "raychan.run.specular_paths",
     "visibility": "raychan.study.visibility",
 }
+"""Where each public name is at home; the imports below say the same to type checkers."""
+
+if TYPE_CHECKING:
+    from raychan.kinds import InteractionType as InteractionType
+    from raychan.radar.antenna import Antenna as Antenna
+    from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
+    from raychan.radar.antenna import CosineAntenna as CosineAntenna
+    from raychan.radar.antenna import IsotropicAntenna as IsotropicAntenna
+    from raychan.radar.pattern import MeasuredAntenna as MeasuredAntenna
+    from raychan.radar.processing import Processing as Processing
+    from raychan.radar.radar import Radar as Radar
+    from raychan.radar.waveform import Waveform as Waveform
+    from raychan.records import Paths as Paths
+    from raychan.records import SpecularPaths as SpecularPaths
+    from raychan.run.explain import explain as explain
+    from raychan.run.rcs import rcs as rcs
+    from raychan.run.result import Result as Result
+    from raychan.run.sequence import frames as frames
+    from raychan.run.simulate import simulate as simulate
+    from raychan.run.specular_paths import specular_paths as specular_paths
+    from raychan.run.storage import load_result as load_result
+    from raychan.study.visibility import visibility as visibility
+    from raychan.world.body import Body as Body
+    from raychan.world.errors import SceneError as SceneError
+    from raychan.world.material import PEC as PEC
+    from raychan.world.material import Material as Material
+    from raychan.world.radar_mount import load_antenna as load_antenna
+    from raychan.world.scene import Scene as Scene
+
+    __version__: str
 
 __all__ = [*_HOME, "__version__"]
 
 
-def __getattr__(name: str) -> Any:
+def _load(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
@@ -53,6 +96,10 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value
+
+
+if not TYPE_CHECKING:
+    __getattr__ = _load  # type checkers know the names, and that there are no others
 
 
 def __dir__() -> list[str]:

@@ -3,96 +3,28 @@
     Scene -> Facets -> Routes -> Paths -> Profile
                                  Paths -> Cube -> RangeDoppler -> Detections
 
-Every record is a frozen struct of arrays, one row a thing. Each array field declares its axes (letters shared
-within a record must agree), unit and dtype; the constructor checks them, rejects NaN and infinity, and makes the array
-read-only. Integer sentinel: -1 means "none". SI units and radians throughout.
+Every record is a frozen struct of arrays, one row a thing, checked when built (`raychan.columns`).
+Integer sentinel: -1 means "none". SI units and radians throughout.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.reprs import Drawn, Told
+from raychan.columns import Record, column
+from raychan.kinds import *  # noqa: F403
+from raychan.reprs import Drawn
+from raychan.units import C0
 
 Floats = NDArray[np.float64]
+Vectors = NDArray[np.float32] | NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 Ints = NDArray[np.signedinteger[Any]]
-
-# What happens at a vertex of a route.
-NONE, REFLECT, TRANSMIT, SCATTER, POINT, DIFFRACT = 0, 1, 2, 3, 4, 5
-KIND_LETTERS = ("", "R", "T", "S", "P", "D")
-"""Reflect at a mirror, transmit a thin layer, scatter by physical optics, point target of given RCS, diffract."""
-KIND_WORDS = ("", "reflect", "pass", "scatter", "point", "diffract")
-
-# What a material is to a wave.
-PEC, HALF_SPACE, LAYER = 0, 1, 2
-
-# What a body does besides blocking: scatter and reflect; reflect only (infinite ground); block only.
-SCATTERER, MIRROR, BLOCKER = 0, 1, 2
-
-
-def column(axes: str, dtype: Any = np.float64, unit: str = "1", doc: str = "", finite: bool = True) -> Any:
-    """Declare an array field: axes as space-separated letters or numbers ('n 3'), dtype, unit, meaning."""
-    meta = {"axes": axes.split(), "dtype": np.dtype(dtype), "unit": unit, "doc": doc, "finite": finite}
-    return field(metadata=meta)
-
-
-class Record(Told):
-    """Base of all records: checks and freezes every declared column when built."""
-
-    def __post_init__(self) -> None:
-        sizes: dict[str, int] = {}
-        for f in dataclasses.fields(self):  # type: ignore[arg-type]
-            if "axes" in f.metadata:
-                object.__setattr__(self, f.name, self._checked(f, sizes))
-
-    def _checked(self, f: dataclasses.Field[Any], sizes: dict[str, int]) -> NDArray[Any]:
-        where = f"{type(self).__name__}.{f.name}"
-        axes, dtype = f.metadata["axes"], f.metadata["dtype"]
-        given = np.asarray(getattr(self, f.name))
-        if not np.can_cast(given.dtype, dtype, "same_kind") and given.size:
-            raise TypeError(f"{where}: dtype {given.dtype} given, {dtype} wanted")
-        value = given.astype(dtype, copy=False).view()
-        if value.ndim != len(axes):
-            raise ValueError(f"{where}: shape {value.shape} given, axes ({', '.join(axes)}) wanted")
-        for axis, size in zip(axes, value.shape, strict=True):
-            want = int(axis) if axis.isdigit() else sizes.setdefault(axis, size)
-            if size != want:
-                raise ValueError(f"{where}: axis {axis} is {size} long, {want} wanted")
-        if f.metadata["finite"] and dtype.kind in "fc" and not np.isfinite(value).all():
-            raise ValueError(f"{where}: holds NaN or infinity")
-        value.flags.writeable = False
-        return value
-
-    def rebuilt(self, **columns: NDArray[Any]) -> Any:
-        """Return a copy with other columns of the same form, whose maker answers for them: frozen, but not checked
-        again, which for a record of 1e6 rows of which few changed took longer than all else."""
-        out = copy(self)
-        for name, value in columns.items():
-            frozen = value.view()
-            frozen.flags.writeable = False
-            object.__setattr__(out, name, frozen)
-        return out
-
-    def replace(self, **changes: Any) -> Any:
-        """Return a copy with some fields changed (and all checked again)."""
-        return dataclasses.replace(self, **changes)  # type: ignore[type-var]
-
-
-def take(record: Any, index: Any) -> Any:
-    """Return the rows `index` of a record whose row axis is 'n'."""
-    changes = {
-        f.name: getattr(record, f.name)[index]
-        for f in dataclasses.fields(record)
-        if f.metadata.get("axes", [""])[0] == "n"
-    }
-    return dataclasses.replace(record, **changes)
 
 
 @dataclass(frozen=True)
@@ -130,9 +62,7 @@ class Points(Record):
     position: Floats = column("n 3", unit="m")
     velocity: Floats = column("n 3", unit="m/s")
     body: Ints = column("n", np.int32)
-    azimuth: Floats = column(
-        "t", unit="rad", doc="knots of the RCS table, increasing, relative to heading, from -pi to pi"
-    )
+    azimuth: Floats = column("t", unit="rad", doc="knots of the RCS table relative to heading, from -pi to pi")
     sigma: Floats = column("n t", unit="m2", doc="RCS seen from each azimuth")
     heading: Floats = column("n", unit="rad")
 
@@ -192,44 +122,58 @@ class DiffractedRoutes(Record):
 
 @dataclass(frozen=True)
 class Ways(Record):
-    """Where paths went; a row a way, d slots a chain."""
+    """Where paths went; a row a way, d slots a chain. Float32 but for specular paths (`ExactWays`)."""
 
-    departure: NDArray[np.float32] = column("w 3", np.float32, doc="unit direction of departure, world axes")
+    departure: Vectors = column("w 3", np.float32, doc="unit direction of departure, world axes")
     arrival: Floats = column("w 3", doc="unit direction towards which the receiver looks, world axes")
-    body: Ints = column("w d", np.int16)
-    part: Ints = column("w d", np.int16)
-    kind: Ints = column("w d", np.int8)
-    vertices: NDArray[np.float32] = column("w d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
+    body: NDArray[np.int16] = column("w d", np.int16)
+    part: NDArray[np.int16] = column("w d", np.int16)
+    kind: NDArray[np.int8] = column("w d", np.int8)
+    vertices: Vectors = column("w d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
 
 
 @dataclass(frozen=True)
-class Paths(Record):
-    """What the routes carry; a row a path (or tube). Paths over the corners of one footprint share a way.
+class ExactWays(Ways):
+    """Ways in double precision."""
 
-    `departure`, `arrival`, `body`, `part`, `kind` and `vertices` are columns of `ways`, put out a row a path when asked
-    for.
+    departure: Floats = column("w 3", doc="unit direction of departure, world axes")
+    vertices: Floats = column("w d 3", unit="m", doc="unused slots repeat the receiver")
+
+
+@dataclass(frozen=True)
+class PropagationPaths(Record):
+    """What all paths have, simulated or specular; a row a path, d the most interactions.
+
+    `length` and `length_rate` are of the whole way from transmitter to receiver; half of them, `range` and
+    `range_rate`, is what a monostatic radar reads. Paths over the corners of one footprint share a row of `ways`.
     """
 
-    delay: Floats = column("n", unit="s")
-    amplitude: Complexes = column(
-        "n", np.complex128, doc="received over transmitted voltage wave, antennas in, carrier phase in"
-    )
-    rate: Floats = column("n", unit="m/s", doc="range rate: half the rate of the length; positive = receding")
-    way: Ints = column("n", np.int32, doc="row of `ways`")
+    length: Floats = column("n", unit="m", doc="from transmitter to receiver, the whole way")
+    length_rate: Floats = column("n", unit="m/s", doc="rate of the length; positive = growing")
+    way: NDArray[np.int32] = column("n", np.int32, doc="row of `ways`")
     ways: Ways
     body_names: tuple[str, ...]
     part_names: tuple[str, ...]
     tx: Floats = column("3", unit="m")
     rx: Floats = column("3", unit="m")
 
-    @classmethod
-    def of(cls, **columns: Any) -> Paths:
-        """Return paths of columns of which each has a row a path, those of `Ways` among them."""
-        ways = Ways(**{f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)})
-        return cls(way=np.arange(len(columns["delay"]), dtype=np.int32), ways=ways, **columns)
+    @property
+    def delay(self) -> Floats:
+        """Delays (n,) [s]: length over c."""
+        return self.length / C0
 
     @property
-    def departure(self) -> NDArray[np.float32]:
+    def range(self) -> Floats:
+        """Ranges (n,) [m] that a monostatic radar reads: half the length."""
+        return 0.5 * self.length
+
+    @property
+    def range_rate(self) -> Floats:
+        """Range rates (n,) [m/s] that a monostatic radar reads, positive = receding: half the length's rate."""
+        return 0.5 * self.length_rate
+
+    @property
+    def departure(self) -> Vectors:
         """Unit directions of departure (n, 3), world axes."""
         return self.ways.departure[self.way]
 
@@ -239,24 +183,60 @@ class Paths(Record):
         return self.ways.arrival[self.way]
 
     @property
-    def body(self) -> Ints:
-        """Bodies met (n, d), -1 in unused slots."""
+    def body(self) -> NDArray[np.int16]:
+        """Bodies met (n, d) as rows of `body_names`, -1 in unused slots."""
         return self.ways.body[self.way]
 
     @property
-    def part(self) -> Ints:
-        """Parts met (n, d), -1 in unused slots."""
+    def bodies(self) -> NDArray[np.str_]:
+        """Names of the bodies met (n, d), '' in unused slots."""
+        return np.array([*self.body_names, ""])[self.body]
+
+    @property
+    def part(self) -> NDArray[np.int16]:
+        """Parts met (n, d) as rows of `part_names`, -1 in unused slots."""
         return self.ways.part[self.way]
 
     @property
-    def kind(self) -> Ints:
-        """What happened at each vertex (n, d), NONE in unused slots."""
+    def kind(self) -> NDArray[np.int8]:
+        """What happened at each vertex (n, d): values of InteractionType, NONE in unused slots."""
         return self.ways.kind[self.way]
 
     @property
-    def vertices(self) -> NDArray[np.float32]:
-        """Vertices (n, d, 3) [m]; unused slots repeat the receiver."""
-        return self.ways.vertices[self.way]
+    def vertices(self) -> Vectors:
+        """Vertices (n, d + 2, 3) [m] from transmitter to receiver; unused slots repeat the receiver."""
+        inner = self.ways.vertices[self.way]
+        first, last = (np.broadcast_to(x.astype(inner.dtype), (len(inner), 1, 3)) for x in (self.tx, self.rx))
+        return np.concatenate([first, inner, last], axis=1)
+
+
+@dataclass(frozen=True)
+class Paths(PropagationPaths):
+    """What the routes of a scene carry from the radar and back to it; a row a path (or corner of a tube)."""
+
+    amplitude: NDArray[np.complex128] = column(
+        "n", np.complex128, doc="received over transmitted voltage wave, antennas in, carrier phase in"
+    )
+
+    @classmethod
+    def of(cls, **columns: Any) -> Paths:
+        """Return paths of columns of which each has a row a path, those of `Ways` among them."""
+        ways = Ways(**{f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)})
+        return cls(way=np.arange(len(columns["length"]), dtype=np.int32), ways=ways, **columns)
+
+
+@dataclass(frozen=True)
+class SpecularPaths(PropagationPaths):
+    """Exact paths between two points with isotropic ends, shortest first; each has a way of its own."""
+
+    gain: NDArray[np.complex128] = column(
+        "n 2 2", np.complex128, doc="rows the receiver's V, H, columns the transmitter's; lambda/4 pi L and phase in"
+    )
+
+    @property
+    def rate(self) -> Floats:
+        """The same as `length_rate` (n,) [m/s]: of the whole length, not of the range."""
+        return self.length_rate
 
 
 @dataclass(frozen=True)
@@ -273,9 +253,8 @@ class Profile(Record, Drawn):
 class Cube(Record):
     """Dechirped samples; voltage waves in sqrt(W), so |x|^2 is received power before processing."""
 
-    samples: Complexes = column("a c s", np.complex64, unit="sqrt(W)", doc="antenna, chirp, sample")
-    noise_power: float
-    """Thermal noise power per complex sample, kT0BF [W]; 0 when noise is off."""
+    samples: NDArray[np.complex64] = column("a c s", np.complex64, unit="sqrt(W)", doc="antenna, chirp, sample")
+    noise_power: float  # thermal, per complex sample, kT0BF [W]; 0 when noise is off
 
 
 @dataclass(frozen=True)
@@ -284,7 +263,7 @@ class RangeDoppler(Record, Drawn):
 
     range: Floats = column("r", unit="m")
     rate: Floats = column("v", unit="m/s", doc="range rate, positive = receding, increasing")
-    spectrum: Complexes = column("a v r", np.complex64, unit="sqrt(W)")
+    spectrum: NDArray[np.complex64] = column("a v r", np.complex64, unit="sqrt(W)")
     power: Floats = column("v r", unit="W", doc="mean over antennas of |spectrum|^2")
     noise: float
     """Expected thermal noise power per cell [W]; 0 when unknown."""
@@ -296,7 +275,7 @@ class RangeDoppler(Record, Drawn):
 
 @dataclass(frozen=True)
 class MapError(Record):
-    """How wrong a map may be: the power that a launch with another lattice, less fine, differs by in each cell."""
+    """How wrong a map may be: by what power a launch on another, coarser lattice differs in each cell."""
 
     power: Floats = column("v r", unit="W")
 
@@ -311,4 +290,4 @@ class Detections(Record):
     azimuth: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
-    cell: Ints = column("n 2", np.int32, doc="map indices (rate, range) of the peak")
+    cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")

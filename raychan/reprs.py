@@ -9,11 +9,16 @@ import dataclasses
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from raychan.units import C0, db, dbm
+from raychan.units import db, dbm
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
 
 _ROWS = 12
 
@@ -72,11 +77,22 @@ class Told:
 class Drawn:
     """Base of what has a picture."""
 
-    def plot(self, axes: Any = None) -> Any:
+    def plot(self, axes: Axes | None = None) -> Axes:
         """Draw with matplotlib and return the axes, those given or those of a new figure of pyplot."""
         from raychan.report.shown import draw
 
-        return draw(self, axes)
+        return draw(self, axes)  # type: ignore[no-any-return]
+
+
+class DrawnTwice:
+    """Base of what has two pictures, side by side."""
+
+    def plot(self, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
+        """Draw with matplotlib and return both axes, those given or those of a new figure of pyplot."""
+        from raychan.report.shown import draw
+
+        first, second = draw(self, axes)
+        return first, second
 
 
 def span(values: Any, unit: str = "", digits: int = 4) -> str:
@@ -122,15 +138,16 @@ def _columns(record: Any) -> Facts:
 def _paths(p: Any) -> Facts:
     bodies = np.unique(p.ways.body[p.ways.body >= 0])
     met = [p.body_names[b] for b in bodies]
+    gain = p.amplitude if hasattr(p, "amplitude") else p.gain[np.abs(p.gain) > 0.0]
     depth = (p.ways.kind > 0).sum(axis=1)
     lines = [
-        ("range", span(0.5 * C0 * p.delay, "m")),
-        ("range rate", span(p.rate, "m/s")),
-        ("gain", span(db(np.abs(p.amplitude) ** 2), "dB")),
+        ("range", span(p.range, "m")),
+        ("range rate", span(p.range_rate, "m/s")),
+        ("gain", span(db(np.abs(gain) ** 2), "dB")),
         ("interactions", span(depth)),
         ("over", ", ".join(met[:8]) + (f" and {len(met) - 8} more" if len(met) > 8 else "") or "nothing"),
     ]
-    return Facts(f"Paths: {counted(len(p.delay), 'path')}", tuple(lines))
+    return Facts(f"{type(p).__name__}: {counted(len(p.delay), 'path')}", tuple(lines))
 
 
 def _map(m: Any) -> Facts:
@@ -203,5 +220,5 @@ def _place(at: Any) -> str:
     return "(" + ", ".join(f"{x:g}" for x in at) + ")"
 
 
-_OWN = {"Paths": _paths, "RangeDoppler": _map, "Detections": _detections, "Scene": _scene, "Result": _result}
+_OWN = {"PropagationPaths": _paths, "RangeDoppler": _map, "Detections": _detections, "Scene": _scene, "Result": _result}
 """Those of which more is to be told than their columns."""

@@ -32,11 +32,11 @@ def diffracted_paths(routes: DiffractedRoutes, facets: Facets, radar: RadarEnds,
         back = leg_field(_leg(routes, r, 1), facets, radar.rx_field, k)
         amplitude[r] = 0.5 / k * np.sqrt(routes.sigma[r] / (4.0 * np.pi)) * (there @ back)
     length = (routes.near + routes.far).sum(axis=1)
-    rate = np.array([0.5 * _length_rate(routes, r, facets, np.asarray(radar.velocity)) for r in range(n)])
+    rate = np.array([_length_rate(routes, r, facets, np.asarray(radar.velocity)) for r in range(n)])
     return Paths.of(
-        delay=length / C0,
+        length=length,
         amplitude=amplitude,
-        rate=rate,
+        length_rate=rate,
         departure=routes.leaves[:, 0],
         arrival=routes.leaves[:, 1],
         body=routes.body,

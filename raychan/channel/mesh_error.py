@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import take
+from raychan.columns import take
 from raychan.world.creases import Readings
 from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved

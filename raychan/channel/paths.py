@@ -14,7 +14,6 @@ from raychan.channel.ends import RadarEnds
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
 from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Ways
-from raychan.units import C0
 
 Floats = NDArray[np.float64]
 
@@ -41,9 +40,9 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
     part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
     return Paths(
-        delay=np.concatenate([routes.length[whole], corner[rows].ravel()]) / C0,
+        length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
         amplitude=np.concatenate([a[whole].sum(axis=1), a[rows].ravel()]),
-        rate=np.concatenate([rate[whole], corner_rates(routes, rows, facets, v).ravel()]),
+        length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, v).ravel()]),
         way=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
         ways=Ways(
             departure=away.astype(np.float32),
@@ -64,9 +63,9 @@ def nothing(facets: Facets, radar: RadarEnds) -> Paths:
     """Return the empty record of a scene of which nothing is in view."""
     end, none = np.asarray(radar.position, float), np.zeros((0, 1), np.int8)
     return Paths.of(
-        delay=np.zeros(0),
+        length=np.zeros(0),
         amplitude=np.zeros(0, complex),
-        rate=np.zeros(0),
+        length_rate=np.zeros(0),
         departure=np.zeros((0, 3)),
         arrival=np.zeros((0, 3)),
         body=none,
@@ -99,7 +98,7 @@ def join(parts: list[Paths]) -> Paths:
         else:
             ways[f.name] = np.concatenate(held)
     rows: dict[str, Any] = {
-        name: np.concatenate([getattr(p, name) for p in parts]) for name in ("delay", "amplitude", "rate")
+        name: np.concatenate([getattr(p, name) for p in parts]) for name in ("length", "length_rate", "amplitude")
     }
     way = np.concatenate([p.way + np.int32(first) for p, first in zip(parts, begin, strict=True)])
     return dataclasses.replace(parts[0], **rows, way=way, ways=Ways(**ways))
@@ -114,5 +113,5 @@ def strongest(paths: Paths, most: int) -> Paths:
     keep[np.argsort(-power, kind="stable")[:most]] = True
     rows, number = keep[paths.way], np.cumsum(keep, dtype=np.int32) - 1
     ways = Ways(**{f.name: getattr(paths.ways, f.name)[keep] for f in dataclasses.fields(Ways)})
-    columns = {name: getattr(paths, name)[rows] for name in ("delay", "amplitude", "rate")}
+    columns = {name: getattr(paths, name)[rows] for name in ("length", "length_rate", "amplitude")}
     return dataclasses.replace(paths, **columns, way=number[paths.way[rows]], ways=ways)

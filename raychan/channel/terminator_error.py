@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 
 Floats = NDArray[np.float64]
 

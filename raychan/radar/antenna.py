@@ -54,7 +54,7 @@ def check(polarization: str, loss_db: float = 0.0, **positive: float) -> None:
 
 
 @dataclass(frozen=True)
-class Isotropic:
+class IsotropicAntenna:
     """Gain 1 everywhere, or, if `front`, only ahead of the plane x = 0 (and then the gain is 2)."""
 
     polarization: str = "V"
@@ -71,7 +71,7 @@ class Isotropic:
 
 
 @dataclass(frozen=True)
-class CosinePattern:
+class CosineAntenna:
     """A patch: gain falls as cos^p of the angle off boresight, p by the plane; nothing behind.
 
     Between the two planes p follows the direction's angle about the boresight, so that there is no seam.
@@ -106,7 +106,7 @@ class CosinePattern:
 
 
 @dataclass(frozen=True)
-class UniformArray:
+class ArrayAntenna:
     """A plane of ny by nz equal elements in phase, its gain from the integral of the pattern over the sphere.
 
     Spacings in wavelengths; tapers are window names (see radar.windows) along y and z. The pattern is element times
@@ -119,7 +119,7 @@ class UniformArray:
     spacing_z: float
     taper_y: str = "rect"
     taper_z: str = "rect"
-    element: Antenna = field(default_factory=lambda: Isotropic(front=True))
+    element: Antenna = field(default_factory=lambda: IsotropicAntenna(front=True))
     loss_db: float = 0.0
 
     def __post_init__(self) -> None:

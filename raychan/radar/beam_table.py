@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from raychan.frames import direction
+from raychan.poses import direction
 from raychan.radar.beam_kernels import fields_towards
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import angles, direction
+from raychan.poses import angles, direction
 from raychan.radar.antenna import Antenna, check, polarized
 from raychan.units import undb
 
@@ -27,7 +27,7 @@ class PatternError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredPattern:
+class MeasuredAntenna:
     """A pattern on knots of azimuth and elevation, linear in dB between them and held at the edges."""
 
     azimuth: Floats
@@ -44,7 +44,7 @@ class MeasuredPattern:
         check(self.polarization)
 
     @classmethod
-    def load(cls, path: str | Path, polarization: str = "V") -> MeasuredPattern:
+    def load(cls, path: str | Path, polarization: str = "V") -> MeasuredAntenna:
         """Read a CSV file: two cuts (plane az|el, angle_deg, gain_dbi) or a full grid.
 
         A grid has azimuth_deg, elevation_deg, gain_dbi and may have phase_deg. Of two cuts the pattern is their sum
@@ -106,7 +106,7 @@ def _number(path: Path, row: int, column: str, text: str | None, limit: float = 
     return value
 
 
-def _from_cuts(path: Path, rows: list[dict[str, str]], polarization: str) -> MeasuredPattern:
+def _from_cuts(path: Path, rows: list[dict[str, str]], polarization: str) -> MeasuredAntenna:
     cuts: dict[str, dict[float, float]] = {"az": {}, "el": {}}
     for number, row in enumerate(rows, start=2):
         plane = (row["plane"] or "").strip()
@@ -122,10 +122,10 @@ def _from_cuts(path: Path, rows: list[dict[str, str]], polarization: str) -> Mea
     az, el = (np.array(sorted(cut.items())) for cut in cuts.values())
     ahead = 0.5 * (np.interp(0.0, *az.T) + np.interp(0.0, *el.T))
     gain = az[:, 1][:, None] + el[:, 1][None, :] - ahead
-    return MeasuredPattern(np.radians(az[:, 0]), np.radians(el[:, 0]), gain, np.zeros_like(gain), polarization)
+    return MeasuredAntenna(np.radians(az[:, 0]), np.radians(el[:, 0]), gain, np.zeros_like(gain), polarization)
 
 
-def _from_grid(path: Path, rows: list[dict[str, str]], polarization: str, phased: bool) -> MeasuredPattern:
+def _from_grid(path: Path, rows: list[dict[str, str]], polarization: str, phased: bool) -> MeasuredAntenna:
     known: dict[tuple[float, float], tuple[float, float]] = {}
     for number, row in enumerate(rows, start=2):
         azimuth = _number(path, number, "azimuth_deg", row["azimuth_deg"], 180.0)
@@ -142,7 +142,7 @@ def _from_grid(path: Path, rows: list[dict[str, str]], polarization: str, phased
             f"{path}: {len(known)} rows do not fill a grid of {len(az)} azimuths by {len(el)} elevations, both >= 2"
         )
     values = np.array([[known[a, e] for e in el] for a in az])
-    return MeasuredPattern(np.radians(az), np.radians(el), values[..., 0], values[..., 1], polarization)
+    return MeasuredAntenna(np.radians(az), np.radians(el), values[..., 0], values[..., 1], polarization)
 
 
 @dataclass(frozen=True)

@@ -1,64 +1,107 @@
-"""Sensor: a radar mounted in the world: antennas, waveform, power and noise."""
+"""A radar mounted in the world: antennas, waveform, power, noise, and what its receiver does."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from raychan.frames import rotation
-from raychan.radar.antenna import Antenna
+from raychan.poses import rotation
+from raychan.radar.antenna import Antenna, IsotropicAntenna
 from raychan.radar.pattern import gain_dbi
+from raychan.radar.processing import Processing
 from raychan.radar.spherical_vectors import turned, vectors
 from raychan.radar.waveform import Waveform
-from raychan.units import K_BOLTZMANN, T0, dbm, undb
+from raychan.units import K_BOLTZMANN, T0, dbm, undb, watt
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+_AHEAD, _POWER, _PROCESSING = IsotropicAntenna(front=True), float(watt(12.0)), Processing()
+_NUMBERS = ("yaw_deg", "pitch_deg", "roll_deg", "noise_figure_db")
+_VECTORS = {"position": "(3,)", "velocity": "(3,)", "elements": "(a, 3)"}
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, init=False)
 class Radar:
-    """A monostatic radar: one transmitter, one or several receivers of the same pattern."""
+    """A monostatic radar: one transmitter, one or several receivers of one pattern. Defaults as in a scene file.
 
-    position: Floats
-    """Phase centre (3,) in the world [m]."""
-    tx: Antenna
-    rx: Antenna
+    Args: waveform; position (3,) [m] of the phase centre in the world; antenna of transmitter and receiver, or
+    tx_antenna and rx_antenna of their own; power [W] into the antenna; noise_figure_db [dB]; noise: whether samples get
+    noise; yaw_deg, pitch_deg, roll_deg [deg] of the boresight; velocity (3,) [m/s], world axes; elements (a, 3) [m],
+    the receivers' phase centres in the antenna's frame; processing of the receiver.
+    Raises: ValueError for values that cannot be.
+    """
+
     waveform: Waveform
+    position: Floats
+    antenna: Antenna
+    tx_antenna: Antenna | None
+    """None: `antenna`."""
+    rx_antenna: Antenna | None
+    """None: `antenna`."""
     power: float
-    """Transmitted power into the antenna [W]."""
     noise_figure_db: float
-    yaw: float = 0.0
-    pitch: float = 0.0
-    roll: float = 0.0
-    velocity: Floats = field(default_factory=lambda: np.zeros(3))
-    """World axes (3,) [m/s]."""
-    elements: Floats = field(default_factory=lambda: np.zeros((1, 3)))
-    """Receiver phase centres (a, 3) in the antenna's frame [m]."""
-    noise: bool = True
+    noise: bool
+    yaw_deg: float
+    pitch_deg: float
+    roll_deg: float
+    velocity: Floats
+    elements: Floats
+    processing: Processing
 
-    def __post_init__(self) -> None:
-        if not (self.power > 0.0 and np.isfinite(self.power)):
-            raise ValueError(f"Sensor.power = {self.power!r}: must be positive and finite")
-        for name in ("yaw", "pitch", "roll", "noise_figure_db"):
-            if not np.isfinite(getattr(self, name)):
-                raise ValueError(f"Sensor.{name} = {getattr(self, name)!r}: must be finite")
-        for name, dimensions in (("position", 1), ("velocity", 1), ("elements", 2)):
-            value = np.array(getattr(self, name), np.float64)
-            if value.ndim != dimensions or value.shape[-1] != 3 or not value.size or not np.isfinite(value).all():
-                wanted = ("(3,)", "(a, 3)")[dimensions - 1]
-                raise ValueError(f"Sensor.{name}: finite numbers of shape {wanted} wanted, {value.tolist()} given")
+    def __init__(
+        self,
+        waveform: Waveform,
+        position: ArrayLike = (0.0, 0.0, 0.5),
+        *,
+        antenna: Antenna = _AHEAD,
+        tx_antenna: Antenna | None = None,
+        rx_antenna: Antenna | None = None,
+        power: float = _POWER,
+        noise_figure_db: float = 15.0,
+        noise: bool = True,
+        yaw_deg: float = 0.0,
+        pitch_deg: float = 0.0,
+        roll_deg: float = 0.0,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        elements: ArrayLike = ((0.0, 0.0, 0.0),),
+        processing: Processing = _PROCESSING,
+    ) -> None:
+        given = {name: value for name, value in locals().items() if name != "self"}
+        if not (power > 0.0 and np.isfinite(power)):
+            raise ValueError(f"Radar.power = {power!r}: must be positive and finite")
+        for name in _NUMBERS:
+            if not np.isfinite(given[name]):
+                raise ValueError(f"Radar.{name} = {given[name]!r}: must be finite")
+        for name, wanted in _VECTORS.items():
+            value = np.array(given[name], np.float64)
+            if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
+                raise ValueError(f"Radar.{name}: numbers of shape {wanted} wanted, {value.tolist()} given")
+            if not np.isfinite(value).all():
+                raise ValueError(f"Radar.{name}: finite numbers wanted, {value.tolist()} given")
             value.flags.writeable = False
+            given[name] = value
+        for name, value in given.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def tx(self) -> Antenna:
+        """The transmitter's antenna."""
+        return self.tx_antenna or self.antenna
+
+    @property
+    def rx(self) -> Antenna:
+        """The receivers' antenna."""
+        return self.rx_antenna or self.antenna
 
     @cached_property
     def axes(self) -> Floats:
         """Matrix (3, 3) from the antenna's frame to the world's."""
-        return rotation(self.yaw, self.pitch, self.roll)
+        return rotation(*map(float, np.radians([self.yaw_deg, self.pitch_deg, self.roll_deg])))
 
     @cached_property
     def kept(self) -> dict[Any, Any]:

@@ -25,13 +25,16 @@ class Waveform:
     """Frequency swept while sampling [Hz]."""
     chirp_duration: float
     """Time that is sampled in a ramp [s]."""
-    repetition: float
-    """Time from ramp to ramp [s]."""
-    n_chirps: int
-    n_samples: int
+    repetition: float = None  # type: ignore[assignment]
+    """Time from ramp to ramp [s]; by default chirp_duration: ramps without a pause."""
+    n_chirps: int = 128
+    n_samples: int = 256
     complex_sampling: bool = True
+    """I/Q sampling; else real."""
 
     def __post_init__(self) -> None:
+        if self.repetition is None:
+            object.__setattr__(self, "repetition", self.chirp_duration)
         for f in fields(self):
             value = getattr(self, f.name)
             if not (f.name == "complex_sampling" or (math.isfinite(value) and value > 0)):

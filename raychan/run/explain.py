@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import angles
-from raychan.records import KIND_WORDS, NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler, Record, column
+from raychan.columns import Record, column
+from raychan.poses import angles
+from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
 from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result
 
+_VERBS = ("", "reflect", "pass", "scatter", "point", "diffract")  # by InteractionType
 _SAME = 0.1  # cells: places that are so alike are the same to who typed one of them
 
 
@@ -116,7 +118,7 @@ def _paths_in(result: Result, row: int, column: int, known: Chains | None = None
         phase=np.asarray(np.angle(amplitude), float),
         wave=wave[order] * np.sqrt(receiver.power),
         range=at[order],
-        rate=paths.rate[order],
+        rate=paths.range_rate[order],
         departure=np.stack(angles(paths.ways.departure), axis=1)[way],
         arrival=np.stack(angles(paths.ways.arrival), axis=1)[way],
         interactions=((kind != NONE) & (kind != TRANSMIT)).sum(axis=1)[way],
@@ -131,7 +133,7 @@ def _met(paths: Paths, known: Chains) -> tuple[tuple[str, ...], ...]:
     first = np.zeros(len(known.names), np.int64)
     first[known.part[::-1]] = paths.way[::-1]
     return tuple(
-        tuple(f"{KIND_WORDS[k]} {name.strip('()')}" for k, name in zip(paths.ways.kind[way], names, strict=False))
+        tuple(f"{_VERBS[k]} {name.strip('()')}" for k, name in zip(paths.ways.kind[way], names, strict=False))
         for way, names in zip(first, known.names, strict=True)
     )
 

@@ -56,7 +56,7 @@ def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown
             taken = np.array([strongest])
             folds, near = _folds(paths, taken, response, shown, mirrored)[0], np.ones(1, bool)
         power = _powers(paths, taken, response, shown, mirrored)
-        at, rate = response.stands(paths.delay[taken], paths.rate[taken], shown.rate is not None)
+        at, rate = response.stands(paths.delay[taken], paths.range_rate[taken], shown.rate is not None)
         places, place = np.unique(folds[near], axis=0, return_inverse=True)
         for i, whole in enumerate(places):
             weight = power * (place.ravel() == i)
@@ -85,7 +85,7 @@ def _folds(
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """Return the ambiguities (n, 2) of range and rate between paths and the place shown, and whether the paths stand
     on the main lobe about it when these are taken out."""
-    at, rate = response.stands(paths.delay[rows], paths.rate[rows], shown.rate is not None)
+    at, rate = response.stands(paths.delay[rows], paths.range_rate[rows], shown.rate is not None)
     sign = -1.0 if mirrored else 1.0
     away, smear = np.zeros((len(rows), 2)), np.zeros(len(rows))
     away[:, 0] = sign * at - shown.at_range
@@ -108,5 +108,5 @@ def _powers(paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirro
     else:
         sign = -1.0 if mirrored else 1.0
         cell = sign * shown.range, sign * shown.rate
-        wave = response.image_in_cell(paths.amplitude[rows], delay, paths.rate[rows], *cell)[0]
+        wave = response.image_in_cell(paths.amplitude[rows], delay, paths.range_rate[rows], *cell)[0]
     return np.abs(wave) ** 2

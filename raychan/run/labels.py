@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import KIND_LETTERS, TRANSMIT, Detections, Paths, RangeDoppler
+from raychan.records import TRANSMIT, Detections, InteractionType, Paths, RangeDoppler
 from raychan.run.cell_sums import cell_sums
 from raychan.run.convergence import figure
 from raychan.run.folding import Shown, truth
 from raychan.run.point_spread import PointSpread
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver
-from raychan.units import C0
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -76,7 +75,7 @@ def explain_cell(
     the same chain add as waves, chains as powers.
     """
     wave, at = waves_in(paths, response, range, rate)
-    sums = cell_sums(known.part, len(known.names), wave, at, paths.rate)
+    sums = cell_sums(known.part, len(known.names), wave, at, paths.range_rate)
     cell = _Cell(Shown(range, rate, range, rate or 0.0), power, error)
     return _explained(paths, known, response, tuple(x[0] for x in sums), cell, receiver)
 
@@ -141,7 +140,7 @@ def waves_in(
     Args: range [m] and rate [m/s] of the cell; None for a cell of the power-delay profile.
     """
     if rate is not None:
-        return response.in_cell(paths.amplitude, paths.delay, paths.rate, range, rate)
+        return response.in_cell(paths.amplitude, paths.delay, paths.range_rate, range, rate)
     weight, at = response.in_profile(paths.delay, range)
     return paths.amplitude * weight, at
 
@@ -154,7 +153,7 @@ def provenance(
     rows, columns = detections.cell.T
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
     at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
-    sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.rate, at)
+    sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.range_rate, at)
     found = []
     for i in range(len(at)):
         shown = Shown(*map(float, (at[i, 0], at[i, 1], detections.range[i], detections.rate[i])))
@@ -173,7 +172,7 @@ def _alike(paths: Paths) -> tuple[Ints, Ints]:
     """Return one way of each chain that a path took, and the chain of each path (n,); slot by slot, for speed."""
     ways = paths.ways
     code, most = np.zeros(len(ways.kind), np.int64), 1
-    width = (len(paths.body_names) + 1) * (len(paths.part_names) + 1) * len(KIND_LETTERS)
+    width = (len(paths.body_names) + 1) * (len(paths.part_names) + 1) * len(InteractionType)
     for body, part, kind in zip(ways.body.T, ways.part.T, ways.kind.T, strict=True):
         if not kind.any():
             break
@@ -181,7 +180,7 @@ def _alike(paths: Paths) -> tuple[Ints, Ints]:
             code = np.unique(code, return_inverse=True)[1].astype(np.int64)
             most = int(code.max(initial=0)) + 1
         slot = (body + 1) * np.int64(len(paths.part_names) + 1) + part + 1
-        code, most = code * width + np.where(kind > 0, slot * len(KIND_LETTERS) + kind, 0), most * width
+        code, most = code * width + np.where(kind > 0, slot * len(InteractionType) + kind, 0), most * width
     taken = np.zeros(len(code), bool)
     taken[paths.way] = True
     rows = np.flatnonzero(taken)
@@ -216,5 +215,5 @@ def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver
     way = paths.way[row]
     index = [paths.body_names[b] in targets for b in paths.ways.body[way]]
     straight = np.linalg.norm(paths.ways.vertices[way][index] - 0.5 * (paths.tx + paths.rx), axis=1).min()
-    detour = 0.5 * C0 * paths.delay[row] - straight
+    detour = 0.5 * paths.length[row] - straight
     return DIRECT if detour < max(receiver.waveform.range_resolution, _DEPTH) else MULTIPATH

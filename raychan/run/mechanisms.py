@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
-from raychan.records import DIFFRACT, TRANSMIT, Paths, take
+from raychan.records import DIFFRACT, TRANSMIT, Paths
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ _NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: what a whole number of dB shows as more than 0
 
 
-def counts(found: ExplainedDetections, tolerance_db: float) -> dict[str, Any]:
+def counts(found: ExplainedDetections, tolerance_db: float) -> dict[str, float]:
     """Return the counts of summary.json; `reached_db` is the worst error that is a figure."""
     known = found.error_db[found.converged]
     return {
@@ -53,7 +53,7 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
     return said
 
 
-def noted(found: ExplainedDetections, tolerance_db: float, ledger: dict[str, Any]) -> list[str]:
+def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Any]) -> list[str]:
     """Return the lines that stand below the table of detections: on the tolerance, and on what was left out."""
     said = []
     stated = counts(found, tolerance_db)
@@ -69,7 +69,7 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: dict[str, Any
     return said
 
 
-def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: dict[str, Any]) -> list[str]:
+def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: Mapping[str, Any]) -> list[str]:
     """Return all lines on detections."""
     return [*warned(found, tolerance_db, rdmap), *noted(found, tolerance_db, ledger)]
 
@@ -107,7 +107,7 @@ def marks(found: ExplainedDetections) -> str:
     return "".join(f", {n} {word}" for word, n in counted.items() if n)
 
 
-def _above(ledger: dict[str, Any]) -> Iterable[tuple[float, str, str]]:
+def _above(ledger: Mapping[str, Any]) -> Iterable[tuple[float, str, str]]:
     """Give the level [dB] and name of each mechanism that the ledger puts above the weakest detection."""
     for name, entry in ledger.items():
         if isinstance(entry, Entry) and isinstance(entry.level_db, float) and entry.level_db >= _LEAST_DB:

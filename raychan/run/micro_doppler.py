@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from raychan.channel.paths import join
 from raychan.channel.slow_time import Poses, carried, strengths
 from raychan.channel.transfer import departures
+from raychan.columns import take
 from raychan.radar.radar import Radar
-from raychan.records import DIFFRACT, Paths, Routes, take
+from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.segments import Keyframe, Retraced, Segment, Traced, echoes, joined, reach
 from raychan.run.solver import Batch, solve_into
 from raychan.signal.baseband import synthesize
@@ -192,9 +193,9 @@ class _Work:
         wave = self.radar.waveform
         shape = (2, len(self.radar.elements), last - first + 1, wave.n_samples)
         out = np.zeros(shape, np.complex64)
-        growth = 2.0 * key.others.rate / C0 * (first - key.chirp) * self.step
+        growth = key.others.length_rate / C0 * (first - key.chirp) * self.step
         late = key.others.replace(
-            delay=key.others.delay + growth,
+            length=key.others.length + C0 * growth,
             amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * growth),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
@@ -221,7 +222,8 @@ class _Work:
         """Return the samples (chirp, sample) of parts (chirp + 1, n, 3) of routes with these lengths [m]."""
         wave, count = self.radar.waveform, len(lengths) - 1
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
-        delay = lengths.reshape(count + 1, -1)[:, parts] / C0
+        length = lengths.reshape(count + 1, -1)[:, parts]
+        delay = length / C0
         growth, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
         strength = amplitudes.reshape(count + 1, -1)[:-1, parts]
         if len(parts) * wave.n_samples <= _FEW:
@@ -233,7 +235,10 @@ class _Work:
             self.radar, elements=here[None], power=1.0, waveform=dataclasses.replace(wave, n_chirps=1)
         )
         return np.stack(
-            [synthesize(echoes(*row, here), one).samples[0, 0] for row in zip(delay, strength, growth, strict=True)]
+            [
+                synthesize(echoes(*row, here), one).samples[0, 0]
+                for row in zip(length[:-1], strength, growth, strict=True)
+            ]
         )
 
     def poses(self, key: Keyframe, chirps: NDArray[np.signedinteger]) -> Poses:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler, Ways
 from raychan.run.result import ExplainedDetections, Result
-from raychan.units import dbm
+from raychan.units import C0, dbm
 
 CONVENTIONS = "CF-1.11"
 GROUPS: dict[str, Any] = {
@@ -33,6 +33,8 @@ _AXES = {"a": "antenna", "c": "chirp", "s": "sample", "v": "range_rate", "r": "r
 _ROWS = {"paths": "path", "detections": "detection"}
 _CALLED = {"rate": "range_rate", "true_rate": "true_range_rate"}
 """Columns that have another name in a file than in their record."""
+_FORMER = {"length": ("delay", C0), "length_rate": ("range_rate", 2.0)}
+"""What files of form 2 have instead, and the factor on it."""
 _UNITS = {"sqrt(W)": "V"}
 """As UDUNITS writes them: waves at 1 ohm. It has no decibel, which is written dB."""
 _TITLES = {
@@ -41,6 +43,8 @@ _TITLES = {
     "power": "received power",
     "snr": "signal-to-noise ratio in dB",
     "error_db": "stated error in dB",
+    "length": "length of the path, from transmitter to receiver",
+    "length_rate": "rate of the length, growing positive",
     "amplitude": "complex gain of the path",
     "samples": "dechirped voltage wave at 1 ohm",
     "spectrum": "range-Doppler spectrum, voltage wave at 1 ohm",
@@ -50,7 +54,9 @@ _TITLES = {
 _STANDARD = {"rate": "radial_velocity_of_scatterers_away_from_instrument"}
 _KINDS = ("none", "reflect", "transmit", "scatter", "point_target", "diffract")
 _COMMENTS = {
-    "delay": "from transmitter to receiver, both ways; range is c delay / 2",
+    "length": "the whole way; range is half of it, delay is length / c",
+    "length_rate": "of the whole way; range rate is half of it",
+    "vertices": "where the interactions are, tx and rx left out; unused slots repeat rx",
     "body": "row of the attribute body_names; -1 in unused slots",
     "part": "row of the attribute part_names; -1 in unused slots",
 }
@@ -87,7 +93,10 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
         values: dict[str, Any] = {}
         for f in columns(kind):
             name = _CALLED.get(f.name, f.name)
-            if "axes" not in f.metadata:
+            if name not in data and kind is Paths and name in _FORMER:
+                former, factor = _FORMER[name]
+                values[f.name] = factor * data[former].values
+            elif "axes" not in f.metadata:
                 told = data.attrs[f.name]
                 values[f.name] = tuple(json.loads(told)) if isinstance(told, str) else float(told)
             elif f.metadata["dtype"].kind == "c":
@@ -112,7 +121,7 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
     record = getattr(result, name)
     wave = result.receiver.waveform
     for f in columns(type(record)):
-        value = getattr(record, f.name)
+        value = record.ways.vertices[record.way] if f.name == "vertices" else getattr(record, f.name)
         if "axes" in f.metadata:
             _column(group, name, f, value, packed)
         else:

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import take
 from raychan.radar.radar import Radar
-from raychan.records import Detections, Paths, take
+from raychan.records import Detections, Paths
 from raychan.run.convergence import figure
 from raychan.run.folding import aliased
 from raychan.run.labels import Chains, chains, label_of, response_of
@@ -16,7 +17,7 @@ from raychan.run.result import Contribution, Explanation, Receiver
 from raychan.run.segments import Retraced
 from raychan.run.unmodelled import Entry
 from raychan.signal.baseband import synthesize
-from raychan.units import C0, db
+from raychan.units import db
 
 Floats = NDArray[np.float64]
 _UNEXPLAINED = 0.1  # a cell to which turning bodies bring less than this share of its power is noise
@@ -81,7 +82,7 @@ def claimed(
 def _given(why: Explanation, paths: Paths, rows: NDArray[np.int64], known: Chains, receiver: Receiver) -> Explanation:
     """Return the explanation of a cell given to the chain, among `rows` of paths over turning bodies, that is strongest
     at the cell's range; at which rate it turns there is not known."""
-    at = 0.5 * C0 * paths.delay[rows]
+    at = 0.5 * paths.length[rows]
     away, folded = aliased(at, why.range, response_of(receiver))
     near = away <= away.min() + receiver.waveform.range_resolution
     chain, strength = known.part[rows], np.abs(paths.amplitude[rows]) ** 2

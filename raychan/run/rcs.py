@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from raychan.channel.error import COVER, LARGEST_DB, MAX_ERROR_DB, stated_error
 from raychan.channel.mesh_error import MeshError, creeping, mesh_error
 from raychan.channel.terminator_error import terminator_error
 from raychan.channel.transfer import transfer
-from raychan.frames import direction, theta_phi
+from raychan.poses import direction, theta_phi
 from raychan.run.first_surface import first_surface
 from raychan.run.single_body import facets_of, mesh_of
 from raychan.tracing.contributions import Contributions
@@ -22,6 +21,7 @@ from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.units import C0
+from raychan.world.body import MeshLike
 from raychan.world.creases import readings
 from raychan.world.geometry import Geometry
 from raychan.world.limits import BOUNCES, CREASE, FREQUENCY, LENGTH, TOLERANCE_DB
@@ -66,17 +66,17 @@ class Rcs:
 
 
 def rcs(
-    mesh: Any,
+    mesh: MeshLike,
     frequency: float,
-    azimuth_deg: Any,
-    elevation_deg: Any = 0.0,
+    azimuth_deg: ArrayLike,
+    elevation_deg: ArrayLike = 0.0,
     polarization: str = "VV",
     distance: float = np.inf,
     material: str | Material = "pec",
     tolerance_db: float = 0.25,
     max_bounces: int = 3,
-    rx_azimuth_deg: Any = None,
-    rx_elevation_deg: Any = None,
+    rx_azimuth_deg: ArrayLike | None = None,
+    rx_elevation_deg: ArrayLike | None = None,
     rx_distance: float | None = None,
     max_rays: int = 1_000_000,
     crease_deg: float | None = None,

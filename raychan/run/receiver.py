@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from raychan.frames import direction
+from raychan.poses import direction
 from raychan.processing.cfar import Grid, fitting_guard
 from raychan.processing.detection import detect
 from raychan.processing.range_doppler import range_doppler

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import column
 from raychan.radar.waveform import Waveform
-from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler, column
-from raychan.reprs import Drawn, Told
+from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler
+from raychan.reprs import DrawnTwice, Told
+
+if TYPE_CHECKING:
+    from raychan.world.scene import Scene
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
 
@@ -111,7 +115,7 @@ class ExplainedDetections(Detections):
 
 
 @dataclass(frozen=True)
-class Result(Told, Drawn):
+class Result(Told, DrawnTwice):
     """Everything from the paths to the detections, and where each detection came from."""
 
     paths: Paths
@@ -124,11 +128,20 @@ class Result(Told, Drawn):
     error: MapError
     seed: int
     timings: dict[str, float] = field(default_factory=dict)
-    ledger: dict[str, Any] = field(default_factory=dict)
-    stats: dict[str, Any] = field(default_factory=dict)
+    ledger: Mapping[str, object] = field(default_factory=dict)
+    """What was left out, by mechanism: entries with `level_db` over the weakest detection (see run.unmodelled)."""
+    stats: dict[str, float] = field(default_factory=dict)
+    """Counts: rays, tubes, tracings; tolerance asked for and reached [dB]."""
     warnings: tuple[str, ...] = ()
-    scene: Any = None
+    scene: Scene | None = None
+    """None where a result was read from disk and its scene could not be."""
     text: str = ""
     """Source of the scene file."""
     path: str = ""
     """Where the scene file was, so that its mesh files can be found again."""
+
+    def require_scene(self) -> Scene:
+        """Return the scene. Raises: ValueError where it could not be read again."""
+        if self.scene is None:
+            raise ValueError("the scene of this result cannot be read again")
+        return self.scene

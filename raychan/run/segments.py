@@ -117,12 +117,12 @@ def joined(parts: list[Samples]) -> Samples:
     return np.concatenate([x[:, :, min(i, 1) :] for i, x in enumerate(parts)], axis=2)
 
 
-def echoes(delay: Floats, amplitude: Complexes, growth: Floats, place: Floats) -> Paths:
-    """Return paths without a history."""
-    n = len(delay)
+def echoes(length: Floats, amplitude: Complexes, growth: Floats, place: Floats) -> Paths:
+    """Return paths without a history, whose delays grow by `growth` [s/s]."""
+    n = len(length)
     none, look = np.full((n, 1), -1, np.int16), np.zeros((n, 3))
     return Paths.of(
-        delay=delay, amplitude=amplitude, rate=0.5 * C0 * growth, departure=look, arrival=look, body=none, part=none,
+        length=length, amplitude=amplitude, length_rate=C0 * growth, departure=look, arrival=look, body=none, part=none,
         kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32), body_names=(), part_names=(),
         tx=place, rx=place,
     )  # fmt: skip

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from raychan.channel.transfer import rates, transfer
-from raychan.frames import theta_phi
-from raychan.records import KIND_LETTERS, REFLECT, TRANSMIT, Facets, Routes
+from raychan.channel.transfer import departures, rates, transfer
+from raychan.poses import theta_phi
+from raychan.records import NONE, REFLECT, TRANSMIT, ExactWays, Facets, Routes, SpecularPaths
 from raychan.tracing.legs import Leg, Mirror
 from raychan.world.geometry import Geometry
 from raychan.world.point_in_body import Place, place_of
+from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -227,31 +226,13 @@ def jones(routes: Routes, facets: Facets, frequency: float) -> NDArray[np.comple
     return transfer(routes, facets, frequency, leaving, arriving)
 
 
-@dataclass(frozen=True)
-class SpecularPaths:
-    """Exact paths between two points: n paths, d interactions at most.
-
-    `length` (n,) [m]; `gain` (n, 2, 2) rows receiver's V, H, columns transmitter's; `rate` (n,) [m/s] of the length;
-    `bodies` and `kind` (n, d): names and 'R' reflect or 'T' pass a thin layer, '' unused; `vertices` (n, d + 2, 3)
-    [m] from tx
-    to rx, rx repeated.
-    """
-
-    length: Floats
-    gain: NDArray[np.complex128]
-    rate: Floats
-    bodies: NDArray[np.str_]
-    kind: NDArray[np.str_]
-    vertices: Floats
-
-
 def specular_paths(
-    scene: Any,
-    tx: Any,
-    rx: Any,
+    scene: Scene,
+    tx: ArrayLike,
+    rx: ArrayLike,
     max_bounces: int = 3,
-    tx_velocity: Any = (0.0, 0.0, 0.0),
-    rx_velocity: Any = (0.0, 0.0, 0.0),
+    tx_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    rx_velocity: ArrayLike = (0.0, 0.0, 0.0),
 ) -> SpecularPaths:
     """Return the exact specular paths between two points of a scene, line of sight included, isotropic ends.
 
@@ -270,16 +251,26 @@ def specular_paths(
     gain = jones(routes, facets, scene.frequency)
     order = np.argsort(routes.length, kind="stable")
     order = order[np.abs(gain[order]).max(axis=(1, 2), initial=0.0) > 0.0]
-    used = routes.kind > 0
-    deep = int(used[order].sum(axis=1).max(initial=0))
-    names = np.array([*facets.body_names, ""])
-    n = len(order)
-    start, stop = (np.broadcast_to(x, (n, 1, 3)) for x in ends[:2])
+    used = (routes.kind != NONE)[order]
+    deep = int(used.sum(axis=1).max(initial=0))
+    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else routes.facet
+    away, look = departures(routes)
+    ways = ExactWays(
+        departure=away[order],
+        arrival=look[order],
+        body=np.where(used, routes.body[order], -1)[:, :deep],
+        part=np.where(used, part[order], -1).astype(np.int16)[:, :deep],
+        kind=routes.kind[order, :deep],
+        vertices=routes.vertices[order, :deep],
+    )
     return SpecularPaths(
         length=routes.length[order],
+        length_rate=2.0 * rates(routes, facets, ends[2], ends[3])[order],
         gain=gain[order],
-        rate=2.0 * rates(routes, facets, ends[2], ends[3])[order],
-        bodies=names[np.where(used, routes.body, -1)][order, :deep],
-        kind=np.array(KIND_LETTERS)[routes.kind][order, :deep],
-        vertices=np.concatenate([start, routes.vertices[order, :deep], stop], axis=1),
+        way=np.arange(len(order), dtype=np.int32),
+        ways=ways,
+        body_names=facets.body_names,
+        part_names=facets.part_names,
+        tx=ends[0],
+        rx=ends[1],
     )

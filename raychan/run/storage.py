@@ -18,7 +18,8 @@ from raychan.run.output_files import Contents, StoreError, csv_bytes
 from raychan.run.result import Contribution, Explanation, Receiver, Result
 from raychan.units import dbm
 
-FORMAT = 2
+FORMAT = 3
+_READS = (2, FORMAT)  # form 2 has delay and range rate of paths instead of length and its rate
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
 CONTENTS = Contents(
     names=("result.nc", "detections.csv", "summary.json", *PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
@@ -72,7 +73,7 @@ def load_result(path: str | Path) -> Result:
     try:
         with xr.open_dataset(file, engine="h5netcdf") as root:
             attrs = dict(root.attrs)
-        if int(attrs.get("format", 0)) != FORMAT:
+        if int(attrs.get("format", 0)) not in _READS:
             raise StoreError(f"{file}: not a result of this version of raychan")
         records = {name: read_record(file, name, kind) for name, kind in GROUPS.items()}
     except (OSError, ValueError, KeyError, TypeError) as error:

@@ -15,7 +15,7 @@ from raychan.records import MIRROR, Facets, Paths, Points
 from raychan.run.mechanisms import interactions, layers, peak
 from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import strongest_bend
-from raychan.units import C0, db
+from raychan.units import db
 from raychan.world.body import Body
 from raychan.world.geometry import Geometry
 
@@ -223,7 +223,7 @@ def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     size = np.abs(paths.amplitude)
     strong = np.flatnonzero(size > 1e-3 * size.max())
     nearest = np.full(len(paths.ways.kind), np.inf)
-    np.minimum.at(nearest, paths.way[strong], np.maximum(0.5 * C0 * paths.delay[strong], 0.5))
+    np.minimum.at(nearest, paths.way[strong], np.maximum(0.5 * paths.length[strong], 0.5))
     taken = np.flatnonzero(np.isfinite(nearest))
     body, away = paths.ways.body[taken], paths.ways.departure[taken].astype(float)
     used = body >= 0

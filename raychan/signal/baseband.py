@@ -45,7 +45,7 @@ def synthesize(
     if not 1e-13 <= tolerance < 1.0:
         raise ValueError(f"tolerance = {tolerance!r}: must lie from 1e-13 to 1")
     wave = radar.waveform
-    growth = 2.0 * paths.rate / C0
+    growth = paths.length_rate / C0
     elements = radar.elements_world
     samples = np.zeros((len(elements), wave.n_chirps, wave.n_samples), np.complex64)
     if len(growth):

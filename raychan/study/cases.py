@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import direction, theta_phi
+from raychan.poses import direction, theta_phi
 from raychan.records import Facets
 from raychan.run.rcs import facets_of, refinements, scattering
 from raychan.study.ray_lattice import Window, echoes

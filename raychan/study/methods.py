@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import direction
+from raychan.poses import direction
 from raychan.run.rcs import facets_of, rcs, refinements, scattering
 from raychan.study.cases import FREQUENCY, WAVENUMBER, Target, vertical
 from raychan.study.ray_lattice import Window, echoes

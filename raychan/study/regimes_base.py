@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import direction
+from raychan.poses import direction
 from raychan.records import Facets
 from raychan.run.rcs import facets_of, refinements, scattering
 from raychan.tracing.legs import Leg

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.em.fresnel import coefficients
-from raychan.frames import rotation
+from raychan.poses import rotation
 from raychan.records import LAYER, PEC, Facets, Materials, Paths, Points
 from raychan.run.rcs import stated_error
 from raychan.run.solver import solve
 from raychan.study.regimes_base import FREQUENCY, Complexes, Floats, K, Outcome, Regime, Row, rectangle, same_db
 from raychan.tracing.settings import refinement
-from raychan.units import C0
 
 _GLASS, _THICK = 6.27 - 0.35j, 4e-3
 _MATERIALS = Materials(
@@ -133,12 +132,12 @@ def _paths(facets: Facets, bounces: int, tolerance_db: float, jitter: float = 0.
 
 def _at(paths: Paths, distance: float) -> complex:
     """Return the amplitude of all paths within 0.1 m of a range [m]."""
-    return complex(paths.amplitude[np.abs(0.5 * C0 * paths.delay - distance) < 0.1].sum())
+    return complex(paths.amplitude[np.abs(paths.range - distance) < 0.1].sum())
 
 
 def _profile(paths: Paths, ranges: Floats) -> Complexes:
     """Return the amplitudes at ranges (n,) [m] of a receiver whose cells are Gaussians."""
-    away = (0.5 * C0 * paths.delay[None] - ranges[:, None]) / _CELL
+    away = (paths.range[None] - ranges[:, None]) / _CELL
     return np.asarray(np.exp(-(away**2)) @ paths.amplitude)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from raychan.channel.error import stated_error
-from raychan.frames import rotation
+from raychan.poses import rotation
 from raychan.run.rcs import rcs
 from raychan.study.regimes_base import (
     FREQUENCY,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from raychan.records import REFLECT
 from raychan.run.rcs import rcs
 from raychan.run.specular_paths import specular_paths
 from raychan.study.regimes_base import (
@@ -42,7 +43,7 @@ def parallel_mirrors(quick: bool) -> Outcome:
             for n, s in (("left", 1.0), ("right", -1.0))
         ]
         p = specular_paths(Scene(bodies=bodies, frequency=FREQUENCY), tx, rx, most)
-        order = (p.kind == "R").sum(axis=1)
+        order = (p.kind == REFLECT).sum(axis=1)
         rows.append(Row(f"{label}: paths", 2 * most + 1, len(p.length), 0, "paths", "closed form: images"))
         exact_length, exact_gain, exact_order = _images(gap, tx, rx, most, material)
         if len(p.length) == len(exact_length):

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
-from raychan.radar.antenna import Isotropic
+from raychan.radar.antenna import IsotropicAntenna
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
-from raychan.records import Paths, RangeDoppler, take
+from raychan.records import Paths, RangeDoppler
 from raychan.signal.baseband import synthesize
 from raychan.study.regimes_base import FREQUENCY, LAMBDA, K, Outcome, Regime, Row, at_most
-from raychan.units import C0
 
 _WAVE = Waveform(FREQUENCY, 1e9, 25.6e-6, 40e-6, 128, 512)
 _GB = 1e9
@@ -23,7 +23,7 @@ _GB = 1e9
 
 def _sensor(wave: Waveform = _WAVE, **changes: Any) -> Radar:
     given: dict[str, Any] = {"position": np.zeros(3), "power": 1.0, "noise_figure_db": 15.0, "noise": False} | changes
-    return Radar(tx=Isotropic(), rx=Isotropic(), waveform=wave, **given)
+    return Radar(antenna=IsotropicAntenna(), waveform=wave, **given)
 
 
 def _echoes(ranges: Any, rates: Any = 0.0, amplitudes: Any = 1.0) -> Paths:
@@ -33,7 +33,7 @@ def _echoes(ranges: Any, rates: Any = 0.0, amplitudes: Any = 1.0) -> Paths:
     look = np.broadcast_to([1.0, 0.0, 0.0], (n, 3))
     none = np.full((n, 1), -1, np.int16)
     return Paths.of(
-        delay=2.0 * r / C0, amplitude=a.astype(complex), rate=v.astype(float), departure=look, arrival=look,
+        length=2.0 * r, amplitude=a.astype(complex), length_rate=2.0 * v, departure=look, arrival=look,
         body=none, part=none, kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32),
         body_names=(), part_names=(), tx=np.zeros(3), rx=np.zeros(3),
     )  # fmt: skip
@@ -77,8 +77,8 @@ def path_counts(quick: bool) -> Outcome:
 
 def _copies(paths: Paths, times: int) -> Paths:
     made: Paths = paths.replace(
-        delay=np.tile(paths.delay, times), amplitude=np.tile(paths.amplitude, times), rate=np.tile(paths.rate, times),
-        way=np.tile(paths.way, times),
+        length=np.tile(paths.length, times), length_rate=np.tile(paths.length_rate, times),
+        amplitude=np.tile(paths.amplitude, times), way=np.tile(paths.way, times),
     )  # fmt: skip
     return made
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from raychan.frames import rotation
+from raychan.poses import rotation
 from raychan.run.rcs import Rcs, rcs
 from raychan.run.simulate import simulate
 from raychan.study.regimes_base import FREQUENCY, Floats, Outcome, Regime, Row, at_most, plate_far, same_db, sheet

@@ -72,9 +72,9 @@ class Road:
         keep = columns["amplitude"] != 0.0
         n, none = int(keep.sum()), np.full((int(keep.sum()), 1), -1, np.int16)
         return Paths.of(
-            delay=columns["length"][keep] / C0,
+            length=columns["length"][keep],
             amplitude=wave * columns["amplitude"][keep],
-            rate=columns["rate"][keep],
+            length_rate=2.0 * columns["rate"][keep],
             departure=columns["away"][keep],
             arrival=columns["look"][keep],
             body=none,

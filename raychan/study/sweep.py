@@ -182,7 +182,7 @@ def _step(values: tuple[float, ...], result: Result, found: Visibility) -> Step:
         seen = Seen(
             float(d.range[i]), float(d.rate[i]), float(d.speed[i]), float(d.snr[i]), why.error_db, why.label, why.bodies
         )
-    return Step(values, seen, found, float(result.scene.processing.min_snr_db))
+    return Step(values, seen, found, float(result.require_scene().processing.min_snr_db))
 
 
 COLUMNS = (

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
-from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points, take
+from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points
 from raychan.run.labels import Chains, chains, label_of
 from raychan.run.receiver import noise_of_cell
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
@@ -17,7 +18,9 @@ from raychan.run.solver import paths_over_wedges
 from raychan.signal.baseband import synthesize
 from raychan.tracing.occlusion import Occlusion, occlusion
 from raychan.units import db, undb
+from raychan.world.body import Body
 from raychan.world.geometry import Geometry
+from raychan.world.scene import Scene
 
 DIFFRACTED = "diffracted"
 WAYS = (DIRECT, MULTIPATH, DIFFRACTED)
@@ -58,15 +61,14 @@ def visibility(result: Result, target: str) -> Visibility:
     diffraction out, by single wedges (UTD).
     Raises: ValueError for an unknown body, the ground, or the radar's own carrier.
     """
-    scene = result.scene
-    check_target(scene, target)
+    scene = check_target(result.scene, target)
     facets, points, radar = scene.facets(0.0), scene.points(0.0), scene.radar
     hidden = occlusion(facets, points, radar.position, target, scene.model.max_transmissions)
     return Visibility(target, hidden, _levels(result, facets, points, radar, target), led_by(result, target))
 
 
-def check_target(scene: Any, target: str) -> None:
-    """Raise ValueError where a body is none of the scene's, or none that can be a target; scene None: not at hand."""
+def check_target(scene: Scene | None, target: str) -> Scene:
+    """Return the scene; ValueError where a body is none of its, or none that can be a target, or where it is None."""
     if scene is None:
         raise ValueError("the scene of this result cannot be read again")
     names = [b.name for b in scene.bodies]
@@ -75,9 +77,10 @@ def check_target(scene: Any, target: str) -> None:
     body = scene.bodies[names.index(target)]
     if is_background(body):
         raise ValueError(f"'{target}' is the ground or the radar's own carrier, which is no target")
+    return scene
 
 
-def is_background(body: Any) -> bool:
+def is_background(body: Body) -> bool:
     """Tell whether a body is never a target (see run.chain.background)."""
     return bool(body.kind == MIRROR or body.name.startswith("ego"))
 
@@ -94,7 +97,7 @@ def _holds(why: Explanation, target: str) -> bool:
 
 
 def _levels(result: Result, facets: Facets, points: Points, radar: Radar, target: str) -> dict[str, Level | None]:
-    settings = result.scene.processing
+    settings = result.require_scene().processing
     weakest = noise_of_cell(radar, settings) * float(undb(settings.min_snr_db))
     kind = ways_of(result, chains(result.paths, result.receiver.background), target)
     found: dict[str, Level | None] = {

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.frames import sizes
 from raychan.parallel import parallel_for
+from raychan.poses import sizes
 from raychan.tracing.edge_crossings import dot
 from raychan.tracing.legs import Leg
 from raychan.tracing.occluders import Occluders

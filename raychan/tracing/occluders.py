@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import sizes
+from raychan.poses import sizes
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import sizes
+from raychan.poses import sizes
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.horizon import FACING, LIT, OBLIQUE
 from raychan.tracing.launch import GAPS, RUNNING, sight

@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import sizes
 from raychan.geometry.curved_patches import rays_on
 from raychan.parallel import parallel_for
+from raychan.poses import sizes
 from raychan.records import REFLECT
 from raychan.tracing.history import History
 from raychan.tracing.legs import Leg

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from raychan.records import BLOCKER, MIRROR, SCATTERER
+from raychan.records import Role
 from raychan.units import undb
 from raychan.world import limits, shapes
 from raychan.world.creases import folds_told
@@ -22,7 +22,12 @@ from raychan.world.mesh import CREASE_DEG, Floats, Mesh
 from raychan.world.mesh_io import from_trimesh, load, oddities
 from raychan.world.motion import Motion
 
-ROLES = {"scatterer": SCATTERER, "mirror": MIRROR, "blocker": BLOCKER}
+if TYPE_CHECKING:
+    import trimesh
+
+MeshLike: TypeAlias = "Mesh | trimesh.Trimesh | trimesh.Scene | str | Path"
+"""A mesh of ours, one of trimesh, or the name of a file."""
+ROLES = {role.name.lower(): role for role in Role}
 
 
 @dataclass(frozen=True)
@@ -36,9 +41,9 @@ class Body:
     """
 
     name: str
-    mesh: Any = None
+    mesh: MeshLike | None = None
     shape: str | None = None
-    params: Mapping[str, Any] = field(default_factory=dict)
+    params: Mapping[str, object] = field(default_factory=dict)
     material: str | Material | None = None
     materials: Mapping[str, str | Material] = field(default_factory=dict)
     position: Sequence[float] = (0.0, 0.0, 0.0)
@@ -48,7 +53,7 @@ class Body:
     velocity: Sequence[float] = (0.0, 0.0, 0.0)
     turn_rate_dps: float = 0.0
     spin_dps: Sequence[float] = (0.0, 0.0, 0.0)
-    rcs: float | Sequence[tuple[float, float]] | None = None
+    rcs_dbsm: float | Sequence[tuple[float, float]] | None = None
     rcs_point: Sequence[float] | None = None
     role: str | None = None
     unit: str = "m"
@@ -114,17 +119,17 @@ class Body:
         return moved
 
     @property
-    def kind(self) -> int:
-        """tables.SCATTERER, MIRROR or BLOCKER: as `role` says; else ground mirrors, a body of given RCS blocks."""
+    def kind(self) -> Role:
+        """What it does besides blocking: as `role` says; else the ground mirrors, a body of given RCS blocks."""
         if self.role is not None:
             if self.role not in ROLES:
                 raise SceneError(
                     f"unknown role '{self.role}'", key=f"{self.name}.role", allowed=nearest(self.role, ROLES)
                 )
             return ROLES[self.role]
-        if self.rcs is not None:
-            return BLOCKER
-        return MIRROR if self.shape == "ground" else SCATTERER
+        if self.rcs_dbsm is not None:
+            return Role.BLOCKER
+        return Role.MIRROR if self.shape == "ground" else Role.SCATTERER
 
     def part_materials(self) -> list[str | Material]:
         """Return the material of each part: by name or pattern, else the body's, else the shape's, else PEC."""
@@ -147,9 +152,9 @@ class Body:
         A table is linear in dB between its azimuths and wraps around; it is resampled every degree.
         """
         ends = np.array([-np.pi, np.pi])
-        if isinstance(self.rcs, (int, float)):
-            return ends, np.full(2, float(undb(self.rcs)))
-        pairs = np.asarray(self.rcs, float).reshape(-1, 2)
+        if isinstance(self.rcs_dbsm, (int, float)):
+            return ends, np.full(2, float(undb(self.rcs_dbsm)))
+        pairs = np.asarray(self.rcs_dbsm, float).reshape(-1, 2)
         wrapped = (pairs[:, 0] + 180.0) % 360.0 - 180.0
         order = np.argsort(wrapped)
         knots = np.radians(np.arange(-180.0, 181.0))
@@ -168,11 +173,11 @@ class Body:
             return []
         mesh, key = self.geometry, f"bodies.{self.name}."
         said = list(mesh.report.warnings())
-        is_file = isinstance(self.mesh, (str, Path))
-        said += oddities(mesh, self.mesh if is_file else "", self.unit, self.up if is_file else "z", key)
+        file = self.mesh if isinstance(self.mesh, str | Path) else ""
+        said += oddities(mesh, file, self.unit, self.up if file else "z", key)
         folds = folds_told(mesh, f"{key}crease_deg")
         said += [folds] if folds else []
-        bare = [] if mesh.part_materials or self.material or self.rcs is not None else self._bare_parts()
+        bare = [] if mesh.part_materials or self.material or self.rcs_dbsm is not None else self._bare_parts()
         if bare:
             what = "it" if len(bare) == len(mesh.part_names) else f"parts {', '.join(bare)}"
             said.append(f"no material given, {what} is taken as a perfect conductor ({key}material)")

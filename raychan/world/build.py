@@ -1,15 +1,33 @@
-"""Bodies and materials as the tables of a scene file say."""
+"""From a scene file to its text, its bodies and its materials."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from raychan.world import bundled, overrides
 from raychan.world.body import Body
-from raychan.world.errors import SceneError
+from raychan.world.errors import SceneError, nearest
 from raychan.world.material import Material
 from raychan.world.schema import BodyTable, MaterialTable
 
 _FORM = ("shape", "params", "mesh", "unit", "up", "forward", "scale", "crease_deg")
+
+
+def scene_text(path: str | Path) -> tuple[str, Path]:
+    """Return the text of a scene file, or of the scene of that name that comes with raychan, and the file.
+
+    Raises: SceneError where there is none, or where it cannot be read.
+    """
+    file = bundled.found(path)
+    overrides.refuse_mesh(file)
+    try:
+        return file.read_text(encoding="utf-8"), file
+    except FileNotFoundError:
+        more = f", or {nearest(file.stem, bundled.names())}" if bundled.names() else ""
+        raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
+    except (OSError, UnicodeDecodeError) as e:
+        reason = getattr(e, "strerror", None) or e
+        raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e
 
 
 def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = None) -> Body:
@@ -31,7 +49,7 @@ def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = No
         velocity=t.velocity_mps,
         turn_rate_dps=t.turn_rate_dps,
         spin_dps=t.spin_dps,
-        rcs=t.rcs_dbsm,
+        rcs_dbsm=t.rcs_dbsm,
         rcs_point=t.rcs_point,
         role=t.role,
         unit=t.unit,

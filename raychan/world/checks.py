@@ -66,7 +66,7 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
     for body in bodies:
         if body.kind == MIRROR or _near_and_slow(body, at, own, limit, top):
             continue
-        place = nearest_point(body, at) if body.rcs is None else body.motion.to_world(body.target_point())
+        place = nearest_point(body, at) if body.rcs_dbsm is None else body.motion.to_world(body.target_point())
         way = place - at
         far = float(np.linalg.norm(way))
         rate = float((body.motion.velocity_at(place) - own) @ way / far) if far > 0.0 else 0.0
@@ -88,7 +88,7 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
 def _near_and_slow(body: Body, at: Floats, own: Floats, limit: float, top: float) -> bool:
     """Tell whether no point of a body is farther than `limit` [m] from a radar, or faster than `top` [m/s] to it."""
     low, high = body.geometry.bounds
-    places = [low, high] if body.rcs is None else [low, high, body.target_point()]
+    places = [low, high] if body.rcs_dbsm is None else [low, high, body.target_point()]
     middle = 0.5 * (low + high)
     radius = max(float(np.linalg.norm(p - middle)) for p in places)
     way = body.motion.to_world(middle) - at

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from raychan.records import HALF_SPACE, LAYER, Materials
-from raychan.records import PEC as KIND_PEC
+from raychan.records import LAYER, MaterialKind, Materials
 from raychan.units import EPS0
 from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import EPS_R, ROUGHNESS_MM, SIGMA, THICKNESS_MM
@@ -44,11 +43,11 @@ class Material:
                 raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=limit.allowed)
 
     @property
-    def kind(self) -> int:
-        """tables.PEC, HALF_SPACE or LAYER."""
+    def kind(self) -> MaterialKind:
+        """What it is to a wave."""
         if self.pec:
-            return KIND_PEC
-        return HALF_SPACE if self.thickness is None else LAYER
+            return MaterialKind.PEC
+        return MaterialKind.HALF_SPACE if self.thickness is None else MaterialKind.LAYER
 
     def eps(self, frequency: float) -> complex:
         """Return eps_r - j sigma / (omega eps0) at a frequency [Hz]; 1 for a perfect conductor."""

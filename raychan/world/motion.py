@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import rotation, yaw_pitch_roll
+from raychan.poses import rotation, yaw_pitch_roll
 
 Array = NDArray[np.float64]
 

@@ -88,7 +88,7 @@ def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
     if not things:
         return ["no body is in view: the scene has none but ground and the radar's own car (bodies)"]
     spread = [surface_sample(b) for b in things]
-    spread += [b.motion.to_world(b.target_point())[None] for b in things if b.rcs is not None]
+    spread += [b.motion.to_world(b.target_point())[None] for b in things if b.rcs_dbsm is not None]
     way = np.concatenate(spread) - radar.position
     far = np.linalg.norm(way, axis=1)
     gain = _two_way(radar, way[far > 0.0] / far[far > 0.0, None])

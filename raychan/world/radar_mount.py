@@ -1,27 +1,54 @@
-"""From the radar table of a scene file to a radar.Sensor."""
+"""Between the radar table of a scene file and a Radar object, both ways."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from raychan.units import watt
 from raychan.world import bundled, overrides
 from raychan.world.errors import SceneError, nearest
-from raychan.world.schema import AntennaTable, RadarTable
+from raychan.world.schema import AntennaTable, ProcessingTable, RadarTable
 from raychan.world.schema_errors import checked
 
+if TYPE_CHECKING:
+    from raychan.radar.antenna import Antenna
+    from raychan.radar.processing import Processing
+    from raychan.radar.radar import Radar
 
-def radar_of(table: RadarTable, folder: Path, file: Any = None) -> Any:
-    """Return the radar.Sensor of a radar table; antenna files are looked up in `folder`."""
+
+def mount(radar: Radar | RadarTable | Mapping[str, object] | None, file: Any = None) -> RadarTable | None:
+    """Return the radar table of what a scene is given; SceneError for values that a scene file could not have."""
+    if radar is None or isinstance(radar, RadarTable | Mapping):
+        return None if radar is None else checked(RadarTable, radar, file)  # type: ignore[no-any-return]
+    from raychan.world.scene_text import radar_table_of
+
+    return radar_table_of(radar)
+
+
+def processing_of(given: Processing | Mapping[str, object] | None, radar: object, file: Any = None) -> Processing:
+    """Return the receiver's settings: those given, else the radar object's own, else the defaults."""
+    from raychan.radar.processing import Processing
+
+    own = getattr(radar, "processing", None) if given is None else given
+    table = asdict(own) if isinstance(own, Processing) else own or {}
+    return Processing(**checked(ProcessingTable, table, file).model_dump())
+
+
+def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any = None) -> Radar:
+    """Return the radar of a radar table; antenna files are looked up in `folder`."""
     from raychan.radar.radar import Radar
     from raychan.radar.waveform import Waveform
 
     w = table.waveform
-    tx, rx = (antenna_of(given, table.polarization, folder, f"radar.{key}", file) for key, given in mounted(table))
+    antennas = {
+        key: antenna_of(given, table.polarization, folder, f"radar.{key}", file) for key, given in mounted(table)
+    }
+    tx, rx = (antennas[key] for key, _ in mounted(table))
     waveform = Waveform(
         carrier=w.carrier_ghz * 1e9,
         bandwidth=w.bandwidth_mhz * 1e6,
@@ -31,17 +58,17 @@ def radar_of(table: RadarTable, folder: Path, file: Any = None) -> Any:
         n_samples=w.samples,
         complex_sampling=w.iq,
     )
-    yaw, pitch, roll = (float(x) for x in np.radians([table.yaw_deg, table.pitch_deg, table.roll_deg]))
     return Radar(
-        position=np.array(table.position),
-        yaw=yaw,
-        pitch=pitch,
-        roll=roll,
-        velocity=np.array(table.velocity_mps),
-        tx=tx,
-        rx=rx,
+        waveform,
+        table.position,
+        antenna=tx,
+        rx_antenna=None if rx is tx else rx,
+        yaw_deg=table.yaw_deg,
+        pitch_deg=table.pitch_deg,
+        roll_deg=table.roll_deg,
+        velocity=table.velocity_mps,
         elements=1e-3 * np.array(table.elements_mm),
-        waveform=waveform,
+        processing=processing,
         power=float(watt(table.power_dbm)),
         noise_figure_db=table.noise_figure_db,
         noise=table.noise,
@@ -84,7 +111,15 @@ def is_antenna(file: Path) -> bool:
         return False
 
 
-def antenna_of(given: str | AntennaTable, polarization: str, folder: Path, key: str, file: Any = None) -> Any:
+def load_antenna(path: str | Path, polarization: str = "V") -> Antenna:
+    """Return the antenna of a file, or one that comes with raychan by its name, such as 'antennas/patch'.
+
+    Args: path of the TOML file; polarization V or H. Raises: SceneError where there is none, or where it is wrong.
+    """
+    return antenna_of(str(path), polarization, Path(), "path")
+
+
+def antenna_of(given: str | AntennaTable, polarization: str, folder: Path, key: str, file: Any = None) -> Antenna:
     """Return the antenna that a table or an antenna file describes."""
     from raychan.radar.pattern import gain_dbi
 
@@ -104,20 +139,20 @@ def antenna_of(given: str | AntennaTable, polarization: str, folder: Path, key: 
         raise SceneError(str(e), file=file, key=key, value=given) from e
 
 
-def _made(table: AntennaTable, loss_db: float, polarization: str, folder: Path, key: str, file: Any) -> Any:
+def _made(table: AntennaTable, loss_db: float, polarization: str, folder: Path, key: str, file: Any) -> Antenna:
     from raychan.radar import antenna as kinds
-    from raychan.radar.pattern import MeasuredPattern
+    from raychan.radar.pattern import MeasuredAntenna
 
     if table.kind == "isotropic":
-        return kinds.Isotropic(polarization, table.front, loss_db)
+        return kinds.IsotropicAntenna(polarization, table.front, loss_db)
     if table.kind == "cosine":
-        return kinds.CosinePattern(table.hpbw_h_deg, table.hpbw_v_deg, polarization, loss_db)  # type: ignore[arg-type]
+        return kinds.CosineAntenna(table.hpbw_h_deg, table.hpbw_v_deg, polarization, loss_db)  # type: ignore[arg-type]
     if table.kind == "measured":
-        pattern = MeasuredPattern.load(folder / str(table.file), polarization)
+        pattern = MeasuredAntenna.load(folder / str(table.file), polarization)
         return replace(pattern, gain_db=pattern.gain_db - loss_db)
-    element = kinds.Isotropic(polarization, front=True)
+    element: Antenna = kinds.IsotropicAntenna(polarization, front=True)
     if table.element is not None:
         element = antenna_of(table.element, polarization, folder, f"{key}.element".removeprefix("."), file)
-    return kinds.UniformArray(
+    return kinds.ArrayAntenna(
         table.ny, table.nz, table.spacing_y, table.spacing_z, table.taper_y, table.taper_z, element, loss_db
     )

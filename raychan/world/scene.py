@@ -4,30 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from operator import is_
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import LAYER, MIRROR, Facets, Points
 from raychan.reprs import Told
-from raychan.world import bundled, checks, overlaps, overrides
+from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
-from raychan.world.build import body_of, material_of
+from raychan.world.build import body_of, material_of, scene_text
 from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
+from raychan.world.point_targets import points_of
 from raychan.world.posed import placed, stack
-from raychan.world.radar_mount import radar_of
-from raychan.world.schema import BodyTable, Model, Processing, RadarTable, SceneFile
+from raychan.world.radar_mount import mount, processing_of, radar_of
+from raychan.world.schema import BodyTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 from raychan.world.seams import over_seams
 from raychan.world.static_geometry import StaticGeometry
 from raychan.world.topology import MeshTopology
+
+if TYPE_CHECKING:
+    from raychan.radar.processing import Processing
+    from raychan.radar.radar import Radar
 
 __all__ = ["Body", "Scene", "SceneError"]
 
@@ -35,19 +41,22 @@ __all__ = ["Body", "Scene", "SceneError"]
 class Scene(Told):
     """Bodies, materials, a radar and settings.
 
-    Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar a table as in a scene
-    file, or None; processing, model tables or mappings; materials by name, which bodies may use; folder to which
-    file names refer.
+    Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar an object, a table as
+    in a scene file, or None; processing of the receiver, an object or a table (default the radar's own); model a table
+    of what is modelled; materials by name, which bodies may use; folder to which file names refer.
     Raises: SceneError for a scene that cannot be.
+
+    >>> Scene(bodies=[Body(name="wall", shape="plate", position=(10, 0, 0))]).frequency
+    77000000000.0
     """
 
     def __init__(
         self,
         bodies: Iterable[Body] = (),
         frequency: float | None = None,
-        radar: RadarTable | Mapping[str, Any] | None = None,
-        processing: Processing | Mapping[str, Any] | None = None,
-        model: Model | Mapping[str, Any] | None = None,
+        radar: Radar | RadarTable | Mapping[str, object] | None = None,
+        processing: Processing | Mapping[str, object] | None = None,
+        model: Model | Mapping[str, object] | None = None,
         materials: Mapping[str, Material] | None = None,
         title: str = "",
         text: str = "",
@@ -57,8 +66,11 @@ class Scene(Told):
         self.title, self.text, self.path = title, text, path
         self.folder = folder or Path.cwd()
         self.bodies = tuple(bodies)
-        self.radar_table: RadarTable | None = None if radar is None else checked(RadarTable, radar, path)
-        self.processing: Processing = checked(Processing, processing or Processing(), path)
+        self.radar_table: RadarTable | None = mount(radar, path)
+        self.processing: Processing = processing_of(processing, radar, path)
+        self.is_radar_object = not isinstance(radar, RadarTable | Mapping | None)
+        if not isinstance(radar, RadarTable | Mapping | None):
+            self.__dict__["radar"] = replace(radar, processing=self.processing)
         self.model: Model = checked(Model, model or Model(), path)
         carrier = self.radar_table.waveform.carrier_ghz * 1e9 if self.radar_table else 77e9
         self.frequency = carrier if frequency is None else float(frequency)
@@ -85,16 +97,7 @@ class Scene(Told):
 
         Raises: SceneError where file, syntax, key or value is wrong.
         """
-        file = bundled.found(path)
-        overrides.refuse_mesh(file)
-        try:
-            text = file.read_text(encoding="utf-8")
-        except FileNotFoundError:
-            more = f", or {nearest(file.stem, bundled.names())}" if bundled.names() else ""
-            raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
-        except (OSError, UnicodeDecodeError) as e:
-            reason = getattr(e, "strerror", None) or e
-            raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e
+        text, file = scene_text(path)
         return cls.from_text(text, file)
 
     @classmethod
@@ -103,12 +106,12 @@ class Scene(Told):
         return cls.from_dict(overrides.parsed(text, path), path, text)
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], path: str | Path | None = None, text: str = "") -> Scene:
+    def from_dict(cls, data: Mapping[str, object], path: str | Path | None = None, text: str = "") -> Scene:
         """Return the scene of tables as they stand in a scene file."""
         return cls._of(data, path, text)
 
     @classmethod
-    def _of(cls, data: Mapping[str, Any], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
+    def _of(cls, data: Mapping[str, object], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
         """Return the scene of tables; bodies that stand in another alike are that one's, with their meshes."""
         file = None if path is None else Path(path)
         tables: SceneFile = checked(SceneFile, data, file)
@@ -119,7 +122,7 @@ class Scene(Told):
             bodies=[body_of(b, folder, known.get(b.name)) for b in tables.bodies],
             frequency=None if ghz is None else ghz * 1e9,
             radar=tables.radar,
-            processing=tables.processing,
+            processing=tables.processing.model_dump(),
             model=tables.model,
             materials={name: material_of(name, m, file) for name, m in tables.materials.items()},
             title=tables.scene.title,
@@ -131,6 +134,15 @@ class Scene(Told):
         if like is not None and scene._stands_as(like):
             scene.kept = like.kept
         return scene
+
+    def to_toml(self) -> str:
+        """Return the scene as the text of a scene file, with meshes and antennas from files by their whole path.
+
+        Raises: ValueError for what no file can hold: a mesh in memory, an antenna of a class of its own.
+        """
+        from raychan.world.scene_text import toml_of
+
+        return toml_of(self)
 
     def override(self, changes: Sequence[str]) -> Scene:
         """Return the scene with keys changed: 'radar.power_dbm=10', 'bodies.suv.position=[12, 0, 0]'.
@@ -173,11 +185,11 @@ class Scene(Told):
             _ = self.radar
 
     @cached_property
-    def radar(self) -> Any:
-        """The radar.Sensor at time 0; SceneError where the scene has no radar."""
+    def radar(self) -> Radar:
+        """The radar at time 0; SceneError where the scene has none."""
         if self.radar_table is None:
             raise SceneError("the scene has no radar", file=self.path, key="radar", allowed="a [radar] table")
-        return radar_of(self.radar_table, self.folder, self.path)
+        return radar_of(self.radar_table, self.processing, self.folder, self.path)
 
     def at(self, time: float) -> Scene:
         """Return the scene as it stands at a time [s]: bodies and radar moved on, meshes and materials shared.
@@ -192,12 +204,12 @@ class Scene(Told):
         moved._still = self._still
         if self.radar_table is not None:
             there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
-            moved.radar = self.radar_table.model_copy(update={"position": there.tolist()})
+            moved.radar_table = self.radar_table.model_copy(update={"position": there.tolist()})
             moved.__dict__["radar"] = self.radar_at(time)
         moved.__dict__.pop("warnings", None)
         moved.text, moved._data = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
         try:
-            checks.radar_outside(moved.bodies, moved.radar)
+            checks.radar_outside(moved.bodies, moved.radar_table)
         except SceneError as e:
             late = f"{e.problem} {time:g} s on"
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
@@ -207,8 +219,8 @@ class Scene(Told):
         """Return the scene without what is kept for it: a result that stays does not hold on to that."""
         return copy(self)
 
-    def radar_at(self, time: float) -> Any:
-        """Return the radar.Sensor where its velocity has brought it at a time [s]."""
+    def radar_at(self, time: float) -> Radar:
+        """Return the radar where its velocity has brought it at a time [s]."""
         return self.radar.at(time)
 
     @cached_property
@@ -282,17 +294,4 @@ class Scene(Told):
 
     def points(self, time: float = 0.0) -> Points:
         """Return the targets given by their RCS at a time [s]."""
-        rows = [(i, b) for i, b in enumerate(self.bodies) if b.rcs is not None]
-        tables = [b.target() for _, b in rows]
-        knots = max((t[0] for t in tables), key=len, default=np.array([-np.pi, np.pi]))
-        place: list[Floats] = [b.motion.to_world(b.target_point(), time) for _, b in rows]
-        return Points(
-            position=np.array(place).reshape(-1, 3),
-            velocity=np.array([b.motion.velocity_at(p, time) for (_, b), p in zip(rows, place, strict=True)]).reshape(
-                -1, 3
-            ),
-            body=np.array([i for i, _ in rows], np.int32),
-            azimuth=knots,
-            sigma=np.array([np.interp(knots, *t) for t in tables]).reshape(-1, len(knots)),
-            heading=np.array([b.motion.heading(time) for _, b in rows], float),
-        )
+        return points_of(self.bodies, time)

@@ -166,7 +166,7 @@ class RadarTable(Table):
     waveform: WaveformTable
 
 
-class Processing(Table):
+class ProcessingTable(Table):
     """[processing]: what the receiver does."""
 
     range_window: Window = "hann"
@@ -250,7 +250,7 @@ class SceneFile(Table):
 
     scene: Header = Header()
     radar: RadarTable | None = None
-    processing: Processing = Processing()
+    processing: ProcessingTable = ProcessingTable()
     model: Model = Model()
     materials: dict[str, MaterialTable] = {}
     bodies: list[BodyTable] = []

@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.bare import recorded, replay
 from bench.measure import Row, against
-from raychan.frames import direction
+from raychan.poses import direction
 from raychan.world.ray_caster import RayCaster
 from raychan.world.scene import Scene
 

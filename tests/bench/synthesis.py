@@ -12,8 +12,9 @@ from support.echoes import echoes, make_radar
 
 from bench.direct import recurrent_sum
 from bench.measure import Row, against, barred, rounds
+from raychan.columns import take
 from raychan.radar.waveform import Waveform
-from raychan.records import Paths, take
+from raychan.records import Paths
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import beat_sum
 from raychan.units import C0, db
@@ -34,7 +35,7 @@ def synthesis(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
     count = 10_000 if quick else 100_000
     paths, radar = some_paths(count), make_radar(WAVE)
     name = f"{count:,} paths into 128 x 1,024"
-    few = (paths.amplitude[:_FEW], paths.delay[:_FEW], 2.0 * paths.rate[:_FEW] / C0)
+    few = (paths.amplitude[:_FEW], paths.delay[:_FEW], paths.length_rate[:_FEW] / C0)
     ramp = (WAVE.carrier, WAVE.slope, WAVE.repetition, WAVE.chirp_duration / WAVE.n_samples, 128, 1024)
 
     def ours() -> None:

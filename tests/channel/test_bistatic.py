@@ -9,7 +9,7 @@ from support.facets import facets, quad
 from truth import mie, po
 
 from raychan.channel.transfer import transfer
-from raychan.frames import direction, theta_phi
+from raychan.poses import direction, theta_phi
 from raychan.run.rcs import facets_of, rcs, refinements, scattering
 from raychan.tracing.beyond_horizon import outlets
 from raychan.tracing.legs import Leg, Mirror

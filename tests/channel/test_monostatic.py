@@ -9,7 +9,7 @@ from support.facets import box, facets, ground, quad
 from support.points import no_points, point, radar
 from truth import slab, tworay
 
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 from raychan.records import HALF_SPACE, PEC
 from raychan.run.solver import solve
 from raychan.tracing.settings import refinement
@@ -25,7 +25,7 @@ def test_a_target_of_given_rcs_obeys_the_radar_equation():
     f = facets([box((200, 0, 0), (201, 1, 1))])
     for distance, sigma in ((5.0, 1.0), (30.0, 0.3), (150.0, 20.0)):
         paths, _ = solve(f, point((distance, 0, 0.5), sigma), radar(), F, refinement(F, 0.5), 1)
-        at = np.argmin(np.abs(0.5 * C0 * paths.delay - distance))
+        at = np.argmin(np.abs(paths.range - distance))
         power = np.abs(paths.amplitude[at]) ** 2
         assert 10 * np.log10(power / tworay.radar_power(distance, sigma, WAVE)) == pytest.approx(0.0, abs=0.01)
 
@@ -62,7 +62,7 @@ def test_ground_below_the_radar_returns_as_its_image():
     f = facets([ground(1000.0)], [(HALF_SPACE, ASPHALT, 0.0, 0.0)], role=[1])
     paths, _ = solve(f, no_points(), radar(), F, refinement(F, 0.5), 3)
     fresnel = slab.half_space(1.0, ASPHALT)[0]
-    assert 0.5 * C0 * paths.delay == pytest.approx([0.5])
+    assert paths.range == pytest.approx([0.5])
     assert np.abs(paths.amplitude) == pytest.approx([WAVE / (4 * np.pi) * abs(fresnel)], rel=1e-6)
 
 
@@ -97,8 +97,8 @@ def test_range_rates_are_those_of_the_moved_scene():
             at = rows[np.argmax(np.abs(paths.amplitude[rows]))]
             power = np.abs(paths.amplitude[rows]) ** 2
             seen[tuple(chain.tolist())] = (
-                (0.5 * C0 * paths.delay[rows] * power).sum() / power.sum(),
-                (paths.rate[rows] * power).sum() / power.sum(),
+                (paths.range[rows] * power).sum() / power.sum(),
+                (paths.range_rate[rows] * power).sum() / power.sum(),
                 abs(paths.amplitude[at]),
             )
         return seen

@@ -9,7 +9,8 @@ import pytest
 ROOT = Path(__file__).parents[2] / "raychan"
 STOREYS = (
     ("units", "parallel", "compile"),
-    ("frames", "reprs"),
+    ("poses", "reprs", "kinds"),
+    ("columns",),
     ("records",),
     ("em", "geometry"),
     ("radar",),
@@ -30,12 +31,20 @@ UPWARD = {("reprs.py", "raychan.report.shown")}
 LAZY = {"pyvista", "matplotlib", "serial", "dask"}
 
 
+def _for_types(test: ast.expr) -> bool:
+    return isinstance(test, ast.Name) and test.id == "TYPE_CHECKING"
+
+
 def imports(file: Path) -> list[tuple[str, bool]]:
     """Modules that a file imports, and whether it does so outside of any function."""
     tree = ast.parse(file.read_text(encoding="utf-8"))
     inner = {n for f in ast.walk(tree) if isinstance(f, ast.FunctionDef | ast.Lambda) for n in ast.walk(f)}
+    # What only type checkers read is not imported.
+    typing = {n for f in ast.walk(tree) if isinstance(f, ast.If) and _for_types(f.test) for n in ast.walk(f)}
     found = []
     for node in ast.walk(tree):
+        if node in typing:
+            continue
         if isinstance(node, ast.Import):
             found += [(a.name, node not in inner) for a in node.names]
         elif isinstance(node, ast.ImportFrom):

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.places import SCENES
 
-from raychan.frames import direction, theta_phi
-from raychan.radar.antenna import Antenna, CosinePattern, Isotropic, UniformArray
-from raychan.radar.pattern import MeasuredPattern, PatternError, characteristics, gain_dbi
+from raychan.poses import direction, theta_phi
+from raychan.radar.antenna import Antenna, ArrayAntenna, CosineAntenna, IsotropicAntenna
+from raychan.radar.pattern import MeasuredAntenna, PatternError, characteristics, gain_dbi
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
@@ -23,18 +23,18 @@ from raychan.world.schema import AntennaTable
 WAVE = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128)
 AHEAD = np.array([[1.0, 0.0, 0.0]])
 EVERY = {
-    "isotropic": Isotropic(),
-    "front": Isotropic("H", front=True),
-    "patch": CosinePattern(86.0, 60.0),
-    "array": UniformArray(4, 3, 0.6, 0.5, "hann", "rect", CosinePattern(100.0, 90.0)),
-    "backed": UniformArray(2, 2, 1.047, 0.544, element=Isotropic()),
+    "isotropic": IsotropicAntenna(),
+    "front": IsotropicAntenna("H", front=True),
+    "patch": CosineAntenna(86.0, 60.0),
+    "array": ArrayAntenna(4, 3, 0.6, 0.5, "hann", "rect", CosineAntenna(100.0, 90.0)),
+    "backed": ArrayAntenna(2, 2, 1.047, 0.544, element=IsotropicAntenna()),
 }
 
 
 def test_a_sensor_turns_theta_and_phi_parts_into_world_axes():
     looks = np.concatenate([fibonacci_sphere(200), np.eye(3), -np.eye(3)])
-    for antenna in (*EVERY.values(), CosinePattern(86.0, 60.0, "H")):
-        radar = Radar(np.zeros(3), antenna, antenna, WAVE, 1.0, 10.0, yaw=0.7, pitch=-0.3, roll=1.1)
+    for antenna in (*EVERY.values(), CosineAntenna(86.0, 60.0, "H")):
+        radar = Radar(WAVE, antenna=antenna, yaw_deg=40.0, pitch_deg=-17.0, roll_deg=63.0)
         local = looks @ radar.axes
         theta, phi = theta_phi(local)
         parts = antenna.field(local)
@@ -62,19 +62,19 @@ def test_gain_averages_to_one_over_all_directions(name):
 @pytest.mark.parametrize("width", [60.0, 90.0, 120.0])
 def test_round_cosine_has_the_directivity_of_its_exponent(width):
     exponent = math.log(0.5) / math.log(math.cos(math.radians(width / 2)))
-    patch = CosinePattern(width, width)
+    patch = CosineAntenna(width, width)
     assert gain(patch, AHEAD)[0] == pytest.approx(2.0 * (exponent + 1.0), rel=1e-6)
     assert not gain(patch, direction(np.radians([91.0, 135.0, 180.0]))).any()
 
 
 @given(st.floats(0.1, 2.0))
 def test_two_isotropic_elements_have_their_closed_form_directivity(spacing):
-    pair = UniformArray(2, 1, spacing, 0.5, element=Isotropic())
+    pair = ArrayAntenna(2, 1, spacing, 0.5, element=IsotropicAntenna())
     assert gain(pair, AHEAD)[0] == pytest.approx(2.0 / (1.0 + np.sinc(2.0 * spacing)), rel=1e-6)
 
 
 def test_array_is_the_sum_over_its_elements():
-    antenna = UniformArray(5, 4, 0.7, 0.45, "taylor(30)", "hamming", CosinePattern(80.0, 90.0, "H"))
+    antenna = ArrayAntenna(5, 4, 0.7, 0.45, "taylor(30)", "hamming", CosineAntenna(80.0, 90.0, "H"))
     d = fibonacci_sphere(500)
     y, z = 0.7 * (np.arange(5) - 2.0), 0.45 * (np.arange(4) - 1.5)
     slow = np.zeros(len(d), complex)
@@ -89,21 +89,21 @@ def test_array_is_the_sum_over_its_elements():
 
 
 def test_chebyshev_taper_has_equal_side_lobes_at_its_level():
-    found = characteristics(UniformArray(16, 8, 0.5, 0.5, "chebyshev(40)", "chebyshev(25)"))
+    found = characteristics(ArrayAntenna(16, 8, 0.5, 0.5, "chebyshev(40)", "chebyshev(25)"))
     assert found.sll_h_db == pytest.approx(-40.0, abs=0.05)
     assert found.sll_v_db == pytest.approx(-25.0, abs=0.05)
 
 
 def test_figures_of_merit_turn_with_the_pattern_and_know_what_is_not_there():
-    found = characteristics(CosinePattern(86.0, 60.0, loss_db=2.0))
+    found = characteristics(CosineAntenna(86.0, 60.0, loss_db=2.0))
     assert (found.hpbw_h_deg, found.hpbw_v_deg) == pytest.approx((86.0, 60.0), abs=1e-3)
     assert math.isnan(found.sll_h_db)
-    everywhere = characteristics(Isotropic(loss_db=3.0))
+    everywhere = characteristics(IsotropicAntenna(loss_db=3.0))
     assert everywhere.gain_dbi == pytest.approx(-3.0)
     assert everywhere.hpbw_h_deg == 360.0
-    ahead = characteristics(Isotropic(front=True))
+    ahead = characteristics(IsotropicAntenna(front=True))
     assert ahead.hpbw_h_deg == pytest.approx(180.0, abs=0.02)
-    assert gain_dbi(Isotropic(front=True), np.pi) == -math.inf
+    assert gain_dbi(IsotropicAntenna(front=True), np.pi) == -math.inf
 
 
 def mounted(name, polarization="V"):
@@ -158,13 +158,13 @@ def test_gain_dbi_scales_any_antenna_and_keeps_its_shape(given, tmp_path):
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Isotropic("X"),
-        lambda: Isotropic(loss_db=math.nan),
-        lambda: CosinePattern(0.0, 60.0),
-        lambda: CosinePattern(180.0, 60.0),
-        lambda: UniformArray(0, 2, 0.5, 0.5),
-        lambda: UniformArray(2, 2, -0.5, 0.5),
-        lambda: UniformArray(2, 2, 0.5, 0.5, taper_z="kaiser"),
+        lambda: IsotropicAntenna("X"),
+        lambda: IsotropicAntenna(loss_db=math.nan),
+        lambda: CosineAntenna(0.0, 60.0),
+        lambda: CosineAntenna(180.0, 60.0),
+        lambda: ArrayAntenna(0, 2, 0.5, 0.5),
+        lambda: ArrayAntenna(2, 2, -0.5, 0.5),
+        lambda: ArrayAntenna(2, 2, 0.5, 0.5, taper_z="kaiser"),
     ],
 )
 def test_impossible_antennas_are_refused(make):
@@ -182,7 +182,7 @@ def test_two_cuts_are_met_in_their_planes_and_add_in_db_between(tmp_path):
     rows = ["plane,angle_deg,gain_dbi"]
     rows += [f"az,{a},{10.0 - 0.01 * a * a}" for a in range(-90, 91, 5)]
     rows += [f"el,{a},{10.0 - 0.02 * a * a}" for a in range(-60, 61, 5)]
-    antenna = MeasuredPattern.load(written(tmp_path, "\n".join(rows)))
+    antenna = MeasuredAntenna.load(written(tmp_path, "\n".join(rows)))
     assert gain_dbi(antenna, math.radians(30.0)) == pytest.approx(1.0)
     assert gain_dbi(antenna, 0.0, math.radians(-15.0)) == pytest.approx(5.5)
     assert gain_dbi(antenna, math.radians(30.0), math.radians(-15.0)) == pytest.approx(-3.5)
@@ -191,13 +191,13 @@ def test_two_cuts_are_met_in_their_planes_and_add_in_db_between(tmp_path):
 
 
 def test_a_sampled_pattern_becomes_itself_again(tmp_path):
-    original = CosinePattern(80.0, 60.0, "H")
+    original = CosineAntenna(80.0, 60.0, "H")
     azimuth, elevation = np.arange(-60, 61, 2), np.arange(-40, 41, 2)
     rows = ["azimuth_deg,elevation_deg,gain_dbi,phase_deg"]
     for a in azimuth:
         for e in elevation:
             rows.append(f"{a},{e},{gain_dbi(original, math.radians(a), math.radians(e))!r},{7.0 * a + e}")
-    antenna = MeasuredPattern.load(written(tmp_path, "\n".join(rows)), "H")
+    antenna = MeasuredAntenna.load(written(tmp_path, "\n".join(rows)), "H")
     rng = np.random.default_rng(1)
     a, e = rng.uniform(-60, 60, 200), rng.uniform(-40, 40, 200)
     d = direction(np.radians(a), np.radians(e))
@@ -223,6 +223,6 @@ def test_a_sampled_pattern_becomes_itself_again(tmp_path):
 )
 def test_a_bad_pattern_file_is_named_with_row_and_column(tmp_path, text, says):
     with pytest.raises(PatternError, match=says):
-        MeasuredPattern.load(written(tmp_path, text))
+        MeasuredAntenna.load(written(tmp_path, text))
     with pytest.raises(PatternError, match=r"none\.csv: cannot be read"):
-        MeasuredPattern.load(tmp_path / "none.csv")
+        MeasuredAntenna.load(tmp_path / "none.csv")

@@ -10,8 +10,8 @@ import pytest
 from support.places import SCENES
 from support.study_tables import figures
 
-from raychan.frames import rotation
-from raychan.radar.antenna import CosinePattern, Isotropic, UniformArray
+from raychan.poses import rotation
+from raychan.radar.antenna import ArrayAntenna, CosineAntenna, IsotropicAntenna
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.units import watt
@@ -26,7 +26,12 @@ WIDE = Waveform(77e9, 4e9, 40e-6, 40e-6, 128, 1024)
 
 def make_radar(**changes):
     given = dict(
-        position=(1.0, 2.0, 0.5), tx=Isotropic(), rx=Isotropic("H"), waveform=NARROW, power=0.01, noise_figure_db=12.0
+        position=(1.0, 2.0, 0.5),
+        antenna=IsotropicAntenna(),
+        rx_antenna=IsotropicAntenna("H"),
+        waveform=NARROW,
+        power=0.01,
+        noise_figure_db=12.0,
     )
     return Radar(**(given | changes))
 
@@ -68,7 +73,7 @@ def test_c008_unambiguous_rate():
 )
 def test_c009_eirp_and_greatest_path_loss(name, dbm, printed, of):
     tx = antenna_of(f"antennas/{name}.toml", "V", SCENES, "antenna")
-    budget = make_radar(tx=tx, power=float(watt(dbm))).link_budget(sensitivity_dbm=-120.0)
+    budget = make_radar(tx_antenna=tx, power=float(watt(dbm))).link_budget(sensitivity_dbm=-120.0)
     theirs = figures(printed)
     assert budget["eirp_dbm"] == pytest.approx(theirs[f"{of}EIRP"], abs=0.01)
     assert budget["max_path_loss_db"] == pytest.approx(theirs[f"{of}greatest path loss at -120 dBm"], abs=0.01)
@@ -106,23 +111,23 @@ def test_noise_is_ktbf_of_the_sample_rate():
 
 
 def test_fields_are_transverse_and_carry_the_gain():
-    array = UniformArray(4, 2, 0.6, 0.5)
-    s = make_radar(tx=array, yaw=0.7, pitch=-0.2, roll=0.4)
+    array = ArrayAntenna(4, 2, 0.6, 0.5)
+    s = make_radar(tx_antenna=array, yaw_deg=40.0, pitch_deg=-11.0, roll_deg=23.0)
     d = directions(500)
     field = s.tx_field(d)
     np.testing.assert_allclose((field * d).sum(axis=1), 0.0, atol=1e-12)
-    local = d @ rotation(0.7, -0.2, 0.4)
+    local = d @ rotation(*np.radians([40.0, -11.0, 23.0]))
     np.testing.assert_allclose(np.linalg.norm(field, axis=1), np.abs(array.field(local)[:, 0]), atol=1e-12)
 
 
 def test_level_radar_sends_vertical_and_gathers_horizontal_ahead():
-    s = make_radar(yaw=0.5)
+    s = make_radar(yaw_deg=30.0)
     np.testing.assert_allclose(s.tx_field(s.boresight[None])[0], [0.0, 0.0, -1.0], atol=1e-12)
-    np.testing.assert_allclose(s.rx_field(s.boresight[None])[0], [-math.sin(0.5), math.cos(0.5), 0.0], atol=1e-12)
+    np.testing.assert_allclose(s.rx_field(s.boresight[None])[0], [-0.5, math.sqrt(0.75), 0.0], atol=1e-12)
 
 
 def test_a_quarter_roll_turns_vertical_into_horizontal():
-    rolled, level = make_radar(roll=np.pi / 2), make_radar()
+    rolled, level = make_radar(roll_deg=90.0), make_radar()
     ahead = level.boresight[None]
     crossed = abs(np.vdot(rolled.tx_field(ahead)[0], level.tx_field(ahead)[0]))
     aligned = abs(np.vdot(rolled.tx_field(ahead)[0], level.rx_field(ahead)[0]))
@@ -131,26 +136,28 @@ def test_a_quarter_roll_turns_vertical_into_horizontal():
 
 
 def test_turning_radar_and_world_together_changes_nothing():
-    turn = rotation(1.1)
+    turn = rotation(math.radians(63.0))
     d = directions(100, seed=3)
-    patch = CosinePattern(86.0, 60.0)
-    still = make_radar(tx=patch, yaw=0.3, pitch=0.1, elements=[[0.0, 0.002, 0.0], [0.0, -0.002, 0.001]])
-    moved = dataclasses.replace(still, yaw=0.3 + 1.1)
+    patch = CosineAntenna(86.0, 60.0)
+    still = make_radar(
+        tx_antenna=patch, yaw_deg=17.0, pitch_deg=6.0, elements=[[0.0, 0.002, 0.0], [0.0, -0.002, 0.001]]
+    )
+    moved = dataclasses.replace(still, yaw_deg=17.0 + 63.0)
     np.testing.assert_allclose(moved.tx_field(d @ turn.T), still.tx_field(d) @ turn.T, atol=1e-12)
     np.testing.assert_allclose(moved.elements_world, still.elements_world @ turn.T, atol=1e-15)
 
 
 @pytest.mark.parametrize(
-    ("velocity", "yaw", "speed"),
+    ("velocity", "yaw_deg", "speed"),
     [
         ((7.0, 0.0, 0.0), 0.0, 7.0),
-        ((7.0, 0.0, 0.0), math.pi, -7.0),
-        ((3.0, 4.0, 0.0), 0.2, 5.0),
+        ((7.0, 0.0, 0.0), 180.0, -7.0),
+        ((3.0, 4.0, 0.0), 11.0, 5.0),
         ((0.0, 0.0, 0.0), 0.0, 0.0),
     ],
 )
-def test_ego_speed_is_signed_along_the_boresight(velocity, yaw, speed):
-    assert make_radar(velocity=velocity, yaw=yaw).ego_speed == pytest.approx(speed)
+def test_ego_speed_is_signed_along_the_boresight(velocity, yaw_deg, speed):
+    assert make_radar(velocity=velocity, yaw_deg=yaw_deg).ego_speed == pytest.approx(speed)
 
 
 def test_sensors_are_frozen_and_default_to_one_receiver_at_rest():
@@ -170,7 +177,7 @@ def test_sensors_are_frozen_and_default_to_one_receiver_at_rest():
         {"elements": np.zeros((0, 3))},
         {"elements": (0.0, 0.0, 0.0)},
         {"power": 0.0},
-        {"yaw": math.nan},
+        {"yaw_deg": math.nan},
         {"noise_figure_db": math.inf},
     ],
 )

@@ -47,7 +47,7 @@ def test_a_paths_own_figures_are_those_of_the_result(ran):
     mine = r.paths.amplitude[told.row]
     assert np.exp(1j * told.phase) == pytest.approx(mine / np.abs(mine))
     assert told.power == pytest.approx(np.abs(mine) ** 2 * r.receiver.power)
-    assert told.rate == pytest.approx(r.paths.rate[told.row])
+    assert told.rate == pytest.approx(r.paths.range_rate[told.row])
     away = r.paths.departure[told.row].astype(float)
     azimuth, elevation = told.departure.T
     assert np.cos(elevation) * np.cos(azimuth) == pytest.approx(away[:, 0], abs=1e-6)

@@ -9,14 +9,14 @@ import pytest
 from support.results import WAVE, paths, receiver, result
 
 from raychan.channel.error import stated_error
+from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
-from raychan.radar.antenna import Isotropic
+from raychan.radar.antenna import IsotropicAntenna
 from raychan.radar.radar import Radar
-from raychan.records import REFLECT, SCATTER, TRANSMIT, take
+from raychan.records import REFLECT, SCATTER, TRANSMIT
 from raychan.run.explain import explain
 from raychan.run.labels import chains, explain_cell, response_of
 from raychan.signal.baseband import synthesize
-from raychan.units import C0
 
 GROUND, SUV, TRUCK, WALKER = range(4)
 DIRECT_SUV = [(SUV, SCATTER)]
@@ -40,7 +40,7 @@ def test_prediction_is_the_map_itself(name, speed, bandwidth, iq, share):
     r = middle + rng.uniform(-2, 2, 8) * wave.range_resolution
     v = speed + rng.uniform(-2, 2, 8) * wave.rate_resolution
     p = paths(r, v, rng.normal(size=8) + 1j * rng.normal(size=8), [DIRECT_SUV] * 8)
-    radar = Radar(np.zeros(3), Isotropic(), Isotropic(), wave, 1.0, 10.0, noise=False)
+    radar = Radar(wave, np.zeros(3), antenna=IsotropicAntenna(), power=1.0, noise=False)
     rdmap = range_doppler(synthesize(p, radar), wave, name, name)
     rx = dataclasses.replace(receiver(name), waveform=wave)
     order = np.argsort(rdmap.power, axis=None)[::-1]
@@ -64,10 +64,10 @@ def test_cells_explained_together_are_what_each_is_alone_though_far_paths_are_le
     rx = receiver(name)
     known, response = chains(p, rx.background), response_of(rx)
     strong = np.argsort(-size)[:12]
-    cells = np.stack([0.5 * C0 * p.delay[strong], p.rate[strong], size[strong]], axis=1)
-    total, sizes, strongest = response.in_cells(known.part, 4, p.amplitude, p.delay, p.rate, cells)
+    cells = np.stack([p.range[strong], p.range_rate[strong], size[strong]], axis=1)
+    total, sizes, strongest = response.in_cells(known.part, 4, p.amplitude, p.delay, p.range_rate, cells)
     for i, (r, v, wave) in enumerate(cells):
-        alone, at = response.in_cell(p.amplitude, p.delay, p.rate, r, v)
+        alone, at = response.in_cell(p.amplitude, p.delay, p.range_rate, r, v)
         for g in range(4):
             mine = known.part == g
             assert abs(total[i, g] - alone[mine].sum()) < 1e-3 * wave
@@ -125,7 +125,7 @@ def test_labels(chain, label, interactions):
 def test_a_long_way_over_the_ground_is_a_ghost_and_a_short_one_adds_to_the_target():
     p = paths([9.0, 9.0, 9.0], [0, 0, 0], [2.0, 1.5, 1.5], [DIRECT_SUV, BY_GROUND, BY_GROUND[::-1]])
     assert (cell(p, 9.0, 0.0).label, cell(p, 9.0, 0.0).bodies) == ("direct", "suv.tail")
-    near = p.vertices - np.float32([1.0, 0.0, 0.0])  # the target stands a metre before where its echo seems to be
+    near = p.ways.vertices - np.float32([1.0, 0.0, 0.0])  # the target stands a metre before where its echo seems to be
     ghost = take(p.replace(ways=p.ways.replace(vertices=near)), [1, 2])
     assert cell(ghost, 9.0, 0.0).label == "multipath"
 

@@ -14,7 +14,7 @@ from truth import corner, mie, po, slab
 
 from raychan.channel.transfer import transfer
 from raychan.em.fresnel import coefficients_array
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 from raychan.records import HALF_SPACE, LAYER
 from raychan.run.rcs import facets_of, rcs, refinements, scattering
 from raychan.tracing.legs import Leg

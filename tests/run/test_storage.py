@@ -50,7 +50,7 @@ def test_a_result_without_paths_or_detections_is_stored_too(tmp_path):
 def test_groups_open_in_xarray_and_as_plain_hdf5_with_units(made, tmp_path):
     save_result(made, tmp_path)
     with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf", group="paths") as data:
-        assert data["delay"].attrs["units"] == "s"
+        assert data["length"].attrs["units"] == "m"
         np.testing.assert_array_equal(data["amplitude_im"], made.paths.amplitude.imag)
     with h5py.File(tmp_path / "result.nc") as file:
         assert set(file) >= {"paths", "profile", "cube", "rdmap", "detections"}

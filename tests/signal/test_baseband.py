@@ -18,7 +18,7 @@ def formula(paths, wave: Waveform) -> np.ndarray:
     m, s = np.arange(wave.n_chirps)[:, None], np.arange(wave.n_samples)
     t = s * wave.chirp_duration / wave.n_samples
     total = np.zeros((wave.n_chirps, wave.n_samples), complex)
-    for a, tau0, v in zip(paths.amplitude, paths.delay, paths.rate, strict=True):
+    for a, tau0, v in zip(paths.amplitude, paths.delay, paths.range_rate, strict=True):
         grown = 2.0 * v * (m * wave.repetition + t) / C0
         tau = tau0 + grown
         total += a * np.exp(-2j * np.pi * (wave.carrier * grown + wave.slope * t * tau - 0.5 * wave.slope * tau**2))
@@ -30,7 +30,7 @@ def worst_db(cube, truth) -> float:
 
 
 def grids(paths, wave: Waveform):
-    growth = 2.0 * paths.rate / C0
+    growth = paths.length_rate / C0
     middle = paths.delay + growth * centre(wave)[0]
     return keystones(Echoes(middle, growth, paths.amplitude, paths.arrival), wave, 1e-6, 0.0)
 
@@ -170,7 +170,7 @@ def test_power_is_amplitude_squared_times_transmitted_power():
 
 def test_a_receiver_set_aside_sees_the_paths_of_a_shifted_receiver():
     azimuth, aside = 0.4, 0.05
-    radar = make_radar(SMALL, elements=np.array([[0, 0, 0], [0, aside, 0]]), yaw=0.3)
+    radar = make_radar(SMALL, elements=np.array([[0, 0, 0], [0, aside, 0]]), yaw_deg=np.degrees(0.3))
     # In the antenna's frame the wave comes from azimuth 0.4; the path to the second receiver is shorter.
     paths = echoes([10.0], 3.0, 1.0, azimuth + 0.3)
     shorter = aside * np.sin(azimuth)

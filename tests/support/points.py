@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 from raychan.records import Points
 
 

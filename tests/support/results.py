@@ -11,7 +11,6 @@ from raychan.radar.waveform import Waveform
 from raychan.records import Cube, Detections, MapError, Paths, Profile, RangeDoppler
 from raychan.run.labels import provenance
 from raychan.run.result import ExplainedDetections, Receiver, Result
-from raychan.units import C0
 
 WAVE = Waveform(
     carrier=77e9,
@@ -38,8 +37,8 @@ def paths(ranges, rates, amplitudes, chains) -> Paths:
             vertices[i, j] = (ranges[i], 0.1 * b, 0.5)
     forward = np.tile([1.0, 0.0, 0.0], (n, 1))
     return Paths.of(
-        delay=2.0 * np.asarray(ranges, float) / C0, amplitude=np.asarray(amplitudes, complex),
-        rate=np.asarray(rates, float), departure=forward, arrival=forward, body=body, kind=kind,
+        length=2.0 * np.asarray(ranges, float), amplitude=np.asarray(amplitudes, complex),
+        length_rate=2.0 * np.asarray(rates, float), departure=forward, arrival=forward, body=body, kind=kind,
         part=np.where(body < 0, -1, np.isin(body, (1, 2))),
         vertices=vertices, body_names=BODIES, part_names=PARTS, tx=np.zeros(3), rx=np.zeros(3),
     )  # fmt: skip

@@ -8,7 +8,7 @@ from support.facets import box, facets, quad
 from support.points import point, radar
 
 from raychan.channel.edge_diffraction import leg_field
-from raychan.frames import theta_phi
+from raychan.poses import theta_phi
 from raychan.records import DIFFRACT
 from raychan.run.solver import solve
 from raychan.tracing.edge_diffraction import wedge_legs

@@ -137,5 +137,5 @@ def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_
     assert max(calls) > 0
     monkeypatch.setattr(Occluders, "within", lambda self, leg: NOTHING)
     every = paths()
-    for name in ("delay", "amplitude", "rate", "body", "kind", "vertices"):
+    for name in ("length", "amplitude", "length_rate", "body", "kind", "vertices"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(every, name), err_msg=name)

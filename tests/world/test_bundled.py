@@ -48,7 +48,7 @@ def test_an_antenna_that_comes_along_serves_any_scene_and_ones_own_goes_before(e
     (elsewhere / "antennas").mkdir()
     (elsewhere / "antennas" / "patch.toml").write_text('kind = "isotropic"\n')
     own = rc.Scene.load("mine.toml").override(["radar.antenna=antennas/patch.toml"])
-    assert type(own.radar.tx).__name__ == "Isotropic"
+    assert type(own.radar.tx).__name__ == "IsotropicAntenna"
     assert invoke(["info", "antennas/array_2x2"]) == 0
     assert "10.36" in capsys.readouterr().out
 

@@ -142,7 +142,7 @@ def test_surfaces_go_without_the_garbage_collector_frame_by_frame():
 
 def test_a_moving_radar_has_one_beam(scene):
     assert beam_of(scene.radar) is beam_of(scene.radar.at(0.3))
-    assert beam_of(scene.radar) is not beam_of(dataclasses.replace(scene.radar, yaw=0.1))
+    assert beam_of(scene.radar) is not beam_of(dataclasses.replace(scene.radar, yaw_deg=6.0))
 
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (0.3, 3.0, -1.0), (6.0, 0.2, 0.1), (30.0, -4.0, 9.0)])

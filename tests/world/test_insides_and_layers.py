@@ -59,12 +59,12 @@ def paths(f, bounces, tolerance=0.5, jitter=0.0, end=(0.0, 0.0, 0.0)):
 
 def profile(p, ranges, width=0.15):
     """Amplitudes at ranges of a receiver whose cells are Gaussians."""
-    away = (0.5 * C0 * p.delay[None] - ranges[:, None]) / width
+    away = (p.range[None] - ranges[:, None]) / width
     return np.exp(-(away**2)) @ p.amplitude
 
 
 def at_range(p, distance, width=0.1):
-    return p.amplitude[np.abs(0.5 * C0 * p.delay - distance) < width].sum()
+    return p.amplitude[np.abs(p.range - distance) < width].sum()
 
 
 @pytest.mark.parametrize("back", ["glass", "metal"])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from raychan.frames import rotation
+from raychan.poses import rotation
 from raychan.world.motion import Motion
 
 angle = st.floats(-3.0, 3.0)

@@ -61,7 +61,7 @@ def test_empty_scene_is_valid():
 def test_roles():
     bodies = [
         Body(name="road", shape="ground"),
-        Body(name="man", shape="pedestrian", rcs=0.85),
+        Body(name="man", shape="pedestrian", rcs_dbsm=0.85),
         Body(name="car", shape="car"),
         Body(name="mirror", shape="plate", role="mirror"),
     ]
@@ -70,10 +70,10 @@ def test_roles():
 
 def test_target_of_given_rcs():
     man = Body(
-        name="man", shape="pedestrian", rcs=[(0.0, 0.0), (90.0, 10.0), (-90.0, 10.0), (180.0, 20.0)],
+        name="man", shape="pedestrian", rcs_dbsm=[(0.0, 0.0), (90.0, 10.0), (-90.0, 10.0), (180.0, 20.0)],
         rcs_point=(0, 0, 1.0), position=(5.0, 1.0, 0.0), yaw_deg=90.0, velocity=(0.0, 2.0, 0.0),
     )  # fmt: skip
-    p = Scene([man, Body(name="dot", shape="sphere", rcs=3.0)]).points(1.0)
+    p = Scene([man, Body(name="dot", shape="sphere", rcs_dbsm=3.0)]).points(1.0)
     np.testing.assert_allclose(p.position[0], [5.0, 3.0, 1.0])
     np.testing.assert_allclose(p.heading, [np.pi / 2, 0.0])
     at = [np.interp(np.radians(a), p.azimuth, p.sigma[0]) for a in (-180, -90, 0, 45, 90, 180)]

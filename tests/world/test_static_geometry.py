@@ -94,7 +94,7 @@ def test_what_is_kept_is_what_is_made_anew(scene):
             "first",
             "normal",
             "area",
-            "bulge",
+            "edge_curvature",
             "curved",
             "extents",
             "plane",

@@ -11,15 +11,16 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
-from raychan.records import TRANSMIT, Paths, take
+from raychan.records import TRANSMIT, Paths
 from raychan.run.clock import STAGES
 from raychan.run.receiver import noise_of_cell
 from raychan.run.result import MULTIPATH, Result
 from raychan.run.simulate import background, simulate
 from raychan.signal.baseband import synthesize
 from raychan.study.validation.data import POINT, Study, Target
-from raychan.units import C0, db
+from raychan.units import db
 from raychan.world.errors import SceneError, nearest
 from raychan.world.scene import Scene
 
@@ -129,7 +130,7 @@ class Bench:
         given, result = self.target(target), self.run(run)
         at = self.expected_range(target)
         # Paths of another length, folded ones among them, would show there by the side lobes of the window only.
-        ways = over(result, given.parts, given.over) & (np.abs(0.5 * C0 * result.paths.delay - at) <= _ROOM)
+        ways = over(result, given.parts, given.over) & (np.abs(result.paths.range - at) <= _ROOM)
         if not ways.any():
             return None
         top = peak_snr(result, ways, at, _ROOM)
@@ -149,7 +150,7 @@ def over(result: Result, parts: tuple[str, ...], via: tuple[str, ...] = ()) -> M
     led = np.any(touched[: len(parts)], axis=0)
     if via:
         return np.asarray((led & np.all(touched[len(parts) :], axis=0))[paths.way])
-    own = {p.split(".")[0] for p in parts} | set(background(result.scene.facets(0.0)))
+    own = {p.split(".")[0] for p in parts} | set(background(result.require_scene().facets(0.0)))
     strange = [i for i, name in enumerate(paths.body_names) if name not in own]
     led &= ~(np.isin(ways.body, strange) & met & (ways.kind != TRANSMIT)).any(axis=1)
     return np.asarray(led[paths.way])
@@ -157,7 +158,7 @@ def over(result: Result, parts: tuple[str, ...], via: tuple[str, ...] = ()) -> M
 
 def peak_snr(result: Result, ways: Mask, at: float, room: float) -> float:
     """Return the highest SNR [dB] within `room` [m] of a range [m] in a map of some paths (n,) without noise."""
-    scene = result.scene
+    scene = result.require_scene()
     settings, quiet = scene.processing, dataclasses.replace(scene.radar, noise=False)
     cube = synthesize(take(result.paths, ways), quiet)
     made = range_doppler(cube, quiet.waveform, settings.range_window, settings.rate_window, settings.pad)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.frames import angles, direction
+from raychan.poses import angles, direction
 from raychan.processing.cfar import factor
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.pattern import gain_dbi
@@ -17,7 +17,7 @@ from raychan.run.receiver import noise_of_cell
 from raychan.signal.baseband import synthesize
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure
-from raychan.units import C0, db, dbm
+from raychan.units import db, dbm
 
 Floats = NDArray[np.float64]
 
@@ -36,9 +36,9 @@ def _echo(bench: Bench, run: str, at: float, rate: float, window: str, pad: tupl
     look, none = np.array([[1.0, 0.0, 0.0]]), np.full((1, 1), -1)
     here = np.asarray(given.position)
     path = Paths.of(
-        delay=np.array([2.0 * at / C0]),
+        length=np.array([2.0 * at]),
         amplitude=np.ones(1, complex),
-        rate=np.array([rate]),
+        length_rate=np.array([2.0 * rate]),
         departure=look,
         arrival=look,
         body=none,
@@ -152,7 +152,7 @@ def link_snr(bench: Bench, run: str, target: str) -> dict[str, float]:
     azimuth, elevation = (float(a) for a in angles(ray))
     back = (azimuth + np.pi - points.heading[k] + np.pi) % (2.0 * np.pi) - np.pi
     sigma = float(np.interp(back, points.azimuth, points.sigma[k], period=2.0 * np.pi))
-    gain = gain_dbi(radar.tx, azimuth - radar.yaw, elevation)
+    gain = gain_dbi(radar.tx, azimuth - np.radians(radar.yaw_deg), elevation)
     loss = float(point_loss(bench, run, distance, float(db(sigma))) or 0.0)
     snr = dbm(radar.power) + 2.0 * gain - loss - dbm(noise_of_cell(radar, scene.processing))
     return {

@@ -126,7 +126,8 @@ def budgets(bench: Bench, run: str) -> list[Budget]:
         met = result.paths.kind > 0
         alone = over(result, given.parts) & (met.sum(axis=1) == 1) & (result.paths.body[:, 0] == body)
         power = abs(result.paths.amplitude[alone].sum()) ** 2 * result.receiver.power
-        direct = float(db(power / noise_of_cell(result.scene.radar, result.scene.processing))) if alone.any() else None
+        scene = result.require_scene()
+        direct = float(db(power / noise_of_cell(scene.radar, scene.processing))) if alone.any() else None
         made.append(
             Budget(
                 target,

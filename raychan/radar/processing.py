@@ -1,0 +1,51 @@
+"""What a radar's receiver does with its samples: windows, zero padding, detector."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Processing:
+    """Settings of the receiver, as the table [processing] of a scene file.
+
+    Pairs are (along range, along range rate). Raises: ValueError for settings that cannot be.
+
+    >>> Processing(range_window="taylor(40)", min_snr_db=15.0).pad
+    (2, 2)
+    """
+
+    range_window: str = "hann"
+    """Name of a window of `raychan.radar.windows`."""
+    rate_window: str = "hann"
+    pad: tuple[int, int] = (2, 2)
+    """Zero padding, as a multiple of samples and of chirps."""
+    cfar: str = "os"
+    """Detector: 'ca' cell averaging, 'os' ordered statistic."""
+    pfa: float = 1e-7
+    """Probability of false alarm of a cell."""
+    min_snr_db: float = 20.0
+    """Least signal-to-noise ratio that is reported [dB]."""
+    guard: tuple[int, int] | None = None
+    """Guard cells to each side of the cell under test; None: the detector's choice."""
+    train: tuple[int, int] | None = None
+    """Training cells to each side beyond the guard; None: the detector's choice."""
+
+    def __post_init__(self) -> None:
+        for name in ("range_window", "rate_window"):
+            value = getattr(self, name)
+            if value not in ("rect", "hann"):  # others need scipy to be checked
+                from raychan.radar.windows import window
+
+                window(value, 2)
+        if self.cfar not in ("ca", "os"):
+            raise ValueError(f"Processing.cfar = {self.cfar!r}: must be 'ca' or 'os'")
+        if not 0.0 < self.pfa < 1.0:
+            raise ValueError(f"Processing.pfa = {self.pfa!r}: must lie between 0 and 1")
+        if not math.isfinite(self.min_snr_db):
+            raise ValueError(f"Processing.min_snr_db = {self.min_snr_db!r}: must be finite")
+        for name, least in (("pad", 1), ("guard", 0), ("train", 0)):
+            pair = getattr(self, name)
+            if pair is not None and (len(pair) != 2 or any(int(n) != n or n < least for n in pair)):
+                raise ValueError(f"Processing.{name} = {pair!r}: must be two whole numbers of at least {least}")
