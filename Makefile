@@ -11,7 +11,7 @@ BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py 
 	world/test_shapes.py \
 	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
 # Tests of the kernels that are cheap enough as plain Python; marked `compiled`: what is not, each with its reason.
-NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_doppler.py signal \
+NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_doppler.py \
 	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
