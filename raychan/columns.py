@@ -14,7 +14,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.reprs import Told
+from raychan.reprs import Described
 
 
 def column(axes: str, dtype: Any = np.float64, unit: str = "1", doc: str = "", finite: bool = True) -> Any:
@@ -23,7 +23,7 @@ def column(axes: str, dtype: Any = np.float64, unit: str = "1", doc: str = "", f
     return field(metadata=meta)
 
 
-class Record(Told):
+class Record(Described):
     """Base of all records: checks and freezes every declared column when built."""
 
     def __post_init__(self) -> None:
@@ -62,7 +62,7 @@ class Record(Told):
             object.__setattr__(out, name, frozen)
         return out
 
-    def replace(self, **changes: Any) -> Self:
+    def replace(self, **changes: object) -> Self:
         """Return a copy with some fields changed (and all checked again)."""
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 

@@ -1,4 +1,4 @@
-"""Rows: work on many rows of arrays over two threads that are kept between calls, and two works at once."""
+"""Two threads: one loop over rows of arrays on both, or two functions at once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ B = TypeVar("B")
 
 
 class cached(cached_property):  # type: ignore[type-arg]
-    """A property of an object made once, by one thread: the object's lock `making` is held meanwhile."""
+    """A property of an object computed once, by one thread: the object's lock `making` is held meanwhile."""
 
     def __get__(self, instance: Any, owner: Any = None) -> Any:
         if instance is None:
@@ -24,29 +24,32 @@ class cached(cached_property):  # type: ignore[type-arg]
 
 
 class Stopped(Exception):
-    """Raised in the second of two works when the first has failed or was interrupted."""
+    """Raised in the second of two functions when the first has failed or was interrupted."""
 
 
-class _Own(threading.local):
-    """What a thread knows: whether another is at work beside it, and whether it was told to stop."""
+class _ThreadState(threading.local):
+    """State of a thread: the event that the other of a pair has ended, and the event that it is told to stop."""
 
     beside: threading.Event | None = None
     stop: threading.Event | None = None
 
 
-_own = _Own()
+_own = _ThreadState()
 
 
 @lru_cache(maxsize=1)
 def _helper() -> ThreadPoolExecutor:
-    # A forked child has no threads of its parent's: it makes its own.
+    # A forked child has none of its parent's threads: it starts its own.
     os.register_at_fork(after_in_child=_helper.cache_clear)
     return ThreadPoolExecutor(1, "raychan-rows")
 
 
 def parallel_for(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
-    """Do the work on rows 0 to n, on this thread and another when there are many: it must release the interpreter's
-    lock, and may not call this again. Beside another work (`run_pair`) this thread does it alone."""
+    """Call `work` with slices that cover rows 0 to n: on two threads from `least` rows on, else on this one.
+
+    The work must release the interpreter's lock, and must not call this again. Within `run_pair` one thread does it
+    all.
+    """
     if _own.stop is not None and _own.stop.is_set():
         raise Stopped
     if n < least or (_own.beside is not None and not _own.beside.is_set()):
@@ -60,8 +63,8 @@ def parallel_for(n: int, work: Callable[[slice], None], least: int = 2000) -> No
 
 
 def was_interrupted(failure: BaseException | None) -> bool:
-    """Tell whether a fault of compiled code is a Ctrl-C: one that reaches it while it waits for the interpreter becomes
-    a SystemError, since it gives back a result all the same."""
+    """Tell whether an error of compiled code is a Ctrl-C: one that arrives while it waits for the interpreter becomes a
+    SystemError, since the code returns a result all the same."""
     if not isinstance(failure, SystemError):
         return False
     while failure is not None and not isinstance(failure, KeyboardInterrupt):
@@ -70,10 +73,11 @@ def was_interrupted(failure: BaseException | None) -> bool:
 
 
 def run_pair(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
-    """Return what two works return, one done by this thread and one by another; neither may call this again.
+    """Return what two functions return, `here` called by this thread and `there` by another; neither may call this
+    again.
 
-    Where the first fails or is interrupted the other is stopped at its next rows. Raises: what they raise, the first's
-    before the other's.
+    If `here` fails or is interrupted, `there` is stopped at its next `parallel_for`. Raises: what they raise, `here`
+    first.
     """
     ended, stop = threading.Event(), threading.Event()
     found: list[B] = []
@@ -88,7 +92,7 @@ def run_pair(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
         finally:
             ended.set()
 
-    # No thread of a pool: one that an interruption leaves behind must not keep the process from ending.
+    # Not a thread of a pool: one that an interruption leaves behind must not keep the process from ending.
     other = threading.Thread(target=second, name="raychan-beside", daemon=True)
     _own.beside = ended
     try:

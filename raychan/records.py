@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from raychan.columns import Record, column
 from raychan.kinds import *  # noqa: F403
-from raychan.reprs import Drawn
+from raychan.reprs import Plotted
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -219,10 +219,11 @@ class Paths(PropagationPaths):
     )
 
     @classmethod
-    def of(cls, **columns: Any) -> Paths:
+    def of(cls, **columns: object) -> Paths:
         """Return paths of columns of which each has a row a path, those of `Ways` among them."""
-        ways = Ways(**{f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)})
-        return cls(way=np.arange(len(columns["length"]), dtype=np.int32), ways=ways, **columns)
+        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)}
+        rows: dict[str, Any] = columns
+        return cls(way=np.arange(len(rows["length"]), dtype=np.int32), ways=Ways(**held), **rows)
 
 
 @dataclass(frozen=True)
@@ -240,7 +241,7 @@ class SpecularPaths(PropagationPaths):
 
 
 @dataclass(frozen=True)
-class Profile(Record, Drawn):
+class Profile(Record, Plotted):
     """Power-delay profile as received in the waveform's bandwidth."""
 
     range: Floats = column("r", unit="m", doc="c tau / 2")
@@ -258,7 +259,7 @@ class Cube(Record):
 
 
 @dataclass(frozen=True)
-class RangeDoppler(Record, Drawn):
+class RangeDoppler(Record, Plotted):
     """Range-Doppler map; scaled so that a lone path's peak reads its received power."""
 
     range: Floats = column("r", unit="m")

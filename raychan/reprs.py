@@ -1,6 +1,6 @@
-"""How records, scenes and results tell of themselves in console and notebook, and the one door to their pictures.
+"""The text, HTML and plots of records, scenes and results in console and notebook.
 
-What tells has a `facts()`: a title, lines of (what, text), and perhaps a table of which the first rows are shown.
+`facts()` of an object gives a title, lines of (what, text), and perhaps a table, of which the first rows are shown.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ROWS = 12
 
 @dataclass(frozen=True)
 class Facts:
-    """What a thing tells of itself."""
+    """What console and notebook show of an object."""
 
     title: str
     lines: tuple[tuple[str, str], ...] = ()
@@ -55,15 +55,15 @@ class Facts:
         return [f"and {more} more"] if more > 0 else []
 
 
-class Told:
-    """Base of what tells: a repr and an HTML repr of its facts."""
+class Described:
+    """Base of objects whose repr and HTML repr show their facts."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls.__repr__ = Told.__repr__  # type: ignore[method-assign]  # else dataclass makes one of whole arrays
+        cls.__repr__ = Described.__repr__  # type: ignore[method-assign]  # else dataclass makes one of whole arrays
 
     def facts(self) -> Facts:
-        """Return what is told: of a record its columns, their sizes and spans."""
+        """Return what is shown: of a record its columns, their sizes and spans."""
         known = (_OWN[kind.__name__] for kind in type(self).__mro__ if kind.__name__ in _OWN)
         return next(known, _columns)(self)
 
@@ -74,8 +74,8 @@ class Told:
         return self.facts().html()
 
 
-class Drawn:
-    """Base of what has a picture."""
+class Plotted:
+    """Base of what has one plot."""
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw with matplotlib and return the axes, those given or those of a new figure of pyplot."""
@@ -84,8 +84,8 @@ class Drawn:
         return draw(self, axes)  # type: ignore[no-any-return]
 
 
-class DrawnTwice:
-    """Base of what has two pictures, side by side."""
+class PlottedTwice:
+    """Base of what has two plots, side by side."""
 
     def plot(self, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
         """Draw with matplotlib and return both axes, those given or those of a new figure of pyplot."""
@@ -126,7 +126,7 @@ def _columns(record: Any) -> Facts:
             unit = "" if f.metadata["unit"] == "1" else f.metadata["unit"]
             what = f"|{f.name}| " if np.iscomplexobj(value) else ""
             lines.append((f.name, f"({axes})  {what}{span(np.abs(value) if what else value, unit)}"))
-        elif isinstance(value, Told):
+        elif isinstance(value, Described):
             lines.append((f.name, type(value).__name__))
         elif isinstance(value, tuple):
             lines.append((f.name, f"{len(value)}: {', '.join(map(str, value[:8]))}{', ...' if len(value) > 8 else ''}"))
@@ -221,4 +221,4 @@ def _place(at: Any) -> str:
 
 
 _OWN = {"PropagationPaths": _paths, "RangeDoppler": _map, "Detections": _detections, "Scene": _scene, "Result": _result}
-"""Those of which more is to be told than their columns."""
+"""Classes with facts of their own, by name; other records show their columns."""

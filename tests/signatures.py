@@ -43,6 +43,9 @@ def write_type(kind: Any) -> str:
     if isinstance(kind, types.Array):
         frozen = "" if kind.mutable else ", readonly=True"
         return f"Array({kind.dtype}, {kind.ndim}, {kind.layout!r}{frozen})"
+    if isinstance(kind, types.NamedTuple | types.NamedUniTuple):
+        fields = ", ".join(map(write_type, kind.types))
+        return f"Named({kind.instance_class.__module__!r}, {kind.instance_class.__name__!r}, ({fields},))"
     if isinstance(kind, types.UniTuple | types.Tuple):
         return f"Tuple(({', '.join(map(write_type, kind.types))},))"
     if isinstance(kind, types.Number | types.Boolean) and not isinstance(kind, types.Literal):

@@ -89,10 +89,8 @@ def _halved(geometry: Geometry, found: Readings, wavenumber: float) -> Geometry 
         return None
     v, n = halved(facets.vertices, facets.normals)
     every = np.tile(np.arange(len(facets.vertices)), 4)
-    finer = Geometry(take(facets, every).replace(vertices=v, normals=n))
-    # Middles of the edges of a saddle lie inside, by less than its facets are off.
-    finer.convex_alone, finer.hides_nothing = geometry.convex_alone, geometry.hides_nothing
-    return finer
+    # Middles of the edges of a saddle lie inside, by less than its facets are off: they hide nothing more.
+    return Geometry(take(facets, every).replace(vertices=v, normals=n), finer_of=geometry)
 
 
 def creeping(geometry: Geometry, wavenumber: float) -> tuple[float, float]:

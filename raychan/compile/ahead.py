@@ -1,9 +1,9 @@
-"""Compile ahead: a second process that compiles, from the last stage backwards, what a cold run needs.
+"""Compilation in a second process, for a run that finds nothing compiled.
 
 Numba compiles one function at a time in a process, and a run compiles stage after stage as it comes to them. The second
-process starts from the other end; neither compiles what the other has in hand (`compile.code_cache`). What a run
-needs is listed in `signatures.txt` (written by `make signatures`): a kernel that is missing there is compiled by the
-run itself, so an old list costs time only.
+process starts from the last stage backwards; neither compiles what the other is compiling (`compile.code_cache`).
+What a run needs is listed in `signatures.txt` (written by `make signatures`): a kernel that is missing there is
+compiled by the run itself, so an old list costs time only.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from typing import Any
 from numba import types
 
 LIST = Path(__file__).with_name("signatures.txt")
-MANY = 20  # kernels from which a second process, which takes 2 s to start, is worth it
+MANY = 20  # missing kernels from which a second process, which takes 2 s to start, pays; not measured
 
 
 @contextmanager
 def helped(list_name: str, missing: int) -> Iterator[None]:
-    """Compile what a command needs in a second process too, as long as this lasts, where much is missing."""
+    """Compile what a command needs in a second process too while the block runs, if many kernels are missing."""
     other = _second(list_name) if missing >= MANY and (os.cpu_count() or 1) > 1 else None
     try:
         yield
@@ -46,7 +46,7 @@ def _second(list_name: str) -> subprocess.Popen[bytes] | None:
 
 
 def lists(file: Path = LIST) -> dict[str, list[tuple[str, str, str]]]:
-    """Return, for each command, the module, name and argument types of its kernels, in the order of their compiling."""
+    """Return, for each command, the module, name and argument types of its kernels, in the order of compilation."""
     found: dict[str, list[tuple[str, str, str]]] = {}
     for line in file.read_text(encoding="utf-8").splitlines():
         if line.startswith("["):
@@ -58,7 +58,7 @@ def lists(file: Path = LIST) -> dict[str, list[tuple[str, str, str]]]:
 
 
 def compile_list(rows: list[tuple[str, str, str]]) -> int:
-    """Compile kernels from the last to the first; return how many of them are not there as listed."""
+    """Compile kernels from the last to the first; return how many of them do not exist as listed."""
     lost = 0
     for module, name, arguments in reversed(rows):
         try:
@@ -70,11 +70,17 @@ def compile_list(rows: list[tuple[str, str, str]]) -> int:
 
 def read_types(text: str) -> tuple[Any, ...]:
     """Return the argument types that a line of the list gives; the text is this package's own."""
-    return tuple(eval(f"({text},)", {"__builtins__": {}}, vars(types) | {"bool": types.boolean}))
+    names = vars(types) | {"bool": types.boolean, "Named": _named}
+    return tuple(eval(f"({text},)", {"__builtins__": {}}, names))
+
+
+def _named(module: str, name: str, fields: tuple[Any, ...]) -> Any:
+    """Return the type of a named tuple, given its class and the types of its fields."""
+    return types.BaseTuple.from_types(fields, getattr(importlib.import_module(module), name))
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that started it has ended, however it did."""
+    """End this process when the one that started it ends, for whatever reason."""
     sys.stdin.read()
     os._exit(0)
 

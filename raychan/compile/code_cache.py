@@ -1,11 +1,11 @@
-"""Kept: compiled code on disk, which any number of processes write and read at once.
+"""The cache of compiled code on disk, which any number of processes read and write at once.
 
 Numba keeps an index beside its data files and picks a data file's name by what the index holds: two processes that
-compile at once leave an index of one with code of the other. Here there is no index. A file's name is made of all that
-its code depends on, it appears whole or not at all, and it says itself what it holds.
+compile at once leave an index of one with code of the other. Here there is no index. A file's name is a digest of
+all that its code depends on; it appears whole or not at all, and names what it holds itself.
 
-Who compiles holds a lock meanwhile: another process that needs the same code waits for it. Waiting goes only from a
-function to those it calls, so no two processes wait for each other.
+A process that compiles holds a lock meanwhile, and another process that needs the same code waits for it. A function
+waits only for those that it calls, so no two processes wait for each other.
 """
 
 from __future__ import annotations
@@ -36,15 +36,16 @@ except ImportError:  # not on Windows
 _SWITCHES = ("BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "LLVM_REFPRUNE_PASS")
 _DIGEST = 32
 
-unkept: list[str] = []  # why compiled code could not be written; empty when all was
+unkept: list[str] = []  # reasons for which compiled code could not be written
 
 
 def _digest(*parts: object) -> bytes:
+    """Return a digest of what parts print as."""
     return hashlib.sha256("\n".join(map(repr, parts)).encode()).digest()
 
 
 class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
-    """The compiled code of one function, a file a signature."""
+    """The cached code of one function, one file for each signature."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
@@ -57,13 +58,13 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
         self._locks: list[contextlib.ExitStack] = []
 
     def stamped(self, stamp: bytes) -> bytes:
-        """Set what the code is made of, and return it; code made of anything else is not used, and cleared."""
+        """Set the digest of all that the code is compiled from, and return it; code with another one is removed."""
         self._stamp = stamp
         self._prefix = f"{self._base}.{stamp.hex()[:16]}"
         return stamp
 
     def is_there(self) -> bool:
-        """Tell whether code for any signature is kept."""
+        """Tell whether code for any signature is cached."""
         names = _names(self.folder, _changed(self.folder))
         return any(name.startswith(f"{self._prefix}.") and name.endswith(".code") for name in names)
 
@@ -72,7 +73,7 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Let go, at its end, of the lock that was taken within to compile."""
+        """Release at the end the lock that was taken to compile within the block."""
         with contextlib.ExitStack() as lock:
             self._locks.append(lock)
             try:
@@ -86,7 +87,7 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
         if code is None and self._locks:
             with contextlib.suppress(OSError):
                 self._locks[-1].enter_context(_alone(self._file(key).with_suffix(".lock")))
-                code = self._read(key, target_context)  # another process may have made it meanwhile
+                code = self._read(key, target_context)  # another process may have compiled it meanwhile
         return code
 
     def _read(self, key: Any, target_context: Any) -> Any:
@@ -109,11 +110,11 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
             self._clear()
             _write(self._file(key), hashlib.sha256(content).digest() + content)
         except OSError as reason:
-            # The code runs all the same, and is compiled again the next time.
+            # The code runs, but is compiled again the next time.
             unkept.append(str(reason))
 
     def _clear(self) -> None:
-        """Remove code that was made of what has changed since."""
+        """Remove code whose sources have changed since."""
         for file in self.folder.glob(f"{self._base}.*.code"):
             if not file.name.startswith(f"{self._prefix}."):
                 with contextlib.suppress(OSError):
@@ -122,7 +123,7 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
 
 @contextlib.contextmanager
 def _alone(file: Path) -> Iterator[None]:
-    """Hold a lock that other processes wait for; where the system has none, nobody waits."""
+    """Hold a lock that other processes wait for; where the system has no file locks, none waits."""
     if fcntl is None:
         yield
         return
@@ -143,6 +144,7 @@ def _names(folder: Path, changed: int) -> list[str]:
 
 
 def _changed(folder: Path) -> int:
+    """Return when a folder last changed [ns], -1 if there is none."""
     try:
         return folder.stat().st_mtime_ns
     except OSError:
@@ -150,7 +152,7 @@ def _changed(folder: Path) -> int:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Write a file that appears whole or not at all, whoever else writes it."""
+    """Write a file so that it appears whole or not at all, even if others write it too."""
     stage = file.with_name(f"{file.name}.{uuid.uuid4().hex[:16]}")
     try:
         stage.write_bytes(content)

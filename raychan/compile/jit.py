@@ -1,8 +1,8 @@
-"""Compiling: numba, with code kept on disk until something that it was made of changes.
+"""`njit`: numba's, with a cache on disk that notices when anything changes from which code was compiled.
 
-Numba keeps compiled code by the text of the file in which a function stands. What that function calls from other files,
-and the constants it takes from them, are compiled into it all the same: left to itself, numba would go on using them
-as they were. What is kept, and how processes share it, stands in `compile.code_cache`.
+Numba's own cache looks at the file of a function only. The functions that it calls from other files, and the constants
+that it takes from them, are compiled into it too: after a change there numba would go on using the old code. Which
+files the cache writes, and how processes share them, is in `compile.code_cache`.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from raychan.compile.code_cache import CodeCache
 _CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
 _CONSTANTS = int, float, complex, str, tuple
 
-KERNELS: list[Kernel] = []  # all that are kept on disk, as their modules are imported
+KERNELS: list[Kernel] = []  # all that are cached on disk, as their modules are imported
 
 
 class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
-    """A compiled function. Called from Python, it takes frozen arrays as if they could be written to: numba would
-    compile it once more for every mixture of both.
+    """A compiled function. Called from Python, it takes read-only arrays as writable ones: numba would compile it once
+    more for every mixture of both.
 
-    With bounds checked (NUMBA_BOUNDSCHECK=1) frozen arrays stay frozen, and a kernel that writes to one does not
+    With bounds checked (NUMBA_BOUNDSCHECK=1) read-only arrays stay so, and a kernel that writes to one does not
     compile.
     """
 
@@ -45,8 +45,8 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return numba's `njit` with these options; with `cache`, code is kept as long as no file has changed of the
-    compiled functions within reach of this one, nor a constant it may have taken from elsewhere."""
+    """Return numba's `njit` with these options; with `cache`, code stays valid until the file of a compiled function
+    within reach of this one changes, or a constant that it may take from elsewhere."""
     keep = options.pop("cache", False)
 
     def compiled(function: Callable[..., Any]) -> Any:
@@ -62,21 +62,22 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _open(value: Any) -> Any:
-    """Return an argument whose arrays, in tuples or alone, can all be written to, on the same memory."""
-    if type(value) is tuple:
-        return tuple(map(_open, value))
+    """Return an argument with writable views of its arrays, in tuples or alone."""
+    if isinstance(value, tuple):
+        opened = map(_open, value)
+        return tuple(opened) if type(value) is tuple else type(value)(*opened)
     if type(value) is not np.ndarray or value.flags.writeable:
         return value
     seen = value.view()
     try:
         seen.flags.writeable = True
-    except ValueError:  # the memory's owner is frozen itself
+    except ValueError:  # the memory's owner is read-only itself
         return np.asarray(_Memory(value))
     return seen
 
 
 class _Memory:
-    """The memory of an array, without its note that it is frozen."""
+    """The memory of an array, without its note that it is read-only."""
 
     def __init__(self, held: np.ndarray[Any, Any]) -> None:
         self.held = held
@@ -85,7 +86,7 @@ class _Memory:
 
 
 def _within_reach(function: Callable[..., Any], own: Any) -> bytes:
-    """Return the stamp of a function's own file, and all that its module has brought in before it was compiled."""
+    """Return the stamp of a function's own file, and of all that its module had imported when it was compiled."""
     seen = [repr(own)]
     for name, value in sorted(function.__globals__.items()):
         if name.startswith("__"):

@@ -1,4 +1,4 @@
-"""Compiling: how much of it lies ahead of a command, and how far it is."""
+"""How many kernels a command has compiled, and how many are still to be compiled."""
 
 from __future__ import annotations
 
@@ -12,32 +12,33 @@ from numba.core import event
 from raychan.compile.code_cache import unkept
 from raychan.compile.jit import KERNELS, Kernel
 
-_EACH = 0.25  # s of a cold run a kernel, two processes on two quiet cores; soon this run has its own mean
-_OWN = 20  # kernels after which the mean is this run's own
+_EACH = 0.25  # s a kernel in a cold run, two processes on two quiet cores, until this run has a mean of its own
+_OWN = 20  # kernels after which that is so
 
 Told = Callable[[int, int, float], None]
 
 
 @contextmanager
 def watched(tell: Told) -> Iterator[None]:
-    """Tell, whenever a kernel is compiled, how many are, how many are still to be at most, and how long these take [s].
-
-    What is still to be compiled is what the modules now imported hold, and no file keeps."""
+    """Call `tell`, whenever a kernel is compiled, with how many are, how many more are to be compiled at most, and
+    how long these take [s]: those of the modules now imported that are not cached."""
     with event.install_listener("numba:compile", _Watch(tell)):
         yield
 
 
 def lost() -> str:
-    """Return why compiled code was not kept, for a warning; empty when it was."""
+    """Return why compiled code could not be cached, for a warning; empty if it could."""
     return f"compiled code could not be kept, so that the next run compiles again: {unkept[0]}" if unkept else ""
 
 
 def missing() -> list[Kernel]:
-    """Return the kernels of the modules now imported that are neither compiled nor kept."""
+    """Return the kernels of the modules now imported that are neither compiled nor cached."""
     return [k for k in KERNELS if not k.overloads and not k.kept.is_there()]
 
 
 class _Watch(event.Listener):  # type: ignore[misc,no-any-unimported]
+    """Counts compiled kernels and times them; a kernel that is compiled within another counts, but not its time."""
+
     def __init__(self, tell: Told) -> None:
         self._tell = tell
         self._done, self._depth, self._begun, self._spent = 0, 0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Single diffraction at a straight wedge: uniform theory of diffraction (numba scalars).
+"""Single diffraction at a straight wedge by the uniform theory of diffraction, UTD (numba kernels of scalars).
 
 Conventions: field exp(+j omega t); angles about the edge are measured from face 0 through the open space to face n at
 n pi (exterior angle n pi, so n = 2 is a half plane); soft (s) = E along the edge, hard (h) = H along it. Reflection
@@ -22,17 +22,20 @@ CONDUCTOR = (-1.0 + 0j, 1.0 + 0j)
 
 @njit(cache=True)
 def _tail(u: float) -> complex:
-    """Return F(u^2)/u, finite at u = 0: sqrt(j pi) exp(z^2) erfc(z) at z = u sqrt(j) (u >= 0)."""
+    """Return F(u^2)/u, finite at u = 0, for u >= 0: sqrt(j pi) exp(z^2) erfc(z) at z = u sqrt(j).
+
+    Source: Abramowitz & Stegun, 7.1.6 (series) and 7.1.14 (continued fraction).
+    """
     z = ROOT_J * u
     if u < 2.4:
-        # power series of erf (Abramowitz & Stegun 7.1.6, free of cancellation between its terms)
+        # Power series of erf, whose terms do not cancel each other.
         term, total, m = z, z, 0
         while abs(term) > 1e-17 * (abs(total) + 1e-300) and m < 80:
             m += 1
             term = term * 2.0 * z * z / (2 * m + 1)
             total += term
         return math.sqrt(math.pi) * ROOT_J * (cmath.exp(z * z) - 2.0 / math.sqrt(math.pi) * total)
-    # continued fraction (Abramowitz & Stegun 7.1.14), from the far end
+    # Continued fraction, from its last term.
     f = z
     for m in range(80 if u < 6.0 else 20, 0, -1):
         f = z + 0.5 * m / f
@@ -94,7 +97,10 @@ def wedge_coefficients(
 
 @njit(cache=True)
 def edge_point(tx: Vec, rx: Vec, origin: Vec, edge: Vec) -> float:
-    """Return the place of diffraction along an edge [m from origin]: Keller's cone, the shortest way over the line."""
+    """Return the point of diffraction along an edge [m from origin]: the shortest path over the line.
+
+    Source: Keller (1962), J. Opt. Soc. Am. 52(2): equal angles of both rays to the edge.
+    """
     a = (tx[0] - origin[0], tx[1] - origin[1], tx[2] - origin[2])
     b = (rx[0] - origin[0], rx[1] - origin[1], rx[2] - origin[2])
     along_a, along_b = dot(a, edge), dot(b, edge)

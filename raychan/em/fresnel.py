@@ -1,4 +1,4 @@
-"""Reflection and transmission coefficients of half spaces and thin layers (numba scalars).
+"""Reflection and transmission coefficients of half spaces and thin layers (numba kernels of scalars).
 
 Convention: s = perpendicular (TE), p = parallel (TM), field exp(+j omega t); for a perfect conductor R_s = -1, R_p = +1
 with the p vectors s x k of each ray, so tangential fields cancel.
@@ -18,7 +18,7 @@ PEC, HALF_SPACE, LAYER = 0, 1, 2
 
 @njit(cache=True)
 def _root(cos_i: float, eps: complex) -> complex:
-    """Return the normal wave number inside over k, of the wave that fades away from the face."""
+    """Return the normal component of the wave vector inside over k; the root whose wave decays away from the face."""
     root = cmath.sqrt(eps - (1.0 - cos_i * cos_i))
     return -root if root.imag > 0.0 else root
 
@@ -41,13 +41,13 @@ def layer(cos_i: float, eps: complex, thickness: float, k: float) -> tuple[compl
     """
     root = _root(cos_i, eps)
     r_s, r_p = half_space(cos_i, eps)
-    cached = cmath.exp(-1j * k * thickness * root)
-    twice = cached * cached
+    passage = cmath.exp(-1j * k * thickness * root)
+    twice = passage * passage
     free = cmath.exp(1j * k * thickness * cos_i)
     d_s = 1.0 - r_s * r_s * twice
     d_p = 1.0 - r_p * r_p * twice
-    t_s = (1.0 - r_s * r_s) * cached / d_s * free
-    t_p = (1.0 - r_p * r_p) * cached / d_p * free
+    t_s = (1.0 - r_s * r_s) * passage / d_s * free
+    t_p = (1.0 - r_p * r_p) * passage / d_p * free
     return r_s * (1.0 - twice) / d_s, r_p * (1.0 - twice) / d_p, t_s, t_p
 
 
@@ -55,7 +55,7 @@ def layer(cos_i: float, eps: complex, thickness: float, k: float) -> tuple[compl
 def coefficients(
     kind: int, eps: complex, thickness: float, roughness: float, cos_i: float, k: float
 ) -> tuple[complex, complex, complex, complex]:
-    """Return (R_s, R_p, T_s, T_p) of any material; opaque ones pass nothing.
+    """Return (R_s, R_p, T_s, T_p) of any material; opaque ones transmit nothing.
 
     Roughness lowers the coherent reflection by the Ament factor exp(-2 (k h cos_i)^2) (Ament 1953).
     """

@@ -1,5 +1,7 @@
-"""Quadrature: the integral of a wave of quadratic phase over a triangle by a Gauss rule, a vector unit's width at a
-time."""
+"""Gauss-Legendre quadrature of exp(-j phase) over a triangle, the phase quadratic across it (numba kernels).
+
+The inner loop has no branch and no library call, so that the compiler makes vector instructions of it.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ import numpy as np
 from raychan.compile.jit import njit
 
 _SIZES = (8, 16, 24, 32)  # points along an edge, each a multiple of a vector unit's width
-_REACH = (9.0, 35.0, 62.0, 92.0)  # rad by which the phase may run and bend in all for 1e-6
+_REACH = (9.0, 35.0, 62.0, 92.0)  # rad by which the phase may run and bend in all for an error of 1e-6
 _RULES = np.zeros((len(_SIZES), 2, max(_SIZES)))
 for _at, _size in enumerate(_SIZES):
     _knots, _weights = np.polynomial.legendre.leggauss(_size)
@@ -21,8 +23,8 @@ _ODD = np.array([(-1.0) ** i / math.factorial(2 * i + 1) for i in range(10)])
 
 @njit(cache=True)
 def points_for(reach):  # type: ignore[no-untyped-def]
-    """Return how many points along an edge a phase needs that runs and bends by `reach` [rad] in all; 0: no rule has
-    as many."""
+    """Return how many points along an edge a phase needs that runs and bends by `reach` [rad] in all; 0: more than any
+    rule has."""
     for i in range(len(_SIZES)):
         if reach <= _REACH[i]:
             return _SIZES[i]
@@ -37,7 +39,7 @@ def _along(first, step, bend, knots, weights):  # type: ignore[no-untyped-def]
     for i in range(len(knots)):
         x = knots[i]
         turn = first + x * (step + bend * (1.0 - x))
-        # About the nearest half turn, without a branch.
+        # Series about the nearest half turn, without a branch.
         half = np.floor(2.0 * turn + 0.5)
         angle = 2.0 * math.pi * (turn - 0.5 * half)
         square = angle * angle
@@ -56,16 +58,16 @@ def _along(first, step, bend, knots, weights):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def mean_parts(phases, bend01, bend12, bend20, points, out):  # type: ignore[no-untyped-def]
-    """Fill in the parts (3,) of the mean of exp(-j phi) over a triangle that belong to each corner: with the corner's
-    barycentric coordinate as weight.
+    """Write the parts (3,) of the mean of exp(-j phi) over a triangle that belong to each corner: those weighted by the
+    corner's barycentric coordinate.
 
-    Args: phases (., ) [rad] at the corners; bends of the edges' middles from straight; points along an edge, from
-    `points_for`.
+    Args: phases (3,) or more [rad], first at the corners; bends [rad] of the edges' middles from straight; points along
+    an edge, from `points_for`.
     """
     rule = _RULES[points // 8 - 1]
     knots, weights = rule[0, :points], rule[1, :points]
     turn = 0.5 / math.pi
-    # The phase of the first corner is taken out: it may be many turns.
+    # Relative to the first corner's phase, which may be many turns.
     p1, p2 = turn * (phases[1] - phases[0]), turn * (phases[2] - phases[0])
     b01, b12, b20 = turn * bend01, turn * bend12, turn * bend20
     part0, part1, part2 = 0j, 0j, 0j

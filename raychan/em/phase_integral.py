@@ -1,4 +1,9 @@
-"""The phase integral: the mean of exp(-j phase) over a flat triangle, the phase quadratic across it."""
+"""The phase integral of physical optics: the mean of exp(-j phase) over a triangle, the phase quadratic across it.
+
+A phase that bends little is integrated in closed form (Gordon 1975). One that runs fast is given by the ends of lines
+along which it runs (stationary phase), others by a Gauss rule or by pieces that are linear each. The mean is returned
+in three parts, one for each corner, so that each may be given its own delay.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +19,7 @@ _TURN = 0.5 / math.pi
 
 
 @njit(cache=True, forceinline=True)
-def _turned(phase: float) -> complex:
+def _exp_minus_j(phase: float) -> complex:
     """Return exp(-j phase)."""
     cosine, sine = unit_phasor(_TURN * phase)
     return complex(cosine, sine)
@@ -22,7 +27,7 @@ def _turned(phase: float) -> complex:
 
 @njit(cache=True)
 def _edge(a: float, b: float, ea: complex, eb: complex) -> complex:
-    """Mean of exp(-j phi) along a line on which phi runs from a to b, given exp(-j a) and exp(-j b)."""
+    """Return the mean of exp(-j phi) along a line on which phi runs from a to b, given exp(-j a) and exp(-j b)."""
     gap = b - a
     if abs(gap) < 1e-3:
         return ea * complex(1.0 - gap * gap / 6.0, gap * (gap * gap / 24.0 - 0.5))
@@ -30,13 +35,14 @@ def _edge(a: float, b: float, ea: complex, eb: complex) -> complex:
 
 
 @njit(cache=True, forceinline=True)
-def _mended(
+def _with_first_moment(
     p0: float, p1: float, p2: float, t0: complex, t1: complex, t2: complex, lost: complex
 ) -> tuple[complex, complex, complex]:
-    """Return corner terms of the same sum that also keep the first moment of the phase, off by j `lost`.
+    """Return corner terms of the same sum with the right first moment of the phase, from which they are off by j
+    `lost`.
 
-    Terms of stationary phase fall with frequency, t ~ 1/phase; given fixed amplitudes they would keep the mean at the
-    carrier only, and beside it neighbours made by another rule would not match them.
+    Terms of stationary phase fall with frequency, t ~ 1/phase: with fixed amplitudes their sum would be right at the
+    carrier only, and would not match that of neighbours integrated by another rule beside it.
     """
     mean = (p0 + p1 + p2) / 3.0
     a, b, c = p0 - mean, p1 - mean, p2 - mean
@@ -54,7 +60,7 @@ def _corner_terms(
     (1975) for a triangle, without his singular cases. Where the phase runs, it is a sum of corner terms; what
     corners within 2 rad have in common is shared equally.
     """
-    # Sorted, low to high, with the place each came from.
+    # Sorted, low to high, with the corner each came from.
     i0, i1, i2 = 0, 1, 2
     if p0 > p1:
         p0, p1, e0, e1, i0, i1 = p1, p0, e1, e0, i1, i0
@@ -79,7 +85,7 @@ def _corner_terms(
     else:
         scale = 2j / span
         gap = p2 - p1
-        # Each division by a phase leaves out of the first moment what _mended puts back.
+        # Each division by a phase leaves out of the first moment what _with_first_moment puts back.
         if gap < 2.0:
             upper = scale * _edge(p1, p2, e1, e2)
             t1, t2 = upper * complex(0.5, gap / 12.0), upper * complex(0.5, -gap / 12.0)
@@ -97,32 +103,33 @@ def _corner_terms(
             t0 = first
             t1 += last
             lost += 2.0 * (first + last)
-        t0, t1, t2 = _mended(p0, p1, p2, t0, t1, t2, lost)
+        t0, t1, t2 = _with_first_moment(p0, p1, p2, t0, t1, t2, lost)
     r0 = t0 if i0 == 0 else (t1 if i1 == 0 else t2)
     r1 = t0 if i0 == 1 else (t1 if i1 == 1 else t2)
     r2 = t0 if i0 == 2 else (t1 if i1 == 2 else t2)
     return r0, r1, r2
 
 
-_MOST = 20  # pieces along an edge: enough for the most that a tube which counts may bend
-_FINE = 1e-5  # of the mean over a triangle in phase: what may be left out
+_MOST_PIECES = 20  # along an edge: tubes that count bend no more than these follow
+_NEGLIGIBLE = 1e-5  # share of the mean over a triangle in phase that may be left out
 _PANEL = 6.0  # rad that the Gauss rule along an edge follows to 1e-6
-_NEAR = 18.0  # rad up to which nothing is cut in pieces
-_PER_PIECE = 16  # points of a Gauss rule in the time of a piece
-_SIX = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
+_ALWAYS_GAUSS = 18.0  # rad of phase up to which pieces are never used; not measured
+_POINTS_PER_PIECE = 16  # points of a Gauss rule that take as long as a piece; not measured
+_SIX_POINTS = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
 
 
 @njit(cache=True, forceinline=True)
-def _inner(w: float, c: float) -> complex:
-    """Return one end's share in the integral of exp(-j phi) along a line, over exp(-j phi): phi' = w, phi'' = c."""
+def _end_term(w: float, c: float) -> complex:
+    """Return the term of one end, over exp(-j phi) there, of the integral of exp(-j phi) along a line: phi' = w,
+    phi'' = c."""
     x = c / (w * w)
     return 1j / w * complex(1.0 - 3.0 * x * x, x)
 
 
 @njit(cache=True)
 def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
-    """Integrate `_inner` exp(-j phi) along an edge; return the parts of its two ends, and by how many phases they were
-    divided in all.
+    """Integrate `_end_term` times exp(-j phi) along an edge; return the parts of its two ends, and by how many phases
+    they were divided.
 
     Args: pa, pm, pb phases [rad] at ends and middle; wa, wb, c slopes at the ends and bend across the edge.
     """
@@ -130,28 +137,32 @@ def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
     sa, sb = s + 4.0 * d, s - 4.0 * d
     if sa * sb > 0.0 and min(abs(sa), abs(sb)) > 4.0:
         # The phase runs: the ends alone count (stationary phase), here to second order.
-        ga, gb, turn = _inner(wa, c), _inner(wb, c), wb - wa
+        ga, gb, turn = _end_term(wa, c), _end_term(wb, c), wb - wa
         xa, xb = -turn / (wa * sa) + 8.0 * d / (sa * sa), -turn / (wb * sb) + 8.0 * d / (sb * sb)
         worst = max(abs(turn / (wa * sa)), abs(turn / (wb * sb))) + 8.0 * abs(d) / min(sa * sa, sb * sb)
-        if 12.0 * worst * worst < _FINE * min(abs(sa * wa), abs(sb * wb)):
-            first = -1j * ga / sa * complex(1.0, -xa) * _turned(pa)
-            last = 1j * gb / sb * complex(1.0, -xb) * _turned(pb)
+        if 12.0 * worst * worst < _NEGLIGIBLE * min(abs(sa * wa), abs(sb * wb)):
+            first = -1j * ga / sa * complex(1.0, -xa) * _exp_minus_j(pa)
+            last = 1j * gb / sb * complex(1.0, -xb) * _exp_minus_j(pb)
             return first, last, 2.0
     panels = 1 + int((abs(s) + 4.0 * abs(d)) / _PANEL)
     first, last = 0j, 0j
     for i in range(panels):
         for q in range(6):
-            t = (i + _SIX[0, q]) / panels
-            g = _SIX[1, q] * _inner(wa + t * (wb - wa), c) * _turned(pa + t * s + 4.0 * d * t * (1.0 - t))
+            t = (i + _SIX_POINTS[0, q]) / panels
+            g = (
+                _SIX_POINTS[1, q]
+                * _end_term(wa + t * (wb - wa), c)
+                * _exp_minus_j(pa + t * s + 4.0 * d * t * (1.0 - t))
+            )
             first += (1.0 - t) * g
             last += t * g
     return first / panels, last / panels, 1.0
 
 
 @njit(cache=True)
-def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
-    """Fill in the mean's parts where the phase runs along lines parallel to one edge: the ends of these, which lie on
-    the two other edges, alone count. Return False where it runs in no such direction.
+def _by_stationary_phase(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
+    """Write the mean's parts where the phase runs fast along all lines parallel to one edge: only the ends of these
+    lines count, which lie on the two other edges. Return False where it runs in no such direction.
 
     Source: Wong, Asymptotic Approximations of Integrals, 2001, secs. II.3 and VIII.
     """
@@ -163,7 +174,7 @@ def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
         wk = wi + 4.0 * (d[j] - d[i] - d[k])
         if wi * wj > 0.0 and wi * wk > 0.0:
             least = min(abs(wi), abs(wj), abs(wk))
-            if 60.0 * abs(8.0 * d[i] / (least * least)) ** 3 < _FINE * least and least > max(best, 4.0):
+            if 60.0 * abs(8.0 * d[i] / (least * least)) ** 3 < _NEGLIGIBLE * least and least > max(best, 4.0):
                 best, edge = least, i
     if edge < 0:
         return False
@@ -174,7 +185,7 @@ def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
     j_part, k_part, ahead = _along_edge(phases[j], phases[3 + j], phases[k], wj, wk, c)
     i_part, other, behind = _along_edge(phases[i], phases[3 + k], phases[k], wi, wk, c)
     lost = 2.0 * (ahead * (j_part + k_part) - behind * (i_part + other))
-    out[i], out[j], out[k] = _mended(
+    out[i], out[j], out[k] = _with_first_moment(
         phases[i], phases[j], phases[k], -2.0 * i_part, 2.0 * j_part, 2.0 * (k_part - other), lost
     )
     return True
@@ -182,27 +193,29 @@ def _running(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _quadratic(phases, d01, d12, d20, v, w):  # type: ignore[no-untyped-def]
+    """Return the quadratic phase at barycentric (1 - v - w, v, w)."""
     u = 1.0 - v - w
     return u * phases[0] + v * phases[1] + w * phases[2] + 4.0 * (d01 * u * v + d12 * v * w + d20 * w * u)
 
 
 @njit(cache=True)
-def _pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped-def]
-    """Fill in the mean's parts by m^2 equal pieces, linear on each, with the mean bend of a piece put in its phase."""
+def _by_pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped-def]
+    """Write the mean's parts by m^2 equal pieces, the phase linear on each, with the mean bend of a piece added to
+    it."""
     h = 1.0 / m
     # The mean of a piece's own bend: a third of the sum of its edges' bends, alike for all pieces.
-    shift = _turned((d01 + d12 + d20) * h * h / 3.0) * h * h
+    shift = _exp_minus_j((d01 + d12 + d20) * h * h / 3.0) * h * h
     p, e = np.empty((2, m + 1)), np.empty((2, m + 1), np.complex128)
     total, s1, s2 = 0j, 0j, 0j
     # Along a row the phase is a parabola, so its exponential follows from two running factors.
     curve = -8.0 * d20 * h * h
-    turn = _turned(curve)
+    turn = _exp_minus_j(curve)
     for i in range(m + 1):
         row = i & 1
         v = i * h
         first = _quadratic(phases, d01, d12, d20, v, 0.0)
         step = _quadratic(phases, d01, d12, d20, v, h) - first
-        value, factor = _turned(first), _turned(step)
+        value, factor = _exp_minus_j(first), _exp_minus_j(step)
         for j in range(m - i + 1):
             p[row, j], e[row, j] = first, value
             first += step
@@ -231,36 +244,37 @@ def _pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untyped-def]
-    """Integrate exp(-j phi) over a triangle on which phi is quadratic; return how many points or pieces it took.
+    """Write the mean of exp(-j phi) over a triangle on which phi is quadratic; return how many points or pieces it
+    took.
 
-    Args: phases (6,) [rad] at the corners 0, 1, 2 and the middles of edges 01, 12, 20; linear [rad] how far a phase may
-    bend that counts as linear. out (3,) receives the mean's parts that belong to each corner (their sum is the mean),
-    so that each may be given its own delay.
+    Args: phases (6,) [rad] at the corners 0, 1, 2 and the middles of edges 01, 12, 20; linear [rad] by which a phase
+    may bend that counts as linear; out (3,) receives the part of each corner, whose sum is the mean.
+    Source: Gordon (1975), IEEE Trans. Antennas Propag. 23(4), for the linear phase.
     """
     d01 = phases[3] - 0.5 * (phases[0] + phases[1])
     d12 = phases[4] - 0.5 * (phases[1] + phases[2])
     d20 = phases[5] - 0.5 * (phases[2] + phases[0])
     bend = max(abs(d01), abs(d12), abs(d20))
     if bend <= linear:
-        e0, e1, e2 = _turned(phases[0]), _turned(phases[1]), _turned(phases[2])
+        e0, e1, e2 = _exp_minus_j(phases[0]), _exp_minus_j(phases[1]), _exp_minus_j(phases[2])
         t0, t1, t2 = _corner_terms(phases[0], phases[1], phases[2], e0, e1, e2)
-        shift = _turned((d01 + d12 + d20) / 3.0)
+        shift = _exp_minus_j((d01 + d12 + d20) / 3.0)
         out[0], out[1], out[2] = shift * t0, shift * t1, shift * t2
         return 1
     span = max(phases[0], phases[1], phases[2]) - min(phases[0], phases[1], phases[2])
-    if span > _PANEL and _running(phases, (d01, d12, d20), out):
+    if span > _PANEL and _by_stationary_phase(phases, (d01, d12, d20), out):
         return 1
     reach = span + 4.0 * bend
-    points, pieces = points_for(reach), min(math.ceil(math.sqrt(bend / linear)), _MOST)
-    if points > 0 and (reach <= _NEAR or points * points <= _PER_PIECE * pieces * pieces):
+    points, pieces = points_for(reach), min(math.ceil(math.sqrt(bend / linear)), _MOST_PIECES)
+    if points > 0 and (reach <= _ALWAYS_GAUSS or points * points <= _POINTS_PER_PIECE * pieces * pieces):
         mean_parts(phases, d01, d12, d20, points, out)
         return points * points
-    return _pieces(phases, d01, d12, d20, pieces, out)
+    return _by_pieces(phases, d01, d12, d20, pieces, out)
 
 
 @njit(cache=True, nogil=True)
 def quadratic_means(phases, linear):  # type: ignore[no-untyped-def]
-    """Return the mean of exp(-j phi) over each triangle of (n, 6) corner and mid-edge phases."""
+    """Return the means (n,) of exp(-j phi) over triangles with phases (n, 6) as for `triangle_terms`."""
     out = np.empty(phases.shape[0], np.complex128)
     part = np.empty(3, np.complex128)
     for i in range(phases.shape[0]):

@@ -1,4 +1,4 @@
-"""The unit phasor exp(-j 2 pi x), from its series: faster in a loop than a library's sine and cosine."""
+"""The unit phasor exp(-j 2 pi x) by its series, which in a loop is faster than a library's sine and cosine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Physical optics: what the currents on a lit surface radiate, of the reflected wave and of the shadow (scalars)."""
+"""Physical optics: fields that the currents on a lit surface radiate (numba kernels of scalars)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from raychan.em.polarization import Vec, cross, dot, mirror, reflect, transmit
 
 @njit(cache=True)
 def radiated(e: Vec, k: Vec, s: Vec, n: Vec, r_s: complex, r_p: complex, g: Vec) -> complex:
-    """Project on g what the currents of the reflected wave of (e, k) radiate towards s."""
+    """Return the field, projected on g, that the currents of the reflected wave of (e, k) radiate towards s.
+
+    Source: Stratton-Chu; Balanis, Advanced Engineering Electromagnetics, 2012, sec. 7.10.
+    """
     er = reflect(e, k, n, r_s, r_p)
     hr = cross(mirror(k, n), er)
     magnetic = cross(s, cross(n, er))
@@ -38,8 +41,8 @@ def huygens(
 
 @njit(cache=True)
 def reflected_wave(e: Vec, k: Vec, to: Vec, element: Vec, r_s: complex, r_p: complex, g: Vec) -> complex:
-    """Project on g what the currents n x H, -n x E of the reflected wave of (e, k) on a vector element of area (on the
-    lit side) radiate in the direction `to`; multiply as for `huygens`. Source: as there."""
+    """Return the field, projected on g, that the currents n x H, -n x E of the reflected wave of (e, k) on a vector
+    element of area (on the lit side) radiate in the direction `to`; multiply as for `huygens`. Source: as there."""
     size = math.sqrt(dot(element, element))
     if size == 0.0:
         return 0j
@@ -49,9 +52,12 @@ def reflected_wave(e: Vec, k: Vec, to: Vec, element: Vec, r_s: complex, r_p: com
 
 @njit(cache=True)
 def shadow_wave(e: Vec, k: Vec, to: Vec, element: Vec, t_s: complex, t_p: complex, g: Vec) -> complex:
-    """Project on g what the currents n x H, -n x E of the wave (e, k) itself on a vector element of area (on the lit
-    side) radiate in the direction `to`, less what goes on behind it (T_s, T_p): the shadow radiation, nothing in
-    backscatter. With `reflected_wave` it is physical optics, 2 n x H on a conductor (Ufimtsev 2014, ch. 1)."""
+    """Return the field, projected on g, that the currents n x H, -n x E of the wave (e, k) itself, less what is
+    transmitted (T_s, T_p), on a vector element of area (on the lit side) radiate in the direction `to`.
+
+    This is the shadow radiation, which vanishes in backscatter; with `reflected_wave` it makes physical optics, 2 n x H
+    on a conductor. Source: Ufimtsev, Fundamentals of the Physical Theory of Diffraction, 2014, ch. 1.
+    """
     size = math.sqrt(dot(element, element))
     if size == 0.0:
         return 0j

@@ -1,4 +1,4 @@
-"""Three-vectors of complex field carried over mirrors and layers (numba, length-3 arrays in registers)."""
+"""Polarisation: field vectors reflected at mirrors and transmitted through layers (numba kernels of 3-tuples)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Solids: what closed surfaces of facets hold (numba loops). Everywhere: v (n, 3, 3) [m] corners of the facets."""
+"""Closed surfaces of facets: what is inside, and how far away they are (numba kernels).
+
+Everywhere: v (n, 3, 3) [m] corners of the facets.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,9 @@ from raychan.compile.jit import njit
 
 
 @njit(cache=True, nogil=True)
-def crossed(v, low, cell, shape):  # type: ignore[no-untyped-def]
-    """Return which cubes of a grid (shape (3,), side `cell` [m], from `low` (3,) on) facets pass through, and perhaps
-    some beside them."""
+def crossed_cells(v, low, cell, shape):  # type: ignore[no-untyped-def]
+    """Return which cubes of a grid (shape (3,), side `cell` [m], from `low` (3,) [m] on) facets pass through, and
+    perhaps some beside them."""
     out = np.zeros((shape[0], shape[1], shape[2]), np.bool_)
     begin, end, n = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3)
     wide = 1e-6 * cell
@@ -32,15 +35,16 @@ def crossed(v, low, cell, shape):  # type: ignore[no-untyped-def]
                 y = n[1] * (low[1] + (j + 0.5) * cell - v[f, 0, 1])
                 for k in range(begin[2], end[2]):
                     z = n[2] * (low[2] + (k + 0.5) * cell - v[f, 0, 2])
-                    if abs(x + y + z) <= reach:
-                        out[i, j, k] = True
+                    out[i, j, k] |= abs(x + y + z) <= reach
     return out
 
 
 @njit(cache=True, nogil=True)
 def winding(v, point):  # type: ignore[no-untyped-def]
-    """Return how often the facets surround a point (3,): 1 inside a closed surface, 0 outside. Source: Van Oosterom
-    and Strackee (1983), IEEE Trans. Biomed. Eng. 30(2)."""
+    """Return the winding number of the facets about a point (3,) [m]: 1 inside a closed surface, 0 outside.
+
+    Source: Van Oosterom and Strackee (1983), IEEE Trans. Biomed. Eng. 30(2).
+    """
     total = 0.0
     for f in range(len(v)):
         ax, ay, az = v[f, 0, 0] - point[0], v[f, 0, 1] - point[1], v[f, 0, 2] - point[2]

@@ -1,6 +1,7 @@
-"""Patches: triangles of a true surface behind flat facets, seen from a point or a direction (numba loops).
+"""Patches of curved surfaces: Nagata's quadratic triangles through corners and corner normals of facets, and rays to
+them (numba kernels). Source: Nagata (2005), Computer Aided Geometric Design 22(4), eq. 10.
 
-Everywhere: v, n, b (m, 3, 3) corners, corner normals and edge bulges of the facets; image (3,) the source's mirror
+Everywhere: v, n, b (m, 3, 3) corners, corner normals and edge curvatures of the facets; image (3,) the source's mirror
 image [m], or the unit direction towards it when far; bary (n, 3, 3) corners of patches on their facets.
 """
 
@@ -12,17 +13,18 @@ import numpy as np
 
 from raychan.compile.jit import njit
 
-_ALIKE = 1.0 + 1e-9  # sizes nearer than this are one: rounding must not choose between them
+_ALIKE = 1.0 + 1e-9  # ratio of sizes that count as equal, so that rounding does not choose between them
 
 
 @njit(cache=True, forceinline=True)
 def dot(a, b):  # type: ignore[no-untyped-def]
+    """Return a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, forceinline=True)
 def copy_to(out, a):  # type: ignore[no-untyped-def]
-    """Write a into out, one axis; numba compiles a page of Python's strings, for its message, into `out[:] = a`."""
+    """Write a into out, one axis; numba compiles `out[:] = a` into much code, for an error message."""
     for c in range(len(out)):
         out[c] = a[c]
 
@@ -36,7 +38,7 @@ def copy_corners(out, w):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
-    """Write into p the point of the true surface at barycentric (x, y, z)."""
+    """Write into p the point of the curved surface at barycentric (x, y, z)."""
     xy, yz, zx = x * y, y * z, z * x
     for c in range(3):
         p[c] = x * v[0, c] + y * v[1, c] + z * v[2, c] - xy * b[0, c] - yz * b[1, c] - zx * b[2, c]
@@ -53,8 +55,8 @@ def middle(w):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _face(n, x, y, z, out):  # type: ignore[no-untyped-def]
-    """Write into out the unit normal of the true surface at barycentric (x, y, z)."""
+def _normal_on(n, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Write into out the unit normal of the curved surface at barycentric (x, y, z)."""
     for c in range(3):
         out[c] = x * n[0, c] + y * n[1, c] + z * n[2, c]
     size = math.sqrt(dot(out, out))
@@ -64,7 +66,7 @@ def _face(n, x, y, z, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
-    """Write into k the direction in which a ray of the source travels at p; return its length."""
+    """Write into k the direction in which a ray from the source travels at p; return its length [m]."""
     if far:
         k[0], k[1], k[2] = -image[0], -image[1], -image[2]
         return -dot(p, image)
@@ -78,6 +80,7 @@ def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def length_to(p, image, far):  # type: ignore[no-untyped-def]
+    """Return the length [m] of the ray between p and the image; of a plane wave, against the plane through 0."""
     if far:
         return -dot(p, image)
     return math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
@@ -85,6 +88,7 @@ def length_to(p, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def largest(a, b, c):  # type: ignore[no-untyped-def]
+    """Return which of three sizes is largest: 0, 1 or 2, the first of equal ones."""
     if a * _ALIKE >= b and a * _ALIKE >= c:
         return 0
     return 1 if b * _ALIKE >= c else 2
@@ -92,12 +96,13 @@ def largest(a, b, c):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def distance(p, q):  # type: ignore[no-untyped-def]
+    """Return the distance between p and q."""
     return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
 
 
 @njit(cache=True, forceinline=True)
-def _seen(p, q, image, far):  # type: ignore[no-untyped-def]
-    """Return how long pq looks from the end of a way [m]."""
+def _length_across(p, q, image, far):  # type: ignore[no-untyped-def]
+    """Return the length of pq across the rays from the image [m]."""
     whole, along, size = 0.0, 0.0, 0.0
     for c in range(3):
         d = q[c] - p[c]
@@ -112,10 +117,12 @@ def _seen(p, q, image, far):  # type: ignore[no-untyped-def]
 def edge_to_cut(  # type: ignore[no-untyped-def]
     facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend, across
 ):  # fmt: skip
-    """Return which edge (n,) of each patch to halve so that its two-way phase comes nearer to a quadratic; -1: none.
+    """Return at which edge (n,) to bisect each patch so that its two-way phase comes nearer to a quadratic; -1: none.
 
-    Args: phase [rad] that the quadratic through corners and mid-edges may miss the centre by; turn [rad] of the
-    normal; max_edge [m], as seen from the end of the first way if `across`; most_bend [rad] that an edge may bend.
+    All limits on phase and normal grow with half the span of phase: where it runs, a patch scatters less.
+
+    Args: phase [rad] by which the quadratic through corners and edge middles may miss the centre; turn [rad] of the
+    normal; max_edge [m], across the rays of the first leg if `across`; most_bend [rad] of the phase along an edge.
     """
     out = np.empty(len(facet), np.int8)
     p, normal, total = np.empty((7, 3)), np.empty((4, 3)), np.empty(7)
@@ -124,13 +131,13 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         for c in range(3):
             d = (c + 1) % 3
             place_on(v[f], b[f], w[c, 0], w[c, 1], w[c, 2], p[c])
-            _face(n[f], w[c, 0], w[c, 1], w[c, 2], normal[c])
+            _normal_on(n[f], w[c, 0], w[c, 1], w[c, 2], normal[c])
             place_on(
                 v[f], b[f], 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2]), p[3 + c]
             )
         x, y, z = middle(w)
         place_on(v[f], b[f], x, y, z, p[6])
-        _face(n[f], x, y, z, normal[3])
+        _normal_on(n[f], x, y, z, normal[3])
         low, high = np.inf, -np.inf
         for q in range(7):
             total[q] = wavenumber * (length_to(p[q], image, far) + length_to(p[q], out_image, out_far))
@@ -146,14 +153,15 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         for c in range(3):
             turned = max(turned, distance(normal[c], normal[3]) / turn)
         if across:
-            e0, e1, e2 = _seen(p[0], p[1], image, far), _seen(p[1], p[2], image, far), _seen(p[2], p[0], image, far)
+            e0, e1 = _length_across(p[0], p[1], image, far), _length_across(p[1], p[2], image, far)
+            e2 = _length_across(p[2], p[0], image, far)
         else:
             e0, e1, e2 = distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0])
         limit = 1.0 + 0.5 * (high - low)
         if off > limit:
             out[i] = largest(bend0, bend1, bend2)
         elif turned > limit:
-            # Where the phase bends no more, only a cut across the turn brings it down.
+            # Where the phase is quadratic, only a cut across the turn of the normal lessens it.
             n0, n1 = distance(normal[0], normal[1]), distance(normal[1], normal[2])
             out[i] = largest(n0, n1, distance(normal[2], normal[0]))
         elif max(e0, e1, e2) > max_edge:
@@ -165,15 +173,15 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def halved(facet, bary, edge, jitter, level):  # type: ignore[no-untyped-def]
-    """Return (facet, bary) of both halves of patches cut from a point of `edge` to the corner opposite.
+    """Return (facet, bary) of both halves of patches cut from a point of `edge` (m,) to the opposite corner.
 
-    The point is the middle, or `jitter` of the edge off it, this way and that.
+    The point is the middle, or a share `jitter` of the edge to either side of it.
     """
     m = len(facet)
     facets, barys = np.empty(2 * m, facet.dtype), np.empty((2 * m, 3, 3))
     for i in range(m):
         a, c = edge[i], (edge[i] + 1) % 3
-        # Which way is drawn by lot, the same lot in every run.
+        # To which side is pseudo-random, by facet and level, and the same in every run.
         share = 0.5 + (jitter if ((facet[i] * 40503 >> 7) + level) & 1 else -jitter)
         facets[2 * i], facets[2 * i + 1] = facet[i], facet[i]
         copy_corners(barys[2 * i], bary[i])
@@ -186,10 +194,8 @@ def halved(facet, bary, edge, jitter, level):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyped-def]
-    """Return points (n, 4, 3) [m], directions (n, 4, 3), lengths (n, 4) [m] and normals (n, 4, 3) of four rays.
-
-    They are those of the source to corners and centre of each patch; normals face the source on open sheets.
-    """
+    """Return points (n, 4, 3) [m], directions (n, 4, 3), lengths (n, 4) [m] and normals (n, 4, 3) of the rays from the
+    source to corners and centre of each patch; normals of facets lit from both sides (`is_open`) face the source."""
     m = len(facet)
     p, k, length, normal = np.empty((m, 4, 3)), np.empty((m, 4, 3)), np.empty((m, 4)), np.empty((m, 4, 3))
     for i in range(m):
@@ -200,7 +206,7 @@ def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyp
             else:
                 x, y, z = w[q, 0], w[q, 1], w[q, 2]
             place_on(v[f], b[f], x, y, z, p[i, q])
-            _face(n[f], x, y, z, normal[i, q])
+            _normal_on(n[f], x, y, z, normal[i, q])
             length[i, q] = _ray(p[i, q], image, far, k[i, q])
         if is_open[f] and dot(normal[i, 3], k[i, 3]) > 0.0:
             for q in range(4):

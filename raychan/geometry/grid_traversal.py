@@ -1,4 +1,4 @@
-"""Cells: which cells of a grid a tube passes between its mirror and its landing (numba)."""
+"""Which cells of a grid of edges a tube passes, layer by layer across one axis (numba kernels)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from raychan.compile.jit import njit
 
-BLOCK = 8  # cells a side that are passed over at once where they hold no edge
-ALONG = 0.1  # cosine to the axis under which rays do
-BESIDE = 0.25  # cells that a tube is taken to be wider: edges are in the cells that they pass within half of one
+BLOCK = 8  # cells a side of a block, which is skipped as a whole where it holds no edge; not measured
+ALONG = 0.1  # cosine to the axis under which a ray counts as running along the layers; not measured
+BESIDE = 0.25  # cells that a tube is taken to be wider: edges are sampled every half cell, so they may cross one unseen
 
 
 @njit(cache=True, forceinline=True)
@@ -28,13 +28,14 @@ def widths(points, ks):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def span(points, ks, wide, spread, reach, ball, radius):  # type: ignore[no-untyped-def]
-    """Return from where to where (to `reach`) a tube passes through the balls about bodies; equal: nowhere."""
+def span_through_spheres(points, ks, wide, spread, reach, centre, radius):  # type: ignore[no-untyped-def]
+    """Return from where to where [m] (at most `reach`) a tube passes through the spheres about bodies, centre (b, 3)
+    and radius (b,) [m]; equal: nowhere."""
     begin, end = np.inf, 0.0
-    for j in range(len(ball)):
+    for j in range(len(centre)):
         along, apart = 0.0, 0.0
         for c in range(3):
-            d = ball[j, c] - points[3, c]
+            d = centre[j, c] - points[3, c]
             along += d * ks[3, c]
             apart += d * d
         size = radius[j] + wide + spread * max(along, 0.0)
@@ -50,9 +51,10 @@ def span(points, ks, wide, spread, reach, ball, radius):  # type: ignore[no-unty
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def layer(points, ks, axis, at, count, near, far_off, low, cell, shape, cut_off, begin, end):  # type: ignore[no-untyped-def]
-    """Write the box of cells that a tube passes from `near` to `far_off` along its rays in `count` layers of cells
-    across an axis, from layer `at` on; return how many there are in one layer."""
+def layer_cells(points, ks, axis, at, count, near, far_off, grid, begin, end):  # type: ignore[no-untyped-def]
+    """Write the box of cells, from begin to end (3,), that a tube passes from `near` to `far_off` [m] along its rays in
+    `count` layers across an axis, from layer `at` on; return how many cells it has in one layer."""
+    low, cell, shape, cut_off = grid.low, grid.cell, grid.shape, grid.cut_off
     floor, room, per = low[axis] + cell * (at - BESIDE), 1, 1.0 / cell
     for c in range(3):
         begin[c], end[c] = shape[c], 0
@@ -83,8 +85,9 @@ def layer(points, ks, axis, at, count, near, far_off, low, cell, shape, cut_off,
 
 
 @njit(cache=True, forceinline=True)
-def layers(points, ks, axis, near, far_off, low, cell, shape, cut_off):  # type: ignore[no-untyped-def]
-    """Return the first and the last layer across an axis that a tube passes."""
+def layer_range(points, ks, axis, near, far_off, grid):  # type: ignore[no-untyped-def]
+    """Return the first and the last layer across an axis that a tube passes from `near` to `far_off` [m]."""
+    low, cell, shape, cut_off = grid.low, grid.cell, grid.shape, grid.cut_off
     least, most = np.inf, -np.inf
     for q in range(4):
         x, y = points[q, axis] + near * ks[q, axis], points[q, axis] + far_off * ks[q, axis]
@@ -95,11 +98,11 @@ def layers(points, ks, axis, near, far_off, low, cell, shape, cut_off):  # type:
 
 
 @njit(cache=True, forceinline=True)
-def crowded(crowd, begin, end):  # type: ignore[no-untyped-def]
+def any_occupied(occupied, begin, end):  # type: ignore[no-untyped-def]
     """Tell whether any block of a box of cells holds an edge."""
     for i in range(begin[0] // BLOCK, (end[0] + BLOCK - 1) // BLOCK):
         for j in range(begin[1] // BLOCK, (end[1] + BLOCK - 1) // BLOCK):
             for k in range(begin[2] // BLOCK, (end[2] + BLOCK - 1) // BLOCK):
-                if crowd[i, j, k]:
+                if occupied[i, j, k]:
                     return True
     return False

@@ -1,20 +1,46 @@
-"""Rays: what is done in float64 about the float32 casts of a ray and its two companions (numba loops).
+"""Ray casting in float64 around Embree's float32 hits (numba kernels).
 
-Everywhere: origin, direction (n, 3) [m], unit; normal (m, 3), first (m, 3) and vertices (m, 3, 3) of the facets.
+Embree names a triangle; where the ray meets its plane is computed here. Each ray is cast with two companions a few
+float32 spacings aside, since Embree lets some rays aimed at corners and edges of a mesh through.
+
+Everywhere: origin, direction (n, 3) [m], unit; normal (f, 3), first (f, 3) and vertices (f, 3, 3) of the facets.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 
-_FAR = 32.0  # radii of the ball about all facets from which an origin is far off
-_ALONG = 1e-9  # sine of the angle under which a ray runs along a facet: far from the origin rounding is of this size
-_BESIDE = 1e-3  # of a facet's length along a ray: what a grazing ray's hit may lie beside it
-_PACES = 64.0  # the same in paces of the ray, of which a small facet is no more
+_FAR = 32.0  # radii of the bounding sphere beyond which an origin is moved towards it; not measured
+_GRAZING = 1e-9  # sine of the angle under which a ray runs along a facet: far from the origin rounding is of this size
+_BESIDE = 1e-3  # of a facet's length along a ray: what a grazing ray's hit may lie beside it; not measured
+_OFFSETS_BESIDE = 64.0  # the same in offsets of the ray, for facets no larger than these; not measured
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+class CastRays(NamedTuple):
+    """Rays to cast: origin, direction (n, 3); skip (n,) facet that each leaves, -1 for none; start (n,) [m] from which
+    hits count."""
+
+    origin: Floats
+    direction: Floats
+    skip: Ints
+    start: Floats
+
+
+class FacetShapes(NamedTuple):
+    """Facets: vertices (f, 3, 3) [m], a point on each (f, 3) [m], unit normals (f, 3)."""
+
+    vertices: Floats
+    first: Floats
+    normal: Floats
 
 
 @njit(cache=True, forceinline=True)
@@ -40,8 +66,8 @@ def plane_distances(facet, origin, direction, first, normal):  # type: ignore[no
 
 
 @njit(cache=True, forceinline=True)
-def _holds(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
-    """Tell whether x + t d, a point of a facet's plane, lies on it, or at most `margin` [m] outside."""
+def contains(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
+    """Tell whether x + t d, a point of a facet's plane, lies on the facet, or at most `margin` [m] outside."""
     for a in range(3):
         b = (a + 1) % 3
         sx, sy, sz = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
@@ -53,8 +79,8 @@ def _holds(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def near_ball(origin, direction, most, centre, radius):  # type: ignore[no-untyped-def]
-    """Return the rays (k,) of those (n,) that may meet a ball, centre (3,) and radius [m], before `most` (n,) [m]."""
+def near_sphere(origin, direction, most, centre, radius):  # type: ignore[no-untyped-def]
+    """Return which rays (k,) may meet a sphere, centre (3,) and radius [m], before `most` (n,) [m]."""
     rows = np.empty(len(origin), np.int64)
     count = 0
     for i in range(len(origin)):
@@ -71,36 +97,36 @@ def near_ball(origin, direction, most, centre, radius):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def set_out(origin, direction, skip, start, centre, radius, slack, size):  # type: ignore[no-untyped-def]
-    """Return how far ahead (n,) [m] rays are cast, and their pace (n,) [m]: a few float32 spacings.
+def offset_origins(rays, centre, radius, relative, size):  # type: ignore[no-untyped-def]
+    """Return how far ahead (n,) [m] of its origin each ray is cast, and its offset (n,) [m]: a few float32 spacings.
 
-    Args: skip, start (n,) as for `RayCaster.cast`; centre (3,), radius [m] of a ball about all facets; slack, the pace
-    in parts of a coordinate; size [m] that a coordinate counts at least.
+    Args: rays as `CastRays`; centre (3,), radius [m] of a bounding sphere of all facets; relative offset in parts of a
+    coordinate; size [m] that a coordinate counts at least.
     """
-    n = len(origin)
-    ahead, pace = np.empty(n), np.empty(n)
+    n = len(rays.origin)
+    ahead, offset = np.empty(n), np.empty(n)
     for i in range(n):
-        x, d = origin[i], direction[i]
+        x, d, start = rays.origin[i], rays.direction[i], rays.start[i]
         along = 0.0
         for c in range(3):
             along += (centre[c] - x[c]) * d[c]
         aside = 0.0
         for c in range(3):
             aside += (x[c] + along * d[c] - centre[c]) ** 2
-        # Before the ball about all facets nothing is hit: rays from far off set out there, where float32 is finer.
+        # Before the bounding sphere nothing is hit: rays from far off are cast from there, where float32 is finer.
         at = along - math.sqrt(max(radius * radius - aside, 0.0))
-        at = at if at > max(start[i], _FAR * radius) else start[i]
+        at = at if at > max(start, _FAR * radius) else start
         most = 0.0
         for c in range(3):
             most = max(most, abs(x[c] + at * d[c] - centre[c]))
-        pace[i] = slack * (size + most)
-        ahead[i] = at + (pace[i] if at == start[i] and (skip[i] >= 0 or start[i] > 0.0) else 0.0)
-    return ahead, pace
+        offset[i] = relative * (size + most)
+        ahead[i] = at + (offset[i] if at == start and (rays.skip[i] >= 0 or start > 0.0) else 0.0)
+    return ahead, offset
 
 
 @njit(cache=True, nogil=True)
-def companions(todo, origin, direction, ahead, pace, centre, turn):  # type: ignore[no-untyped-def]
-    """Return float32 origins and directions (3 m, 3) of the rays `todo` (m,), each with two companions, a pace to
+def companions(todo, origin, direction, ahead, offset, centre, turn):  # type: ignore[no-untyped-def]
+    """Return float32 origins and directions (3 m, 3) of the rays `todo` (m,), each with two companions, an offset to
     either side, or a quarter turn from there if `turn`: no plane through the ray holds both pairs."""
     m = len(todo)
     o, d = np.empty((3 * m, 3), np.float32), np.empty((3 * m, 3), np.float32)
@@ -116,20 +142,20 @@ def companions(todo, origin, direction, ahead, pace, centre, turn):  # type: ign
             u, v, w = side
             side[0], side[1], side[2] = y * w - z * v, z * u - x * w, x * v - y * u
         for c in range(3):
-            at, way = origin[i, c] + ahead[i] * direction[i, c], pace[i] * side[c]
+            at, aside = origin[i, c] + ahead[i] * direction[i, c], offset[i] * side[c]
             o[3 * j, c], d[3 * j, c] = at - centre[c], direction[i, c]
-            o[3 * j + 1, c], d[3 * j + 1, c] = at + way - centre[c], direction[i, c]
-            o[3 * j + 2, c], d[3 * j + 2, c] = at - way - centre[c], direction[i, c]
+            o[3 * j + 1, c], d[3 * j + 1, c] = at + aside - centre[c], direction[i, c]
+            o[3 * j + 2, c], d[3 * j + 2, c] = at - aside - centre[c], direction[i, c]
     return o, d
 
 
 @njit(cache=True, forceinline=True)
-def _met(v, n, x, d, t, pace):  # type: ignore[no-untyped-def]
+def _on_facet(v, n, x, d, t, offset):  # type: ignore[no-untyped-def]
     """Tell whether the distance t [m] along a ray to a facet's plane is one to the facet: not before it nor beyond.
 
-    A facet seen edge-on, which float32 meets, has none, or any: the ray runs along its plane but for rounding.
+    A facet seen edge-on, which float32 may hit, has no such distance: the ray runs along its plane but for rounding.
     """
-    if not (abs(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) > _ALONG and math.isfinite(t)):
+    if not (abs(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) > _GRAZING and math.isfinite(t)):
         return False
     low, high = np.inf, -np.inf
     for q in range(3):
@@ -137,136 +163,80 @@ def _met(v, n, x, d, t, pace):  # type: ignore[no-untyped-def]
         for c in range(3):
             along += (v[q, c] - x[c]) * d[c]
         low, high = min(low, along), max(high, along)
-    room = _BESIDE * (high - low) + _PACES * pace
+    room = _BESIDE * (high - low) + _OFFSETS_BESIDE * offset
     return low - room < t < high + room
 
 
 @njit(cache=True, forceinline=True)
-def _beside(j, hit, x, d, ahead, pace, vertices, first, normal):  # type: ignore[no-untyped-def]
-    """Return what stands for a facet that a ray runs along: the nearest that its companions meet, -1 if nothing; -2 if
-    they run along one too."""
+def _instead_of_grazed(j, hit, x, d, ahead, offset, shapes):  # type: ignore[no-untyped-def]
+    """Return the facet that counts instead of one that a ray runs along: the nearest that its companions meet, -1 for
+    none; -2 if they run along one too."""
     h, old = -1, np.inf
     for s in range(1, 3):
         other = hit[3 * j + s]
         if other < 0:
             continue
-        new = plane_distance(normal[other], first[other], x, 0.0, d)
-        if other == hit[3 * j] or not _met(vertices[other], normal[other], x, d, new, pace):
+        new = plane_distance(shapes.normal[other], shapes.first[other], x, 0.0, d)
+        if other == hit[3 * j] or not _on_facet(shapes.vertices[other], shapes.normal[other], x, d, new, offset):
             return -2
         if ahead < new < old:
             h, old = other, new
     return h
 
 
-@njit(cache=True, nogil=True)
-def land(  # type: ignore[no-untyped-def]
-    todo, hit, origin, direction, skip, start, ahead, pace, edge, nearest, vertices, first, normal, facet, distance
-):
-    """Write facets and distances of the rays `todo` (m,); return those to be cast again, from farther on or with
-    companions farther aside.
+@njit(cache=True, forceinline=True)
+def _nearer_of_companions(j, h, hit, x, d, ahead, offset, edge, shapes):  # type: ignore[no-untyped-def]
+    """Return facet h (-1: none), or one that a companion met nearer and that the ray meets too, or misses by `edge` of
+    its offset at most."""
+    for s in range(1, 3):
+        other = hit[3 * j + s]
+        if other < 0 or other == h:
+            continue
+        old = np.inf if h < 0 else plane_distance(shapes.normal[h], shapes.first[h], x, ahead, d)
+        v, n = shapes.vertices[other], shapes.normal[other]
+        new = plane_distance(n, shapes.first[other], x, ahead, d)
+        at = ahead + new
+        if 0.0 < new < old - offset and _on_facet(v, n, x, d, at, offset) and contains(v, n, x, at, d, edge * offset):
+            h = other
+    return h
 
-    Args: hit (3 m,) what each ray and its companions met. Of rays aimed at corners Embree lets one in some hundreds
-    through, of those aimed at edges one in a million: what a companion met nearer counts, where the ray meets it too,
-    or misses it by `edge` of its pace at most. nearest [m]: a hit closer to the start is the surface left.
+
+@njit(cache=True, nogil=True)
+def resolve_hits(todo, hit, rays, ahead, offset, shapes, limits, facet, distance):  # type: ignore[no-untyped-def]
+    """Write facets and distances of the rays `todo` (m,); return those to be cast again, from farther on or with
+    companions farther aside, as `ahead` and `offset` (n,) [m] then say.
+
+    Of rays aimed at corners Embree lets one in some hundreds through, of those aimed at edges one in a million
+    (`raychan study stability`, leaks): companions find what they miss.
+
+    Args: hit (3 m,) what each ray and its companions met; rays as `CastRays`, shapes as `FacetShapes`; limits (edge,
+    nearest): share of the offset by which a ray may miss what its companion met, and distance [m] closer than which a
+    hit is the surface left.
     """
+    edge, nearest = limits
     again = np.empty(len(todo), np.int64)
     count = 0
     for j in range(len(todo)):
         i = todo[j]
-        x, d = origin[i], direction[i]
+        x, d = rays.origin[i], rays.direction[i]
         h = hit[3 * j]
-        t = plane_distance(normal[h], first[h], x, 0.0, d) if h >= 0 else 0.0
-        if h >= 0 and not _met(vertices[h], normal[h], x, d, t, pace[i]):
-            h = _beside(j, hit, x, d, ahead[i], pace[i], vertices, first, normal)
+        t = plane_distance(shapes.normal[h], shapes.first[h], x, 0.0, d) if h >= 0 else 0.0
+        if h >= 0 and not _on_facet(shapes.vertices[h], shapes.normal[h], x, d, t, offset[i]):
+            h = _instead_of_grazed(j, hit, x, d, ahead[i], offset[i], shapes)
             if h == -2:
-                pace[i] *= 2.0
+                offset[i] *= 2.0
                 again[count] = i
                 count += 1
                 continue
-        for s in range(1, 3):
-            other = hit[3 * j + s]
-            if other < 0 or other == h:
-                continue
-            old = np.inf if h < 0 else plane_distance(normal[h], first[h], x, ahead[i], d)
-            new = plane_distance(normal[other], first[other], x, ahead[i], d)
-            at = ahead[i] + new
-            if (
-                0.0 < new < old - pace[i]
-                and _met(vertices[other], normal[other], x, d, at, pace[i])
-                and _holds(vertices[other], normal[other], x, at, d, edge * pace[i])
-            ):
-                h = other
+        h = _nearer_of_companions(j, h, hit, x, d, ahead[i], offset[i], edge, shapes)
         if h < 0:
             continue
-        t = plane_distance(normal[h], first[h], x, 0.0, d)
-        if h != skip[i] and t > start[i] + nearest:
+        t = plane_distance(shapes.normal[h], shapes.first[h], x, 0.0, d)
+        if h != rays.skip[i] and t > rays.start[i] + nearest:
             facet[i], distance[i] = h, t
             continue
-        ahead[i] = max(t, ahead[i]) + 2.0 * pace[i]
-        pace[i] *= 2.0
+        ahead[i] = max(t, ahead[i]) + 2.0 * offset[i]
+        offset[i] *= 2.0
         again[count] = i
         count += 1
     return again[:count].copy()
-
-
-@njit(cache=True, forceinline=True)
-def _clear(  # type: ignore[no-untyped-def]
-    a, b, t, x, d, limit, slack, touch, plane, smooth, vertices, normal, margin
-):
-    """Tell whether a ray aimed at facet b (-1: none) that met facet a at t [m] reached its `limit` [m].
-
-    Only the target's own smooth surface may lie before it by `slack` [m], others by `touch` [m]. Where another
-    surface lies in the plane of the target, at the same place, that counts and the target does not: what is drawn
-    twice returns once. Facets of one plane overlap where the point lies within both, by `margin` [m].
-    """
-    if a < 0 or a == b:
-        return True
-    own = b >= 0 and smooth[a] == smooth[b]
-    close = min(slack, touch)
-    free = t >= limit - (slack if own else close)
-    if b < 0 or abs(t - limit) >= close:
-        return free
-    if abs(normal[a, 0] * normal[b, 0] + normal[a, 1] * normal[b, 1] + normal[a, 2] * normal[b, 2]) <= 1.0 - 1e-9:
-        return free
-    if plane[a] != plane[b] and not own:
-        return False
-    return free and not (
-        _holds(vertices[a], normal[a], x, t, d, -margin) and _holds(vertices[b], normal[b], x, t, d, -margin)
-    )
-
-
-@njit(cache=True, nogil=True)
-def arrive(  # type: ignore[no-untyped-def]
-    todo, facet, t, origin, direction, limit, slack, target, touch, plane, smooth, vertices, normal, margin, body,
-    inside, is_layer, reached, passed, blocker,
-):  # fmt: skip
-    """Write what became of the rays `todo` (m,) that met `facet` (m,) at t (m,) [m]; return which of these (k,) go on
-    behind a thin layer.
-
-    Args: origin, direction (m, 3); limit, slack [m], target facet and the body that it stands `inside`, which never
-    blocks (n,; empty: none); is_layer (f,), empty where nothing is; reached (n,), passed (n, layers), blocker (n,).
-    """
-    more = np.empty(len(todo), np.int64)
-    count = 0
-    for j in range(len(todo)):
-        i, a = todo[j], facet[j]
-        free = _clear(
-            a, target[i], t[j], origin[j], direction[j], limit[i], slack[i], touch, plane, smooth, vertices, normal,
-            margin,
-        )  # fmt: skip
-        if not free and len(inside):
-            free = body[a] == inside[i]
-        if free:
-            reached[i] = True
-            blocker[i] = -1
-            continue
-        blocker[i] = a
-        if not len(is_layer) or not is_layer[a]:
-            continue
-        for q in range(passed.shape[1]):
-            if passed[i, q] < 0:
-                passed[i, q] = a
-                more[count] = j
-                count += 1
-                break
-    return more[:count].copy()

@@ -1,4 +1,5 @@
-"""Lit: which parts of patches face the source (numba loops); arguments as for `patch`."""
+"""Lit parts of patches: curved patches are clipped at the terminator, where the surface turns away from the source
+(numba kernels). Arguments as in `geometry.curved_patches`."""
 
 from __future__ import annotations
 
@@ -11,13 +12,13 @@ from raychan.geometry.curved_patches import copy_corners, dot, middle, place_on
 
 
 @njit(cache=True, forceinline=True)
-def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
-    """Return 1 if all of a facet's true surface is turned to the image, -1 if all away, 0 if that is not sure."""
+def _facing(v, n, b, image, far):  # type: ignore[no-untyped-def]
+    """Return 1 if all of a facet's curved surface faces the image, -1 if all turns away, 0 if that is not sure."""
     low, high = np.inf, -np.inf
     for i in range(3):
         swell = 0.0
         for j in range(3):
-            # The edges' bulges weigh a third in all at most.
+            # Of a patch's three products l_i l_j the sum is at most 1/3.
             swell = max(swell, abs(dot(n[i], b[j])) / 3.0)
         for j in range(3):
             height = 0.0
@@ -29,7 +30,8 @@ def _faces(v, n, b, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _towards(v, n, b, x, y, z, image, far):  # type: ignore[no-untyped-def]
-    """Return the cosine of incidence at barycentric (x, y, z) of the true surface: above 0 where it faces the image."""
+    """Return the cosine of incidence at barycentric (x, y, z) of the curved surface: above 0 where it faces the
+    image."""
     xy, yz, zx = x * y, y * z, z * x
     along, size, reach = 0.0, 0.0, 0.0
     for c in range(3):
@@ -44,8 +46,8 @@ def _towards(v, n, b, x, y, z, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _parts_towards(v, n, b, is_open, w, image, far, side, p, out):  # type: ignore[no-untyped-def]
-    """Write the parts of a patch that face the image into out (3, 3, 3), of an open sheet those of either side; return
-    how many.
+    """Write the parts of a patch that face the image into out (3, 3, 3), on facets lit from both sides (is_open) all
+    parts; return how many.
 
     Args: side (3,), p (3, 3) for work.
     """
@@ -59,7 +61,7 @@ def _parts_towards(v, n, b, is_open, w, image, far, side, p, out):  # type: igno
     for q in range(3):
         if side[q] == 0.0:
             side[q] = 1e-12
-    _three(w, side, out)
+    _clip(w, side, out)
     count = 0
     for j in range(3):
         x, y, z = middle(out[j])
@@ -75,7 +77,7 @@ def _parts_towards(v, n, b, is_open, w, image, far, side, p, out):  # type: igno
 
 @njit(cache=True)
 def _with_room(facets, barys, room):  # type: ignore[no-untyped-def]
-    """Return facets and barys in arrays that have room for more."""
+    """Return copies of facets (n,) and barys (n, 3, 3) in arrays with room for `room` rows."""
     more_facets, more_barys = np.empty(room, facets.dtype), np.empty((room, 3, 3))
     for i in range(len(facets)):
         more_facets[i] = facets[i]
@@ -85,9 +87,9 @@ def _with_room(facets, barys, room):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def lit_parts(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyped-def]
-    """Return (facet, bary) of the parts of patches that face the source, cut along the terminator.
+    """Return (facet, bary) of the parts of patches that face the source, clipped along the terminator.
 
-    Args: is_open (m,) facets of open sheets, which face the source from either side.
+    Args: is_open (f,) facets that are lit from both sides.
     """
     m = len(facet)
     room = m + m // 4 + 9
@@ -97,7 +99,7 @@ def lit_parts(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-unt
     for i in range(m):
         if facet[i] != f:
             f = facet[i]
-            lit = _faces(v[f], n[f], b[f], image, far)
+            lit = _facing(v[f], n[f], b[f], image, far)
             lit = lit * lit if is_open[f] else lit
         if lit < 0:
             continue
@@ -115,8 +117,8 @@ def lit_parts(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-unt
 
 
 @njit(cache=True, forceinline=True)
-def _three(w, side, part):  # type: ignore[no-untyped-def]
-    """Write the three parts of a triangle cut where `side` (3,) changes sign: the lone corner's first."""
+def _clip(w, side, part):  # type: ignore[no-untyped-def]
+    """Write the three parts of a triangle clipped where `side` (3,) changes sign: first that of the lone corner."""
     positive = int(side[0] > 0.0) + int(side[1] > 0.0) + int(side[2] > 0.0)
     lone = 0
     for c in range(3):
@@ -135,6 +137,7 @@ def _three(w, side, part):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _twice_area(p):  # type: ignore[no-untyped-def]
+    """Return twice the area of a triangle (3, 3) [m^2]."""
     ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
     bx, by, bz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
     return math.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2)

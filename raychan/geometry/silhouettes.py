@@ -1,6 +1,9 @@
-"""Outlines: which edges of clustered facets are outlines as seen from somewhere (numba loops).
+"""Silhouette edges: which edges of clustered facets turn away from a point or a direction (numba kernels).
 
-Everywhere: faces (e, 2) facets on both sides of edges, -1 beyond a rim; k clusters of facets.
+Clusters whose normal cones face the point altogether, or turn away from it, with all their neighbours, hold none and
+are skipped.
+
+Everywhere: faces (e, 2) facets on both sides of edges, -1 beyond a boundary edge; k clusters of facets.
 """
 
 from __future__ import annotations
@@ -11,15 +14,16 @@ import numpy as np
 
 from raychan.compile.jit import njit
 
-_WIDE = 1e-6  # rad: rounding must not tell a cluster's side where a facet grazes
+_ROUNDING = 1e-6  # rad by which a cluster must clearly face the point, or turn away
 
 
 @njit(cache=True, nogil=True)
-def by_cluster(faces, order, start):  # type: ignore[no-untyped-def]
-    """Return edges by the cluster of their first facet, as (edges (e,), first (k + 1,)), and the other clusters beside
-    each, as (beside (b,), begin (k + 1,)): itself where it has a rim; and the cluster of each facet (f,).
+def edges_by_cluster(faces, order, start):  # type: ignore[no-untyped-def]
+    """Return edges by the cluster of their first facet, as (edges (e,), first (k + 1,)); the other clusters beside
+    each, as (beside (b,), begin (k + 1,)), itself among them where it has a boundary edge; and the cluster of each
+    facet (f,).
 
-    Args: facets order[start[i] : start[i + 1]] make a cluster.
+    Args: facets order[start[i] : start[i + 1]] make cluster i.
     """
     k = len(start) - 1
     cluster = np.empty(len(order), np.int32)
@@ -53,13 +57,9 @@ def by_cluster(faces, order, start):  # type: ignore[no-untyped-def]
     return edges, first, beside[:count].copy(), begin, cluster
 
 
-@njit(cache=True, nogil=True)
-def turning(faces, edges, first, beside, begin, cluster, centre, radius, axis, spread, point, normal, image, far):  # type: ignore[no-untyped-def]
-    """Return the edges (n,) of which one facet faces the image and the other does not, or is none; in no order.
-
-    Args: edges to cluster as `by_cluster` gives them; centre (k, 3), radius (k,) [m], axis (k, 3), spread (k,) [rad] of
-    clusters' balls and cones; point, normal (f, 3) of facets; image (3,) [m], or the direction to it when far.
-    """
+@njit(cache=True, forceinline=True)
+def _cluster_sides(centre, radius, axis, half_angle, image, far):  # type: ignore[no-untyped-def]
+    """Return of clusters (k,) 1 where all facets face the image, -1 where all turn away, 0 where that is not sure."""
     k = len(radius)
     side = np.zeros(k, np.int8)
     d = np.empty(3)
@@ -72,14 +72,42 @@ def turning(faces, edges, first, beside, begin, cluster, centre, radius, axis, s
         there = math.sqrt(there)
         if not far and not there > radius[i]:
             continue
-        room = 0.5 * math.pi - spread[i] - _WIDE - (0.0 if far else math.asin(radius[i] / there))
+        room = 0.5 * math.pi - half_angle[i] - _ROUNDING - (0.0 if far else math.asin(radius[i] / there))
         off = math.acos(min(max(along / there, -1.0), 1.0))
         if off < room:
             side[i] = 1
         elif math.pi - off < room:
             side[i] = -1
+    return side
+
+
+@njit(cache=True, forceinline=True)
+def _is_silhouette(f, g, point, normal, image, far):  # type: ignore[no-untyped-def]
+    """Tell whether of the facets f and g beside an edge one faces the image and the other does not, or is none."""
+    if g < 0:
+        return True
+    front = 0
+    for h in (f, g):
+        towards = 0.0
+        for c in range(3):
+            towards += normal[h, c] * (image[c] if far else image[c] - point[h, c])
+        front += 1 if towards > 0.0 else 0
+    return front == 1
+
+
+@njit(cache=True, nogil=True)
+def silhouette_edges(edges_of, clusters, point, normal, image, far):  # type: ignore[no-untyped-def]
+    """Return the edges (n,) of which one facet faces the image and the other does not, or is none; in no order.
+
+    Args: edges_of: faces and what `edges_by_cluster` returns; clusters: centre (k, 3), radius (k,) [m] of bounding
+    spheres, axis (k, 3), half angle (k,) [rad] of normal cones; point, normal (f, 3) of facets; image (3,) [m], or the
+    direction to it when far.
+    """
+    faces, edges, first, beside, begin, cluster = edges_of
+    centre, radius, axis, half_angle = clusters
+    side = _cluster_sides(centre, radius, axis, half_angle, image, far)
     out, count = np.empty(1 << 10, np.int64), 0
-    for i in range(k):
+    for i in range(len(radius)):
         same = side[i] != 0
         for at in range(begin[i], begin[i + 1]):
             same &= beside[at] != i and side[beside[at]] == side[i]
@@ -87,17 +115,10 @@ def turning(faces, edges, first, beside, begin, cluster, centre, radius, axis, s
             continue
         for at in range(first[i], first[i + 1]):
             e = edges[at]
-            if side[i] != 0 and faces[e, 1] >= 0 and side[cluster[faces[e, 1]]] == side[i]:
+            f, g = faces[e, 0], faces[e, 1]
+            if side[i] != 0 and g >= 0 and side[cluster[g]] == side[i]:
                 continue
-            front = 0
-            for q in range(2):
-                f = faces[e, q]
-                towards = 0.0
-                if f >= 0:
-                    for c in range(3):
-                        towards += normal[f, c] * (image[c] if far else image[c] - point[f, c])
-                front += 1 if towards > 0.0 else 0
-            if faces[e, 1] >= 0 and front != 1:
+            if not _is_silhouette(f, g, point, normal, image, far):
                 continue
             if count == len(out):
                 out = np.append(out, np.empty_like(out))

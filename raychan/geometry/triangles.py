@@ -1,4 +1,4 @@
-"""Facets: what a triangle is by itself, how two bend where they meet, and what holds many (numba loops).
+"""Triangles: planes, edges and folds between neighbours, curvature, and bounds of clusters (numba kernels).
 
 Everywhere: v, n (m, 3, 3) corners [m] and corner normals of the facets; normal (m, 3), area (m,) of their planes.
 """
@@ -11,13 +11,13 @@ import numpy as np
 
 from raychan.compile.jit import njit
 
-_SHARP = 0.95  # cosine of corner normals across an edge above which it is round, not a wedge
+_SHARP = 0.95  # cosine of corner normals across an edge above which it is round, not a wedge; not measured
 
 
 @njit(cache=True, nogil=True)
-def turned(rows, matrix, shift):  # type: ignore[no-untyped-def]
+def transform(rows, matrix, shift):  # type: ignore[no-untyped-def]
     """Return matrix (3, 3) times each of the rows (n, 3), plus shift (3,)."""
-    # NumPy's product of arrays this narrow took 6 to 12 times as long.
+    # NumPy's product of arrays this narrow takes 6 to 12 times as long.
     out = np.empty((len(rows), 3))
     for i in range(len(rows)):
         x, y, z = rows[i, 0], rows[i, 1], rows[i, 2]
@@ -27,13 +27,13 @@ def turned(rows, matrix, shift):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def stand(vertices, faces, looks, matrix, shift, v, n):  # type: ignore[no-untyped-def]
-    """Write the corners v (m, 3, 3) of faces (m, 3) of vertices (k, 3), turned by a matrix (3, 3) and shifted by (3,),
-    and their normals n (m, 3, 3), turned alike."""
-    there = turned(vertices, matrix, shift)
+def pose(vertices, faces, normals, matrix, shift, v, n):  # type: ignore[no-untyped-def]
+    """Write the corners v (m, 3, 3) [m] and corner normals n (m, 3, 3) of faces (m, 3) of vertices (k, 3) [m], turned
+    by a matrix (3, 3) and shifted by (3,) [m]."""
+    there = transform(vertices, matrix, shift)
     for f in range(len(faces)):
         for q in range(3):
-            x, y, z = looks[f, q, 0], looks[f, q, 1], looks[f, q, 2]
+            x, y, z = normals[f, q, 0], normals[f, q, 1], normals[f, q, 2]
             for c in range(3):
                 v[f, q, c] = there[faces[f, q], c]
                 n[f, q, c] = matrix[c, 0] * x + matrix[c, 1] * y + matrix[c, 2] * z
@@ -60,8 +60,11 @@ def planes_of(v):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def edge_curvatures(v, n):  # type: ignore[no-untyped-def]
-    """Return the bulge (m, 3, 3) [m] of each edge of the quadratic patches x = sum l_i x_i - sum c_ij l_i l_j through
-    corners and corner normals (Nagata 2005, eq. 10), and which facets (m,) are curved."""
+    """Return the edge curvatures c (m, 3, 3) [m] of the quadratic patches x = sum l_i x_i - sum c_ij l_i l_j through
+    corners and corner normals, and which facets (m,) are curved.
+
+    Source: Nagata (2005), Computer Aided Geometric Design 22(4), eq. 10.
+    """
     m = len(v)
     out, curved = np.zeros((m, 3, 3)), np.zeros(m, np.bool_)
     for f in range(m):
@@ -107,7 +110,7 @@ def extents(v, body, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def ends(v, half):  # type: ignore[no-untyped-def]
+def half_edge_ends(v, half):  # type: ignore[no-untyped-def]
     """Return both ends (e, 2, 3) [m] of half edges (e,): 3 f + k runs from corner k of facet f to the next."""
     out = np.empty((len(half), 2, 3))
     for i in range(len(half)):
@@ -118,34 +121,36 @@ def ends(v, half):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def bends(pair, v, n, normal, area):  # type: ignore[no-untyped-def]
-    """Tell of edges, given as half edges (e, 2) of both facets, half edge 3 f + k from corner k of facet f on: whether
-    the facets share a plane (flat), corner normals (soft), bend outward (bent), make a wedge (sharp), and how far the
-    second rises over the first's plane (e,) [m]."""
+def edge_folds(pair, v, n, normal, area):  # type: ignore[no-untyped-def]
+    """Return how two facets meet at their edge, given as half edges (e, 2), 3 f + k from corner k of facet f on.
+
+    Returns: whether they share a plane (flat), share corner normals (soft), meet in a convex edge (convex), in a wedge
+    (sharp), and how far the second rises over the first's plane (e,) [m].
+    """
     e = len(pair)
-    flat, soft, bent = np.empty(e, np.bool_), np.empty(e, np.bool_), np.empty(e, np.bool_)
+    flat, soft, convex = np.empty(e, np.bool_), np.empty(e, np.bool_), np.empty(e, np.bool_)
     sharp, height = np.empty(e, np.bool_), np.empty(e)
     for i in range(e):
         a, b, ka, kb = pair[i, 0] // 3, pair[i, 1] // 3, pair[i, 0] % 3, pair[i, 1] % 3
         cosine, here, there, up = 0.0, 0.0, 0.0, 0.0
         for c in range(3):
             cosine += normal[a, c] * normal[b, c]
-            # The two facets walk their edge in opposite ways.
+            # The two facets run along their edge in opposite directions.
             here += n[a, ka, c] * n[b, (kb + 1) % 3, c]
             there += n[a, (ka + 1) % 3, c] * n[b, kb, c]
             up += (v[b, (kb + 2) % 3, c] - v[a, ka, c]) * normal[a, c]
         flat[i] = abs(cosine) > 1.0 - 1e-10
         soft[i] = here > 1.0 - 1e-6 and there > 1.0 - 1e-6
-        bent[i] = up < -1e-9 * math.sqrt(area[b])
+        convex[i] = up < -1e-9 * math.sqrt(area[b])
         sharp[i] = up < -1e-9 and here < _SHARP
         height[i] = up
-    return flat, soft, bent, sharp, height
+    return flat, soft, convex, sharp, height
 
 
 @njit(cache=True, nogil=True)
-def hulls(order, first, v, n, normal, edge_curvature):  # type: ignore[no-untyped-def]
-    """Return for clusters of facets, order[first[i] : first[i + 1]], a ball, centre (k, 3) and radius (k,) [m], that
-    holds their true surfaces, and a cone, axis (k, 3) and half angle (k,) [rad], that holds all their normals."""
+def cluster_bounds(order, first, v, n, normal, edge_curvature):  # type: ignore[no-untyped-def]
+    """Return for clusters of facets, order[first[i] : first[i + 1]], bounding spheres of their curved surfaces, centre
+    (k, 3) and radius (k,) [m], and normal cones, axis (k, 3) and half angle (k,) [rad]."""
     k = len(first) - 1
     centre, radius, axis, spread = np.zeros((k, 3)), np.zeros(k), np.zeros((k, 3)), np.full(k, math.pi)
     low, high = np.empty(3), np.empty(3)

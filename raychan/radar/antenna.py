@@ -1,4 +1,4 @@
-"""Antennas: what each sends and gathers, by direction.
+"""Antennas: complex field patterns by direction.
 
 Every antenna has one method, field(direction): unit vectors (n, 3) in its own frame (boresight +x, y left, z up) to
 (n, 2) complex sqrt(gain) along theta-hat (V) and phi-hat (H). Gain is power gain over an isotropic radiator, losses in.
@@ -28,7 +28,7 @@ POLARIZATIONS = ("V", "H")
 
 @runtime_checkable
 class Antenna(Protocol):
-    """What all antennas can do."""
+    """An antenna, by its pattern: any class with this method is one."""
 
     def field(self, direction: Floats) -> Complexes:
         """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
@@ -55,7 +55,10 @@ def check(polarization: str, loss_db: float = 0.0, **positive: float) -> None:
 
 @dataclass(frozen=True)
 class IsotropicAntenna:
-    """Gain 1 everywhere, or, if `front`, only ahead of the plane x = 0 (and then the gain is 2)."""
+    """Gain 1 everywhere, or, if `front`, gain 2 ahead of the plane x = 0 and none behind.
+
+    Args: polarization V or H; front; loss_db [dB].
+    """
 
     polarization: str = "V"
     front: bool = False
@@ -72,9 +75,11 @@ class IsotropicAntenna:
 
 @dataclass(frozen=True)
 class CosineAntenna:
-    """A patch: gain falls as cos^p of the angle off boresight, p by the plane; nothing behind.
+    """A patch: gain falls as cos^p of the angle off boresight, p by the half-power widths; nothing behind.
 
-    Between the two planes p follows the direction's angle about the boresight, so that there is no seam.
+    Args: hpbw_h_deg, hpbw_v_deg half-power beam widths [deg] in the horizontal and the vertical plane; polarization V
+    or H; loss_db [dB]. Between the two planes p follows the direction's angle about the boresight, so that there is no
+    seam. Raises: ValueError for widths not between 0 and 180 deg.
     """
 
     hpbw_h_deg: float
@@ -109,8 +114,9 @@ class CosineAntenna:
 class ArrayAntenna:
     """A plane of ny by nz equal elements in phase, its gain from the integral of the pattern over the sphere.
 
-    Spacings in wavelengths; tapers are window names (see radar.windows) along y and z. The pattern is element times
-    array factor, without coupling; `loss_db` is what the antenna loses on top of that.
+    Args: ny, nz elements; spacing_y, spacing_z [wavelengths]; taper_y, taper_z names of windows; element, by default
+    isotropic ahead; loss_db [dB]. The pattern is element times array factor, without coupling.
+    Raises: ValueError for an unknown window or a number that is not positive.
     """
 
     ny: int

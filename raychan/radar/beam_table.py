@@ -1,4 +1,4 @@
-"""Beam: how strong a radar is in each direction, so that tubes go where its antennas look."""
+"""The field of a radar in each direction, from a table: tubes are launched where its antennas look."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Beam:
 
 
 def beam_of(radar: Any) -> Beam:
-    """Return the beam of a radar, made once and kept with it if it has a place `kept` for that."""
+    """Return the beam of a radar, cached with the radar if it has a cache."""
     kept: dict[Any, Beam] = getattr(radar, "kept", {})
     if Beam not in kept:
         kept[Beam] = Beam(radar)

@@ -1,4 +1,4 @@
-"""Patterns: antennas measured, and the figures of merit of any antenna."""
+"""Measured antenna patterns, and the figures of merit of any antenna."""
 
 from __future__ import annotations
 
@@ -28,12 +28,15 @@ class PatternError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class MeasuredAntenna:
-    """A pattern on knots of azimuth and elevation, linear in dB between them and held at the edges."""
+    """A pattern on a grid of azimuth and elevation, linear in dB between its points and constant beyond its edges.
+
+    `MeasuredAntenna.load` reads one from a CSV file.
+    """
 
     azimuth: Floats
-    """Knots (a,), increasing [rad]."""
+    """Azimuths (a,), increasing [rad]."""
     elevation: Floats
-    """Knots (e,), increasing [rad]."""
+    """Elevations (e,), increasing [rad]."""
     gain_db: Floats
     """Gain (a, e) in dBi."""
     phase: Floats

@@ -105,7 +105,7 @@ class Radar:
 
     @cached_property
     def kept(self) -> dict[Any, Any]:
-        """What others make of the antennas and how they stand, by its class; shared with the same radar elsewhere."""
+        """Cache of what other modules derive from antennas and pose, by class; shared with this radar elsewhere."""
         return {}
 
     def at(self, time: float) -> Radar:

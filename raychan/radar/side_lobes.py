@@ -1,4 +1,4 @@
-"""Lobes: how much a strong echo may show in the cells around it, by the window it was weighted with."""
+"""Side lobes of a window: an envelope of its response, and how it correlates noise between cells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Patterns: patches' patterns and fields along the unit vectors of a direction (numba loops)."""
+"""Fields along theta-hat and phi-hat as vectors, and the pattern of a patch (numba loops)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from raychan.compile.jit import njit
 
 @njit(cache=True, nogil=True)
 def cosine_power(direction, over_y, over_z):  # type: ignore[no-untyped-def]
-    """Return x^p (n,) of unit directions (n, 3), 0 behind: p goes from `over_y` in the plane z = 0 to `over_z` in
-    y = 0, as the square of the cosine of the angle about x."""
+    """Return x^p (n,) of unit directions (n, 3), 0 behind.
+
+    p goes from `over_y` in the plane z = 0 to `over_z` in y = 0, as the square of the cosine of the angle about x.
+    """
     out = np.empty(len(direction))
     for i in range(len(direction)):
         y2, z2 = direction[i, 1] ** 2, direction[i, 2] ** 2
@@ -33,8 +35,10 @@ def turned(vector, axes):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def vectors(field, direction, axes):  # type: ignore[no-untyped-def]
-    """Return fields (n, 3), world axes, of their parts (n, 2) along theta-hat and phi-hat of directions (n, 3) in a
-    frame of axes (3, 3), its columns; at the poles azimuth is taken as zero (as frames.theta_phi does)."""
+    """Return fields (n, 3), world axes, of their parts (n, 2) along theta-hat and phi-hat of directions (n, 3).
+
+    Directions are in a frame of axes (3, 3), its columns; at the poles azimuth is zero, as in `poses.theta_phi`.
+    """
     out = np.empty((len(field), 3), np.complex128)
     for i in range(len(field)):
         x, y, z = direction[i, 0], direction[i, 1], direction[i, 2]

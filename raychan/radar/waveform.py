@@ -17,7 +17,14 @@ from raychan.units import C0
 
 @dataclass(frozen=True)
 class Waveform:
-    """A frame of `n_chirps` equal ramps, `n_samples` samples in each."""
+    """A frame of `n_chirps` equal linear frequency ramps, `n_samples` samples in each; SI units.
+
+    Raises: ValueError for values that cannot be.
+
+    >>> wave = Waveform(carrier=77e9, bandwidth=1e9, chirp_duration=25e-6)
+    >>> round(wave.range_resolution, 3), round(wave.unambiguous_rate, 1)
+    (0.15, 38.9)
+    """
 
     carrier: float
     """Frequency at the start of the sampled part of the ramp [Hz]."""

@@ -1,4 +1,4 @@
-"""Explain: which detection or cell of a map is meant, and every path that feeds it."""
+"""Which paths make a detection or a cell of the map: the one meant by range and speed, and every path that feeds it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_
 from raychan.run.result import Explanation, Result
 
 _VERBS = ("", "reflect", "pass", "scatter", "point", "diffract")  # by InteractionType
-_SAME = 0.1  # cells: places that are so alike are the same to who typed one of them
+_SAME = 0.1  # resolution cells: a range and speed typed by hand do not tell closer places apart; not measured
 
 
 @dataclass(frozen=True)
@@ -147,8 +147,7 @@ def _checked(result: Result, number: int) -> int:
 
 
 def _nearest(result: Result, range: float, speed: float | None) -> list[int]:
-    """Return the detections within a resolution cell of a place, the nearest first; of equally near ones the strongest
-    is."""
+    """Return the detections within a resolution cell of a place: nearest first, of equally near ones the strongest."""
     d, m = result.detections, result.rdmap
     away = np.abs(d.range - range) / m.range_resolution
     if speed is not None:

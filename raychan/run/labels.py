@@ -134,9 +134,9 @@ def _explained(
 def waves_in(
     paths: Paths, response: PointSpread, range: float, rate: float | None
 ) -> tuple[NDArray[np.complexfloating[Any, Any]], Floats]:
-    """Return what each path (n,) brings to a cell, its amplitude times the response of both windows there, and the
-    range (n,) [m] at which it stands.
+    """Return what each path brings to a cell (n,), and the range at which it stands (n,) [m].
 
+    A path brings its amplitude times the response of both windows at its distance from the cell.
     Args: range [m] and rate [m/s] of the cell; None for a cell of the power-delay profile.
     """
     if rate is not None:

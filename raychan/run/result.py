@@ -1,4 +1,4 @@
-"""Result: all that one run of a scene gives."""
+"""The result of a run: paths, profile, cube, map, detections, and where each detection comes from."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from raychan.columns import column
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler
-from raychan.reprs import DrawnTwice, Told
+from raychan.reprs import Described, PlottedTwice
 
 if TYPE_CHECKING:
     from raychan.world.scene import Scene
@@ -23,7 +23,7 @@ DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
 
 @dataclass(frozen=True)
 class Receiver:
-    """What the receiver did, as far as an explanation of its map needs it."""
+    """The receiver's settings that an explanation of its map needs."""
 
     waveform: Waveform
     range_window: str
@@ -115,7 +115,7 @@ class ExplainedDetections(Detections):
 
 
 @dataclass(frozen=True)
-class Result(Told, DrawnTwice):
+class Result(Described, PlottedTwice):
     """Everything from the paths to the detections, and where each detection came from."""
 
     paths: Paths

@@ -142,7 +142,7 @@ def _one(geometry: Geometry, leg: Leg, rx: Floats, slots: int, layers: int):  # 
     """Return (length, vertices, normals, facets, kinds) of one chain, or None if it is not real."""
     if np.linalg.norm(rx - leg.image) == 0.0 or not leg.may_reach(rx[None], np.zeros(1))[0]:
         return None
-    stops = [leg.end, *leg.bounces(rx[None])[0], rx]
+    stops = [leg.end, *leg.mirror_points(rx[None])[0], rx]
     vertices: list[Floats] = []
     normals: list[Floats] = []
     facets: list[int] = []
@@ -190,8 +190,10 @@ def _one(geometry: Geometry, leg: Leg, rx: Floats, slots: int, layers: int):  # 
 
 
 def _there(geometry: Geometry, at: Floats, way: Floats, gap: float, mirror: Mirror) -> int:
-    """Return the facet of a mirror that a ray, `gap` [m] long along `way`, meets at its end, or -1: none, or one that
-    coincides with another that counts."""
+    """Return the facet of a mirror that a ray, `gap` [m] long along `way`, meets at its end, or -1.
+
+    -1: there is none, or another body's facet lies in the same place and counts instead.
+    """
     step = min(1e-3, 0.5 * gap)
     hit, t = geometry.cast((at - step * way)[None], way[None], np.array([-1], np.int32))
     if hit[0] >= 0 and geometry.plane[hit[0]] == geometry.plane[mirror.facet]:
@@ -236,9 +238,10 @@ def specular_paths(
 ) -> SpecularPaths:
     """Return the exact specular paths between two points of a scene, line of sight included, isotropic ends.
 
-    Args: scene Scene; tx, rx (3,) [m]; max_bounces the most reflections; velocities (3,) [m/s] of the ends.
-    Gains hold lambda/4 pi L and the carrier phase exp(-jkL), V, H are theta-hat, phi-hat of the direction of travel;
-    paths of gain 0 are left out.
+    Args: scene; tx, rx (3,) [m]; max_bounces the most reflections; tx_velocity, rx_velocity (3,) [m/s] of the ends.
+    Returns: SpecularPaths, shortest first: length [m] and length_rate [m/s] of the whole way, gain (n, 2, 2) with
+    lambda / 4 pi L and the carrier phase exp(-jkL), rows the receiver's V, H, columns the transmitter's (theta-hat and
+    phi-hat of the direction of travel), bodies and kind (n, d), vertices (n, d + 2, 3) [m]. Gain 0 is left out.
     Raises: ValueError for points that are not three finite numbers. Source: image method, McKown, Hamilton 1991.
     """
     ends = [np.asarray(x, float) for x in (tx, rx, tx_velocity, rx_velocity)]

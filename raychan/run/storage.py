@@ -100,8 +100,11 @@ def load_result(path: str | Path) -> Result:
 
 
 def rows(result: Result) -> list[tuple[str, ...]]:
-    """Return the detections as text, a tuple of COLUMNS each; what is unknown is empty: an azimuth that no array gives,
-    the error of a detection that is not converged, the true place of noise."""
+    """Return the detections as text, a tuple of COLUMNS each.
+
+    Empty is what is unknown: an azimuth that no array gives, the error of a detection that is not converged, the true
+    place of noise.
+    """
     d = result.detections
     return [
         (
@@ -132,7 +135,7 @@ def _word(value: bool) -> str:
 
 
 def summary(result: Result) -> dict[str, Any]:
-    """Return what summary.json holds: counts, timings, tolerance reached, warnings, what was left out."""
+    """Return what summary.json holds: counts, timings, tolerance reached, warnings, unmodelled effects."""
     return {
         "scene": result.path,
         "seed": result.seed,

@@ -111,7 +111,7 @@ def _gain(radar: Radar, points: Floats) -> tuple[Floats, Floats, Floats]:
 def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     """Edges' fringe currents: a straight edge of length L seen broadside returns at most L^2/pi (Ross 1966; Knott
     2004)."""
-    edges = geometry.outline
+    edges = geometry.plane_edges
     if not len(edges):
         return Entry(NOTHING, "exact", "no surface has an edge")
     middle = edges.mean(axis=1)
@@ -125,7 +125,7 @@ def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     sigma = zone**2 / np.pi * np.sinc(2.0 * along / wavelength) ** 2
     power = radar.power * gain * wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
     at = int(np.argmax(power))
-    name = geometry.facets.body_names[geometry.facets.body[geometry.outline_facet[at]]]
+    name = geometry.facets.body_names[geometry.facets.body[geometry.plane_edge_facet[at]]]
     how = f"strongest edge's fringe field, L^2/pi broadside, if it were seen: on {name} at {r[at]:.1f} m"
     return Entry(float(db(power[at] / weakest)), "bound", how)
 

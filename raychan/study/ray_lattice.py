@@ -145,7 +145,7 @@ def _seen(
     rows = rows[np.einsum("ij,ij->i", along, n[rows]) < 0.0]
     if bounce == 1 and not out.mirrors:
         return rows  # the ray itself came that way
-    point, stop = p[rows], out.bounces(p[rows])[:, 0] if out.mirrors else np.tile(out.end, (len(rows), 1))
+    point, stop = p[rows], out.mirror_points(p[rows])[:, 0] if out.mirrors else np.tile(out.end, (len(rows), 1))
     d = stop - point
     reach = np.linalg.norm(d, axis=1)
     d /= reach[:, None]
@@ -158,7 +158,7 @@ def _seen(
 
 def _receiver(tracer: RayCaster, out: Leg, p: Floats, rx_field: FieldOf, k: float) -> tuple[Floats, Complexes]:
     """Return where the receiver looks (n, 3) and its field at points p (n, 3) over the leg."""
-    towards = out.bounces(p)[:, 0] if out.mirrors else p
+    towards = out.mirror_points(p)[:, 0] if out.mirrors else p
     look = towards - out.end
     look /= np.linalg.norm(look, axis=1)[:, None]
     g = np.ascontiguousarray(rx_field(look), np.complex128)

@@ -1,4 +1,4 @@
-"""Beyond the horizon: currents radiate through the body that they flow on, to where their ray leaves it."""
+"""Currents beyond the horizon: they radiate through the body on which they flow, to where their ray leaves it."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_MOST = 64  # facets met within overlapping bodies before a ray is given up
+_MOST = 64  # facets met within overlapping bodies before a ray is dropped; not measured
 
 
-def outlets(geometry: Geometry, leg: Leg, points: Floats, facet: Ints) -> tuple[Floats, Ints]:
+def exit_points(geometry: Geometry, leg: Leg, points: Floats, facet: Ints) -> tuple[Floats, Ints]:
     """Return points (n, 3) [m] and facets (n,), moved along the ray to the end to where it leaves the bodies, for rays
     that enter them.
 
-    A closed body does not hide its own currents: what they radiate into it is part of physical optics. What stands
-    behind its other side hides them as it hides all else.
+    A closed body does not hide its own currents: in physical optics they radiate in free space (Ufimtsev 2014, ch. 1).
+    What stands behind its other side hides them as it hides all else.
     """
     d, length = leg.rays(points)
     inward = np.einsum("ij,ij->i", d, geometry.normal[facet]) > 0.0
-    rows = np.flatnonzero(geometry.shell[facet] & inward)
+    rows = np.flatnonzero(geometry.closed_opaque[facet] & inward)
     points, facet = points.copy(), facet.copy()
     way, far = -d[rows], np.full(len(rows), np.inf) if leg.far else length[rows]
     skip, start, depth = facet[rows], np.zeros(len(rows)), np.ones(len(rows), int)
@@ -33,7 +33,7 @@ def outlets(geometry: Geometry, leg: Leg, points: Floats, facet: Ints) -> tuple[
         hit, t = geometry.cast(points[rows], way, skip, start)
         met = (hit >= 0) & (t < far)
         leaves = np.einsum("ij,ij->i", way, geometry.normal[hit]) > 0.0
-        depth += np.where(met & geometry.shell[hit], np.where(leaves, -1, 1), 0)
+        depth += np.where(met & geometry.closed_opaque[hit], np.where(leaves, -1, 1), 0)
         out = met & (depth <= 0)
         points[rows[out]] += t[out, None] * way[out]
         facet[rows[out]] = hit[out]

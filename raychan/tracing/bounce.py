@@ -1,4 +1,8 @@
-"""Trace: from bounce to bounce; tubes that would straddle two surfaces are cut while they matter."""
+"""One reflection: tubes leave their surface as rays of the law of reflection and are followed to the next surface.
+
+The centre ray is cast first. Where a tube's contribution counts, its corner rays are cast too: a tube whose rays land
+on several surfaces, or through which an edge runs, is subdivided (bisected, or clipped along that edge) and cast again.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,25 @@ from numpy.typing import NDArray
 from raychan.parallel import parallel_for
 from raychan.records import REFLECT
 from raychan.tracing.contributions import Contributions
-from raychan.tracing.edge_crossings import edges_within
-from raychan.tracing.launch import on_facets, write_layers
+from raychan.tracing.edge_crossings import FacetPlanes, TubeRays, edges_within
+from raychan.tracing.launch import write_layers
 from raychan.tracing.legs import Leg
-from raychan.tracing.resolve_hits import agreeing, ahead_of, corner_rays, fates, put_down, reflected, weigh
-from raychan.tracing.silhouette_crossings import between
-from raychan.tracing.subdivide import divide
-from raychan.tracing.tubes import CENTRE, Refinement, Tubes
+from raychan.tracing.resolve_hits import (
+    IncidentTubes,
+    LandedTubes,
+    ReflectingFacets,
+    contribution_bounds,
+    corner_rays,
+    on_one_surface,
+    phase_at_hits,
+    reflect_directions,
+    resolve_hits,
+    tubes_at_hits,
+)
+from raychan.tracing.silhouette_crossings import silhouette_crossings_of
+from raychan.tracing.subdivide import subdivide
+from raychan.tracing.tubes import CENTRE, Refinement, Tubes, slices
+from raychan.tracing.visibility import on_facets
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -24,38 +40,36 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Rows = NDArray[np.signedinteger]
 
-_ALIKE = 0.98  # cosine within which normals of one smooth patch may differ over a tube
-_LIGHT = 0.1  # of the cost of a cut for sight: what one between bounces takes
-_MANY = 2000  # tubes from which on a second thread pays
+_SAME_PATCH_COSINE = 0.98  # of the normals of one smooth patch over a tube; trades cuts for accuracy, not measured
+_BUDGET_SHARE = 0.1  # of a cut for visibility: what a cut between bounces takes of the budget; not measured
+_PARALLEL_FROM = 2000  # tubes from which on a second thread pays; not measured
+_PAST_LAYER = 1e-6  # m behind a layer from which on hits count
 
 
-def bounce(
-    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, first: bool, last: bool, found: Contributions
-) -> Tubes:
-    """Return the tubes after one more reflection, standing where they land.
+@dataclass(frozen=True)
+class _Bounce:
+    """One reflection of one launch.
 
-    Args: out the way back used to weigh tubes, but for its antenna; first, last whether `tubes` stand on their first
-    surface, or land on their last; found what was so far.
+    Fields: leg in; out the leg by which contributions are bounded, without its antenna; first, last whether the tubes
+    stand on their first surface, or land on their last; found the field found so far.
     """
-    rule = found.rule
-    landed: list[Tubes] = []
-    short = tubes.slots < rule.slots - 2
-    tubes = tubes if short.all() else tubes.take(short)
-    n = len(tubes)
-    flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, rule.layers), -1, np.int32), np.zeros((2, n), np.int8))
-    while len(flight.tubes):
-        flight = _step(geometry, leg, out, flight, first, last, found, landed)
-    if not landed:
-        return tubes.take(np.zeros(n, bool))
-    weights = [_weigh(geometry, out, t, rule) for t in landed]
-    area, bound, whole = np.concatenate(weights, axis=1)
-    return Tubes.join(landed, found.that_count(bound if last else area, whole))
+
+    geometry: Geometry
+    leg: Leg
+    out: Leg
+    first: bool
+    last: bool
+    found: Contributions
+
+    @property
+    def rule(self) -> Refinement:
+        return self.found.rule
 
 
 @dataclass(frozen=True)
 class _Flight:
-    """Tubes between two surfaces: `start` (n, 4) [m] from which hits count, layers `through` (n, l) so far, and how
-    often each was cut and passed a layer, `count` (2, n)."""
+    """Tubes between two surfaces: `start` (n, 4) [m] from which hits count, layers passed so far, `through` (n, l), and
+    how often each tube was cut and passed a layer, `count` (2, n)."""
 
     tubes: Tubes
     start: Floats
@@ -63,58 +77,92 @@ class _Flight:
     count: NDArray[np.int8]
 
 
-def _step(
-    geometry: Geometry,
-    leg: Leg,
-    out: Leg,
-    flight: _Flight,
-    first: bool,
-    last: bool,
-    found: Contributions,
-    landed: list[Tubes],
-) -> _Flight:
-    """Cast centre rays, and corners where they matter; land what agrees; return what was cut, and what goes on behind
-    the thin layers that were hit."""
-    rule, tubes = found.rule, flight.tubes
-    area, _, whole = _weigh(geometry, out, tubes, rule)
-    way = np.empty_like(tubes.k)
-    parallel_for(len(tubes), lambda rows: reflected(tubes.k[rows], tubes.normals[rows], way[rows]), _MANY)
-    points = on_facets(geometry, tubes) if first else tubes.points
-    mid, ahead = geometry.cast(points[:, CENTRE], way[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
-    if last:
-        # What counts is how the phase will run where the tube lands: two mirrors at right angles send it straight
-        # back. Before more mirrors nobody knows. Where the centre meets nothing a body may still stand beside it.
-        span, whole = np.empty((2, len(tubes)))
-        ways = geometry.first, geometry.normal, out.image, out.far, rule.wavenumber
-        ahead_of(*(tubes.points, way, tubes.length, mid, ahead, *ways, span, whole))
-        matters = area > found.prune_threshold(whole) * (1.0 + 0.5 * span)
-    else:
-        matters = area > found.prune_threshold(whole)
-    matters &= not found.budget.spent(geometry)
-    # Beside a centre that meets nothing no corner is cast: the outline of a body there runs through the tube.
-    hit, t = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
-    agree = mid >= 0
-    rows = np.flatnonzero(matters & agree)
-    met, reach = geometry.cast(*corner_rays(rows, points, way, tubes.facet, flight.start))
-    hit[rows, :3], t[rows, :3] = met.reshape(-1, 3), reach.reshape(-1, 3)
-    agreeing(rows, hit, geometry.plane, geometry.smooth, geometry.normal, _ALIKE, agree)
-    side = _edges(geometry, leg, tubes, points, way, hit, t, np.flatnonzero(matters))
-    mixed = (~agree & (mid >= 0)) | side.any(axis=1)
-    split = found.budget.affords(geometry, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _LIGHT)
+def bounce(
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, first: bool, last: bool, found: Contributions
+) -> Tubes:
+    """Return the tubes after one more reflection, on the surfaces where they land.
+
+    Args: leg by which they came; out the leg by which their contributions are bounded, without its antenna; first, last
+    whether `tubes` stand on their first surface, or land on their last; found the field found so far, by which tubes
+    are subdivided or pruned.
+    """
+    step = _Bounce(geometry, leg, out, first, last, found)
+    rule = found.rule
+    landed: list[Tubes] = []
+    has_room = tubes.slots < rule.slots - 2
+    tubes = tubes if has_room.all() else tubes.take(has_room)
+    n = len(tubes)
+    flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, rule.layers), -1, np.int32), np.zeros((2, n), np.int8))
+    while len(flight.tubes):
+        flight = _cast_and_subdivide(step, flight, landed)
+    if not landed:
+        return tubes.take(np.zeros(n, bool))
+    weights = [_contribution_bounds(step, t) for t in landed]
+    in_phase, bound, length = np.concatenate(weights, axis=1)
+    return Tubes.join(landed, found.that_count(bound if last else in_phase, length))
+
+
+def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> _Flight:
+    """Cast centre rays, and corner rays where they matter; append to `landed` the tubes that land on one surface.
+
+    Returns: the parts of tubes that were subdivided, and the tubes that go on behind thin layers.
+    """
+    geometry, found, rule, tubes = step.geometry, step.found, step.rule, flight.tubes
+    directions = np.empty_like(tubes.k)
+    parallel_for(
+        len(tubes),
+        lambda rows: reflect_directions(tubes.k[rows], tubes.normals[rows], directions[rows]),
+        _PARALLEL_FROM,
+    )
+    points = on_facets(geometry, tubes) if step.first else tubes.points
+    mid, ahead = geometry.cast(points[:, CENTRE], directions[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
+    matters = _matters(step, tubes, directions, mid, ahead)
+    # Where the centre ray meets nothing no corner is cast: a silhouette edge found below clips such a tube.
+    hit, reach = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
+    one_surface = mid >= 0
+    rows = np.flatnonzero(matters & one_surface)
+    facets, distances = geometry.cast(*corner_rays(rows, points, directions, tubes.facet, flight.start))
+    hit[rows, :3], reach[rows, :3] = facets.reshape(-1, 3), distances.reshape(-1, 3)
+    on_one_surface(rows, hit, geometry.plane, geometry.smooth, geometry.normal, _SAME_PATCH_COSINE, one_surface)
+    side = _edges_within(step, tubes, points, directions, hit, reach, np.flatnonzero(matters))
+    mixed = (~one_surface & (mid >= 0)) | side.any(axis=1)
+    split = found.budget.affords(
+        geometry, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _BUDGET_SHARE
+    )
     ready = np.flatnonzero(~split & (mid >= 0))
-    landed.append(_land(geometry, leg, tubes, ready, way, hit, agree, flight.through, rule))
-    parts, rows = divide(geometry, leg, tubes, np.flatnonzero(split), side, first, rule.jitter)
+    landed.append(_landed_tubes(step, tubes, ready, directions, hit, one_surface, flight.through))
+    parts, rows = subdivide(geometry, step.leg, tubes, np.flatnonzero(split), side, step.first, rule.jitter)
     start = flight.start[rows]
     start[:] = np.where(start > 0, start.max(axis=1, keepdims=True), 0.0)
     cut = _Flight(parts, start, flight.through[rows], flight.count[:, rows] + np.array([[1], [0]], np.int8))
     behind = ready[geometry.is_layer[mid[ready]] & (flight.count[1, ready] < rule.layers)]
-    return _beyond(flight, behind, mid, t, cut) if len(behind) else cut
+    return _with_tubes_behind_layers(flight, behind, mid, reach, cut) if len(behind) else cut
 
 
-def _beyond(flight: _Flight, rows: Rows, mid: Ints, t: Floats, cut: _Flight) -> _Flight:
-    """Return what was cut, and the tubes `rows` behind the thin layers `mid` (n,) that their rays met after t (n, 4)
-    [m]."""
-    start = np.where(np.isfinite(t[rows]), t[rows], t[rows, CENTRE, None]) + 1e-6
+def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: Floats) -> Bools:
+    """Tell which tubes (n,) are worth subdividing: those that may contribute more than the prune threshold.
+
+    Args: mid (n,) facet that the centre ray meets after `ahead` (n,) [m], -1 for none.
+    """
+    geometry, out, found = step.geometry, step.out, step.found
+    in_phase, _, length = _contribution_bounds(step, tubes)
+    if step.last:
+        # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.
+        # Before more mirrors that is not known. Where the centre ray meets nothing a body may still stand beside it.
+        span, length = np.empty((2, len(tubes)))
+        planes = geometry.first, geometry.normal
+        rays = tubes.points, directions, tubes.length
+        phase_at_hits(*rays, mid, ahead, *planes, out.image, out.far, step.rule.wavenumber, span, length)
+        matters = in_phase > found.prune_threshold(length) * (1.0 + 0.5 * span)
+    else:
+        matters = in_phase > found.prune_threshold(length)
+    return np.asarray(matters & (not found.budget.spent(geometry)))
+
+
+def _with_tubes_behind_layers(flight: _Flight, rows: Rows, mid: Ints, reach: Floats, cut: _Flight) -> _Flight:
+    """Return the tubes `cut`, and the tubes `rows` that go on behind the thin layers `mid` (n,) that their rays meet
+    after reach (n, 4) [m]."""
+    start = np.where(np.isfinite(reach[rows]), reach[rows], reach[rows, CENTRE, None]) + _PAST_LAYER
     through, count = flight.through[rows], flight.count[:, rows]
     through[np.arange(len(rows)), count[1]] = mid[rows]
     count[1] += 1
@@ -126,83 +174,76 @@ def _beyond(flight: _Flight, rows: Rows, mid: Ints, t: Floats, cut: _Flight) -> 
     )
 
 
-def _weigh(geometry: Geometry, out: Leg, tubes: Tubes, rule: Refinement) -> Floats:
-    """Return what tubes could scatter over a way, all in phase or as their corners' phases run [1/m], and the length
-    of the whole way [m] (3, n)."""
-    weights = np.empty((3, len(tubes)))
+def _contribution_bounds(step: _Bounce, tubes: Tubes) -> Floats:
+    """Return what tubes could scatter over the leg out, all in phase or as their corners' phases run [1/m], and the
+    length of the two-way path [m] (3, n)."""
+    bounds = np.empty((3, len(tubes)))
+    geometry, out = step.geometry, step.out
     rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.strength, tubes.spread
-    how = out.image, out.far, rule.wavenumber, geometry.dull, *geometry.matter
+    how = out.image, out.far, step.rule.wavenumber, geometry.lossy, *geometry.material_columns
 
     def some(rows: slice) -> None:
-        weigh(*(*(x[rows] for x in rays), *how, *weights[:, rows]))
+        contribution_bounds(*(*(x[rows] for x in rays), *how, *bounds[:, rows]))
 
-    parallel_for(len(tubes), some, _MANY)
-    return weights
+    parallel_for(len(tubes), some, _PARALLEL_FROM)
+    return bounds
 
 
-def _edges(
-    geometry: Geometry, leg: Leg, tubes: Tubes, points: Floats, way: Floats, hit: Ints, t: Floats, rows: Rows
+def _edges_within(
+    step: _Bounce, tubes: Tubes, points: Floats, directions: Floats, hit: Ints, reach: Floats, rows: Rows
 ) -> Floats:
-    """Return the sides (n, 3) of an edge that runs through each of the tubes `rows`; zeros where none does."""
+    """Return signed distances (n, 3) [m] of corners from an edge that runs through each of the tubes `rows`; zeros
+    where none does."""
+    geometry = step.geometry
     flat = tubes.flat & ~geometry.curved[tubes.facet]
     side = np.zeros((len(tubes), 3))
-    rays = points, way, tubes.length
-    around = geometry.extent, geometry.plane, geometry.first_edge, geometry.outline, geometry.first, geometry.normal
+    rays = TubeRays(points, directions, tubes.length, flat, hit, reach)
+    planes = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
+    edges = geometry.first_edge, geometry.plane_edges
 
     def some(part: slice) -> None:
-        edges_within(*(rows[part], *rays, flat, leg.far, hit, t, *around, side))
+        edges_within(rows[part], rays, step.leg.far, geometry.extent, planes, *edges, side)
 
-    parallel_for(len(rows), some, _MANY)
-    between(geometry).across(rows, *rays, leg.far, flat, hit, t, side)
+    parallel_for(len(rows), some, _PARALLEL_FROM)
+    silhouette_crossings_of(geometry).find(rows, rays, step.leg.far, side)
     return side
 
 
-def _land(
-    geometry: Geometry,
-    leg: Leg,
-    tubes: Tubes,
-    rows: Rows,
-    way: Floats,
-    hit: Ints,
-    agree: Bools,
-    through: Ints,
-    rule: Refinement,
+def _landed_tubes(
+    step: _Bounce, tubes: Tubes, rows: Rows, directions: Floats, hit: Ints, one_surface: Bools, through: Ints
 ) -> Tubes:
-    """Return the tubes `rows` put down on the planes of the facets that they hit, or of the centre's where these do not
-    agree, their reflection written into the history."""
-    rows, facet, reach = fates(rows, tubes.points, way, hit, agree, geometry.first, geometry.normal)
+    """Return the tubes `rows` on the planes of the facets that their rays meet, or of the facet that the centre ray
+    meets where these are not of one surface; the reflection is written into their history."""
+    geometry = step.geometry
+    rows, facet, reach = resolve_hits(rows, tubes.points, directions, hit, one_surface, geometry.first, geometry.normal)
     n = len(rows)
-    points, k, normals = np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4, 3))
-    length, (spread, strength) = np.empty((n, 4)), np.empty((2, n))
-    flat, caustics = np.empty(n, bool), np.empty_like(tubes.caustics, shape=n)
-    rays = tubes.points, way, tubes.length, tubes.normals, tubes.facet, tubes.spread, tubes.strength, tubes.flat
+    before = IncidentTubes(
+        tubes.points, directions, tubes.length, tubes.normals, tubes.facet, tubes.spread, tubes.strength, tubes.flat,
+        tubes.caustics,
+    )  # fmt: skip
+    after = LandedTubes(
+        np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4)), np.empty((n, 4, 3)), np.empty(n), np.empty(n),
+        np.empty(n, bool), np.empty_like(tubes.caustics, shape=n),
+    )  # fmt: skip
     f = geometry.facets
-    shape = f.vertices, f.normals, geometry.curved, leg.far, rule.wavenumber, *geometry.matter
-    written = points, k, length, normals, spread, strength, flat, caustics
+    facets = ReflectingFacets(f.vertices, f.normals, geometry.curved, *geometry.material_columns)
 
     def some(part: slice) -> None:
         there = rows[part], facet[part], reach[part]
-        put_down(*(*there, *rays, tubes.caustics, *shape, *(x[part] for x in written)))
+        tubes_at_hits(*there, before, facets, step.leg.far, step.rule.wavenumber, slices(after, part))
 
-    parallel_for(n, some, _MANY)
+    parallel_for(n, some, _PARALLEL_FROM)
     vertex, normal = tubes.points[rows, CENTRE], tubes.normals[rows, CENTRE]
-    after = Tubes(
-        points=points,
-        k=k,
-        length=length,
-        normals=normals,
+    landed = Tubes(
+        **after._asdict(),
         facet=facet[:, CENTRE].copy(),
-        spread=spread,
-        strength=strength,
-        flat=flat,
         bary=np.empty((n, 0, 3)),
         slots=tubes.slots[rows] + np.int8(1),
         bounces=tubes.bounces[rows] + np.int8(1),
-        caustics=caustics,
         last=tubes.history.append(tubes.last[rows], vertex, normal, tubes.facet[rows], REFLECT),
         history=tubes.history,
     )
     passed = through[rows]
     if (passed >= 0).any():
-        write_layers(geometry, after, vertex, k[:, CENTRE], passed, rule)
-    return after
+        write_layers(geometry, landed, vertex, after.k[:, CENTRE], passed, step.rule)
+    return landed

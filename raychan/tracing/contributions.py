@@ -7,18 +7,19 @@ from numpy.typing import NDArray
 
 from raychan.em.phase_integral import quadratic_means
 from raychan.parallel import parallel_for
-from raychan.tracing.tubes import Phases, Refinement
+from raychan.tracing.tube_phases import Phases
+from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_MANY = 4096  # tubes; to prune fewer saves nothing
-_THREADS = 1000  # tubes from which on a second thread pays
+_MANY = 4096  # tubes from which on pruning pays; not measured
+_THREADS = 1000  # tubes from which on a second thread pays; not measured
 _NOTHING = 1e-100  # 1/m
-_DEPTH = 1e-2  # of the strongest cell: weaker ones are no finer than such a one, should there be no noise
-_SHARE = 0.3  # of the prune threshold: what all pruned tubes of a cell may add up to in phase
+_DEPTH = 1e-2  # of the strongest cell: without noise weaker cells are refined as if they held this; not measured
+_SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; not measured
 
 
 class Budget:
@@ -28,23 +29,24 @@ class Budget:
         self.rule = rule
         self._tubes, self._cuts, self._rays = 0, 0.0, -1
         self.uncut = np.zeros(0, np.int64)
-        """Tubes (bodies,) that budgets kept from being cut."""
+        """Tubes (bodies,) that budgets kept from being subdivided."""
 
     def affords_phase(self, geometry: Geometry, facet: Ints, wanted: Bools) -> Bools:
-        """Return which tubes (n,) on facets (n,) may be cut for their phase: none once there are `rule.max_tubes`."""
+        """Return which tubes (n,) on facets (n,) may be bisected for their phase: none once there are
+        `rule.max_tubes`."""
         self._tubes += len(wanted)
         return self._within(geometry, facet, wanted, self._tubes > self.rule.max_tubes)
 
     def affords(self, geometry: Geometry, facet: Ints, wanted: Bools, weight: float = 1.0) -> Bools:
-        """Return which tubes (n,) may be cut for what hides parts of them: none once `rule.max_cuts` are made, each
-        counted by its weight, or `rule.max_rays` cast by this launch."""
+        """Return which tubes (n,) may be subdivided for visibility: none once `rule.max_cuts` are made, each counted by
+        its weight, or `rule.max_rays` cast by this launch."""
         rest = 0.0 if self.spent(geometry) else (self.rule.max_cuts - self._cuts) / weight
         self._cuts += weight * np.count_nonzero(wanted)
         within = wanted & (np.cumsum(wanted) <= rest)
         return within | self._within(geometry, facet, wanted & ~within, True)
 
     def spent(self, geometry: Geometry) -> bool:
-        """Tell whether nothing may be cut any more for what hides it."""
+        """Tell whether the budgets for visibility are spent."""
         if self._rays < 0:
             self._rays = geometry.rays
         return self._cuts > self.rule.max_cuts or geometry.rays - self._rays > self.rule.max_rays
@@ -55,7 +57,7 @@ class Budget:
         bodies = geometry.facets.body[facet[wanted]]
         count = np.bincount(bodies, minlength=max(len(geometry.facets.role), len(self.uncut)))
         self.uncut = count + np.pad(self.uncut, (0, len(count) - len(self.uncut)))
-        geometry.uncut += int(np.count_nonzero(wanted))
+        geometry.count_uncut(int(np.count_nonzero(wanted)))
         return np.zeros_like(wanted)
 
 
@@ -87,17 +89,17 @@ class Contributions:
         return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * level)
 
     def add(self, ph: Phases) -> None:
-        """Count tubes that are seen: in each cell the scalar sum of all, or their rms sum where that cancels."""
+        """Add tubes that are seen: in each cell the sum of their amplitudes, or their rms sum where that cancels."""
         if not len(ph.six):
             return
         each = np.empty(len(ph.six), complex)
 
         def some(rows: slice) -> None:
-            each[rows] = ph.area[rows] * quadratic_means(ph.six[rows], 0.5)
+            each[rows] = ph.in_phase[rows] * quadratic_means(ph.six[rows], 0.5)
 
         parallel_for(len(each), some, _THREADS)
         cell = self._cell(ph.length)
-        # A cell more at the end, which stays empty, for all that is longer.
+        # One more cell at the end, which stays empty, for all longer paths.
         n = max(len(self._level), int(cell.max()) + 3)
         whole = np.hypot(np.bincount(cell, each.real, n), np.bincount(cell, each.imag, n))
         size = np.maximum(whole, np.sqrt(np.bincount(cell, np.abs(each) ** 2, n)))

@@ -1,10 +1,14 @@
-"""Seeds: the facets that could be met over a leg; clusters of them that all turn away are passed over whole, and so are
-those out of a mirror's reach, behind a wall or a solid body, or where the antenna does not look."""
+"""Culling: which facets a leg may light at all.
+
+Facets are dropped by clusters of neighbours, each with a bounding sphere and a normal cone: clusters that turn away,
+that no ray over the leg's mirror reaches, that an occluder (a wall or a solid body) hides, or that lie outside the
+antenna's beam.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +16,7 @@ from numpy.typing import NDArray
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
 from raychan.poses import sizes
+from raychan.tracing.cache import cache_of
 from raychan.tracing.edge_crossings import dot
 from raychan.tracing.legs import Leg
 from raychan.tracing.occluders import Occluders
@@ -21,39 +26,67 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_MANY = 1000  # clusters from which on a second thread pays
-_WIDE = 1e-6  # rad: rounding must not hide what grazes
+_PARALLEL_FROM = 1000  # clusters from which on a second thread pays; not measured
+_ROUNDING = 1e-6  # rad: what grazes within it is kept
+
+
+class _Clusters(NamedTuple):
+    """Clusters of facets: which are wanted (k,), their bodies (k,), which hold facets that are lit from both sides
+    (k,), bounding spheres, centre (k, 3) and radius (k,) [m], and normal cones, axis (k, 3) and half angle (k,)
+    [rad]."""
+
+    wanted: Bools
+    body: Ints
+    both_sides: Bools
+    centre: Floats
+    radius: Floats
+    axis: Floats
+    half_angle: Floats
+
+
+class _Source(NamedTuple):
+    """Where rays come from: the image (3,) [m] (a unit direction when far), and, if mirrored, the last mirror: a point
+    on it, its normal, and the centre and radius [m] of a sphere about it."""
+
+    image: Floats
+    far: bool
+    mirrored: bool
+    point: Floats
+    normal: Floats
+    centre: Floats
+    radius: float
 
 
 def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
-    """Return the facets of pieces (p,) that could be met over a leg, in order."""
+    """Return the facets (n,) that a leg may light, in order, of those pieces (p,) that are wanted."""
     f = geometry.facets
     if not len(f.body) or not pieces.any():
         return np.zeros(0, np.int32)
-    c, screens = geometry.clusters, _screens(geometry)
-    walls, balls = screens.over(leg), screens.within(leg)
+    c = geometry.clusters
+    occluders = cache_of(geometry).single("occluders", lambda: Occluders(geometry))
+    walls, spheres = occluders.walls_over(leg), occluders.spheres_over(leg)
     mirror = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
     if leg.mirrors and not leg.far:
         m = leg.mirrors[-1]
         mirror = m.point, m.normal, m.centre, m.radius
     image = np.asarray(leg.image, float)
-    way = image, leg.far, bool(leg.mirrors) and not leg.far, *mirror
+    source = _Source(image, leg.far, bool(leg.mirrors) and not leg.far, *mirror)
     lead = c.order[c.first[:-1]]
     of, sides, piece = f.body[lead], geometry.scene_topology.cluster_sides, geometry.scene_topology.cluster_piece
-    # Of clusters of several pieces each facet is asked later.
+    # Of clusters of several pieces each facet is tested below.
     wanted = pieces[piece] | (piece < 0)
     alive = np.zeros(len(lead), np.bool_)
 
     def some(rows: slice) -> None:
-        hull = c.centre[rows], c.radius[rows], c.axis[rows], c.spread[rows]
-        about = wanted[rows], of[rows], sides[rows], *hull
-        _alive(*(*about, *way, *walls, *balls, alive[rows]))
+        bounds = c.centre[rows], c.radius[rows], c.axis[rows], c.half_angle[rows]
+        clusters = _Clusters(wanted[rows], of[rows], sides[rows], *bounds)
+        _may_be_lit(clusters, source, walls, spheres, alive[rows])
 
-    parallel_for(len(lead), some, _MANY)
+    parallel_for(len(lead), some, _PARALLEL_FROM)
     left = np.flatnonzero(alive)
     left = left[~leg.outside_beam(c.centre[left], c.radius[left])]
     shape = f.vertices, f.normals, geometry.area, geometry.both_sides
-    rows = np.sort(_lit(left, c.order, c.first, *shape, image, leg.far))
+    rows = np.sort(_lit_facets(left, c.order, c.first, *shape, image, leg.far))
     if not pieces.all():
         rows = rows[pieces[geometry.piece[rows]]]
     if leg.mirrors:
@@ -61,13 +94,6 @@ def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
         middle = v.mean(axis=1)
         rows = rows[leg.may_reach(middle, sizes(v - middle[:, None]).max(axis=1))]
     return rows
-
-
-def _screens(geometry: Geometry) -> Any:
-    with geometry.making:
-        if geometry.screens is None:
-            geometry.screens = Occluders(geometry)
-    return geometry.screens
 
 
 @njit(cache=True, forceinline=True)
@@ -78,101 +104,104 @@ def _angle(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _half(radius, distance):  # type: ignore[no-untyped-def]
-    """Return half the angle [rad] under which a ball is seen; pi from within."""
+def _half_width(radius, distance):  # type: ignore[no-untyped-def]
+    """Return half the angle [rad] under which a sphere is seen; pi from within."""
     return math.asin(radius / distance) if radius < distance else math.pi
 
 
 @njit(cache=True, forceinline=True)
-def _over(centre, radius, d, image, point, normal, middle, reach, work):  # type: ignore[no-untyped-def]
-    """Tell whether something in a ball, at d from the image, could be met over a mirror within a ball about middle."""
+def _reached_over_mirror(centre, radius, d, source, work):  # type: ignore[no-untyped-def]
+    """Tell whether a ray over the source's mirror may reach a sphere whose centre lies at d (3,) [m] from the image."""
     height = 0.0
     for c in range(3):
-        height += (centre[c] - point[c]) * normal[c]
-        work[c] = middle[c] - image[c]
-    # A facet in the ball has a ball of its own, of up to twice the radius, that may lie across.
+        height += (centre[c] - source.point[c]) * source.normal[c]
+        work[c] = source.centre[c] - source.image[c]
+    # A facet in the sphere has a sphere of its own, of up to twice the radius, that may lie across.
     if height < -3.0 * radius:
         return False
-    widest = _half(reach + 2.0 * radius, math.sqrt(dot(work, work))) + _half(radius, math.sqrt(dot(d, d)))
-    return _angle(work, d) <= widest + _WIDE
+    widest = _half_width(source.radius + 2.0 * radius, math.sqrt(dot(work, work)))
+    widest += _half_width(radius, math.sqrt(dot(d, d)))
+    return _angle(work, d) <= widest + _ROUNDING
 
 
 @njit(cache=True, forceinline=True)
-def _hidden(centre, radius, body, point, normal, owner, first, edge, inward):  # type: ignore[no-untyped-def]
-    """Tell whether a wall of another body hides a ball: it lies behind, within the planes through the wall's edges."""
-    for w in range(len(owner)):
-        if owner[w] == body:
+def _behind_wall(centre, radius, body, walls):  # type: ignore[no-untyped-def]
+    """Tell whether a wall of another body hides a sphere: it lies behind, within the planes through the wall's
+    edges."""
+    for w in range(len(walls.body)):
+        if walls.body[w] == body:
             continue
         depth = 0.0
         for c in range(3):
-            depth -= (centre[c] - point[w, c]) * normal[w, c]
+            depth -= (centre[c] - walls.point[w, c]) * walls.normal[w, c]
         hides = depth > radius
-        for e in range(first[w], first[w + 1]):
+        for e in range(walls.first[w], walls.first[w + 1]):
             if not hides:
                 break
-            within = 0.0
+            inside = 0.0
             for c in range(3):
-                within += (centre[c] - edge[e, c]) * inward[e, c]
-            hides = within > radius
+                inside += (centre[c] - walls.edge[e, c]) * walls.inward[e, c]
+            hides = inside > radius
         if hides:
             return True
     return False
 
 
 @njit(cache=True, forceinline=True)
-def _eclipsed(centre, radius, body, image, far, core, size, owner):  # type: ignore[no-untyped-def]
-    """Tell whether a ball lies wholly in the shadow of a core of another body: within its cone or, from far, cylinder,
-    and behind where rays enter the core."""
-    for w in range(len(owner)):
-        if owner[w] == body or (far and radius >= size[w]):
+def _eclipsed(centre, radius, body, image, far, spheres):  # type: ignore[no-untyped-def]
+    """Tell whether a sphere lies wholly in the shadow of a sphere inside another body: within its cone or, from far,
+    cylinder, and behind where rays enter it."""
+    for w in range(len(spheres.body)):
+        size = spheres.radius[w]
+        if spheres.body[w] == body or (far and radius >= size):
             continue
         along, here, there = 0.0, 0.0, 0.0
         for c in range(3):
-            a = core[w, c] - (centre[c] if far else image[c])
+            a = spheres.centre[w, c] - (centre[c] if far else image[c])
             b = image[c] if far else centre[c] - image[c]
             along, here, there = along + a * b, here + a * a, there + b * b
         if far:
-            # The image is the direction towards the end: a core nearer to it lies higher.
-            if along > radius and here - along * along < (size[w] - radius) ** 2:
+            # The image is the direction towards the end: a sphere nearer to it lies higher.
+            if along > radius and here - along * along < (size - radius) ** 2:
                 return True
             continue
-        # Rays enter the core nearer than where they touch it.
-        rim, apart = here - size[w] * size[w], math.sqrt(there)
+        # Rays enter the sphere nearer than where they touch it.
+        rim, apart = here - size * size, math.sqrt(there)
         if rim <= 0.0 or apart <= radius or (apart - radius) ** 2 <= rim:
             continue
         off = math.acos(min(max(along / math.sqrt(here * there), -1.0), 1.0))
-        if off + _half(radius, apart) < _half(size[w], math.sqrt(here)) - _WIDE:
+        if off + _half_width(radius, apart) < _half_width(size, math.sqrt(here)) - _ROUNDING:
             return True
     return False
 
 
 @njit(cache=True, nogil=True)
-def _alive(  # type: ignore[no-untyped-def]
-    wanted, body, is_open, centre, radius, axis, spread, image, far, mirrored, at, normal, middle, reach, walls,
-    normals, owners, begins, edges, inwards, touch, inner_spheres, sizes, solids, out,
-):  # fmt: skip
-    """Tell of clusters (k,), each with a ball and a cone of normals, which may hold a facet that could be met."""
+def _may_be_lit(clusters, source, walls, spheres, out):  # type: ignore[no-untyped-def]
+    """Write which clusters (k,) may hold a facet that the source lights; named tuples as their types say."""
     d, work = np.empty(3), np.empty(3)
-    for i in range(len(radius)):
-        if not wanted[i]:
+    image, far = source.image, source.far
+    for i in range(len(clusters.radius)):
+        if not clusters.wanted[i]:
             continue
+        centre, radius = clusters.centre[i], clusters.radius[i]
         for c in range(3):
-            d[c] = -image[c] if far else centre[i, c] - image[c]
-        if not is_open[i]:
-            around = 0.0 if far else _half(radius[i], math.sqrt(dot(d, d)))
-            if _angle(d, axis[i]) + spread[i] + around < 0.5 * math.pi - _WIDE:
+            d[c] = -image[c] if far else centre[c] - image[c]
+        if not clusters.both_sides[i]:
+            around = 0.0 if far else _half_width(radius, math.sqrt(dot(d, d)))
+            if _angle(d, clusters.axis[i]) + clusters.half_angle[i] + around < 0.5 * math.pi - _ROUNDING:
                 continue
-        if mirrored and not _over(centre[i], radius[i], d, image, at, normal, middle, reach, work):
+        if source.mirrored and not _reached_over_mirror(centre, radius, d, source, work):
             continue
-        swell = 1.001 * radius[i] + touch
-        if _hidden(centre[i], swell, body[i], walls, normals, owners, begins, edges, inwards):
+        swell = 1.001 * radius + walls.touch
+        if _behind_wall(centre, swell, clusters.body[i], walls):
             continue
-        out[i] = not _eclipsed(centre[i], swell, body[i], image, far, inner_spheres, sizes, solids)
+        out[i] = not _eclipsed(centre, swell, clusters.body[i], image, far, spheres)
 
 
 @njit(cache=True, nogil=True)
-def _lit(clusters, order, first, v, n, area, is_open, image, far):  # type: ignore[no-untyped-def]
-    """Return the facets of clusters that face the image at a corner at least, or are open, in no order."""
+def _lit_facets(clusters, order, first, v, n, area, is_open, image, far):  # type: ignore[no-untyped-def]
+    """Return the facets of clusters that face the image at one corner or more, or are lit from both sides, in no
+    order."""
     total = 0
     for i in clusters:
         total += first[i + 1] - first[i]

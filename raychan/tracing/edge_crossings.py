@@ -1,20 +1,48 @@
-"""Edges: which edge of the surfaces runs through a tube, so that the tube can be cut exactly there."""
+"""Where edges of surfaces cross tubes, so that a tube can be clipped exactly there (numba kernels).
+
+The rays of a tube come from a source: a point, or a direction. With the source an edge spans a plane; where that plane
+parts the corners of the tube and the edge passes through the pyramid of its rays, the tube is clipped along it.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import copy_to
 
-_MANY = 64  # edges around a plane beyond which halving is cheaper than looking at each
-_INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not cut it
+_MOST_EDGES = 64  # around a plane: beyond, bisecting the tube is taken to be cheaper than testing each; not measured
+_INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not clip it; not measured
+
+
+class TubeRays(NamedTuple):
+    """Rays of tubes that leave a mirror: points (n, 4, 3) [m] corners and centre; directions (n, 4, 3); length (n, 4)
+    [m] back to the image source; flat (n,) whether all mirrors so far were planes, so that there is one; hit (n, 4)
+    facet on which each ray lands, -1 for none, after reach (n, 4) [m]."""
+
+    points: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    length: NDArray[np.float64]
+    flat: NDArray[np.bool_]
+    hit: NDArray[np.int32]
+    reach: NDArray[np.float64]
+
+
+class FacetPlanes(NamedTuple):
+    """Of each facet: the number of its plane (f,), a point on it (f, 3) [m] and its normal (f, 3)."""
+
+    number: NDArray[np.int32]
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]
 
 
 @njit(cache=True, forceinline=True)
 def dot(a, b):  # type: ignore[no-untyped-def]
+    """Return a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -73,8 +101,8 @@ def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped
 
 @njit(cache=True, forceinline=True)
 def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
-    """Write into side (3,) the corners' distances from the plane through the image and segment ab; return whether that
-    parts them."""
+    """Write into side (3,) the signed distances [m] of the corners from the plane through the image and segment ab;
+    return whether the plane parts them."""
     x, y, z = _normal(a, b, image, k, far)
     size = math.sqrt(x * x + y * y + z * z)
     if size == 0.0:
@@ -88,12 +116,13 @@ def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def size_of(a, b):  # type: ignore[no-untyped-def]
+    """Return the length of segment ab [m]."""
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
 @njit(cache=True, forceinline=True)
 def above(ha, hb):  # type: ignore[no-untyped-def]
-    """Return the part (0 to 1) of a segment whose ends have heights ha, hb that lies above zero; equal: none."""
+    """Return from where to where (0 to 1) a segment whose ends have heights ha, hb lies above zero; equal: nowhere."""
     if ha <= 0.0 and hb <= 0.0:
         return 0.0, 0.0
     if ha <= 0.0:
@@ -103,16 +132,16 @@ def above(ha, hb):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _height(a, p, n):  # type: ignore[no-untyped-def]
-    """Return how far a lies before the plane through p of normal n [m]."""
+    """Return the height [m] of a over the plane through p of normal n."""
     return (a[0] - p[0]) * n[0] + (a[1] - p[1]) * n[1] + (a[2] - p[2]) * n[2]
 
 
 @njit(cache=True)
-def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type: ignore[no-untyped-def]
-    """Write into side (3,) the corners' distances from the plane through the source and the line where two planes meet.
+def _two_planes(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances [m] from the plane through the source and the line in which two
+    planes meet: where bodies run into each other, no edge is drawn there.
 
-    Returns whether it parts the rays that land on plane a from those that land on plane b (bodies that
-    run into each other have no edge there).
+    Returns: whether it parts the rays that land on plane a from those that land on plane b.
     """
     c1 = dot(k, n1) if far else _height(source, p1, n1)
     c2 = dot(k, n2) if far else _height(source, p2, n2)
@@ -137,7 +166,7 @@ def _between(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type
 
 @njit(cache=True)
 def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side, work):  # type: ignore[no-untyped-def]
-    """Write into side (3,) the corners' distances from a line where two of the planes that the rays met meet."""
+    """Write into side (3,) the corners' distances [m] from a line in which two of the planes that the rays hit meet."""
     for r in range(3):
         a, b = plane[r], plane[r + 1]
         if a < 0 or b < 0 or a == b:
@@ -145,15 +174,15 @@ def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side
         fa, fb = facet[r], facet[r + 1]
         pa, na = (first[fa], normal[fa]) if fa >= 0 else (points[3], own)
         pb, nb = (first[fb], normal[fb]) if fb >= 0 else (points[3], own)
-        if _between(points, source, k, far, plane, pa, na, pb, nb, a, b, work):
+        if _two_planes(points, source, k, far, plane, pa, na, pb, nb, a, b, work):
             copy_to(side, work)
             break
 
 
 @njit(cache=True, nogil=True)
 def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side):  # type: ignore[no-untyped-def]
-    """Fill in rows of side (n, 3) that are zero: the line where two of the planes that a tube's rays met run into
-    each other.
+    """Fill in the rows of side (n, 3) that are zero: distances [m] of corners from the line in which two of the planes
+    that a tube's rays hit meet.
 
     Args: points (n, 4, 3) [m] corners and centre; source (n, 3) [m] where the rays come from, or k (n, 3) their
     direction when far; plane (n, 4) where each ray lands (-1: nowhere); facet (n, 4) met by each ray, -1 for the tube's
@@ -166,17 +195,17 @@ def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side
 
 
 @njit(cache=True, forceinline=True)
-def _longest(corners, source, k, far, plane, first_edge, outline, planes, side, work):  # type: ignore[no-untyped-def]
-    """Write into side (3,), if there is one, the distances of the corners from the edge of which the longest part lies
-    inside a tube; return whether there is."""
+def _longest(corners, source, k, far, plane, first_edge, edges, planes, side, work):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the distances [m] of the corners from the edge of which the longest part lies inside a tube;
+    return whether there is one."""
     here = pyramid(corners, source, k, far, planes)
     best = 0.0
     for r in range(4):
         g = plane[r]
-        if g < 0 or (r > 0 and g == plane[r - 1]) or first_edge[g + 1] - first_edge[g] > _MANY:
+        if g < 0 or (r > 0 and g == plane[r - 1]) or first_edge[g + 1] - first_edge[g] > _MOST_EDGES:
             continue
         for e in range(first_edge[g], first_edge[g + 1]):
-            a, b = outline[e, 0], outline[e, 1]
+            a, b = edges[e, 0], edges[e, 1]
             da, db = 0.0, 0.0
             for c in range(3):
                 da += (a[c] - corners[3, c]) * k[c]
@@ -194,30 +223,28 @@ def _longest(corners, source, k, far, plane, first_edge, outline, planes, side, 
 
 
 @njit(cache=True, nogil=True)
-def edges_within(  # type: ignore[no-untyped-def]
-    rows, points, ways, length, flat, far, hit, reach, extent, plane, first_edge, outline, first, normal, side
-):  # fmt: skip
-    """Write into rows of side (n, 3) signed distances [m] of a tube's corners from the plane through its source and an
-    edge inside it: of those around the planes that were hit the one of which the longest part lies inside, or else the
-    line where two of these planes meet.
+def edges_within(rows, rays, far, extent, planes, first_edge, edges, side):  # type: ignore[no-untyped-def]
+    """Write into rows of side (n, 3) the signed distances [m] of a tube's corners from the plane through its source and
+    an edge inside it: of the edges around the planes that its rays hit the one of which the longest part lies inside,
+    or else the line in which two of these planes meet.
 
-    Args: rows (m,) of the tubes to look at; points, ways (n, 4, 3) corners and centre [m], and directions; length
-    (n, 4) [m] so far; flat (n,) whether rays come from one point, or one direction if far; hit, reach (n, 4) facet on
-    which each ray lands, -1 for none (so far as `extent` [m]), and after how far; plane, first, normal of facets.
+    Args: rows (m,) of the tubes to test; rays as `TubeRays`; far whether the source is a direction; extent [m] reach of
+    rays that hit nothing; planes as `FacetPlanes`; edges[first_edge[g] : first_edge[g + 1]] (e, 2, 3) [m] around plane
+    g.
     """
     at, source, landed = np.empty((4, 3)), np.empty(3), np.empty(4, np.int32)
-    planes, work = np.empty((3, 3)), np.empty(3)
+    sides, work = np.empty((3, 3)), np.empty(3)
     for i in rows:
-        k = ways[i, 3]
-        t = reach[i, 3] if hit[i, 3] >= 0 else extent
-        parallel = far or not flat[i]
+        points, k, hit = rays.points[i], rays.directions[i, 3], rays.hit[i]
+        t = rays.reach[i, 3] if hit[3] >= 0 else extent
+        parallel = far or not rays.flat[i]
         for c in range(3):
-            source[c] = points[i, 3, c] - length[i, 3] * k[c]
+            source[c] = points[3, c] - rays.length[i, 3] * k[c]
         for q in range(4):
-            landed[q] = plane[hit[i, q]] if hit[i, q] >= 0 else -1
+            landed[q] = planes.number[hit[q]] if hit[q] >= 0 else -1
             for c in range(3):
                 # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the
                 # section that the tube has where it lands.
-                at[q, c] = points[i, q, c] + (0.0 if flat[i] else t * (ways[i, q, c] - k[c]))
-        if not _longest(at, source, k, parallel, landed, first_edge, outline, planes, side[i], work):
-            _meeting_line(at, source, k, parallel, landed, hit[i], first, normal, k, side[i], work)
+                at[q, c] = points[q, c] + (0.0 if rays.flat[i] else t * (rays.directions[i, q, c] - k[c]))
+        if not _longest(at, source, k, parallel, landed, first_edge, edges, sides, side[i], work):
+            _meeting_line(at, source, k, parallel, landed, hit, planes.point, planes.normal, k, side[i], work)

@@ -1,4 +1,5 @@
-"""How a tube's footprint weighs from corner to corner: obliquity, spreading, and the area of the true surface."""
+"""Footprints: lengths at six points of each, and how obliquity, spreading and the curved surface's area vary over it
+(numba kernels)."""
 
 from __future__ import annotations
 
@@ -11,9 +12,10 @@ from raychan.compile.jit import njit
 
 @njit(cache=True, forceinline=True)
 def element_of(v, b, w, out):  # type: ignore[no-untyped-def]
-    """Write the vector [m^2] normal to the true surface at w (3,): its area for a unit of the last two coordinates.
+    """Write the vector element of area (3,) [m^2] of the curved surface at barycentric w (3,): the cross product of its
+    derivatives by the last two coordinates.
 
-    Args: v (3, 3) [m] corners, b (3, 3) [m] bulges of the edges (Nagata 2005, eq. 10).
+    Args: v (3, 3) [m] corners, b (3, 3) [m] edge curvatures (Nagata 2005, eq. 10).
     """
     for c in range(3):
         d, e = (c + 1) % 3, (c + 2) % 3
@@ -26,6 +28,7 @@ def element_of(v, b, w, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _mean_cosine(normal, k, back):  # type: ignore[no-untyped-def]
+    """Return the mean of the cosines of incidence from both ends, waves travelling along k and back (3,)."""
     total = 0.0
     for c in range(3):
         total -= 0.5 * normal[c] * (k[c] + back[c])
@@ -53,7 +56,8 @@ def _back(p, image, far, k):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _share(w):  # type: ignore[no-untyped-def]
-    """Return the share of its facet that a patch of corners w (3, 3) takes, below 0 where it runs the other way."""
+    """Return the share of its facet that a patch of corners w (3, 3) takes, below 0 where it runs the other way
+    round."""
     share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
     share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
     return share + w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
@@ -61,15 +65,15 @@ def _share(w):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignore[no-untyped-def]
-    """Write how tubes stand on their footprints.
+    """Write the footprints of tubes.
 
     Args: tubes: points, k, normals (n, 4, 3), length (n, 4), facet (n,), bary (n, 3, 3),
     or (n, 0, 3) once they left their first facet and all are flat; middle (n, 3, 3) [m] of the
     edges and length there half_way (n, 3) [m]; facets: normal (f, 3),
-    vertices and bulge (f, 3, 3), curved (f,); image of the way out's end, or the direction to it when far; out: points
-    (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): the mean obliquity times spreading
-    at corners over that at the centre, for areas of the flat footprints, zero beyond the terminator; area (n,) and
-    length (n,) of the way out.
+    vertices and edge curvature (f, 3, 3), curved (f,); image of the end of the leg out, or the direction to it when
+    far; out: points (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): the mean
+    obliquity times spreading at corners over that at the centre, for areas of the flat footprints, zero beyond the
+    terminator; area (n,) and length (n,) [m] of the leg out.
     """
     points, k, normals, length, facet, bary = tubes
     facing, vertices, edge_curvature, curved = facets
@@ -108,7 +112,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
                 if side < 0.0:
                     strength = -strength
             else:
-                # Where the true surface turns away from the flat one there is more of it.
+                # Where the curved surface turns away from the flat footprint it has more area.
                 turned = 0.0
                 for c in range(3):
                     turned += normals[i, j, c] * flat[c] / least
@@ -120,17 +124,18 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
 
 
 @njit(cache=True, forceinline=True)
-def _toward(p, image, far):  # type: ignore[no-untyped-def]
+def _distance(p, image, far):  # type: ignore[no-untyped-def]
+    """Return the distance [m] from p (3,) to an image, 1 when far."""
     return 1.0 if far else math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
 
 
 @njit(cache=True, nogil=True)
 def elements(points, normals, facet, bary, vertices, edge_curvature, curved, image, out_image, far, out):  # type: ignore[no-untyped-def]
     """Write the vector elements of area (n, 3, 3) [m^2] of first tubes at their corners, on the lit side: the mean of
-    the three is the tube's, weighed by both ends' spreading there over that at the centre.
+    the three is the tube's, weighted by both ends' spreading there over that at the centre.
 
-    Args: points, normals (n, 4, 3), facet (n,), bary (n, 3, 3) of the tubes; vertices, bulge (f, 3, 3), curved (f,) of
-    facets; images of both ends [m], or directions to them when far.
+    Args: points, normals (n, 4, 3), facet (n,), bary (n, 3, 3) of the tubes; vertices, edge curvature (f, 3, 3),
+    curved (f,) of facets; images of both ends [m], or directions to them when far.
     """
     one = np.empty(3)
     for i in range(len(facet)):
@@ -138,10 +143,10 @@ def elements(points, normals, facet, bary, vertices, edge_curvature, curved, ima
         share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
         share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
         share += w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
-        centre = _toward(points[i, 3], image, far) * _toward(points[i, 3], out_image, far)
+        centre = _distance(points[i, 3], image, far) * _distance(points[i, 3], out_image, far)
         p, q, r = points[i, 0], points[i, 1], points[i, 2]
         for j in range(3):
-            size = 0.5 * centre / (_toward(points[i, j], image, far) * _toward(points[i, j], out_image, far))
+            size = 0.5 * centre / (_distance(points[i, j], image, far) * _distance(points[i, j], out_image, far))
             if curved[f]:
                 element_of(vertices[f], edge_curvature[f], w[j], one)
                 size *= share

@@ -1,4 +1,4 @@
-"""History: what the tubes of one launch met on their way, each vertex a row that points to the one before."""
+"""The interactions that tubes of one launch met so far: a table in which each row points to the one before it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FIRST = 1000  # rows; they double when full
 
 
 class History:
-    """Rows of vertices shared by tubes that were cut from each other, so that cutting copies none of them."""
+    """Rows of vertices that tubes share with the tubes they were cut from, so that subdividing copies none of them."""
 
     def __init__(self) -> None:
         self._used = 0
@@ -48,8 +48,8 @@ class History:
             facet[rows] = np.where(self._kind[here] == kind, self._facet[here], -1)
             at[rows] = self._before[here]
 
-    def veiled(self, last: Ints) -> NDArray[np.bool_]:
-        """Tell of which rows `last` (n,) the vertex before the newest reflection is a layer passed."""
+    def behind_layer(self, last: Ints) -> NDArray[np.bool_]:
+        """Tell for which rows `last` (n,) the vertex before the newest reflection is a layer that was passed."""
         at = last.copy()
         while True:
             rows = np.flatnonzero(at >= 0)

@@ -1,4 +1,5 @@
-"""Horizon: which currents of tubes on their last surface still radiate to an end, facing it or not (numba loops)."""
+"""The horizon: which currents on a tube's last surface radiate to an end, whether the surface faces it or not (numba
+kernel)."""
 
 from __future__ import annotations
 
@@ -9,12 +10,13 @@ import numpy as np
 from raychan.compile.jit import njit
 
 FACING, OBLIQUE, LIT = 0, 1, 2
-"""Tubes that radiate: those that face the end; those too whose reflected wave does; all that are lit."""
+"""Which tubes radiate: those that face the end; also those whose reflected wave reaches beyond the horizon; all that
+are lit."""
 
 
 @njit(cache=True, nogil=True)
 def radiating(points, k, normals, image, far, which):  # type: ignore[no-untyped-def]
-    """Return how much of the obliquity cos_i of tubes (n,) is left towards an end, 0 where nothing is to be sent, and
+    """Return what share of the obliquity cos_i of tubes (n,) is left towards an end, 0 where they do not radiate, and
     whether they face it.
 
     Args: points, k, normals (n, 4, 3) of arriving tubes, the centre last; image (3,) [m] of the end, or the direction

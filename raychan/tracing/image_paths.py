@@ -1,7 +1,7 @@
-"""Chains: the way from an end over plane mirrors to a place (numba loops).
+"""The image method: paths from an end over plane mirrors to points (numba kernels).
 
-Everywhere: images (m + 1, 3) [m] of the end, itself first (unit directions when far), at, normal (m, 3) of the mirrors'
-planes, centre (m, 3) and radius (m,) [m] of the circles that hold them, the end's side first.
+Everywhere: images (m + 1, 3) [m] of the end, itself first (unit directions when far); at, normal (m, 3) a point and the
+normal of each mirror's plane; centre (m, 3) and radius (m,) [m] of the circles about the mirrors; the end's side first.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from raychan.radar.beam_kernels import field_towards
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def _onto(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
-    """Return where the way from a place to an image meets the mirror's plane; the place itself if it never does."""
+def _mirror_point(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
+    """Return where the line from a point to an image meets the mirror's plane; the point itself if it never does."""
     dx, dy, dz = image[0] - x, image[1] - y, image[2] - z
     over = (at[0] - x) * normal[0] + (at[1] - y) * normal[1] + (at[2] - z) * normal[2]
     t = over / (dx * normal[0] + dy * normal[1] + dz * normal[2])
@@ -27,8 +27,8 @@ def _onto(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _possible(point, size, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
-    """Tell whether a ball could be met: in front of the last mirror, and by way of each mirror's circle."""
+def _may_reach(point, size, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
+    """Tell whether a ray may reach a sphere: in front of the last mirror, over the circle about each mirror."""
     m = len(at)
     if m == 0:
         return True
@@ -39,8 +39,8 @@ def _possible(point, size, images, at, normal, centre, radius):  # type: ignore[
         return False
     x, y, z = point[0], point[1], point[2]
     for i in range(m - 1, -1, -1):
-        x, y, z = _onto(x, y, z, images[i + 1], at[i], normal[i])
-        # A ray to the ball's rim meets a mirror nearer to the ray to its centre than the ball's radius.
+        x, y, z = _mirror_point(x, y, z, images[i + 1], at[i], normal[i])
+        # A ray to any point of the sphere meets a mirror nearer to the ray to its centre than the sphere's radius.
         off = math.sqrt((x - centre[i, 0]) ** 2 + (y - centre[i, 1]) ** 2 + (z - centre[i, 2]) ** 2)
         if not off < radius[i] + size:
             return False
@@ -48,45 +48,45 @@ def _possible(point, size, images, at, normal, centre, radius):  # type: ignore[
 
 
 @njit(cache=True, nogil=True)
-def possible(points, size, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
-    """Return which balls about points (n, 3) of radius size (n,) [m] could be met over the chain."""
+def may_reach(points, size, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
+    """Tell which spheres (n,) about points (n, 3) of radius size (n,) [m] rays over the mirrors may reach."""
     ok = np.empty(len(points), np.bool_)
     for i in range(len(points)):
-        ok[i] = _possible(points[i], size[i], images, at, normal, centre, radius)
+        ok[i] = _may_reach(points[i], size[i], images, at, normal, centre, radius)
     return ok
 
 
 @njit(cache=True, nogil=True)
 def may_leave(points, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
-    """Return over which tubes of corners and centre (n, 4, 3) [m] the way to the end is possible."""
+    """Tell of which tubes of corners and centre (n, 4, 3) [m] a ray may come to the end over the mirrors."""
     ok = np.empty(len(points), np.bool_)
     for i in range(len(points)):
         size = 0.0
         for q in range(3):
             size = max(size, length_to(points[i, q], points[i, 3], False))
-        ok[i] = _possible(points[i, 3], size, images, at, normal, centre, radius)
+        ok[i] = _may_reach(points[i, 3], size, images, at, normal, centre, radius)
     return ok
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bounces(points, images, at, normal):  # type: ignore[no-untyped-def]
-    """Return the mirror points (n, m, 3) [m] of the way to each of the points (n, 3) [m], the end's side first."""
+def mirror_points(points, images, at, normal):  # type: ignore[no-untyped-def]
+    """Return the mirror points (n, m, 3) [m] on the way to each of the points (n, 3) [m], the end's side first."""
     out = np.empty((len(points), len(at), 3))
     for j in range(len(points)):
         x, y, z = points[j, 0], points[j, 1], points[j, 2]
         for i in range(len(at) - 1, -1, -1):
-            x, y, z = _onto(x, y, z, images[i + 1], at[i], normal[i])
+            x, y, z = _mirror_point(x, y, z, images[i + 1], at[i], normal[i])
             out[j, i, 0], out[j, i, 1], out[j, i, 2] = x, y, z
     return out
 
 
 @njit(cache=True, nogil=True)
 def stretch(i, rows, points, corners, images, at, normal, far, reach):  # type: ignore[no-untyped-def]
-    """Return of `rows` those whose way may go along stretch i, with its starts (k, 3) [m], unit directions (k, 3) and
-    lengths (k,) [m].
+    """Return the `rows` whose path may go along stretch i (from mirror i - 1 to mirror i), with its starts (k, 3) [m],
+    unit directions (k, 3) and lengths (k,) [m]: both ends of a stretch lie on the lit sides of its mirrors.
 
-    Args: points (n, 3) [m], corners (n, m, 3) of the ways to them; reach [m] from which rays come when far. Both ends
-    of a stretch lie on the lit sides of its mirrors.
+    Args: points (n, 3) [m], corners (n, m, 3) [m] mirror points on the ways to them; reach [m] from which rays come
+    when far.
     """
     m, k = len(at), 0
     kept, start, d, length = (
@@ -136,7 +136,10 @@ def rays_from(points, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def weight(p, images, far, normal, table, look):  # type: ignore[no-untyped-def]
-    """Return the field that the end's antenna, with a table of its beam (empty: alike everywhere), sends to p."""
+    """Return the field, relative to the strongest, that the end's antenna sends to p (3,) over the mirrors.
+
+    Args: table of its beam (see radar.beam_kernels), empty: isotropic; look (3,) for work.
+    """
     if len(table) == 0:
         return 1.0
     m = len(normal)

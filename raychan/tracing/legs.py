@@ -1,4 +1,4 @@
-"""Legs: from an end of the link to points of a surface, straight or over plane mirrors (image method)."""
+"""Legs: one-way paths from an end of the link to a surface, straight or over plane mirrors (image method)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.radar.beam_table import Beam
 from raychan.tracing.horizon import radiating
-from raychan.tracing.image_paths import bounces, may_leave, possible, rays_from, stretch, weights
+from raychan.tracing.image_paths import may_leave, may_reach, mirror_points, rays_from, stretch, weights
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -20,8 +20,8 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Mirror:
-    """A plane that reflects: a point on it, its unit normal towards the lit side, one of its facets, its body, and the
-    circle (centre [m], radius [m]) that holds all of it."""
+    """A plane that reflects: a point on it [m], its unit normal towards the lit side, one of its facets, its body, and
+    the circle (centre [m], radius [m]) that holds all of it."""
 
     point: Floats
     normal: Floats
@@ -50,8 +50,8 @@ class Mirror:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How points are seen over a leg: `seen` (n,), mirror points `corners` (n, m, 3) [m], `passed` (n, l) layers on the
-    last stretch, end's side first, and the facet that blocks it (n,), -1 for none."""
+    """How points are seen over a leg: `seen` (n,), mirror points `corners` (n, m, 3) [m], end's side first, layers
+    `passed` (n, l) on the last stretch, and the facet `blocker` (n,) that hides it, -1 for none."""
 
     seen: Bools
     corners: Floats
@@ -70,7 +70,8 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """The way between an end (a point, or a direction when `far`) and the surface over mirrors, end's side first."""
+    """The one-way path between an end (a point, or a direction when `far`) and a surface, over mirrors, end's side
+    first; `image` (3,) the end mirrored at all of them; `beam` of the end's antenna."""
 
     end: Floats
     far: bool = False
@@ -102,19 +103,20 @@ class Leg:
         return np.ones_like(length) if self.far else 1.0 / length
 
     def weight(self, points: Floats) -> Floats:
-        """Return the field (n,) that the end's antenna sends to points over this leg, relative to its strongest."""
+        """Return the field (n,) that the end's antenna sends to points (n, 3) [m] over this leg, relative to its
+        strongest."""
         found: Floats = weights(np.ascontiguousarray(points), *self.antenna)
         return found
 
     @property
     def antenna(self) -> tuple[Any, ...]:
-        """What the kernels ask of the end's antenna: images, far, normals of the mirrors, table of its beam (empty:
-        alike everywhere)."""
+        """What kernels need of the end's antenna: images, far, normals of the mirrors, table of its beam (empty:
+        isotropic)."""
         images, _, normals = self._chain[:3]
         return images, self.far, normals, np.zeros((0, 0)) if self.beam is None else self.beam.table
 
     def outside_beam(self, points: Floats, radius: Floats) -> Bools:
-        """Tell to which balls (n,), about points (n, 3) [m], the end's antenna sends nothing at all over this leg."""
+        """Tell which spheres (n,), about points (n, 3) of this radius (n,) [m], lie outside the beam over this leg."""
         if self.beam is None or self.far:
             return np.zeros(len(points), bool)
         look, length = self._look(points)
@@ -129,37 +131,37 @@ class Leg:
             look = look - 2.0 * np.outer(look @ m.normal, m.normal)
         return look, length
 
-    def bounces(self, points: Floats) -> Floats:
-        """Return the mirror points (n, m, 3) [m] of the way to each point, end's side first."""
-        found: Floats = bounces(points, *self._chain[:3])
+    def mirror_points(self, points: Floats) -> Floats:
+        """Return the mirror points (n, m, 3) [m] on the way to each point (n, 3) [m], end's side first."""
+        found: Floats = mirror_points(points, *self._chain[:3])
         return found
 
     def may_reach(self, points: Floats, size: Floats) -> Bools:
-        """Tell which balls about points (n, 3) of radius `size` (n,) [m] could be met: in front of the last mirror,
-        and by way of each mirror's circle."""
-        ok: Bools = possible(points, size, *self._chain)
+        """Tell which spheres about points (n, 3) of radius `size` (n,) [m] the leg may reach: in front of the last
+        mirror, over the circle about each mirror."""
+        ok: Bools = may_reach(points, size, *self._chain)
         return ok
 
     def may_leave(self, points: Floats) -> Bools:
-        """Tell from which tubes (n, 4, 3) [m] something could come to the end by way of each mirror's circle."""
+        """Tell from which tubes (n, 4, 3) [m] a ray may come to the end over the circle about each mirror."""
         ok: Bools = may_leave(points, *self._chain)
         return ok
 
     def radiating(self, points: Floats, k: Floats, normals: Floats, which: int) -> tuple[Floats, Bools]:
-        """Tell which tubes radiate towards the end, and which face it (see `tracing.horizon.radiating`)."""
+        """Return how tubes radiate towards the end, and which face it (see `tracing.horizon.radiating`)."""
         share, facing = radiating(points, k, normals, self.image, self.far, which)
         return share, facing
 
     def visible(
         self, geometry: Geometry, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None
     ) -> View:
-        """Tell which points the end sees by this leg, through which layers.
+        """Return which points the end sees over this leg, and through which layers.
 
-        Args: points (n, 3) [m] on facets (n,), slack (n,) [m] by which the true surface may lie behind its facet;
-        inside (n,) bodies that the points stand in, which do not hide them.
+        Args: points (n, 3) [m] on facets (n,); slack (n,) [m] by which the points' own smooth surface may lie before
+        them; layers that the last stretch may pass; inside (n,) bodies in which the points lie, which do not hide them.
         """
         n = len(points)
-        corners = self.bounces(points)
+        corners = self.mirror_points(points)
         chain = *self._chain[:3], self.far, 2.0 * geometry.extent + 1.0
         rows, skip = np.arange(n), np.full(n, -1, np.int32)
         for i, m in enumerate(self.mirrors):
@@ -170,10 +172,10 @@ class Leg:
             rows = rows[ok]
             skip[rows] = hit[ok]
         rows, start, d, length = stretch(len(self.mirrors), rows, points, corners, *chain)
-        aims: Any = start, d, length, slack, skip, facet, layers, inside
+        rays: Any = start, d, length, slack, skip, facet, layers, inside
         if len(rows) < n:
-            aims = *aims[:3], slack[rows], skip[rows], facet[rows], layers, None if inside is None else inside[rows]
-        reached, passed, in_way = geometry.walk(*aims)
+            rays = *rays[:3], slack[rows], skip[rows], facet[rows], layers, None if inside is None else inside[rows]
+        reached, passed, in_way = geometry.walk(*rays)
         if len(rows) == n:
             return View(reached, corners, passed, in_way)
         view = View(np.zeros(n, bool), corners, np.full((n, layers), -1, np.int32), np.full(n, -1, np.int32))

@@ -1,31 +1,28 @@
-"""Mirrors: the planes of a scene large enough to send a wave on, and the legs over them that can reach something."""
+"""Plane mirrors of a scene, and the legs over them by image points (image method)."""
 
 from __future__ import annotations
 
 from itertools import permutations
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.beam_table import Beam
 from raychan.records import BLOCKER, MIRROR
+from raychan.tracing.cache import cache_of
 from raychan.tracing.legs import Leg, Mirror
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-_LEAST_AREA = 0.5  # m^2
-_MOST = 24
+_LEAST_AREA = 0.5  # m^2 of a mirror; at street distances smaller faces lie within a few Fresnel zones
+_MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not measured
 
 
 def planes_that_mirror(geometry: Geometry, end: Floats) -> list[Mirror]:
-    """Return the mirrors that `end` (3,) [m] could use: ground planes, and plane faces of at least half a square metre.
-
-    Smaller faces count as scatterers only: at street distances they lie within a few Fresnel zones.
-    The largest 24 as seen from `end` are kept.
-    """
+    """Return the mirrors that `end` (3,) [m] could use: ground planes, and the plane faces of at least half a square
+    metre that look largest from there. Smaller faces only scatter."""
     f = geometry.facets
     if not len(f.vertices):
         return []
@@ -49,7 +46,7 @@ def planes_that_mirror(geometry: Geometry, end: Floats) -> list[Mirror]:
 
 
 def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
-    """Return the legs from `end` (3,) [m], whose antenna has a `beam`, with at most `bounces` mirrors, the direct one
+    """Return the legs from `end` (3,) [m], whose antenna has a `beam`, over at most `bounces` mirrors, the direct one
     first."""
     direct = Leg(end=np.asarray(end, float), beam=beam)
     legs = [direct]
@@ -65,7 +62,7 @@ def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None =
 
 
 def _both_sides(geometry: Geometry, mirrors: list[Mirror]) -> list[Mirror]:
-    """Add the back of what can be met from either side: a second mirror may be met from behind as seen from the end."""
+    """Return the mirrors, and the backs of those that reflect on both sides: a second mirror may be met from behind."""
     backs = [m.turned() for m in mirrors if geometry.both_sides[m.facet]]
     return mirrors + [m for m in backs if geometry.facets.role[m.body] != MIRROR]
 
@@ -81,12 +78,13 @@ def _possible(end: Floats, chain: tuple[Mirror, ...]) -> bool:
 
 
 def reachable(geometry: Geometry, leg: Leg) -> Bools:
-    """Return which pieces (p,) can be met over a leg: in front of its last mirror and through its outline's sphere."""
-    known: WeakKeyDictionary[Leg, Bools] = geometry.reach
-    if leg not in known:
+    """Return which pieces (p,) a leg can reach: in front of its last mirror, over the circle about each mirror."""
+
+    def found() -> Bools:
         ok = np.ones(len(geometry.piece_role), bool)
         if leg.mirrors:
-            ok = leg.may_reach(*geometry.piece_balls)
+            ok = leg.may_reach(*geometry.piece_spheres)
             ok[leg.pieces(geometry)[-1]] = False
-        known[leg] = ok
-    return known[leg]
+        return ok
+
+    return cache_of(geometry).by_leg("reachable pieces", leg, found)

@@ -1,8 +1,8 @@
-"""Screens: plane walls and solid bodies of a scene that hide from a leg all that stands behind them."""
+"""Occluders: large plane walls, and spheres inside solid bodies, that hide from a leg all that lies behind them."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,22 +14,43 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_LEAST_AREA = 0.25  # m^2
-_MOST = 24  # over one leg
-_OUTSIDE = 1.001  # of a ball's radius: an end nearer to its centre does not look at it from outside
-_MOST_EDGES = 64  # around one
+_LEAST_AREA = 0.25  # m^2 of a wall: trades clusters culled for tests of each; not measured
+_MOST = 24  # walls, and spheres, tested over one leg; not measured
+_OUTSIDE = 1.001  # of a sphere's radius: an end nearer to its centre does not look at it from outside
+_MOST_EDGES = 64  # around one wall; not measured
+
+
+class HidingWalls(NamedTuple):
+    """Walls before a leg: point (w, 3) [m], normal (w, 3) towards the leg, body (w,); the edges edge[first[i] :
+    first[i + 1]] (e, 3) [m] around wall i, a point of each, and normals inward (e, 3) of the planes through these and
+    the leg's image; and by how much, touch [m], a thing must lie behind all of these."""
+
+    point: Floats
+    normal: Floats
+    body: Ints
+    first: NDArray[np.int64]
+    edge: Floats
+    inward: Floats
+    touch: float
+
+
+class HidingSpheres(NamedTuple):
+    """Spheres inside closed opaque bodies: centre (k, 3) [m], radius (k,) [m], body (k,)."""
+
+    centre: Floats
+    radius: Floats
+    body: Ints
 
 
 class Occluders:
-    """The large opaque planes of a surface with the edges around them, in the facets' own sense, and the balls inside
-    closed opaque bodies."""
+    """The large opaque planes of a geometry with the edges around them, and the spheres inside closed opaque bodies."""
 
     def __init__(self, geometry: Geometry) -> None:
         f = geometry.facets
         area = geometry.wall_area
-        large = (area >= _LEAST_AREA) & (geometry.scene_topology.around <= _MOST_EDGES)
+        large = (area >= _LEAST_AREA) & (geometry.scene_topology.edges_around <= _MOST_EDGES)
         if len(f.role) < 2:
-            # A body hides others only: how far its own surface may lie before its facets is not known here.
+            # A wall hides other bodies only: how far its own body's curved surface lies before its facets is unknown.
             large[:] = False
         rows = np.flatnonzero(large[geometry.plane])
         rows = rows[np.argsort(geometry.plane[rows], kind="stable")]
@@ -39,19 +60,16 @@ class Occluders:
         self.touch = 1e-4 + geometry.touch
         self.area, self.edge = area[numbers], geometry.ends(half)
         self.first = np.searchsorted(geometry.plane[half // 3], np.append(numbers, len(area)))
-        self.balls = (
-            geometry.inner_spheres if len(f.role) > 1 else (np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32))
-        )
+        none = np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32)
+        self.spheres = geometry.inner_spheres if len(f.role) > 1 else none
         self.point, self.normal, self.owner = (
             geometry.first[rows[lead]],
             geometry.normal[rows[lead]],
             f.body[rows[lead]],
         )
 
-    def over(self, leg: Leg) -> tuple[Any, ...]:
-        """Return the walls that hide most over a leg: point (w, 3), normal (w, 3) towards the leg, body (w,), the first
-        of its edges (w + 1,), a point on each edge (e, 3), normal inward (e, 3) of the plane through it and the leg's
-        image, and how far [m] behind these a thing must lie."""
+    def walls_over(self, leg: Leg) -> HidingWalls:
+        """Return the walls that hide most over a leg."""
         image = np.asarray(leg.image, float)
         height = self.normal @ image if leg.far else np.einsum("ij,ij->i", image - self.point, self.normal)
         away = np.ones(len(height)) if leg.far else np.linalg.norm(image - self.point, axis=1)
@@ -72,11 +90,11 @@ class Occluders:
         inward *= side[:, None] / np.where(size > 0.0, size, 1.0)
         first = np.concatenate([[0], np.cumsum(count)])
         normal = self.normal[pick] * np.sign(height[pick])[:, None]
-        return self.point[pick], normal, self.owner[pick], first, a, inward, self.touch
+        return HidingWalls(self.point[pick], normal, self.owner[pick], first, a, inward, self.touch)
 
-    def within(self, leg: Leg) -> tuple[Floats, Floats, Ints]:
-        """Return the balls that hide most over a leg: centre (k, 3) [m], radius (k,) [m], body (k,)."""
-        centre, radius, owner = self.balls
+    def spheres_over(self, leg: Leg) -> HidingSpheres:
+        """Return the spheres that hide most over a leg."""
+        centre, radius, owner = self.spheres
         image = np.asarray(leg.image, float)
         view = radius
         if not leg.far:
@@ -88,4 +106,4 @@ class Occluders:
             view = np.where((centre - m.point) @ m.normal > radius + self.touch, view, 0.0)
         pick = np.argsort(-view, kind="stable")[:_MOST]
         pick = pick[view[pick] > 0.0]
-        return centre[pick], radius[pick], owner[pick]
+        return HidingSpheres(centre[pick], radius[pick], owner[pick])

@@ -1,4 +1,4 @@
-"""Occlusion: how much of a body's outline, seen from a point, stands behind others, and behind whom."""
+"""How much of a body's silhouette, seen from a point, other bodies block, and which ones (by sampling with rays)."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
 
-_WIDEST = np.cos(np.radians(75.0))  # outlines wider than this about their middle are sampled over the whole sphere
-_SLACK = 1e-4  # m: a body that touches the target's surface does not hide it
+_WIDEST = np.cos(np.radians(75.0))  # silhouettes wider than this about their middle are sampled over the whole sphere
+_SLACK = 1e-4  # m: a body that touches the target's surface does not block it
 
 
 @dataclass(frozen=True)
 class Occlusion:
-    """What hides a body; shares are of the solid angle of its outline."""
+    """What hides a body; shares are of the solid angle of its silhouette."""
 
     solid_angle: float
-    """Of the whole outline, were nothing in the way [sr]; 0 for a body seen edge on."""
+    """Of the whole silhouette, as if nothing were in the way [sr]; 0 for a body seen edge on."""
     blocked: float | None
-    """Share behind something opaque; None for a body without an outline."""
+    """Share behind something opaque; None for a body without a silhouette."""
     veiled: float | None
     """Share seen through thin layers (glass, bumper) alone."""
     error: float
@@ -35,11 +35,11 @@ class Occlusion:
 
 
 def occlusion(facets: Facets, points: Points, eye: Floats, body: str, layers: int = 4, rays: int = 40_000) -> Occlusion:
-    """Return how much of a body is hidden from a point, from two rays in each cell of a grid over its outline.
+    """Return how much of a body is hidden from a point, by two rays in each cell of a grid over its silhouette.
 
     Args: facets, points of the scene; eye (3,) [m]; body its name; layers: how many thin ones a ray may pass;
-    rays over the rectangle about the outline. The places of the rays in their cells are always the same.
-    Raises: ValueError for an unknown body, or one without an outline such as the ground.
+    rays over the rectangle about the silhouette. The rays' positions in their cells are the same in every run.
+    Raises: ValueError for an unknown body, or one without a silhouette such as the ground.
     """
     if body not in facets.body_names:
         raise ValueError(f"no body '{body}'; there are {', '.join(facets.body_names)}")
@@ -49,11 +49,12 @@ def occlusion(facets: Facets, points: Points, eye: Floats, body: str, layers: in
     eye = np.asarray(eye, float)
     scene = RayCaster(facets)
     own = np.flatnonzero(facets.body == index)
-    aims, weight = _aims(facets.vertices[own].reshape(-1, 3) - eye, max(rays // 2, 1))
-    hit, distance = _alone(facets, own).cast(np.broadcast_to(eye, aims.shape), aims, np.full(len(aims), -1, np.int32))
+    directions, weight = _ray_directions(facets.vertices[own].reshape(-1, 3) - eye, max(rays // 2, 1))
+    starts, none = np.broadcast_to(eye, directions.shape), np.full(len(directions), -1, np.int32)
+    hit, distance = _caster_of(facets, own).cast(starts, directions, none)
     seen = np.flatnonzero(hit >= 0)
     reached, passed, blocker = scene.walk(
-        np.broadcast_to(eye, (len(seen), 3)), aims[seen], distance[seen], np.full(len(seen), _SLACK),
+        np.broadcast_to(eye, (len(seen), 3)), directions[seen], distance[seen], np.full(len(seen), _SLACK),
         np.full(len(seen), -1, np.int32), own[hit[seen]].astype(np.int32), layers, np.full(len(seen), index),
     )  # fmt: skip
     hides, veils = blocker >= 0, reached & (passed >= 0).any(axis=1)
@@ -64,7 +65,7 @@ def occlusion(facets: Facets, points: Points, eye: Floats, body: str, layers: in
         return Occlusion(0.0, None, None, 0.0, (), point)
     blocked = float(outline[hides].sum()) / whole
     shares = np.bincount(facets.body[blocker[hides]], outline[hides], len(facets.body_names)) / whole
-    residual = np.zeros(len(aims))
+    residual = np.zeros(len(directions))
     residual[seen] = np.where(hides, outline, 0.0) - blocked * outline
     return Occlusion(
         solid_angle=whole,
@@ -76,11 +77,12 @@ def occlusion(facets: Facets, points: Points, eye: Floats, body: str, layers: in
     )
 
 
-def _aims(corners: Floats, cells: int) -> tuple[Floats, Floats]:
+def _ray_directions(corners: Floats, cells: int) -> tuple[Floats, Floats]:
     """Return unit directions (2n, 3), two after another in a cell, and the solid angle [sr] each stands for.
 
-    Args: corners (k, 3) [m] of the body from the eye; cells about how many. On a plane before the eye the outline of
-    a body lies within that of its corners; where the body is too wide for that, the whole sphere is sampled.
+    Args: corners (k, 3) [m] of the body from the eye; cells about how many. In a plane before the eye the silhouette
+    of a body lies within the rectangle about its corners; where the body is too wide for that, the whole sphere is
+    sampled.
     """
     towards = corners / np.maximum(np.linalg.norm(corners, axis=1, keepdims=True), 1e-12)
     middle = 0.5 * (towards.min(axis=0) + towards.max(axis=0))
@@ -101,7 +103,7 @@ def _aims(corners: Floats, cells: int) -> tuple[Floats, Floats]:
     size = np.maximum(high - low, 1e-9)
     across = max(1, round(float(np.sqrt(cells * size[0] / size[1]))))
     count = np.array([min(across, cells), max(1, cells // across)])
-    # Places in the cells are drawn at random, but always the same: a regular grid would beat with regular edges.
+    # Random positions in the cells, the same in every run: a regular grid would beat with regular edges.
     place = np.random.default_rng(0).random((int(count.prod()), 2, 2))
     cell = np.stack(np.meshgrid(*map(np.arange, count), indexing="ij"), axis=-1).reshape(-1, 1, 2)
     u, v = (low + (cell + place) / count * size).reshape(-1, 2).T
@@ -114,15 +116,15 @@ def _aims(corners: Floats, cells: int) -> tuple[Floats, Floats]:
     return np.column_stack([ring * np.cos(u), ring * np.sin(u), v]), np.full(len(u), area)
 
 
-def _alone(facets: Facets, rows: NDArray[np.int64]) -> RayCaster:
-    """Return a tracer of some facets alone."""
+def _caster_of(facets: Facets, rows: NDArray[np.int64]) -> RayCaster:
+    """Return a ray caster of some facets alone."""
     return RayCaster(
         facets.replace(**{k: getattr(facets, k)[rows] for k in ("vertices", "normals", "body", "part", "material")})
     )
 
 
 def _error(residual: Floats, whole: float, count: int) -> float:
-    """Return twice the standard deviation of a ratio of sums over cells with two samples each, by what these differ.
+    """Return twice the standard deviation of a ratio of sums over cells of two samples each, from their differences.
 
     Args: residual (2n,) of part less ratio times whole, samples of a cell beside each other. Source: Cochran,
     Sampling Techniques, 1977, 5.10 and 6.3.
@@ -133,7 +135,7 @@ def _error(residual: Floats, whole: float, count: int) -> float:
 
 
 def _point(scene: RayCaster, points: Points, eye: Floats, body: int, layers: int) -> str | None:
-    """Return what hides the point of a target given by its RCS."""
+    """Return what blocks the point of a target given by its RCS: see `Occlusion.point`."""
     mine = np.flatnonzero(points.body == body)
     if not len(mine):
         return None

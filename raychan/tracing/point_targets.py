@@ -1,4 +1,4 @@
-"""Targets given by their RCS: points met over every pair of ways in and out, each way as the RCS sees it."""
+"""Routes over targets given by their RCS: points seen over every pair of legs in and out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ Floats = NDArray[np.float64]
 def point_routes(
     geometry: Geometry, points: Points, ways_in: list[Leg], ways_out: list[Leg], bounces: int, slots: int, layers: int
 ) -> Routes | None:
-    """Return the routes over point targets with at most `bounces` interactions, or None where there are none."""
+    """Return the routes over point targets with at most `bounces` interactions, None where there are none.
+
+    Args: ways_in, ways_out legs, the direct one first; slots for interactions; layers that a stretch may pass.
+    """
     if not len(points.body):
         return None
     seen_in = [_see(geometry, points, leg, layers) for leg in ways_in]
@@ -35,12 +38,14 @@ def point_routes(
 
 
 def _see(geometry: Geometry, points: Points, leg: Leg, layers: int) -> View:
+    """Return how the points are seen over a leg; their own bodies do not hide them."""
     n = len(points.body)
     none = np.full(n, -1, np.int32)
     return leg.visible(geometry, points.position, none, np.full(n, 1e-6), layers, points.body)
 
 
 def _route(geometry, points, p, leg, out, seen_in, seen_out, slots):  # type: ignore[no-untyped-def]
+    """Return the columns of `Routes` for point p over a leg in and a leg out."""
     at = points.position[p]
     (k_in, l_in), (k_out, l_out) = leg.rays(at[None]), out.rays(at[None])
     vertices, normals, facets, kinds = [], [], [], []
@@ -91,7 +96,7 @@ def _route(geometry, points, p, leg, out, seen_in, seen_out, slots):  # type: ig
 def bistatic_sigma(points: Points, p: int, towards_tx: Floats, towards_rx: Floats) -> float:
     """Return the RCS [m^2] of point p between two directions: the geometric mean of its monostatic values there.
 
-    Exact when both agree, symmetric under exchange; a table of monostatic values says no more.
+    Exact where both directions agree, and reciprocal; a table of monostatic values determines no more.
     """
     out = 1.0
     for d in (towards_tx, towards_rx):

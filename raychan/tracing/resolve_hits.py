@@ -1,20 +1,67 @@
-"""Landing: where the rays of tubes go after a mirror, how much hangs on it, and their state where they land (numba).
+"""From the hits of rays to tubes on their next surface, and bounds on what a tube may contribute (numba kernels).
 
 Everywhere: points, k, normals (n, 4, 3) [m], length (n, 4) [m] of tubes on their mirror (three corners, the centre);
-way (n, 4, 3) directions after it; first, normal (f, 3): a point and the normal of each facet.
+directions (n, 4, 3) after it; first, normal (f, 3): a point and the normal of each facet.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
 from raychan.geometry.curved_patches import length_to
 
-_DRAWN = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_SHRINK = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share; not measured
+_BEHIND = -1e-6  # m: a hit no farther behind its tube than this is rounding
+_GRAZING_REACH = (
+    10.0  # times the centre's distance (and 1 m more) to a corner's hit: beyond, a ray grazes; not measured
+)
+
+
+class IncidentTubes(NamedTuple):
+    """Tubes on a mirror with the directions in which they leave it; fields as of `tubes.Tubes`."""
+
+    points: Floats
+    directions: Floats
+    length: Floats
+    normals: Floats
+    facet: NDArray[np.int32]
+    spread: Floats
+    strength: Floats
+    flat: Bools
+    caustics: NDArray[np.signedinteger]
+
+
+class LandedTubes(NamedTuple):
+    """Tubes on their next surface, to be written; fields as of `tubes.Tubes`."""
+
+    points: Floats
+    k: Floats
+    length: Floats
+    normals: Floats
+    spread: Floats
+    strength: Floats
+    flat: Bools
+    caustics: NDArray[np.signedinteger]
+
+
+class ReflectingFacets(NamedTuple):
+    """Facets: corners and corner normals (f, 3, 3), which are curved (f,), the material of each (f,), a row of
+    `materials` (kind, eps, thickness, roughness)."""
+
+    vertices: Floats
+    normals: Floats
+    curved: Bools
+    material: NDArray[np.int32]
+    materials: tuple[Any, ...]
 
 
 @njit(cache=True, forceinline=True)
@@ -39,22 +86,23 @@ def _strength(j, materials, cosine, wavenumber):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def reflected(k, normals, way):  # type: ignore[no-untyped-def]
-    """Write the directions after reflection at the true surface."""
+def reflect_directions(k, normals, directions):  # type: ignore[no-untyped-def]
+    """Write the directions (n, 4, 3) after reflection at the curved surface."""
     for i in range(len(k)):
         for q in range(4):
             twice = 2.0 * _dot(k[i, q], normals[i, q])
             for c in range(3):
-                way[i, q, c] = k[i, q, c] - twice * normals[i, q, c]
+                directions[i, q, c] = k[i, q, c] - twice * normals[i, q, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def weigh(  # type: ignore[no-untyped-def]
-    points, k, length, normals, facet, strength, spread, image, far, wavenumber, dull, material, materials, area, bound,
-    whole,
+def contribution_bounds(  # type: ignore[no-untyped-def]
+    points, k, length, normals, facet, strength, spread, image, far, wavenumber, lossy, material, materials, in_phase,
+    bound, whole,
 ):  # fmt: skip
-    """Write what tubes may scatter straight back, were each in phase (`area`) and by how its corners' phases run
-    (`bound`) (n,) [1/m], and the two-way length `whole` (n,) [m]: see `phases.phases`."""
+    """Write what tubes may scatter straight back, all in phase (`in_phase`) and by how their corners' phases run
+    (`bound`) (n,) [1/m], and the two-way length `whole` (n,) [m]: k A / (4 pi r) times the field there, over one plus
+    half the span of phase. See `tube_phases.phases`, which knows the edges' middles too."""
     for i in range(len(facet)):
         low, high, total = np.inf, -np.inf, 0.0
         for c in range(3):
@@ -63,25 +111,28 @@ def weigh(  # type: ignore[no-untyped-def]
         share = wavenumber / (4.0 * math.pi) * abs(_twice_area(points[i], k[i, 3])) * strength[i] * spread[i]
         if not far:
             share /= length_to(points[i, 3], image, far)
-        if dull[facet[i]]:
+        if lossy[facet[i]]:
             share *= _strength(material[facet[i]], materials, abs(_dot(normals[i, 3], k[i, 3])), wavenumber)
-        area[i], bound[i] = share, share / (1.0 + 0.5 * wavenumber * (high - low))
+        in_phase[i], bound[i] = share, share / (1.0 + 0.5 * wavenumber * (high - low))
         whole[i] = total / 3.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def ahead_of(points, way, length, hit, reach, first, normal, image, far, wavenumber, span, whole):  # type: ignore[no-untyped-def]
-    """Write by how much the two-way phase of tubes runs where they land, `span` (n,) [rad], and the `whole` way (n,)
-    [m] over there.
+def phase_at_hits(  # type: ignore[no-untyped-def]
+    points, directions, length, hit, reach, first, normal, image, far, wavenumber, span, whole
+):
+    """Write by how much the two-way phase runs over tubes where they land, `span` (n,) [rad], and the `whole` two-way
+    length (n,) [m] over there.
 
-    Args: hit (n,) facet that the centre meets after reach (n,) [m], -1 for none: then span is 0 and the way ends here.
+    Args: hit (n,) facet that the centre ray meets after reach (n,) [m], -1 for none: then span is 0 and the path ends
+    at the mirror.
     """
     p = np.empty(3)
     for i in range(len(hit)):
         f = hit[i]
         t = reach[i] if f >= 0 else 0.0
         for c in range(3):
-            p[c] = points[i, 3, c] + t * way[i, 3, c]
+            p[c] = points[i, 3, c] + t * directions[i, 3, c]
         whole[i] = length[i, 3] + t + length_to(p, image, far)
         low, high = np.inf, -np.inf
         for q in range(3):
@@ -91,21 +142,21 @@ def ahead_of(points, way, length, hit, reach, first, normal, image, far, wavenum
             height = 0.0
             for c in range(3):
                 height += (first[f, c] - points[i, q, c]) * normal[f, c]
-            slope = _dot(way[i, q], normal[f])
+            slope = _dot(directions[i, q], normal[f])
             if height * slope <= 0.0:
                 # Not all of the tube can land there: how much of it does is not known yet.
                 low, high = 0.0, 0.0
                 break
             t = height / slope
             for c in range(3):
-                p[c] = points[i, q, c] + t * way[i, q, c]
+                p[c] = points[i, q, c] + t * directions[i, q, c]
             phase = wavenumber * (length[i, q] + t + length_to(p, image, far))
             low, high = min(low, phase), max(high, phase)
         span[i] = high - low
 
 
 @njit(cache=True, nogil=True)
-def corner_rays(rows, points, way, facet, start):  # type: ignore[no-untyped-def]
+def corner_rays(rows, points, directions, facet, start):  # type: ignore[no-untyped-def]
     """Return origins and directions (3 m, 3), facets left (3 m,) and distances from which hits count (3 m,) of the
     corner rays of the tubes `rows` (m,)."""
     m = len(rows)
@@ -117,15 +168,15 @@ def corner_rays(rows, points, way, facet, start):  # type: ignore[no-untyped-def
             at = 3 * j + q
             own[at], begin[at] = facet[i], start[i, q]
             for c in range(3):
-                origin[at, c] = points[i, 3, c] + _DRAWN * (points[i, q, c] - points[i, 3, c])
-                direction[at, c] = way[i, q, c]
+                origin[at, c] = points[i, 3, c] + _SHRINK * (points[i, q, c] - points[i, 3, c])
+                direction[at, c] = directions[i, q, c]
     return origin, direction, own, begin
 
 
 @njit(cache=True, nogil=True)
-def agreeing(rows, hit, plane, smooth, normal, alike, out):  # type: ignore[no-untyped-def]
-    """Write for the tubes `rows` (m,) whether all rays land on one plane, or on one smooth patch on which normals
-    differ by no more than a cosine `alike` from the centre's.
+def on_one_surface(rows, hit, plane, smooth, normal, least_cosine, out):  # type: ignore[no-untyped-def]
+    """Write for the tubes `rows` (m,) whether all rays land on one plane, or on one smooth patch whose normals there
+    have at least `least_cosine` with the centre's.
 
     Args: hit (n, 4) facets met, -1 for none; plane, smooth (f,) to which facets belong.
     """
@@ -136,29 +187,29 @@ def agreeing(rows, hit, plane, smooth, normal, alike, out):  # type: ignore[no-u
         for q in range(3):
             g = h[q]
             one_plane &= g >= 0 and plane[g] == plane[f]
-            one_patch &= g >= 0 and smooth[g] == smooth[f] and _dot(normal[g], normal[f]) > alike
+            one_patch &= g >= 0 and smooth[g] == smooth[f] and _dot(normal[g], normal[f]) > least_cosine
         out[rows[j]] = one_plane or one_patch
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fates(rows, points, way, hit, agree, first, normal):  # type: ignore[no-untyped-def]
-    """Return the tubes of `rows` that can be put down, the facet (m, 4) on whose plane each ray is, and after how far
-    (m, 4) [m]. Rays that run beside the centre's plane cannot be: such a sliver is dropped."""
+def resolve_hits(rows, points, directions, hit, one_surface, first, normal):  # type: ignore[no-untyped-def]
+    """Return the tubes (m,) of `rows` that land, the facet (m, 4) on whose plane each ray lands, and after how far
+    (m, 4) [m]. Tubes with a ray that misses or grazes the centre's plane are slivers, and are dropped."""
     m = len(rows)
     kept, facet, reach = np.empty(m, np.int64), np.empty((m, 4), hit.dtype), np.empty((m, 4))
     count = 0
     for j in range(m):
         i = rows[j]
-        sound = True
+        lands = True
         for q in range(3, -1, -1):
-            f = hit[i, q] if agree[i] else hit[i, 3]
-            slope, height = _dot(way[i, q], normal[f]), 0.0
+            f = hit[i, q] if one_surface[i] else hit[i, 3]
+            slope, height = _dot(directions[i, q], normal[f]), 0.0
             for c in range(3):
                 height += normal[f, c] * (first[f, c] - points[i, q, c])
             t = height / slope if slope != 0.0 else np.inf
             facet[count, q], reach[count, q] = f, t
-            sound &= t > -1e-6 and t < 10.0 * reach[count, 3] + 1.0
-        if sound:
+            lands &= t > _BEHIND and t < _GRAZING_REACH * reach[count, 3] + 1.0
+        if lands:
             kept[count] = i
             count += 1
     return kept[:count], facet[:count], reach[:count]
@@ -166,7 +217,8 @@ def fates(rows, points, way, hit, agree, first, normal):  # type: ignore[no-unty
 
 @njit(cache=True, forceinline=True)
 def _normal_at(v, n, p, out):  # type: ignore[no-untyped-def]
-    """Write the unit normal of the true surface behind p, a point of the plane of a facet (v, n: corners, normals)."""
+    """Write the unit normal of the curved surface behind p, a point of the plane of a facet (v, n: corners, normals):
+    corner normals weighted by barycentric coordinates."""
     ax, ay, az = v[1, 0] - v[0, 0], v[1, 1] - v[0, 1], v[1, 2] - v[0, 2]
     bx, by, bz = v[2, 0] - v[0, 0], v[2, 1] - v[0, 1], v[2, 2] - v[0, 2]
     x, y, z = p[0] - v[0, 0], p[1] - v[0, 1], p[2] - v[0, 2]
@@ -184,34 +236,38 @@ def _normal_at(v, n, p, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def put_down(  # type: ignore[no-untyped-def]
-    rows, hit, reach, points, way, length, normals, facet, spread, strength, flat, caustics, vertices, corner_normals,
-    curved, far, wavenumber, material, materials, out_points, out_k, out_length, out_normals, out_spread, out_strength,
-    out_flat, out_caustics,
-):  # fmt: skip
-    """Write the state of the tubes `rows` (m,) where they land, each ray on the plane of its facet `hit` (m, 4) after
-    reach (m, 4) [m]."""
+def tubes_at_hits(rows, hit, reach, tubes, facets, far, wavenumber, out):  # type: ignore[no-untyped-def]
+    """Write the state of the tubes `rows` (m,) where they land.
+
+    Off plane mirrors the field falls with the length from the image source; off curved ones it thins by the area of the
+    tube (conservation of power along a ray tube: Balanis, Advanced Engineering Electromagnetics, 2012, sec. 13.2).
+
+    Args: hit (m, 4) facet on whose plane each ray lands, after reach (m, 4) [m]; tubes as `IncidentTubes`, facets as
+    `ReflectingFacets`, out as `LandedTubes`.
+    """
     for j in range(len(rows)):
         i = rows[j]
-        cosine = abs(_dot(normals[i, 3], way[i, 3]))
-        out_strength[j] = strength[i] * _strength(material[facet[i]], materials, cosine, wavenumber)
+        left = tubes.facet[i]
+        cosine = abs(_dot(tubes.normals[i, 3], tubes.directions[i, 3]))
+        out.strength[j] = tubes.strength[i] * _strength(facets.material[left], facets.materials, cosine, wavenumber)
         for q in range(3, -1, -1):
-            out_length[j, q] = length[i, q] + reach[j, q]
+            out.length[j, q] = tubes.length[i, q] + reach[j, q]
             for c in range(3):
-                out_k[j, q, c] = way[i, q, c]
-                out_points[j, q, c] = points[i, q, c] + reach[j, q] * way[i, q, c]
+                out.k[j, q, c] = tubes.directions[i, q, c]
+                out.points[j, q, c] = tubes.points[i, q, c] + reach[j, q] * tubes.directions[i, q, c]
             f = hit[j, q]
-            _normal_at(vertices[f], corner_normals[f], out_points[j, q], out_normals[j, q])
+            _normal_at(facets.vertices[f], facets.normals[f], out.points[j, q], out.normals[j, q])
         # The centre says which side is lit; a corner beyond the terminator then shows its back and carries nothing.
-        if _dot(out_normals[j, 3], way[i, 3]) > 0.0:
+        if _dot(out.normals[j, 3], tubes.directions[i, 3]) > 0.0:
             for q in range(4):
                 for c in range(3):
-                    out_normals[j, q, c] = -out_normals[j, q, c]
-        before, after = _twice_area(points[i], way[i, 3]), _twice_area(out_points[j], way[i, 3])
-        out_flat[j] = flat[i] and not curved[facet[i]]
-        if out_flat[j]:
-            out_spread[j] = 1.0 if far else 1.0 / out_length[j, 3]
+                    out.normals[j, q, c] = -out.normals[j, q, c]
+        before = _twice_area(tubes.points[i], tubes.directions[i, 3])
+        after = _twice_area(out.points[j], tubes.directions[i, 3])
+        out.flat[j] = tubes.flat[i] and not facets.curved[left]
+        if out.flat[j]:
+            out.spread[j] = 1.0 if far else 1.0 / out.length[j, 3]
         else:
-            thinned = spread[i] * math.sqrt(abs(before / after))
-            out_spread[j] = thinned if math.isfinite(thinned) else 0.0
-        out_caustics[j] = caustics[i] + (1 if before * after < 0.0 else 0)
+            thinned = tubes.spread[i] * math.sqrt(abs(before / after))
+            out.spread[j] = thinned if math.isfinite(thinned) else 0.0
+        out.caustics[j] = tubes.caustics[i] + (1 if before * after < 0.0 else 0)

@@ -1,20 +1,63 @@
-"""Collect: tubes on their last surface, and their way out, become Routes."""
+"""From tubes on their last surface, and their leg out, to Routes: the interactions in order, and the last footprint."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.compile.jit import njit
+from raychan.geometry.curved_patches import copy_to
+from raychan.geometry.intersect import plane_distance
 from raychan.parallel import parallel_for
-from raychan.records import Routes
+from raychan.records import REFLECT, SCATTER, TRANSMIT, Routes
 from raychan.tracing.footprints import footprints
 from raychan.tracing.legs import Leg
-from raychan.tracing.replay import chains, way_back
-from raychan.tracing.tubes import Tubes, middles
+from raychan.tracing.tubes import Tubes, edge_middles, slices
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Bytes = NDArray[np.int8]
+
+_REFLECT, _TRANSMIT, _SCATTER = int(REFLECT), int(TRANSMIT), int(SCATTER)  # plain numbers for the kernels
+
+
+class RouteTubes(NamedTuple):
+    """Columns of `tubes.Tubes` from which interactions follow."""
+
+    points: Floats
+    k: Floats
+    normals: Floats
+    facet: Ints
+    last: Ints
+    slots: Bytes
+    flat: NDArray[np.bool_]
+
+
+class ReturnLegs(NamedTuple):
+    """The leg out: mirror points (n, m, 3) [m], normals (m, 3) and facets (m,) of the mirrors, end's side first; layers
+    passed (n, l) on the last stretch; image (3,) of the end, or the direction to it when far; end (3,) [m], which fills
+    unused slots."""
+
+    corners: Floats
+    normals: Floats
+    facets: NDArray[np.int64]
+    passed: Ints
+    image: Floats
+    far: bool
+    end: Floats
+
+
+class Interactions(NamedTuple):
+    """Interactions to be written: vertices, normals (n, d, 3), facet, body, kind (n, d)."""
+
+    vertices: Floats
+    normals: Floats
+    facet: Ints
+    body: NDArray[np.int16]
+    kind: Bytes
 
 
 def routes_of(
@@ -22,29 +65,31 @@ def routes_of(
 ) -> Routes:
     """Return the routes of tubes that scatter on their present footprint and leave over `out`.
 
-    Args: first whether this is their first surface; corners (n, m, 3) mirror points of the way out, receiver's side
-    first; passed (n, l) layers on its last stretch. Chains are as long as the longest.
+    Args: first whether this is their first surface; corners (n, m, 3) [m] mirror points of the leg out, receiver's side
+    first; passed (n, l) layers on its last stretch. All routes have as many slots as the longest.
     """
     n, m, f = len(tubes), len(out.mirrors), geometry.facets
     end = np.asarray(out.end, float)
-    middle, half_way = middles(geometry, leg, tubes, first)
+    middle, half_way = edge_middles(geometry, leg, tubes, first)
     slots = int((tubes.slots + (passed >= 0).sum(axis=1)).max(initial=0)) + 1 + m
     vertices, normals = np.empty((2, n, slots, 3))
     facet, body = np.empty((n, slots), np.int32), np.empty((n, slots), np.int16)
     kind = np.empty((n, slots), np.int8)
     points, lengths, taper = np.empty((n, 6, 3)), np.empty((n, 6)), np.empty((n, 3))
     length, area, way_out = np.empty((3, n))
-    planes = geometry.first, geometry.normal, f.body
+    written = Interactions(vertices, normals, facet, body, kind)
+    columns = [getattr(tubes, name) for name in RouteTubes._fields]
     mirrors = np.array([x.normal for x in out.mirrors]).reshape(m, 3), np.array([x.facet for x in out.mirrors], int)
+    planes = geometry.first, geometry.normal, f.body
     shape = geometry.normal, f.vertices, geometry.edge_curvature, geometry.curved
-    # Far off, nothing is said of where unused slots are.
+    # A receiver that is a direction has no point to fill unused slots with.
     fill = np.zeros(3) if out.far else end
 
     def some(at: slice) -> None:
-        chains(
-            tuple(getattr(tubes, x)[at] for x in ("points", "k", "normals", "facet", "last", "slots", "flat")),
-            tubes.history.rows, not first, planes, corners[at], mirrors, passed[at], out.image, out.far, fill,
-            tuple(x[at] for x in (vertices, normals, facet, body, kind)),
+        interactions(
+            RouteTubes(*(x[at] for x in columns)), tubes.history.rows, not first, planes,
+            ReturnLegs(corners[at], *mirrors, passed[at], out.image, out.far, fill),
+            slices(written, at),
         )  # fmt: skip
         footprints(
             tuple(getattr(tubes, x)[at] for x in ("points", "k", "normals", "length", "facet", "bary")), middle[at],
@@ -76,9 +121,114 @@ def routes_of(
 
 
 def same_way_back(tubes: Tubes, mirrors: int, layers: int) -> tuple[Floats, Ints]:
-    """Return the mirror points (n, m, 3) and the layers (n, l) on the way out of first-bounce tubes over the leg they
-    came by, from their history."""
+    """Return the mirror points (n, m, 3) [m] and the layers (n, l) on the leg out of first-bounce tubes that leave by
+    the leg over which they came, from their history."""
     corners = np.zeros((len(tubes), mirrors, 3))
     passed = np.empty((len(tubes), layers), np.int32)
-    way_back(tubes.last, tubes.slots, tubes.history.rows, mirrors, corners, passed)
+    same_leg_out(tubes.last, tubes.slots, tubes.history.rows, mirrors, corners, passed)
     return corners, passed
+
+
+@njit(cache=True, nogil=True)
+def same_leg_out(last, slots, history, mirrors, corners, passed):  # type: ignore[no-untyped-def]
+    """Write the mirror points (n, m, 3) at the start of each history, and the layers (n, l) right behind them, -1 for
+    none.
+
+    Args: last row of each history and how many rows it has, slots (n,); history place, normal (h, 3), facet, kind,
+    before (h,); mirrors how many there are.
+    """
+    place, _, facet, kind, before = history
+    layers = passed.shape[1]
+    for i in range(len(last)):
+        at = last[i]
+        for c in range(layers):
+            passed[i, c] = -1
+        for s in range(slots[i] - 1, -1, -1):
+            if s < mirrors:
+                copy_to(corners[i, s], place[at])
+            elif s < mirrors + layers and kind[at] == _TRANSMIT:
+                passed[i, s - mirrors] = facet[at]
+            at = before[at]
+
+
+@njit(cache=True, forceinline=True)
+def _write_history(i, used, tubes, history, retrace, planes, out):  # type: ignore[no-untyped-def]
+    """Write the first `used` interactions of tube i from its history, newest first; with `retrace` and after plane
+    mirrors alone each vertex moves to where the centre ray meets its plane (subdivision moved the centre)."""
+    place, normal_of, facet_of, kind_of, before = history
+    first, normal, _ = planes
+    at = tubes.last[i]
+    px, py, pz = tubes.points[i, 3, 0], tubes.points[i, 3, 1], tubes.points[i, 3, 2]
+    kx, ky, kz = tubes.k[i, 3, 0], tubes.k[i, 3, 1], tubes.k[i, 3, 2]
+    for s in range(used - 1, -1, -1):
+        f = facet_of[at]
+        out.facet[i, s], out.kind[i, s] = f, kind_of[at]
+        for c in range(3):
+            out.vertices[i, s, c], out.normals[i, s, c] = place[at, c], normal_of[at, c]
+        if retrace and tubes.flat[i]:
+            t = plane_distance(normal[f], first[f], (px, py, pz), 0.0, (-kx, -ky, -kz))
+            if abs(t) < 1e300:
+                px, py, pz = px - t * kx, py - t * ky, pz - t * kz
+            out.vertices[i, s, 0], out.vertices[i, s, 1], out.vertices[i, s, 2] = px, py, pz
+            if kind_of[at] == _REFLECT:
+                x, y, z = normal_of[at]
+                turn = 2.0 * (kx * x + ky * y + kz * z)
+                kx, ky, kz = kx - turn * x, ky - turn * y, kz - turn * z
+        at = before[at]
+
+
+@njit(cache=True, forceinline=True)
+def _write_layers_out(i, used, here, planes, legs, out):  # type: ignore[no-untyped-def]
+    """Write the layers that the ray from `here` (3,) to the end passes, from slot `used` on; return the next slot."""
+    first, normal, _ = planes
+    image = legs.image
+    wx, wy, wz = -image[0], -image[1], -image[2]
+    if not legs.far:
+        wx, wy, wz = here[0] - image[0], here[1] - image[1], here[2] - image[2]
+        size = (wx * wx + wy * wy + wz * wz) ** 0.5
+        wx, wy, wz = wx / size, wy / size, wz / size
+    for j in range(legs.passed.shape[1] - 1, -1, -1):
+        f = legs.passed[i, j]
+        if f < 0:
+            continue
+        t = plane_distance(normal[f], first[f], here, 0.0, (-wx, -wy, -wz))
+        out.vertices[i, used, 0] = here[0] - t * wx
+        out.vertices[i, used, 1] = here[1] - t * wy
+        out.vertices[i, used, 2] = here[2] - t * wz
+        for c in range(3):
+            out.normals[i, used, c] = normal[f, c]
+        out.facet[i, used], out.kind[i, used] = f, _TRANSMIT
+        used += 1
+    return used
+
+
+@njit(cache=True, nogil=True)
+def interactions(tubes, history, retrace, planes, legs, out):  # type: ignore[no-untyped-def]
+    """Write the interactions of tubes that scatter on their present footprint and leave over mirrors, in order.
+
+    Args: tubes as `RouteTubes`; history as for `same_leg_out`; retrace whether vertices move to where the centre ray
+    meets the plane mirrors; planes first, normal (f, 3) and body (f,) of facets; legs as `ReturnLegs`; out as
+    `Interactions`.
+    """
+    body_of = planes[2]
+    d = out.kind.shape[1]
+    for i in range(len(tubes.facet)):
+        used, here = tubes.slots[i], tubes.points[i, 3]
+        _write_history(i, used, tubes, history, retrace, planes, out)
+        for c in range(3):
+            out.vertices[i, used, c], out.normals[i, used, c] = here[c], tubes.normals[i, 3, c]
+        out.facet[i, used], out.kind[i, used] = tubes.facet[i], _SCATTER
+        used += 1
+        if legs.passed.shape[1] > 0:
+            used = _write_layers_out(i, used, here, planes, legs, out)
+        for j in range(len(legs.facets) - 1, -1, -1):
+            for c in range(3):
+                out.vertices[i, used, c], out.normals[i, used, c] = legs.corners[i, j, c], legs.normals[j, c]
+            out.facet[i, used], out.kind[i, used] = legs.facets[j], _REFLECT
+            used += 1
+        for s in range(used):
+            out.body[i, s] = body_of[out.facet[i, s]] if out.facet[i, s] >= 0 else -1
+        for s in range(used, d):
+            out.facet[i, s], out.body[i, s], out.kind[i, s] = -1, -1, 0
+            for c in range(3):
+                out.vertices[i, s, c], out.normals[i, s, c] = legs.end[c], 0.0

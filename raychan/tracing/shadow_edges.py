@@ -1,17 +1,22 @@
-"""Shadows: where the outlines of bodies, as an end of the link sees them, cross the tubes behind them."""
+"""Shadow edges: where the silhouettes of bodies, as an end of the link sees them, fall on tubes behind them.
+
+Seen from the last image of a leg, all silhouette edges lie in a plane grid of directions; a tube tests the edges in the
+cells that it covers, and is clipped along the one of which the longest part falls on it.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import copy_to
-from raychan.geometry.edge_grid import most_within, starts_again
+from raychan.geometry.edge_grid import grid_bounds, restore_starts
 from raychan.parallel import parallel_for
+from raychan.tracing.cache import cache_of
 from raychan.tracing.edge_crossings import above, apart, dot, pyramid, scale_at, size_of, within
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
@@ -19,9 +24,26 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_MANY = 200  # tubes from which on a second thread pays
-_KEPT = 64  # legs; each takes a megabyte or two
-_CELLS = 512  # along the longest side of the grid of directions
+_PARALLEL_FROM = 200  # tubes from which on a second thread pays; not measured
+_LEGS_KEPT = 64  # of which the grids are kept; each takes a megabyte or two
+_CELLS = 512  # along the longest side of the grid of directions: trades memory for edges a cell; not measured
+
+
+class _Shadows(NamedTuple):
+    """Silhouette edges (e, 2, 3) [m] as seen from an image (3,) [m] (a unit direction when far), the smooth patches
+    (e, 2) that meet there, and the grid of directions: edges entries[first[i] : first[i + 1]] pass cell i; `axes` (2,)
+    that the grid keeps of a direction's three coordinates, its corner low (2,), cell size and shape (2,)."""
+
+    image: Floats
+    far: bool
+    edges: Floats
+    smooth: Ints
+    first: Ints
+    entries: Ints
+    axes: NDArray[np.int64]
+    low: Floats
+    cell: float
+    shape: NDArray[np.int64]
 
 
 class ShadowEdges:
@@ -29,54 +51,48 @@ class ShadowEdges:
     these the two coordinates that vary most."""
 
     def __init__(self, geometry: Geometry, leg: Leg) -> None:
-        self.edges, self._smooth = _silhouette(geometry, leg)
-        self._from = geometry.normal, geometry.smooth, leg.image, leg.far, geometry.touch
+        self.edges, smooth = _silhouette(geometry, leg)
+        self._facets = geometry.normal, geometry.smooth, geometry.touch
         if len(self.edges):
             low, high = _bounds(self.edges, leg.image, leg.far)
-            low, high, _ = most_within(_places(self.edges.mean(axis=1), leg.image, leg.far), low, high)
+            low, high, _ = grid_bounds(_directions_to(self.edges.mean(axis=1), leg.image, leg.far), low, high)
             axes = np.sort(np.argsort(high - low, kind="stable")[1:])
             low, high = low[axes], high[axes]
             cell = max(float((high - low).max()) / _CELLS, 1e-9)
             low -= 2.0 * cell
             shape = np.ceil((high - low) / cell).astype(np.int64) + 3
-            self._grid = *_fill(self.edges, leg.image, leg.far, axes, low, cell, shape), axes, low, cell, shape
+            first, index = _fill(self.edges, leg.image, leg.far, axes, low, cell, shape)
+            self._shadows = _Shadows(leg.image, leg.far, self.edges, smooth, first, index, axes, low, cell, shape)
 
     def across(self, points: Floats, facet: Ints, slack: Floats) -> Floats:
-        """Return signed distances (n, 3) [m] of tubes' corners from the longest shadow edge on each; zeros: none.
+        """Return signed distances (n, 3) [m] of tubes' corners from the plane through the image and the edge of which
+        the longest shadow falls on each; zeros: none.
 
-        Args: points (n, 4, 3) [m] corners and centres of tubes on facets (n,); slack (n,) [m] in front of a facet that
-        still belongs to its own patch.
+        Args: points (n, 4, 3) [m] corners and centres of tubes on facets (n,); slack (n,) [m] by which the tube's own
+        smooth patch may lie before its facet.
         """
         side = np.zeros((len(points), 3))
         if not len(self.edges):
             return side
 
         def some(rows: slice) -> None:
-            shadows = *self._from, self.edges, self._smooth, *self._grid
-            _across(*(points[rows], facet[rows], slack[rows], *shadows, side[rows]))
+            _longest_shadows(points[rows], facet[rows], slack[rows], *self._facets, self._shadows, side[rows])
 
-        parallel_for(len(points), some, _MANY)
+        parallel_for(len(points), some, _PARALLEL_FROM)
         return side
 
 
 def shadow_edges_of(geometry: Geometry, leg: Leg) -> ShadowEdges:
-    """Return the shadows of a leg, made once for all legs of the same last image and mirror: a surface keeps the newest
-    few."""
+    """Return the shadow edges of a leg, built once for all legs of the same last image and mirror."""
     last = (leg.mirrors[-1].facet, leg.mirrors[-1].normal.tobytes()) if leg.mirrors else None
     key = np.asarray(leg.image, float).tobytes(), leg.far, last
-    known: dict[Any, ShadowEdges] = geometry.shadows
-    with geometry.making:
-        if key not in known:
-            if len(known) >= _KEPT:
-                del known[next(iter(known))]
-            known[key] = ShadowEdges(geometry, leg)
-        return known[key]
+    return cache_of(geometry).newest("shadow edges", key, _LEGS_KEPT, lambda: ShadowEdges(geometry, leg))
 
 
 def _silhouette(geometry: Geometry, leg: Leg) -> tuple[Floats, Ints]:
-    """Return the edges (m, 2, 3) [m] at which a body turns away, and the rims of open sheets, in front of the last
-    mirror; and the smooth patches (m, 2) that meet there."""
-    half, pair = geometry.turning(leg.image, leg.far)
+    """Return the silhouette edges (m, 2, 3) [m] in front of the last mirror, boundary edges of open sheets among them,
+    and the smooth patches (m, 2) that meet there."""
+    half, pair = geometry.silhouette_edges(leg.image, leg.far)
     edges, smooth = geometry.ends(half), geometry.smooth[np.where(pair < 0, pair[:, ::-1], pair)]
     if leg.mirrors:
         m = leg.mirrors[-1]
@@ -86,9 +102,9 @@ def _silhouette(geometry: Geometry, leg: Leg) -> tuple[Floats, Ints]:
 
 
 @njit(cache=True, forceinline=True)
-def _place(p, image, far, out):  # type: ignore[no-untyped-def]
-    """Write the place of p on the unit sphere about the image, or on the plane across a direction; return how far off
-    it lies [m]."""
+def _direction_to(p, image, far, out):  # type: ignore[no-untyped-def]
+    """Write the direction to p from the image, or where p lies in the plane across a direction [m]; return the distance
+    [m], 1 when far."""
     if far:
         along = dot(p, image)
         for c in range(3):
@@ -101,21 +117,21 @@ def _place(p, image, far, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _places(points, image, far):  # type: ignore[no-untyped-def]
-    """Return the places (n, 3) of points (n, 3) [m]."""
+def _directions_to(points, image, far):  # type: ignore[no-untyped-def]
+    """Return the directions (n, 3) of `_direction_to` for points (n, 3) [m]."""
     out = np.empty_like(points)
     for i in range(len(points)):
-        _place(points[i], image, far, out[i])
+        _direction_to(points[i], image, far, out[i])
     return out
 
 
 @njit(cache=True, nogil=True)
 def _bounds(edges, image, far):  # type: ignore[no-untyped-def]
-    """Return the least and the most (3,) of the places of all ends."""
+    """Return the bounds (3,) and (3,) of the directions to all ends of edges."""
     low, high, x = np.full(3, np.inf), np.full(3, -np.inf), np.empty(3)
     for e in range(len(edges)):
         for q in range(2):
-            _place(edges[e, q], image, far, x)
+            _direction_to(edges[e, q], image, far, x)
             for c in range(3):
                 low[c], high[c] = min(low[c], x[c]), max(high[c], x[c])
     return low, high
@@ -123,7 +139,7 @@ def _bounds(edges, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped-def]
-    """Return the edges in each cell of the grid as (first, index): edges are walked in steps under half a cell."""
+    """Return the edges in each cell as (first, index), see `_Shadows`: edges are sampled in steps under half a cell."""
     first = np.zeros(shape[0] * shape[1] + 1, np.int32)
     cells, owner = np.empty(4 * len(edges), np.int32), np.empty(4 * len(edges), np.int32)
     count = 0
@@ -135,7 +151,7 @@ def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped
         while True:
             for c in range(3):
                 p[c] = a[c] + s * (b[c] - a[c])
-            reach = _place(p, image, far, x)
+            reach = _direction_to(p, image, far, x)
             i, j = x[axes[0]] - low[0], x[axes[1]] - low[1]
             # What is beyond the grid belongs to its outermost cells.
             at = int(min(max(i / cell, 0.0), shape[0] - 1.0)) * shape[1] + int(min(max(j / cell, 0.0), shape[1] - 1.0))
@@ -156,67 +172,73 @@ def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped
     for j in range(count):
         index[first[cells[j]]] = owner[j]
         first[cells[j]] += 1
-    starts_again(first)
+    restore_starts(first)
     return first, index
 
 
 @njit(cache=True, nogil=True)
-def _across(  # type: ignore[no-untyped-def]
-    points, facet, slack, normals, smooth, image, far, touch, edges, edge_smooth, first, index, axes, low, cell, shape,
-    out,
-):  # fmt: skip
-    tried = np.full(len(edges), -1, np.int64)
-    side, k, planes = np.empty(3), np.empty(3), np.empty((3, 3))
+def _longest_shadows(points, facet, slack, normals, smooth, touch, shadows, out):  # type: ignore[no-untyped-def]
+    """Write into out (n, 3) the corners' distances from the plane of the edge whose shadow on each tube is longest.
+
+    Args: as for `ShadowEdges.across`; normals (f, 3), smooth (f,) of facets; touch [m] within which surfaces lie on
+    each other; shadows as `_Shadows`.
+    """
+    image, far = shadows.image, shadows.far
+    tested = np.full(len(shadows.edges), -1, np.int64)
+    side, k, sides, cells = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((2, 2), np.int64)
     x, least, most = np.empty(3), np.empty(3), np.empty(3)
     for i in range(len(points)):
         centre, normal, patch = points[i, 3], normals[facet[i]], smooth[facet[i]]
-        for c in range(3):
-            least[c], most[c] = np.inf, -np.inf
-        for q in range(4):
-            _place(points[i, q], image, far, x)
-            for c in range(3):
-                least[c], most[c] = min(least[c], x[c]), max(most[c], x[c])
-        # The ray's direction at the centre, and the height of the plane towards the source.
         for c in range(3):
             k[c] = -image[c] if far else centre[c] - image[c]
         size = math.sqrt(dot(k, k))
         for c in range(3):
             k[c] /= size
+        # Heights over the tube's plane count towards the source.
         sign = -1.0 if dot(k, normal) > 0.0 else 1.0
         level = sign * dot(centre, normal)
-        edge_curvature = 0.0 if far else 0.125 * np.sum((most - least) ** 2)
-        margin = 0.5 * cell + edge_curvature
-        u, v = axes
-        i0, i1 = _cells(least[u] - margin, most[u] + margin, low[0], cell, shape[0])
-        j0, j1 = _cells(least[v] - margin, most[v] + margin, low[1], cell, shape[1])
-        here = pyramid(points[i], image, k, far, planes)
+        _covered_cells(points[i], shadows, x, least, most, cells)
+        here = pyramid(points[i], image, k, far, sides)
         best = 0.0
-        for ci in range(i0, i1):
-            start = ci * shape[1]
-            for at in range(first[start + j0], first[start + j1]):
-                e = index[at]
-                if tried[e] == i:
+        for ci in range(cells[0, 0], cells[0, 1]):
+            start = ci * shadows.shape[1]
+            for at in range(shadows.first[start + cells[1, 0]], shadows.first[start + cells[1, 1]]):
+                e = shadows.entries[at]
+                if tested[e] == i:
                     continue
-                tried[e] = i
-                a, b = edges[e, 0], edges[e, 1]
+                tested[e] = i
                 # Only what lies in front of the tube's plane throws a shadow on it.
-                own = edge_smooth[e, 0] == patch or edge_smooth[e, 1] == patch
+                own = shadows.smooth[e, 0] == patch or shadows.smooth[e, 1] == patch
                 near = level + (slack[i] if own else min(slack[i], touch))
+                a, b = shadows.edges[e, 0], shadows.edges[e, 1]
                 begin, end = above(sign * dot(a, normal) - near, sign * dot(b, normal) - near)
                 if begin == end:
                     continue
-                begin, end = within(a, b, points[i], planes, scale_at(a, b, image, k, far, here), begin, end)
-                if begin == end:
-                    continue
-                length = (end - begin) * size_of(a, b)
-                if length <= best:
-                    continue
-                if apart(a, b, points[i], image, k, far, side):
+                begin, end = within(a, b, points[i], sides, scale_at(a, b, image, k, far, here), begin, end)
+                length = (end - begin) * size_of(a, b) if begin != end else 0.0
+                if length > best and apart(a, b, points[i], image, k, far, side):
                     best = length
                     copy_to(out[i], side)
 
 
 @njit(cache=True, forceinline=True)
-def _cells(low_end, high_end, low, cell, count):  # type: ignore[no-untyped-def]
-    begin, end = (low_end - low) / cell, (high_end - low) / cell
-    return int(min(max(begin, 0.0), count - 1.0)), int(min(max(end, 0.0), count - 1.0)) + 1
+def _covered_cells(points, shadows, x, least, most, cells):  # type: ignore[no-untyped-def]
+    """Write the cells that a tube (4, 3) covers, from and to on both axes of the grid (2, 2).
+
+    Args: x, least, most (3,) for work.
+    """
+    for c in range(3):
+        least[c], most[c] = np.inf, -np.inf
+    for q in range(4):
+        _direction_to(points[q], shadows.image, shadows.far, x)
+        for c in range(3):
+            least[c], most[c] = min(least[c], x[c]), max(most[c], x[c])
+    # On the sphere of directions a tube's sides bulge by an eighth of their square.
+    bulge = 0.0 if shadows.far else 0.125 * np.sum((most - least) ** 2)
+    margin = 0.5 * shadows.cell + bulge
+    for j in range(2):
+        axis = shadows.axes[j]
+        begin = (least[axis] - margin - shadows.low[j]) / shadows.cell
+        end = (most[axis] + margin - shadows.low[j]) / shadows.cell
+        cells[j, 0] = int(min(max(begin, 0.0), shadows.shape[j] - 1.0))
+        cells[j, 1] = int(min(max(end, 0.0), shadows.shape[j] - 1.0)) + 1

@@ -17,7 +17,8 @@ from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import reachable
 from raychan.tracing.return_leg import resolve_return_leg
 from raychan.tracing.routes import routes_of, same_way_back
-from raychan.tracing.tubes import Refinement, Tubes, phases_of
+from raychan.tracing.tube_phases import phases_of
+from raychan.tracing.tubes import Refinement, Tubes
 from raychan.world.geometry import Geometry
 
 Bools = NDArray[np.bool_]
@@ -75,7 +76,7 @@ def _followed(
                 continue
             twice = by_image & (not first or images.over(geometry, out))
             yield from _returned(geometry, leg, out, tubes, own & ~twice, first, False, found)
-            if geometry.veils:
+            if geometry.has_layers:
                 yield from _returned(geometry, leg, out, tubes, own & twice, first, True, found)
         if count >= bounces or geometry.convex_alone:
             return
@@ -144,4 +145,4 @@ class _Images:
         """Tell which tubes (n,) a leg covers: it leads over the mirror where they bounced first to where they are."""
         before = tubes.came_from()
         moved = geometry.piece[before] != geometry.piece[tubes.facet]
-        return self.planes[geometry.plane[before]] & moved & ~tubes.history.veiled(tubes.last)
+        return self.planes[geometry.plane[before]] & moved & ~tubes.history.behind_layer(tubes.last)

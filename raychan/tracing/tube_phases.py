@@ -1,80 +1,185 @@
-"""Phases: how the two-way phase runs over tubes, and how much each may scatter (numba loops)."""
+"""How the two-way phase runs over tubes on their last surface, and bounds on what each may scatter.
+
+The phase is known at six points, corners and edge middles, through which it is quadratic: what the phase integral
+(`em.phase_integral`) takes. Where a quadratic misses the centre, or the surface turns too far, the tube is `rough`.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
 from raychan.geometry.curved_patches import distance, length_to, place_on
+from raychan.parallel import parallel_for
 from raychan.tracing.image_paths import weight
+from raychan.tracing.legs import Leg
+from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, row_numbers, slices
+from raychan.world.geometry import Geometry
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+_PARALLEL_FROM = 4096  # tubes from which on a second thread pays; not measured
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Phases of tubes over a leg out [rad]: `six` (n, 6) at corners and edge middles, `bend` (n, 3) of the edges from
+    straight, `bound` (n,) [1/m] on what a tube can scatter, `in_phase` the same were it all in phase, `rough` (n,)
+    above 1 where a tube bends more than a quadratic phase and one direction of the surface can follow, `length` (n,)
+    [m] of the two-way path."""
+
+    six: Floats
+    bend: Floats
+    bound: Floats
+    in_phase: Floats
+    rough: Floats
+    length: Floats
+
+    def take(self, index: NDArray[np.generic]) -> Phases:
+        """Return the phases of the tubes at `index` (mask or numbers)."""
+        rows = row_numbers(index)
+        return Phases(**{f.name: getattr(self, f.name).take(rows, axis=0) for f in fields(self)})
+
+    @staticmethod
+    def join(parts: list[Phases]) -> Phases:
+        """Return the phases of several sets of tubes as one."""
+        return Phases(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Phases)})
+
+
+class PhaseTubes(NamedTuple):
+    """Columns of `tubes.Tubes` from which phases follow."""
+
+    points: Floats
+    k: Floats
+    length: Floats
+    normals: Floats
+    facet: Ints
+    bary: Floats
+    strength: Floats
+    spread: Floats
+
+
+class PhaseFacets(NamedTuple):
+    """Facets: corners and edge curvatures (f, 3, 3) [m]; lossy (f,) those that reflect in part by their material (f,),
+    a row of `materials` (kind, eps, thickness, roughness)."""
+
+    vertices: Floats
+    edge_curvature: Floats
+    lossy: NDArray[np.bool_]
+    material: Ints
+    materials: tuple[Any, ...]
+
+
+class PhaseColumns(NamedTuple):
+    """The fields of `Phases`, to be written."""
+
+    six: Floats
+    bend: Floats
+    bound: Floats
+    in_phase: Floats
+    rough: Floats
+    length: Floats
+
+
+def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
+    """Return the phases of tubes that came by `leg` over the leg `out`, and what each can scatter there at most."""
+    n, f = len(tubes), geometry.facets
+    written = PhaseColumns(np.empty((n, 6)), np.empty((n, 3)), *np.empty((4, n)))
+    columns = [getattr(tubes, name) for name in PhaseTubes._fields]
+    facets = PhaseFacets(f.vertices, geometry.edge_curvature, geometry.lossy, *geometry.material_columns)
+    limits = rule.phase, rule.turn, MOST_BEND
+
+    def some(rows: slice) -> None:
+        here = PhaseTubes(*(x[rows] for x in columns))
+        phases(here, facets, leg.image, leg.far, out.antenna, rule.wavenumber, limits, slices(written, rows))
+
+    parallel_for(n, some, _PARALLEL_FROM)
+    return Phases(**written._asdict())
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def _length_at_middle(i, c, tubes, facets, image, far, middle):  # type: ignore[no-untyped-def]
+    """Write the middle of edge c of tube i; return the length there [m]: straight to the curved surface on the first
+    facet, later on the chord by the cubic Hermite rule."""
+    d = (c + 1) % 3
+    points, k, length = tubes.points[i], tubes.k[i], tubes.length[i]
+    if tubes.bary.shape[1] == 3:
+        w, f = tubes.bary[i], tubes.facet[i]
+        x, y, z = 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2])
+        place_on(facets.vertices[f], facets.edge_curvature[f], x, y, z, middle)
+        return length_to(middle, image, far)
+    turned = 0.0
+    for x in range(3):
+        middle[x] = 0.5 * (points[c, x] + points[d, x])
+        turned += (k[c, x] - k[d, x]) * (points[d, x] - points[c, x])
+    return 0.5 * (length[c] + length[d]) + 0.125 * turned
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def _largest_amplitude(i, tubes, facets, antenna, wavenumber, back, look):  # type: ignore[no-untyped-def]
+    """Return the amplitude [1/m] that a tube scatters if all in phase, `back` [m] from the end, and the factor by which
+    antenna and material lower it."""
+    images, out_far, mirrors, table = antenna
+    p, q, r = tubes.points[i, 0], tubes.points[i, 1], tubes.points[i, 2]
+    ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    k = tubes.k[i, 3]
+    across = (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
+    gain = weight(tubes.points[i, 3], images, out_far, mirrors, table, look)
+    if facets.lossy[tubes.facet[i]]:
+        cosine = 0.0
+        for c in range(3):
+            cosine += tubes.normals[i, 3, c] * k[c]
+        kind, eps, thickness, roughness = facets.materials
+        j = facets.material[tubes.facet[i]]
+        r_s, r_p, _, _ = coefficients(kind[j], eps[j], thickness[j], roughness[j], abs(cosine), wavenumber)
+        gain *= max(abs(r_s), abs(r_p))
+    share = wavenumber / (4.0 * math.pi) * abs(across) * tubes.strength[i] * tubes.spread[i]
+    return share / (1.0 if out_far else back), gain
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def phases(  # type: ignore[no-untyped-def]
-    points, k, length, normals, facet, bary, v, b, image, far, antenna, wavenumber, strength, spread, limits,
-    dull, material, materials, six, bend, bound, area, rough, way,
-):  # fmt: skip
-    """Write the two-way phases of tubes at corners and mid-edges, and what each tube may scatter.
+def phases(tubes, facets, image, far, antenna, wavenumber, limits, out):  # type: ignore[no-untyped-def]
+    """Write the two-way phases of tubes at corners and edge middles, and bounds on what each tube may scatter.
 
-    Args: bary (n, 3, 3): mid-edges lie on the true surface and are reached straight; (n, 0, 3): on the chord, with the
-    length by the cubic Hermite rule; antenna of the way out (see `chains.weight`); limits (phase, turn, most_bend) as
-    for `edge_to_cut`; dull (m,) facets whose material (m,), a row of `materials` (kind, eps, thickness, roughness),
-    reflects in part. Written: six (n, 6) [rad], bend (n, 3) [rad], bound and area (n,) [1/m], rough (n,): above 1 where
-    phase or normal bend more than a quadratic follows; way (n,) [m] the two-way length.
+    The bound is the amplitude k A cos_i / (2 pi r) of the tube all in phase, over one plus half the span of its phase
+    at the corners.
+
+    Args: tubes as `PhaseTubes`, with bary (n, 3, 3) on their first facet, (n, 0, 3) later; facets as `PhaseFacets`;
+    image (3,) of the end by which they came, or the direction to it when far; antenna of the leg out (see
+    `image_paths.weight`); limits (phase, turn, most_bend) as for `edge_to_cut`; out as `PhaseColumns`.
     """
-    images, out_far, mirrors, table = antenna
+    images, out_far, mirrors, _ = antenna
     out_image = images[len(mirrors)]
     phase, turn, most_bend = limits
-    kind, eps, thickness, roughness = materials
-    first = bary.shape[1] == 3
     middle, look = np.empty(3), np.empty(3)
-    for i in range(len(facet)):
-        f = facet[i]
+    for i in range(len(tubes.facet)):
+        points, six, bend = tubes.points[i], out.six[i], out.bend[i]
         low, high = np.inf, -np.inf
         for c in range(3):
-            six[i, c] = wavenumber * (length[i, c] + length_to(points[i, c], out_image, out_far))
-            low, high = min(low, six[i, c]), max(high, six[i, c])
+            six[c] = wavenumber * (tubes.length[i, c] + length_to(points[c], out_image, out_far))
+            low, high = min(low, six[c]), max(high, six[c])
         span = high - low
-        way[i] = (six[i, 0] + six[i, 1] + six[i, 2]) / 3.0 / wavenumber
+        out.length[i] = (six[0] + six[1] + six[2]) / 3.0 / wavenumber
         for c in range(3):
-            d = (c + 1) % 3
-            if first:
-                w = bary[i]
-                x, y, z = 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2])
-                place_on(v[f], b[f], x, y, z, middle)
-                there = length_to(middle, image, far)
-            else:
-                turned = 0.0
-                for x in range(3):
-                    middle[x] = 0.5 * (points[i, c, x] + points[i, d, x])
-                    turned += (k[i, c, x] - k[i, d, x]) * (points[i, d, x] - points[i, c, x])
-                there = 0.5 * (length[i, c] + length[i, d]) + 0.125 * turned
-            six[i, 3 + c] = wavenumber * (there + length_to(middle, out_image, out_far))
-            bend[i, c] = six[i, 3 + c] - 0.5 * (six[i, c] + six[i, d])
-            low, high = min(low, six[i, 3 + c]), max(high, six[i, 3 + c])
-        back = length_to(points[i, 3], out_image, out_far)
-        miss = wavenumber * (length[i, 3] + back) - (six[i, 0] + six[i, 1] + six[i, 2]) / 3.0
-        miss -= (bend[i, 0] + bend[i, 1] + bend[i, 2]) * (4.0 / 9.0)
-        p, q, r = points[i, 0], points[i, 1], points[i, 2]
-        ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-        way_in = k[i, 3]
-        across = (ay * bz - az * by) * way_in[0] + (az * bx - ax * bz) * way_in[1] + (ax * by - ay * bx) * way_in[2]
-        gain = weight(points[i, 3], images, out_far, mirrors, table, look)
-        if dull[f]:
-            cosine = 0.0
-            for c in range(3):
-                cosine += normals[i, 3, c] * way_in[c]
-            j = material[f]
-            back_s, back_p, _, _ = coefficients(kind[j], eps[j], thickness[j], roughness[j], abs(cosine), wavenumber)
-            gain *= max(abs(back_s), abs(back_p))
-        share = wavenumber / (4.0 * math.pi) * abs(across) * strength[i] * spread[i] / (1.0 if out_far else back)
-        area[i] = gain * share
-        bound[i] = gain * (share / (1.0 + 0.5 * span))
-        off = max(abs(miss) / phase, max(abs(bend[i, 0]), abs(bend[i, 1]), abs(bend[i, 2])) / most_bend)
+            there = _length_at_middle(i, c, tubes, facets, image, far, middle)
+            six[3 + c] = wavenumber * (there + length_to(middle, out_image, out_far))
+            bend[c] = six[3 + c] - 0.5 * (six[c] + six[(c + 1) % 3])
+            low, high = min(low, six[3 + c]), max(high, six[3 + c])
+        back = length_to(points[3], out_image, out_far)
+        miss = wavenumber * (tubes.length[i, 3] + back) - (six[0] + six[1] + six[2]) / 3.0
+        miss -= (bend[0] + bend[1] + bend[2]) * (4.0 / 9.0)
+        share, gain = _largest_amplitude(i, tubes, facets, antenna, wavenumber, back, look)
+        out.in_phase[i] = gain * share
+        out.bound[i] = gain * (share / (1.0 + 0.5 * span))
+        off = max(abs(miss) / phase, max(abs(bend[0]), abs(bend[1]), abs(bend[2])) / most_bend)
         for c in range(3):
-            off = max(off, distance(normals[i, c], normals[i, 3]) / turn)
-        rough[i] = off / (1.0 + 0.5 * (high - low))
+            off = max(off, distance(tubes.normals[i, c], tubes.normals[i, 3]) / turn)
+        out.rough[i] = off / (1.0 + 0.5 * (high - low))

@@ -1,24 +1,23 @@
-"""Tubes of rays: their state between bounces, how they are cut in two, and how much they can matter.
+"""Ray tubes: their state on a surface, and the rule by which they are refined.
 
-A tube is a triangle of three corner rays about a centre ray. Lengths and directions are known at all four, so a
-tube may be cut without tracing it again from the start: between corners the length follows from its values and
+A tube is a triangle of three corner rays about a centre ray. Lengths and directions are known at all four, so a tube
+may be subdivided without tracing it again from the start: between corners the length follows from its values and
 gradients (the directions) by a Hermite rule that is exact to third order; on the first surface it is computed anew.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.curved_patches import rays_on
-from raychan.parallel import parallel_for
 from raychan.poses import sizes
 from raychan.records import REFLECT
 from raychan.tracing.history import History
 from raychan.tracing.legs import Leg
-from raychan.tracing.tube_phases import phases
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -26,21 +25,21 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 CENTRE = 3
-MOST_BEND = 4.0  # rad: beyond it cutting with rays is cheaper than cutting in the integral
+MOST_BEND = 4.0  # rad that an edge may bend: the phase integral divides tubes that bend more itself; not measured
 _MOST_SLOTS = 120  # of a history: their number is kept in a byte
-_MANY = 4096  # tubes from which on a second thread pays
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """How finely tubes are cut.
+    """How finely tubes are subdivided.
 
-    `wavenumber` [rad/m]; `phase` [rad] deviation from quadratic that a tube may have where its phase stands still;
-    `floor` [1/m] scattered amplitude (unit field at 1 m) under which a doubtful tube is left as it is; `relative` the
-    same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
-    [m] of first tubes; `levels` of cutting for sight and bounces; `slots` of history; `layers` that a stretch may
-    pass; `max_tubes` that cuts for phase may come by, `max_cuts` for sight and `max_rays` cast after which a launch
-    cuts no more (see `Contributions.affords`); `jitter` (0 to 0.5) draws cuts off the middle, for a second lattice.
+    Fields: `wavenumber` [rad/m]; `phase` [rad] by which a tube may deviate from quadratic where its phase is
+    stationary; `turn` [rad] by which its normal may; `floor` [1/m] scattered amplitude (unit field at 1 m) under which
+    a tube is not subdivided; `relative` the same for a hundred tubes, as a fraction of what was found within the same
+    `cell` [m] of two-way length; `max_edge` [m] of first tubes; `levels` of subdivision for visibility and bounces;
+    `slots` of history; `layers` that a stretch may pass; budgets of a launch: `max_tubes` that subdivision for phase
+    may make, `max_cuts` for visibility, `max_rays` (see `Contributions.affords`); `jitter` (0 to 0.5) moves cuts off
+    the middle, for a second lattice.
     """
 
     wavenumber: float
@@ -59,18 +58,19 @@ class Refinement:
     jitter: float = 0.0
 
     def for_depth(self, bounces: int) -> Refinement:
-        """Return the same rule with history enough for so many bounces, and layers on every stretch between them."""
+        """Return the same rule with slots for so many bounces, and for layers on every stretch between them."""
         return replace(self, slots=min(max(self.slots, bounces + self.layers * (bounces + 1) + 3), _MOST_SLOTS))
 
 
 @dataclass
 class Tubes:
-    """Tubes standing on their present footprint; n tubes, 4 rays each (corners, centre), d slots of history.
+    """n tubes on their present footprint, four rays each: three corners, then the centre.
 
-    `strength` left of the field by mirrors and layers; `points` [m], `k` unit directions of arrival, `length` [m]
-    from the transmitter, `normals` of the true surface on the lit side, `spread` [1/m] field at the footprint, `flat`
-    all mirrors so far were planes, `bary` (n, 3, 3) corners on the first facet, (n, 0, 3) once they left it, `slots` of
-    history in use, `bounces` counted with this one, `caustics` passed, `last` row of the `history` that tubes of one
+    Fields: `points` (n, 4, 3) [m]; `k` (n, 4, 3) unit directions of arrival; `length` (n, 4) [m] from the transmitter;
+    `normals` (n, 4, 3) of the curved surface on the lit side; `facet` (n,); `spread` (n,) [1/m] field there by
+    spreading alone, `strength` (n,) its share left by mirrors and layers; `flat` (n,) whether all mirrors so far were
+    planes; `bary` (n, 3, 3) corners on the first facet, (n, 0, 3) once tubes left it; `slots` (n,) of history in use,
+    `bounces` (n,) with this one, `caustics` (n,) passed; `last` (n,) row of the `history` that all tubes of one
     launch share.
     """
 
@@ -94,7 +94,7 @@ class Tubes:
 
     def take(self, index: NDArray[np.generic]) -> Tubes:
         """Return the tubes at `index` (mask or numbers)."""
-        rows = numbers(index)
+        rows = row_numbers(index)
         return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _ROWS}, history=self.history)
 
     @staticmethod
@@ -113,7 +113,7 @@ class Tubes:
             columns = [getattr(p, name) for p in some]
             rows[name] = np.empty((len(kept), *columns[0].shape[1:]), columns[0].dtype)
             for column, before, i, j in zip(columns, bounds, at, at[1:], strict=False):
-                # What is in range may go straight to its place.
+                # With mode "clip" numpy writes straight to `out`; all numbers are in range.
                 column.take(kept[i:j] - before, axis=0, out=rows[name][i:j], mode="clip")
         return Tubes(**rows, history=parts[0].history)
 
@@ -123,15 +123,15 @@ class Tubes:
         self.slots[rows] += 1
 
     def came_from(self) -> Ints:
-        """Return the facets (n,) of the last reflection before the surface that the tubes stand on; -1: none."""
+        """Return the facets (n,) of the last reflection before the present surface; -1: none."""
         return self.history.newest(self.last, REFLECT)
 
 
 _ROWS = tuple(f.name for f in fields(Tubes) if f.name != "history")
 
 
-def stand(geometry: Geometry, leg: Leg, facet: Ints, bary: Floats) -> Tubes:
-    """Return first-bounce tubes on the true surface at barycentric corners (n, 3, 3), seen from the end of `leg`."""
+def launch_tubes(geometry: Geometry, leg: Leg, facet: Ints, bary: Floats) -> Tubes:
+    """Return tubes on their first surface, at barycentric corners (n, 3, 3) of facets (n,), from the end of `leg`."""
     n = len(facet)
     points, k, length, normals = first_rays(geometry, leg, facet, bary)
     return Tubes(
@@ -159,8 +159,11 @@ def first_rays(geometry: Geometry, leg: Leg, facet: Ints, bary: Floats) -> tuple
     return rays_on(facet, bary, f.vertices, f.normals, geometry.edge_curvature, geometry.both_sides, leg.image, leg.far)
 
 
-def middles(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
-    """Return the middles of the three edges (n, 3, 3) [m] and the lengths there (n, 3) [m]."""
+def edge_middles(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> tuple[Floats, Floats]:
+    """Return the middles of the three edges (n, 3, 3) [m] and the lengths there (n, 3) [m].
+
+    Args: first whether tubes stand on their first surface.
+    """
     if first:
         points, _, length, _ = first_rays(
             geometry, leg, tubes.facet, 0.5 * (tubes.bary + np.roll(tubes.bary, -1, axis=1))
@@ -172,54 +175,18 @@ def middles(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> tuple[Fl
     return p + 0.5 * d, 0.5 * (length + np.roll(length, -1, axis=1)) + 0.125 * bend
 
 
-@dataclass(frozen=True)
-class Phases:
-    """Phases of tubes over a way out [rad]: `six` (n, 6) at corners and edge middles, `bend` (n, 3) of the edges from
-    straight, `bound` (n,) [1/m] on what a tube can scatter, `area` the same were it in phase, `rough` (n,) above 1
-    where a tube bends more than a quadratic phase and one direction of the surface can follow, `length` (n,) [m] of
-    the whole way."""
-
-    six: Floats
-    bend: Floats
-    bound: Floats
-    area: Floats
-    rough: Floats
-    length: Floats
-
-    def take(self, index: NDArray[np.generic]) -> Phases:
-        """Return the phases of the tubes at `index` (mask or numbers)."""
-        rows = numbers(index)
-        return Phases(**{f.name: getattr(self, f.name).take(rows, axis=0) for f in fields(self)})
-
-    @staticmethod
-    def join(parts: list[Phases]) -> Phases:
-        """Return the phases of several sets of tubes as one."""
-        return Phases(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Phases)})
+def slices(columns: tuple[Any, ...], rows: slice) -> Any:
+    """Return the same named tuple of columns, of some rows."""
+    return type(columns)(*(x[rows] for x in columns))
 
 
-def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
-    """Return the phases of tubes over the way out, and what each can scatter back at most."""
-    n, f = len(tubes), geometry.facets
-    six, bend, (bound, area, rough, way) = np.empty((n, 6)), np.empty((n, 3)), np.empty((4, n))
-    rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, tubes.bary
-    held = tubes.strength, tubes.spread
-    written = six, bend, bound, area, rough, way
-    shape = f.vertices, geometry.edge_curvature, leg.image, leg.far, out.antenna, rule.wavenumber
-
-    def some(rows: slice) -> None:
-        here, of, to = ([x[rows] for x in arrays] for arrays in (rays, held, written))
-        phases(*(*here, *shape, *of, (rule.phase, rule.turn, MOST_BEND), geometry.dull, *geometry.matter, *to))
-
-    parallel_for(n, some, _MANY)
-    return Phases(six, bend, bound, area, rough, way)
-
-
-def numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:
-    """Return the numbers of the rows at `index` (mask or numbers): to take rows by these is up to ten times faster."""
+def row_numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:
+    """Return the numbers of the rows at `index` (mask or numbers); numpy takes rows by number up to ten times
+    faster."""
     return np.flatnonzero(index) if index.dtype == np.bool_ else np.asarray(index, np.intp)
 
 
 def unit(v: Floats) -> Floats:
-    """Return vectors (..., 3) scaled to length one; a vector of none stays as it is."""
+    """Return vectors (..., 3) scaled to length one; zero vectors stay as they are."""
     size = sizes(v)[..., None]
     return v / np.where(size > 0.0, size, 1.0)

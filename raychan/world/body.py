@@ -32,10 +32,10 @@ ROLES = {role.name.lower(): role for role in Role}
 
 @dataclass(frozen=True)
 class Body:
-    """A thing in the scene: `mesh` (Mesh, trimesh or a path) or built-in `shape` with `params`, one of both.
+    """A body of the scene: `mesh` (Mesh, trimesh or a path) or built-in `shape` with `params`, one of both.
 
     Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; spin_dps (3,) [deg/s] about its own axes;
-    `material` for all parts or `materials` by part (patterns), a name or a Material. `rcs` [dBsm], a number or
+    `material` for all parts or `materials` by part (patterns), a name or a Material. `rcs_dbsm` [dBsm], a number or
     (azimuth_deg, dBsm) pairs relative to its heading, makes it a point target at `rcs_point` (body frame [m]) whose
     mesh only blocks.
     """

@@ -31,8 +31,11 @@ def scene_text(path: str | Path) -> tuple[str, Path]:
 
 
 def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = None) -> Body:
-    """Return the body of a table: that of another table if both say the same, and at least with its mesh if they are of
-    one form."""
+    """Return the body of a table.
+
+    Args: like another table and its body, which is returned if both tables are equal, and whose mesh is shared if they
+    describe the same shape.
+    """
     if like is not None and t == like[0]:
         return like[1]
     body = Body(

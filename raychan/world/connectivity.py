@@ -1,4 +1,4 @@
-"""Hang: which facets hang together over shared edges, whatever body each was given to."""
+"""Connected pieces of a scene: facets that share edges, also across bodies that move as one."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from raychan.geometry.triangles import ends
+from raychan.geometry.triangles import half_edge_ends
 from raychan.records import MIRROR, Facets
 from raychan.world.topology import MeshTopology
 
 Ints = NDArray[np.int32]
 
-_WELD = 2e-6  # m: corners nearer than this are one
+_WELD = 2e-6  # m: corners nearer than this are one point
 
 
 def pieces(facets: Facets, joined: Sequence[tuple[MeshTopology, int]], rim: Ints) -> Ints:
-    """Return the number (n,) of the piece that each facet hangs together with, from 0 on.
+    """Return the number (n,) of the connected piece of each facet, from 0 on.
 
-    Args: joined joints and the first facet of each; rim half edges (r,) that have no other side in their body. Bodies
-    that move as one hang together where their rims coincide: it is the same thing whether drawn as one body or several.
+    Bodies that move as one are connected where their boundary edges coincide: a thing is the same whether drawn as one
+    body or as several.
+
+    Args: joined topologies, and the first facet of each; rim boundary half edges (r,) of all bodies.
     """
     begin = np.cumsum([0, *(int(j.piece.max(initial=-1)) + 1 for j, _ in joined)])
     out = np.concatenate([np.zeros(0, np.int32), *(j.piece + b for (j, _), b in zip(joined, begin, strict=False))])
@@ -35,14 +37,14 @@ def pieces(facets: Facets, joined: Sequence[tuple[MeshTopology, int]], rim: Ints
     rim = rim[f.role[owner] != MIRROR]
     owner = f.body[rim // 3]
     if len(np.unique(owner)) > 1:
-        a, b = _coincident(np.ascontiguousarray(ends(f.vertices, rim)), frame[owner])
+        a, b = _coincident(np.ascontiguousarray(half_edge_ends(f.vertices, rim)), frame[owner])
         apart = owner[a] != owner[b]
         out = _linked(out, out[rim[a[apart]] // 3], out[rim[b[apart]] // 3])
     return out.astype(np.int32)
 
 
 def _coincident(edges: NDArray[np.float64], frame: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return pairs (k,) of edges (e, 2, 3) [m] of one frame (e,) that lie in the same place; enough to link all."""
+    """Return pairs (k,) of edges (e, 2, 3) [m] of one frame (e,) that coincide; enough of them to link all."""
     points = edges.reshape(-1, 3)
     near = cKDTree(points).query_pairs(_WELD, output_type="ndarray")
     place = _linked(np.arange(len(points)), near[:, 0], near[:, 1]).reshape(-1, 2)
@@ -53,7 +55,7 @@ def _coincident(edges: NDArray[np.float64], frame: NDArray[np.int64]) -> tuple[N
 
 
 def _linked(label: NDArray[np.signedinteger], a: NDArray[np.signedinteger], b: NDArray[np.signedinteger]) -> Ints:
-    """Return labels (n,) counted anew, those of a (k,) and b (k,) being one."""
+    """Return labels (n,) numbered anew, the labels a (k,) and b (k,) being the same."""
     count = int(label.max(initial=-1)) + 1
     graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
     found: Ints = connected_components(graph, directed=False)[1][label]

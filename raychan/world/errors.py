@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 
@@ -14,23 +15,18 @@ class SceneError(ValueError):
     """
 
     def __init__(
-        self, problem: str, *, file: Any = None, key: str = "", value: Any = None, allowed: str = "", line: int = 0
-    ) -> None:
-        self.problem, self.file, self.key, self.value, self.allowed, self.line = (
-            problem,
-            file,
-            key,
-            value,
-            allowed,
-            line,
-        )
+        self, problem: str, *, file: str | Path | None = None, key: str = "", value: object = None, allowed: str = "",
+        line: int = 0,
+    ) -> None:  # fmt: skip
+        self.problem, self.file, self.key = problem, file, key
+        self.value, self.allowed, self.line = value, allowed, line
         where = f"{file}:{line}" if file and line else str(file or "")
         head = ": ".join(x for x in (where, key, problem) if x)
         # What `nearest` found is a question, not a list of what is allowed.
         hint = allowed if allowed.endswith("?") else f"allowed: {allowed}"
         super().__init__(f"{head}; {hint}" if allowed else head)
 
-    def at(self, *, file: Any = None, key: str = "") -> SceneError:
+    def at(self, *, file: str | Path | None = None, key: str = "") -> SceneError:
         """Return the same error with its file or the front of its key added."""
         path = ".".join(x for x in (key, self.key) if x)
         return SceneError(

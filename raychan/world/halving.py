@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.world.topology import places
+from raychan.world.topology import point_numbers
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def _cubic(a: Floats, b: Floats, p: Floats, q: Floats, t: float) -> Floats:
 
 def _shared(v: Floats, middle: Floats) -> Floats:
     """Return the middles of edges, those of one edge at their mean."""
-    ends = places(v.reshape(-1, 3)).reshape(-1, 3)
+    ends = point_numbers(v.reshape(-1, 3)).reshape(-1, 3)
     after = np.roll(ends, -1, axis=1)
     edge = np.unique(
         np.stack([np.minimum(ends, after), np.maximum(ends, after)], -1).reshape(-1, 2), axis=0, return_inverse=True

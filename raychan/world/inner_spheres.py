@@ -1,4 +1,4 @@
-"""Cores: balls wholly inside a closed body; whatever lies in the shadow of one is hidden by the body."""
+"""Spheres inside closed bodies: what lies in the shadow of one is hidden by the body, so it can be culled."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from raychan.geometry.closed_surfaces import clearance, crossed, winding
+from raychan.geometry.closed_surfaces import clearance, crossed_cells, winding
 from raychan.world.topology import MeshTopology
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-LEAST = 0.28  # m: radius under which a ball hides too little to be looked for
-_MOST = 8  # balls of one body
-_SHARE = 0.3  # of the largest ball's radius, the smallest
-_CELLS = 24  # along the longest side of the grid in which balls are looked for
-_TRIES = 3 * _MOST  # places looked at for them
-_WHOLE = 0.01  # how far a winding number may be from a whole one: facets that do not agree on outside have none
-_INNER = 0.999  # of the way to the nearest facet: rounding of a ray must not pass between
+LEAST = 0.28  # m: radius under which a sphere hides too little to be searched; not measured
+_MOST = 8  # spheres of one body; not measured
+_LEAST_SHARE = 0.3  # of the largest sphere's radius, the smallest; not measured
+_CELLS = 24  # along the longest side of the grid in which spheres are searched; not measured
+_TRIES = 3 * _MOST  # places tried; not measured
+_WINDING_ERROR = 0.01  # of a winding number from a whole one: facets that disagree on what is outside have more
+_INNER = 0.999  # of the distance to the nearest facet: rounding of a ray must not pass between
 
 
 def closed_pieces(topology: MeshTopology, opaque: Bools) -> Bools:
-    """Tell which facets (n,) are of pieces that hang together, close about an inside, and are opaque (n,) all over."""
+    """Return which facets (n,) belong to pieces that are closed and opaque (n,) all over."""
     piece = topology.piece
-    # Two sheets upon each other share every edge twice, yet have no inside.
+    # Two sheets upon each other share every edge twice, but enclose nothing.
     closed = np.zeros(len(opaque), bool)
     one_plane = np.empty(len(opaque), topology.plane.dtype)
     one_plane[piece] = topology.plane
@@ -37,10 +37,11 @@ def closed_pieces(topology: MeshTopology, opaque: Bools) -> Bools:
 
 
 def inner_spheres_of(v: Floats) -> tuple[Floats, Floats]:
-    """Return centres (k, 3) [m] and radii (k,) [m] of balls inside a closed surface, the largest first.
+    """Return centres (k, 3) [m] and radii (k,) [m] of spheres inside a closed surface, the largest first.
 
-    Args: v (n, 3, 3) corners [m] of facets that close: every edge is of two. A ball holds
-    no facet, and the surface winds about it: what goes from outside into it meets a facet.
+    Every ray from outside that enters one meets a facet: no sphere holds a facet, and the surface winds about each.
+
+    Args: v (n, 3, 3) corners [m] of the surface's facets: each edge belongs to two.
     """
     none = np.zeros((0, 3)), np.zeros(0)
     if not len(v):
@@ -52,7 +53,7 @@ def inner_spheres_of(v: Floats) -> tuple[Floats, Floats]:
     # A layer of cells all around, so that the outside is one piece.
     low = low - 1.5 * cell
     shape = np.ceil((high - low) / cell).astype(np.int64) + 2
-    free = ~crossed(v, low, cell, shape)
+    free = ~crossed_cells(v, low, cell, shape)
     piece = label(free)[0]
     free &= piece != piece[0, 0, 0]
     # From a cell's centre to the nearest crossed cell's is at most this much more than to the facet in it.
@@ -60,7 +61,11 @@ def inner_spheres_of(v: Floats) -> tuple[Floats, Floats]:
     centres, radii, inside, tries = list[Floats](), list[float](), dict[int, bool](), 0
     for at in np.argsort(-room, axis=None, kind="stable"):
         i, j, k = np.unravel_index(at, room.shape)
-        if len(radii) == _MOST or tries == _TRIES or room[i, j, k] < max(0.5 * LEAST, _SHARE * max(radii, default=0.0)):
+        if (
+            len(radii) == _MOST
+            or tries == _TRIES
+            or room[i, j, k] < max(0.5 * LEAST, _LEAST_SHARE * max(radii, default=0.0))
+        ):
             break
         centre = low + cell * (np.array([i, j, k]) + 0.5)
         if any(np.linalg.norm(centre - c) < r for c, r in zip(centres, radii, strict=True)):
@@ -68,7 +73,7 @@ def inner_spheres_of(v: Floats) -> tuple[Floats, Floats]:
         number = int(piece[i, j, k])
         if number not in inside:
             turns = winding(v, centre)
-            inside[number] = abs(turns) > 0.5 and abs(turns - round(turns)) < _WHOLE
+            inside[number] = abs(turns) > 0.5 and abs(turns - round(turns)) < _WINDING_ERROR
         tries += 1
         radius = _INNER * float(clearance(v, centre)) if inside[number] else 0.0
         if radius >= LEAST:

@@ -21,7 +21,7 @@ _ROUGHNESS, _THICKNESS = ROUGHNESS_MM.times(1e-3, "m"), THICKNESS_MM.times(1e-3,
 
 @dataclass(frozen=True)
 class Material:
-    """A material at one frequency.
+    """A material at one frequency; `raychan.world.material.names()` lists the built-in ones.
 
     Args: eps_r relative permittivity; sigma [S/m]; thickness [m] of a thin layer that reflects and passes, None for an
     opaque half space; roughness rms height [m]; pec perfect conductor.

@@ -15,7 +15,7 @@ from raychan.world import degenerate_faces
 from raychan.world.errors import SceneError
 from raychan.world.inner_spheres import closed_pieces, inner_spheres_of
 from raychan.world.merge_coplanar import merge_flat
-from raychan.world.topology import MeshTopology, joined, places
+from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
 from raychan.world.vertex_normals import folds, smoothed
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Mesh:
     @cached_property
     def topology(self) -> MeshTopology:
         """How the faces hang together."""
-        return joined(places(self.vertices)[self.faces], self.part, self.corners, self.normals)
+        return mesh_topology(point_numbers(self.vertices)[self.faces], self.part, self.corners, self.normals)
 
     def inner_spheres(self, opaque: tuple[bool, ...]) -> tuple[Floats, Floats]:
         """Return centres (k, 3) [m] and radii (k,) [m] of balls inside, whose shadow the mesh's own holds.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import LAYER, MIRROR, Facets, Points
-from raychan.reprs import Told
+from raychan.reprs import Described
 from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
 from raychan.world.build import body_of, material_of, scene_text
@@ -23,7 +23,7 @@ from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.point_targets import points_of
-from raychan.world.posed import placed, stack
+from raychan.world.posed import posed, stack
 from raychan.world.radar_mount import mount, processing_of, radar_of
 from raychan.world.schema import BodyTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 __all__ = ["Body", "Scene", "SceneError"]
 
 
-class Scene(Told):
+class Scene(Described):
     """Bodies, materials, a radar and settings.
 
     Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar an object, a table as
@@ -81,10 +81,9 @@ class Scene(Told):
         self.materials = dict(materials or {})
         self._data: dict[str, Any] | None = None
         self._tables: Sequence[BodyTable] = ()
-        # What other floors make of the bodies as they stand at time 0, by its class; never changed, and dropped with
-        # the scenes that share it.
+        # Cache of what other modules derive from the bodies at time 0, by class; shared by scenes with the same bodies.
         self.kept: dict[Any, Any] = {}
-        # The same of what stands still, for this scene and all that it becomes as time goes on.
+        # Cache of the static bodies' geometry, shared by this scene at all times.
         self._still: dict[type, StaticGeometry | None] = {}
         try:
             self._prepare()
@@ -112,7 +111,7 @@ class Scene(Told):
 
     @classmethod
     def _of(cls, data: Mapping[str, object], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
-        """Return the scene of tables; bodies that stand in another alike are that one's, with their meshes."""
+        """Return the scene of tables; bodies equal to those of the scene `like` are shared, with their meshes."""
         file = None if path is None else Path(path)
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
@@ -157,7 +156,7 @@ class Scene(Told):
         return self._of(overrides.changed(self._data, changes, self.path), self.path, text, self)
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy, perhaps in another process, makes its own.
+        # Caches stay behind: a copy, perhaps in another process, makes its own.
         return self.__dict__ | {"kept": {}, "_still": {}}
 
     def _stands_as(self, other: Scene) -> bool:
@@ -166,7 +165,7 @@ class Scene(Told):
         return alike and (self.materials, self.frequency) == (other.materials, other.frequency)
 
     def _prepare(self) -> None:
-        """Check everything once, so that a scene is complete or does not exist."""
+        """Check everything once: a scene that exists can be simulated."""
         seen: set[str] = set()
         for body in self.bodies:
             if body.name in seen:
@@ -216,7 +215,7 @@ class Scene(Told):
         return moved
 
     def bare(self) -> Scene:
-        """Return the scene without what is kept for it: a result that stays does not hold on to that."""
+        """Return a copy without caches, for results that outlive the run."""
         return copy(self)
 
     def radar_at(self, time: float) -> Radar:
@@ -225,7 +224,7 @@ class Scene(Told):
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What a user should know: odd meshes, materials out of range, overlaps, nothing in view, targets that fold."""
+        """What a user should know: odd meshes, materials out of range, overlaps, nothing in view, aliased targets."""
         said = [note for body in self.bodies for note in body.notes()]
         used = {
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
@@ -266,7 +265,7 @@ class Scene(Told):
 
     @property
     def still(self) -> StaticGeometry | None:
-        """What is kept of the bodies through all instants; None where that does not pay."""
+        """Geometry of the static bodies, shared by all instants; None where it does not pay."""
         if StaticGeometry not in self._still:
             self._still[StaticGeometry] = StaticGeometry.of(self.bodies)
         still = self._still[StaticGeometry]
@@ -274,11 +273,11 @@ class Scene(Told):
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        return placed(self.bodies, self._index, self.frequency, time, self.still)
+        return posed(self.bodies, self._index, self.frequency, time, self.still)
 
     @property
     def topology(self) -> list[MeshTopology]:
-        """How the facets of each body hang together."""
+        """Topology of each body's mesh."""
         return [b.geometry.topology for b in self.bodies]
 
     @property

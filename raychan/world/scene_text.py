@@ -195,8 +195,10 @@ def _material_table(m: Material) -> dict[str, Any]:
 
 
 def _lines(table: Mapping[str, Any], path: str = "") -> Iterator[str]:
-    """Give the lines of TOML of a table: its values, then the tables in it; the parameters of a shape and
-    the element of an array stay on one line."""
+    """Yield the lines of TOML of a table: its values, then the tables in it.
+
+    The parameters of a shape and the element of an array stay on one line.
+    """
     inner = {k: v for k, v in table.items() if _is_table(k, v)}
     for key, value in table.items():
         if key not in inner:

@@ -54,7 +54,7 @@ class Table(BaseModel):
 
 
 class Header(Table):
-    """[scene]"""
+    """Table [scene]."""
 
     title: str = ""
     frequency_ghz: Carrier | None = None
@@ -62,7 +62,7 @@ class Header(Table):
 
 
 class PublishedTable(Table):
-    """[published] of an antenna: what its source prints of it; `raychan info` sets it beside the computed figures."""
+    """[published] of an antenna: figures that its source prints; `raychan info` shows them beside the computed ones."""
 
     gain_dbi: Gain | None = None
     hpbw_h_deg: Beam | None = None
@@ -122,7 +122,7 @@ _OF_ANY = {"kind", "source", "published", "gain_dbi", "loss_db"}
 
 
 class WaveformTable(Table):
-    """[radar.waveform]"""
+    """Table [radar.waveform]."""
 
     carrier_ghz: Carrier = 77.0
     """At the start of the sampled ramp."""
@@ -146,7 +146,7 @@ class WaveformTable(Table):
 
 
 class RadarTable(Table):
-    """[radar]"""
+    """Table [radar]."""
 
     position: Place = [0.0, 0.0, 0.5]
     yaw_deg: Angle = 0.0
@@ -197,7 +197,7 @@ class Model(Table):
 
 
 class MaterialTable(Table):
-    """[materials.NAME]"""
+    """Table [materials.NAME]."""
 
     eps_r: Permittivity = 1.0
     sigma: Conductivity = 0.0
@@ -209,7 +209,7 @@ class MaterialTable(Table):
 
 
 class BodyTable(Table):
-    """[[bodies]]"""
+    """Table [[bodies]]."""
 
     name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^.\s\p{C}]+$")]
     shape: str | None = None

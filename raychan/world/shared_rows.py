@@ -1,4 +1,4 @@
-"""Sheets: large arrays of which copies differ in a few rows only; what they have alike is in memory once."""
+"""Large arrays whose copies differ in a few rows: copies share the memory pages that nobody writes to."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 
 class SharedRows:
-    """An array (n, ...) kept to be copied. Where the system maps a part of memory twice, copies share all pages that
-    nobody wrote to; elsewhere they are plain copies."""
+    """An array (n, ...) kept to be copied. On Linux (memfd_create) copies share all pages that nobody writes to;
+    elsewhere they are plain copies."""
 
     def __init__(self, array: NDArray[Any]) -> None:
         self._file = -1
@@ -26,7 +26,7 @@ class SharedRows:
             self._plain = None
 
     def copy(self) -> NDArray[Any]:
-        """Return a copy to write to."""
+        """Return a copy that may be written to."""
         if self._plain is not None:
             return self._plain.copy()
         pages = mmap.mmap(self._file, self._size, access=mmap.ACCESS_COPY)

@@ -1,4 +1,4 @@
-"""Still: what of a scene's facets stays as it is while some bodies move, made once for all instants."""
+"""What does not change between instants while some bodies of a scene move: computed once and shared by all instants."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Bools = NDArray[np.bool_]
 T = TypeVar("T")
 Arrays = tuple[NDArray[Any], ...]
 
-MANY = 200_000  # facets from which on they are kept
+MANY = 200_000  # facets from which on sharing pays; not measured
 
 
 @dataclass(frozen=True)
 class Instance:
-    """A body of many facets that moves: its number, its rows of facets (n,), its mesh, and where that stands: turn
-    (3, 3) from body to world axes, origin (3,) [m]."""
+    """A large body that moves: its number, its rows of facets (n,), its mesh, and its pose: turn (3, 3) from body to
+    world axes, origin (3,) [m]."""
 
     body: int
     rows: NDArray[np.int32]
@@ -35,29 +35,29 @@ class Instance:
 
 
 class StaticGeometry:
-    """What is kept of bodies through all instants, and `rigid` those of many facets that move. What is kept is the same
-    whichever instant was asked for first."""
+    """What is kept of bodies through all instants, and the `instances`: large bodies that move, posed at one instant.
+    What is kept does not depend on the instant that was asked for first."""
 
     def __init__(self, moving: Bools, count: NDArray[np.int64]) -> None:
         self.moving = np.flatnonzero(moving)
         at = np.concatenate([[0], np.cumsum(count)])
         self._rows = {int(b): np.arange(at[b], at[b + 1], dtype=np.int32) for b in self.moving}
-        # The facets that move, of these those of small bodies, and the facets that do not.
+        # Rows of the facets that move, of those of small bodies, and of the facets that do not move.
         self.rows = np.concatenate([np.zeros(0, np.int32), *self._rows.values()])
-        self.few = np.flatnonzero(moving & (count < MANY))
-        self.few_rows = np.concatenate([np.zeros(0, np.int32), *(self._rows[int(b)] for b in self.few)])
+        self.small = np.flatnonzero(moving & (count < MANY))
+        self.small_rows = np.concatenate([np.zeros(0, np.int32), *(self._rows[int(b)] for b in self.small)])
         rest = np.ones(at[-1], bool)
         rest[self.rows] = False
         self.rest = np.flatnonzero(rest).astype(np.int32)
-        # Whether rows are kept: where most facets move, all are as soon made anew.
+        # Whether columns are kept: where most facets move, all are computed anew as fast.
         self.shares = len(self.rest) > len(self.rows)
-        self.rigid: tuple[Instance, ...] = ()
+        self.instances: tuple[Instance, ...] = ()
         self._kept: dict[str, Any] = {}
-        self._sheets: dict[str, tuple[SharedRows, ...]] = {}
+        self._columns: dict[str, tuple[SharedRows, ...]] = {}
 
     @staticmethod
     def of(bodies: Sequence[Body]) -> StaticGeometry | None:
-        """Return what to keep for bodies; None where that does not pay."""
+        """Return what is to be kept of bodies; None where sharing does not pay."""
         moving = np.array([b.moves for b in bodies], bool)
         if not moving.any():
             return None
@@ -66,48 +66,48 @@ class StaticGeometry:
         return StaticGeometry(moving, count) if pays else None
 
     def at(self, bodies: Sequence[Body]) -> StaticGeometry:
-        """Return the same with bodies where they stand now."""
+        """Return the same with the large moving bodies at their present poses."""
         now = copy(self)
-        large = [(int(b), bodies[b]) for b in np.setdiff1d(self.moving, self.few)]
-        now.rigid = tuple(
+        large = [(int(b), bodies[b]) for b in np.setdiff1d(self.moving, self.small)]
+        now.instances = tuple(
             Instance(i, self._rows[i], b.geometry, b.motion.rotation(), b.motion.origin()) for i, b in large
         )
         return now
 
-    def lasting(self, name: str, make: Callable[[], T]) -> T:
-        """Return what `make` finds, which is the same wherever bodies stand; made once."""
+    def computed_once(self, name: str, make: Callable[[], T]) -> T:
+        """Return what `make` returns, which does not depend on poses; called once for each name."""
         if name not in self._kept:
             self._kept[name] = make()
         found: T = self._kept[name]
         return found
 
     def columns(self, name: str, make: Callable[[Any], Arrays]) -> Arrays:
-        """Return columns (n, ...) that `make` finds for rows of facets, each by itself: for all the first time, later
-        only for those that move."""
+        """Return columns (n, ...) that `make` computes row by row: for all facets the first time, later only for those
+        that move."""
         if not self.shares:
             return make(slice(None))
-        if name not in self._sheets:
+        if name not in self._columns:
             return self.keep(name, make(slice(None)))
         return self.copies(name, make(self.rows))
 
     def keep(self, name: str, columns: Arrays) -> Arrays:
-        """Keep columns (n, ...) of all facets; return them, shared with what is kept."""
-        self._sheets[name] = tuple(SharedRows(x) for x in columns)
-        return tuple(s.copy() for s in self._sheets[name])
+        """Keep columns (n, ...) of all facets; return copies that share their memory."""
+        self._columns[name] = tuple(SharedRows(x) for x in columns)
+        return tuple(s.copy() for s in self._columns[name])
 
     def copies(self, name: str, parts: Arrays) -> Arrays:
-        """Return columns that are kept, with other rows for the facets that move."""
-        out = tuple(s.copy() for s in self._sheets[name])
+        """Return copies of the columns that are kept, with new rows for the facets that move."""
+        out = tuple(s.copy() for s in self._columns[name])
         for column, part in zip(out, parts, strict=True):
             column[self.rows] = part
         return out
 
 
-def lasting(still: StaticGeometry | None, name: str, make: Callable[[], T]) -> T:
-    """Return what `make` finds, or found before where something is kept."""
-    return make() if still is None else still.lasting(name, make)
+def computed_once(static: StaticGeometry | None, name: str, make: Callable[[], T]) -> T:
+    """Return what `make` returns, called once for each name if there is something to keep it in."""
+    return make() if static is None else static.computed_once(name, make)
 
 
-def columns(still: StaticGeometry | None, name: str, make: Callable[[Any], Arrays]) -> Arrays:
-    """Return the columns that `make` finds for rows of facets, or those kept with the rows of what moves made anew."""
-    return make(slice(None)) if still is None else still.columns(name, make)
+def columns(static: StaticGeometry | None, name: str, make: Callable[[Any], Arrays]) -> Arrays:
+    """Return the columns that `make` computes for rows of facets, or kept ones with new rows for what moves."""
+    return make(slice(None)) if static is None else static.columns(name, make)

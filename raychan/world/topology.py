@@ -1,4 +1,5 @@
-"""Joints: how the facets of a mesh hang together, found once for the mesh, however its body stands and moves."""
+"""The topology of a mesh: neighbours, planes, smooth patches, pieces and clusters of its facets, found once for all
+poses of its body."""
 
 from __future__ import annotations
 
@@ -11,27 +12,27 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from raychan.geometry.triangles import bends, planes_of
+from raychan.geometry.triangles import edge_folds, planes_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_WELD = 1e-6  # m
+_WELD = 1e-6  # m: corners that round to the same multiple are one point
 _MIX = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB, 0x2545F4914F6CDD1D])
-_CLUSTER = 64  # facets
+_CLUSTER = 64  # facets: trades clusters to test for facets culled with each; not measured
 
 
 @dataclass(frozen=True, eq=False)
 class MeshTopology:
-    """The neighbours among n facets. Half edge 3 f + k runs from corner k of facet f to the next.
+    """How n facets are connected. Half edge 3 f + k runs from corner k of facet f to the next.
 
     Fields: plane, smooth (n,) number of the plane (adjacent coplanar facets of one kind) and of the smooth patch of
-    each facet; pair (e, 2) half edges of both sides of each edge; rim (r,) half edges that have no or many other sides;
-    bent, sharp (e,) edges at which the facets bend outward, and by enough for a wedge; turn (e,) exterior angle of
-    these over pi, less 1; outer half edges, by plane, that are not inside one or a smooth patch; border the same for
-    planes alone; convex: closed, of one piece, all edges bent outward or flat; order (n,), first (k + 1,) the facets
-    by clusters of neighbours: order[first[i] : first[i + 1]].
+    each facet; pair (e, 2) half edges of both sides of each edge; rim (r,) boundary half edges, with no other side or
+    several; bent, sharp (e,) convex edges, and those sharp enough for a wedge; turn (e,) exterior angle of these over
+    pi, less 1; outer half edges, by plane, that are not within a plane or a smooth patch; border (3 n,) half edges that
+    are not within a plane; convex: closed, of one piece, all edges convex or flat; order (n,), first (k + 1,) the
+    facets by clusters of neighbours: order[first[i] : first[i + 1]].
     """
 
     plane: Ints
@@ -49,39 +50,40 @@ class MeshTopology:
 
     @cached_property
     def piece(self) -> Ints:
-        """Number (n,) of the piece that each facet hangs together with."""
+        """Number (n,) of the connected piece of each facet."""
         return _components(self.pair, len(self.plane))
 
     @property
     def planes(self) -> int:
-        """How many planes there are."""
+        """Number of planes."""
         return int(self.plane.max(initial=-1)) + 1
 
     @property
     def patches(self) -> int:
-        """How many smooth patches there are."""
+        """Number of smooth patches."""
         return int(self.smooth.max(initial=-1)) + 1
 
 
-def places(points: Floats, group: NDArray[np.signedinteger[Any]] | None = None) -> NDArray[np.int64]:
-    """Return a number (n,) for the place of each point (n, 3) [m], the same within a micrometre and a group (n,)."""
+def point_numbers(points: Floats, group: NDArray[np.signedinteger[Any]] | None = None) -> NDArray[np.int64]:
+    """Return a number (n,) for each point (n, 3) [m], the same for points of a group (n,) that round to the same
+    micrometre."""
     keyed = np.round(points / _WELD).astype(np.int64) @ _MIX[:3]
     if group is not None:
         keyed += group * _MIX[3]
-    # One number a place: rows of four sort ten times slower. Two places share one once in 10^7 scenes.
+    # One hash a point: rows of four numbers sort ten times slower. Two points share one in about 1 of 10^7 scenes.
     return np.unique(keyed, return_inverse=True)[1].astype(np.int64)
 
 
-def joined(
+def mesh_topology(
     vertex: NDArray[np.int64],
     kind: NDArray[np.signedinteger[Any]],
     v: Floats,
     normals: Floats,
     body: NDArray[np.signedinteger[Any]] | None = None,
 ) -> MeshTopology:
-    """Return the joints of facets.
+    """Return the topology of facets.
 
-    Args: vertex (n, 3) number of each corner's place; kind (n,): only facets of one kind share planes and patches;
+    Args: vertex (n, 3) number of each corner's point; kind (n,): only facets of one kind share planes and patches;
     v, normals (n, 3, 3) corners [m] and normals there; body (n,) if they are of several.
     """
     n = len(v)
@@ -93,16 +95,16 @@ def joined(
     use = np.bincount(np.concatenate([[0], np.cumsum(~same)]))
     rim = order[np.repeat(use != 2, use)]
     pair = np.stack([order[:-1][same], order[1:][same]], axis=1).astype(np.int32)
-    flat, soft, bent, sharp, height = bends(pair, v, normals, normal, area)
+    flat, soft, bent, sharp, height = edge_folds(pair, v, normals, normal, area)
     a, b = pair.T // 3
-    kin = kind[a] == kind[b]
-    flat, soft = flat & kin, soft & kin
+    same_kind = kind[a] == kind[b]
+    flat, soft = flat & same_kind, soft & same_kind
     plane = _components(pair[flat], n)
     cosine = np.einsum("ij,ij->i", normal[a[sharp]], normal[b[sharp]])
     turn = np.zeros(len(pair))
     turn[sharp] = np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi
-    border = _but(pair[flat], n)
-    outer = np.flatnonzero(_but(pair[flat | soft], n))
+    border = _unpaired(pair[flat], n)
+    outer = np.flatnonzero(_unpaired(pair[flat | soft], n))
     outer = outer[np.argsort(plane[outer // 3], kind="stable")]
     size = float(np.linalg.norm(np.ptp(v, axis=(0, 1))))
     whole = not len(rim) and int(_components(pair, n).max()) == 0
@@ -126,27 +128,28 @@ def joined(
 
 
 def _starts(body: NDArray[np.signedinteger[Any]] | None, n: int) -> NDArray[np.int64]:
-    """Return where clusters of n facets begin, and n: none holds two bodies."""
+    """Return where clusters of n facets begin, and n; no cluster holds facets of two bodies."""
     every = np.arange(0, n, _CLUSTER)
     change = np.zeros(0, int) if body is None else np.flatnonzero(np.diff(body)) + 1
     return np.append(np.union1d(every, change), n)
 
 
-def _but(pair: Ints, n: int) -> Bools:
-    """Return which half edges of n facets are not among the pairs."""
+def _unpaired(pair: Ints, n: int) -> Bools:
+    """Return which half edges (3 n,) of n facets are not among the pairs (e, 2)."""
     left = np.ones(3 * n, bool)
     left[pair.ravel()] = False
     return left
 
 
 def _components(pair: Ints, n: int) -> Ints:
+    """Return the number (n,) of the component to which each of n facets belongs, connected by pairs of half edges."""
     a, b = pair.T // 3
     graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
     return connected_components(graph, directed=False)[1].astype(np.int32)
 
 
 def _along_curve(at: Floats) -> Ints:
-    """Return the order of points (n, 3) along Morton's curve, on which neighbours are near each other in space."""
+    """Return the order of points (n, 3) along Morton's space-filling curve."""
     low = at.min(axis=0)
     step = max(float((at - low).max()), 1e-300) / 1023.0
     cell = ((at - low) / step).astype(np.int64)

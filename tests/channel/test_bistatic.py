@@ -11,7 +11,7 @@ from truth import mie, po
 from raychan.channel.transfer import transfer
 from raychan.poses import direction, theta_phi
 from raychan.run.rcs import facets_of, rcs, refinements, scattering
-from raychan.tracing.beyond_horizon import outlets
+from raychan.tracing.beyond_horizon import exit_points
 from raychan.tracing.legs import Leg, Mirror
 from raychan.tracing.shooting import tube_routes
 from raychan.units import C0
@@ -224,7 +224,7 @@ def test_rays_of_currents_leave_their_own_body_where_it_ends_and_no_further():
     leg = Leg(end=np.array([-1.0, 0.0, 0.0]), far=True)
     facet = np.flatnonzero(geometry.normal[: len(ball.faces), 0] > 0.3).astype(np.int32)
     points = geometry.facets.vertices[facet].mean(axis=1)
-    moved, there = outlets(geometry, leg, points, facet)
+    moved, there = exit_points(geometry, leg, points, facet)
     assert (there < len(ball.faces)).all() and (moved[:, 0] < 0.0).all()
     np.testing.assert_allclose(moved[:, 1:], points[:, 1:], atol=1e-9)
     seen = leg.visible(geometry, moved, there, np.full(len(facet), 1e-4), 1).seen

@@ -13,7 +13,7 @@ from support.places import SCENES, TESTS
 
 from raychan import rcs
 from raychan.cli import invoke
-from raychan.geometry.triangles import ends
+from raychan.geometry.triangles import half_edge_ends
 
 SCENE_FILES = sorted(SCENES.glob("*.toml"))
 checked = pytest.mark.skipif(not os.environ.get("NUMBA_BOUNDSCHECK"), reason="wants NUMBA_BOUNDSCHECK=1")
@@ -22,7 +22,7 @@ checked = pytest.mark.skipif(not os.environ.get("NUMBA_BOUNDSCHECK"), reason="wa
 @checked
 def test_a_read_beyond_an_array_is_caught():
     with pytest.raises(IndexError):
-        ends(facets([ground()]).vertices, np.array([99]))
+        half_edge_ends(facets([ground()]).vertices, np.array([99]))
 
 
 @checked

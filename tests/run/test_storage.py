@@ -14,6 +14,7 @@ from support.results import paths, result
 from raychan.records import REFLECT, SCATTER
 from raychan.run.output_files import StoreError
 from raychan.run.storage import COLUMNS, load_result, save_result
+from raychan.units import C0
 
 CHAIN = [(2, REFLECT), (3, SCATTER), (2, REFLECT)]
 
@@ -59,6 +60,19 @@ def test_groups_open_in_xarray_and_as_plain_hdf5_with_units(made, tmp_path):
         kinds = {n: file[n].dtype.kind for n in names if isinstance(file[n], h5py.Dataset) and n.count("/") == 1}
         text = {n for n, kind in kinds.items() if kind not in "fiu"}
         assert text == {"detections/label", "detections/bodies"}, "else only real numbers, which MATLAB's h5read takes"
+
+
+def test_a_file_of_the_former_form_is_read(made, tmp_path):
+    save_result(made, tmp_path)
+    with h5py.File(tmp_path / "result.nc", "a") as file:
+        paths = file["paths"]
+        paths["delay"] = paths["length"][:] / C0
+        paths["range_rate"] = 0.5 * paths["length_rate"][:]
+        del paths["length"], paths["length_rate"]
+        file.attrs["format"] = 2
+    back = load_result(tmp_path).paths
+    np.testing.assert_allclose(back.length, made.paths.length, rtol=1e-15)
+    np.testing.assert_array_equal(back.length_rate, made.paths.length_rate)
 
 
 def test_map_and_profile_have_range_and_range_rate_as_coordinates_and_plot_with_named_axes(made, tmp_path):

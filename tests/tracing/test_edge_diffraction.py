@@ -1,4 +1,4 @@
-"""Diffracted ways to points: continuous over shadow boundaries, half at the boundary, alike both ways."""
+"""Diffracted point_legs to points: continuous over shadow boundaries, half at the boundary, alike both point_legs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def horizontal(look):
 
 
 def field(geometry, y, x=20.0):
-    """Field of all ways at (x, y, 0) from the origin, over that of free space; the mean of V and H.
+    """Field of all point_legs at (x, y, 0) from the origin, over that of free space; the mean of V and H.
 
     The mean of soft and hard diffraction is what scalar theory gives.
     """

@@ -13,11 +13,11 @@ from raychan.records import LAYER
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.legs import Leg, Mirror
-from raychan.tracing.occluders import Occluders
+from raychan.tracing.occluders import HidingSpheres, Occluders
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.shapes import build
 
-NOTHING = np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32)
+NOTHING = HidingSpheres(np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int32))
 PANE = (LAYER, 6.3 - 0.2j, 0.004, 0.0)
 STEEL = (0, 1.0 + 0j, 0.0, 0.0)
 
@@ -90,7 +90,7 @@ def test_what_a_solid_body_hides_is_what_no_ray_finds(leg, aside):
     way, bodies = LEGS[leg](geometry), np.array([True, True, False])
     found = seed_facets(geometry, way, bodies)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Occluders, "within", lambda self, leg: NOTHING)
+        patch.setattr(Occluders, "spheres_over", lambda self, leg: NOTHING)
         left = np.setdiff1d(seed_facets(geometry, way, bodies), found)
     middle = geometry.facets.vertices[left].mean(axis=1)
     slack = np.full(len(left), 1e-3)
@@ -124,7 +124,7 @@ def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_
         }
         return rc.simulate(rc.Scene(bodies=bodies, radar=radar, model={"max_bounces": 3, "tolerance_db": 3.0})).paths
 
-    calls, within = [], Occluders.within
+    calls, within = [], Occluders.spheres_over
 
     def counted(self, leg):
         calls.append(len(within(self, leg)[1]))
@@ -132,10 +132,10 @@ def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_
 
     # The weakest tubes are let go up to a sum, to which hidden ones would add.
     monkeypatch.setattr(Contributions, "that_count", lambda self, bound, length, many=0: np.arange(len(bound)))
-    monkeypatch.setattr(Occluders, "within", counted)
+    monkeypatch.setattr(Occluders, "spheres_over", counted)
     ours = paths()
     assert max(calls) > 0
-    monkeypatch.setattr(Occluders, "within", lambda self, leg: NOTHING)
+    monkeypatch.setattr(Occluders, "spheres_over", lambda self, leg: NOTHING)
     every = paths()
     for name in ("length", "amplitude", "length_rate", "body", "kind", "vertices"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(every, name), err_msg=name)

@@ -7,11 +7,12 @@ import pytest
 import trimesh
 from support.facets import facets
 
+from raychan.tracing.edge_crossings import TubeRays
 from raychan.tracing.history import History
 from raychan.tracing.legs import Leg
-from raychan.tracing.resolve_hits import put_down
-from raychan.tracing.silhouette_crossings import between
-from raychan.tracing.subdivide import divide, halves
+from raychan.tracing.resolve_hits import IncidentTubes, LandedTubes, ReflectingFacets, tubes_at_hits
+from raychan.tracing.silhouette_crossings import silhouette_crossings_of
+from raychan.tracing.subdivide import bisect, subdivide
 from raychan.tracing.tubes import Tubes
 from raychan.world.geometry import Geometry
 
@@ -54,8 +55,8 @@ def test_parts_have_the_area_of_the_whole_and_rays_of_its_source():
     side /= np.linalg.norm(line, axis=1, keepdims=True)
     side[::3] = 0.0
     rows = rng.permutation(N)[: N // 2]
-    cut, parent = divide(geometry, leg, tubes, rows, side, False, 0.1)
-    half = halves(geometry, leg, tubes, rows, rng.integers(0, 3, len(rows)), False, 0.2)
+    cut, parent = subdivide(geometry, leg, tubes, rows, side, False, 0.1)
+    half = bisect(geometry, leg, tubes, rows, rng.integers(0, 3, len(rows)), False, 0.2)
     for parts, of in ((cut, parent), (half, np.tile(rows, 2))):
         area = np.bincount(of, vector_area(parts.points)[:, 2], N)
         assert area[rows] == pytest.approx(vector_area(tubes.points)[rows, 2], rel=1e-9)
@@ -94,7 +95,8 @@ def test_outline_found_between_mirror_and_nowhere_is_that_of_which_most_lies_ins
     side = np.zeros((N, 3))
     rows = np.arange(0, N, 2)
     hit, reach = np.full((N, 4), -1, np.int32), np.full((N, 4), np.inf)
-    between(geometry).across(rows, tubes.points, tubes.k, tubes.length, False, tubes.flat, hit, reach, side)
+    rays = TubeRays(tubes.points, tubes.k, tubes.length, tubes.flat, hit, reach)
+    silhouette_crossings_of(geometry).find(rows, rays, False, side)
     ends, faces = geometry.edge_ends, geometry.edge_faces
     towards = np.einsum("fj,fj->f", geometry.normal, source - geometry.first) > 0.0
     ends = ends[towards[faces[:, 0]] != towards[faces[:, 1]]]
@@ -132,10 +134,10 @@ def test_tubes_land_with_the_spreading_of_their_area_and_the_normals_between_the
     (spread, strength), flat, caustics = np.empty((2, N)), np.empty(N, bool), np.empty(N, np.int8)
     start = np.full(N, 2.0)
     rays = tubes.points, tubes.k, tubes.length, tubes.normals, tubes.facet, start, tubes.strength
-    put_down(
-        np.arange(N), hit, reach, *rays, np.zeros(N, bool), tubes.caustics, f.vertices, f.normals, geometry.curved,
-        False, 1600.0, *geometry.matter, points, k, length, normals, spread, strength, flat, caustics,
-    )  # fmt: skip
+    before = IncidentTubes(*rays, np.zeros(N, bool), tubes.caustics)
+    bodies = ReflectingFacets(f.vertices, f.normals, geometry.curved, *geometry.material_columns)
+    after = LandedTubes(points, k, length, normals, spread, strength, flat, caustics)
+    tubes_at_hits(np.arange(N), hit, reach, before, bodies, False, 1600.0, after)
     assert points == pytest.approx(tubes.points + reach[..., None] * tubes.k)
     thrown = [np.abs(np.einsum("ij,ij->i", vector_area(p), tubes.k[:, 3])) for p in (tubes.points, points)]
     assert spread**2 * thrown[1] == pytest.approx(4.0 * thrown[0])

@@ -8,10 +8,10 @@ import trimesh
 from support.facets import facets, ground, quad
 
 from raychan.geometry.lit_parts import lit_parts
-from raychan.tracing.launch import sight
 from raychan.tracing.legs import Leg, Mirror
 from raychan.tracing.shadow_edges import shadow_edges_of
-from raychan.tracing.tubes import Refinement, stand
+from raychan.tracing.tubes import Refinement, launch_tubes
+from raychan.tracing.visibility import tube_visibility
 from raychan.world.geometry import Geometry
 
 LOW, HIGH = np.array([-0.3, -0.2]), np.array([0.4, 0.5])  # m: a rectangle in the plane x = 4, seen from the origin
@@ -41,7 +41,7 @@ def street(floor, least):
 def small_tubes(geometry, leg, rng, n=600):
     facet = rng.choice(np.flatnonzero(geometry.facets.body == 1), n).astype(np.int32)
     centre = rng.dirichlet(np.ones(3), (n, 1))
-    return stand(geometry, leg, facet, 0.9 * centre + 0.1 * rng.dirichlet(np.ones(3), (n, 3)))
+    return launch_tubes(geometry, leg, facet, 0.9 * centre + 0.1 * rng.dirichlet(np.ones(3), (n, 3)))
 
 
 def test_tubes_behind_a_rectangle_are_seen_as_its_shadow_says():
@@ -50,7 +50,7 @@ def test_tubes_behind_a_rectangle_are_seen_as_its_shadow_says():
     tubes = small_tubes(geometry, leg, np.random.default_rng(1))
     n = len(tubes)
     matters = np.arange(n) % 5 > 0
-    view = sight(geometry, leg, tubes, matters, True, RULE)
+    view = tube_visibility(geometry, leg, tubes, matters, True, RULE)
     p = tubes.points
     drawn = np.concatenate([p[:, 3:] + 0.98 * (p[:, :3] - p[:, 3:]), p[:, 3:]], axis=1)
     seen = ~hidden(drawn)

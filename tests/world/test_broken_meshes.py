@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import raychan as rc
 from raychan.cli import app
-from raychan.geometry.edge_grid import most_within
+from raychan.geometry.edge_grid import grid_bounds
 from raychan.run.rcs import facets_of, scattering
 from raychan.tracing.legs import Leg
 from raychan.tracing.shadow_edges import ShadowEdges
@@ -85,9 +85,9 @@ def test_a_vertex_of_no_face_changes_nothing():
 def test_a_grid_of_edges_ignores_a_spike():
     rng = np.random.default_rng(1)
     middle = np.concatenate([rng.normal(size=(1000, 3)), [[3e4, 2e4, -1e4]]])
-    low, high, cut_off = most_within(middle, middle.min(axis=0), middle.max(axis=0))
+    low, high, cut_off = grid_bounds(middle, middle.min(axis=0), middle.max(axis=0))
     assert cut_off and np.ptp([low, high]) < 50.0
-    same = most_within(middle[:-1], middle[:-1].min(axis=0), middle[:-1].max(axis=0))
+    same = grid_bounds(middle[:-1], middle[:-1].min(axis=0), middle[:-1].max(axis=0))
     assert not same[2] and (same[0] == middle[:-1].min(axis=0)).all()
 
 

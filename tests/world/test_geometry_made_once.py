@@ -164,7 +164,7 @@ def test_edges_turn_where_one_facet_looks_here_and_the_other_does_not(end):
             towards = geometry.normal @ image if far else ((image - geometry.first) * geometry.normal).sum(axis=1)
             front = towards > 0.0
             wanted = (faces[:, 1] < 0) | (front[faces[:, 0]] != front[faces[:, 1]])
-            found = geometry.turning(image, far)
+            found = geometry.silhouette_edges(image, far)
             assert 0 < len(found[0]) < len(half)
             np.testing.assert_array_equal(found[0], half[wanted])
             np.testing.assert_array_equal(found[1], faces[wanted])

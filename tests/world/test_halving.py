@@ -15,7 +15,7 @@ from raychan.world.creases import readings
 from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
 from raychan.world.mesh import make_mesh
-from raychan.world.topology import places
+from raychan.world.topology import point_numbers
 
 
 def ellipsoid(axes, subdivisions=2):
@@ -42,7 +42,7 @@ def test_halved_facets_share_every_edge_even_where_normals_part():
     mesh = trimesh.creation.cylinder(0.1, 0.3, sections=24)
     facets = facets_of(mesh, "pec", 77e9)
     v, _ = halved(facets.vertices, facets.normals)
-    corner = places(v.reshape(-1, 3)).reshape(-1, 3)
+    corner = point_numbers(v.reshape(-1, 3)).reshape(-1, 3)
     edge = np.sort(np.stack([corner, np.roll(corner, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     assert (np.unique(edge, axis=0, return_counts=True)[1] == 2).all()
 

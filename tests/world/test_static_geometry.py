@@ -49,7 +49,7 @@ def scene(request, monkeypatch):
     picked = {"still": [0, 1, 3, 4], "rigid": [0, 2, 3, 4], "both": [0, 1, 2, 3, 4]}[request.param]
     scene = rc.Scene(bodies=[all_[i] for i in picked], radar=RADAR, model={"max_bounces": 2, "tolerance_db": 3.0})
     assert scene.still is not None
-    assert bool(scene.still.rigid) == (request.param != "still")
+    assert bool(scene.still.instances) == (request.param != "still")
     return scene
 
 
