@@ -27,7 +27,7 @@ from raychan.study.visibility import Visibility
 
 ELSEWHERE = {"trace", "transfer", "synthesize", "range_doppler", "detect", "SceneRoutes"}
 """Public names whose examples stand in test_stages.py."""
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FLAGS = (
     "--strict", "--follow-imports=silent", "--ignore-missing-imports", "--no-error-summary", "--config-file=",
     f"--cache-dir={ROOT / '.mypy_cache' / 'face'}",
@@ -36,7 +36,7 @@ FLAGS = (
 
 
 def street() -> rc.Scene:
-    """A scene of objects."""
+    """Return a scene of objects."""
     return rc.Scene(
         bodies=[
             rc.Body(name="ground", shape="ground", material="asphalt"),
@@ -89,7 +89,7 @@ def test_examples_in_docstrings_run(home: str) -> None:
 
 
 def public_annotations(name: str) -> Iterator[tuple[str, str]]:
-    """What a public name takes, gives and holds, as it is written, with where that stands."""
+    """Yield what a public name takes, gives and holds, as it is written, with where that stands."""
     thing = getattr(rc, name)
     members = {name: thing} if not isinstance(thing, type) else {f"{name}.{k}": v for k, v in vars(thing).items()}
     for where, member in members.items():
