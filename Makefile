@@ -7,15 +7,22 @@ BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
 # Tests of the kernels, which `make test` also runs with bounds checked; the rest of the suite: make test-bounds.
-BOUNDS := $(addprefix tests/test_,bounds.py cores.py cut.py diffract.py jit.py shapes.py sight.py spectrum.py utd.py)
+BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py \
+	world/test_shapes.py \
+	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
+# Tests of the kernels that are cheap enough as plain Python; marked `compiled`: what is not, each with its reason.
+NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_doppler.py \
+	$(addprefix tracing/test_,edge_diffraction.py occluders.py subdivide.py visibility.py))
 PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: help demo test test-bounds fuzz signatures bench docs clean
+.PHONY: help demo test test-bounds test-nojit coverage fuzz signatures bench docs clean
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
 	@echo "make test   ruff, ruff format, mypy, pytest; the three scenes and the kernels' tests with bounds checked"
 	@echo "make test-bounds   all tests with the bounds of every array in compiled code checked"
+	@echo "make test-nojit   the kernels' tests with the compiler off, where that takes no minutes"
+	@echo "make coverage   which lines tests reach, the kernels' as plain Python (some minutes)"
 	@echo "make fuzz   random scene files, meshes and flags for half an hour (FUZZ=--help: more)"
 	@echo "make signatures   list anew what a cold run compiles, for its second process (some minutes)"
 	@echo "make bench  speed as ratios, memory; a table and out/bench.json (BENCH=--quick: a few minutes; BENCH=--help)"
@@ -34,6 +41,14 @@ test: $(VENV)/.installed-dev
 
 test-bounds: $(VENV)/.installed-dev
 	NUMBA_BOUNDSCHECK=1 $(PYTEST)
+
+test-nojit: $(VENV)/.installed-dev
+	NUMBA_DISABLE_JIT=1 $(PYTEST) $(NOJIT)
+
+# Kernels count where they run as plain Python.
+coverage: $(VENV)/.installed-dev
+	NUMBA_DISABLE_JIT=1 $(PYTEST) $(NOJIT) --cov --cov-report=
+	$(PYTEST) --cov --cov-append --cov-report=term:skip-covered
 
 fuzz: $(VENV)/.installed-dev
 	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)

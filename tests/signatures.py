@@ -27,9 +27,10 @@ class Recorder(event.Listener):
         self.rows: list[Row] = []
 
     def on_start(self, event: Any) -> None:
-        pass
+        """Do nothing: types are known at the end."""
 
     def on_end(self, event: Any) -> None:
+        """Note the module, name and argument types of a kernel that was compiled."""
         kernel = event.data["dispatcher"]
         if isinstance(kernel, Kernel):
             with suppress(ValueError):

@@ -1,0 +1,1 @@
+"""The field: what each route carries for a radar, as paths, and how wrong their sum may be."""

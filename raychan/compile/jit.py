@@ -37,9 +37,11 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
     stamp: bytes
 
     def __call__(self, *args: Any) -> Any:
+        """Call the kernel; unless bounds are checked, it may write to all arrays."""
         return super().__call__(*args) if _CHECKED else super().__call__(*map(_open, args))
 
     def compile(self, sig: Any) -> Any:
+        """Compile the kernel for these argument types, or wait for the process that does and take its code."""
         with global_compiler_lock, self.kept.held():
             return super().compile(sig)
 

@@ -1,0 +1,1 @@
+"""Scalar physics: Fresnel coefficients, polarisation, physical optics, phase integrals, diffraction."""

@@ -1,0 +1,1 @@
+"""Triangles as numbers: curved patches, clipping, silhouettes, closed surfaces."""

@@ -1,0 +1,1 @@
+"""Radars: antennas and their patterns, waveforms, windows."""

@@ -1,0 +1,1 @@
+"""Runs: from a scene to a result, single bodies, sequences, and what is stored of them."""

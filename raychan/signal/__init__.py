@@ -1,0 +1,1 @@
+"""Samples: from paths to the dechirped signal and the power-delay profile."""

@@ -1,0 +1,1 @@
+"""Studies: sweeps, trade-off of error against time, stability of methods, validation against the papers."""

@@ -1,0 +1,1 @@
+"""Three-dimensional pictures of scenes and their paths."""

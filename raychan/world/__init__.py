@@ -1,0 +1,1 @@
+"""Scenes: bodies, materials, meshes, motion, and the geometry that rays meet."""

@@ -63,7 +63,7 @@ def _whole_stl(file: Path) -> None:
     """Raise SceneError for a binary STL that is cut short: 84 bytes, then 50 a triangle, are expected."""
     there = file.stat().st_size
     with file.open("rb") as stream:
-        head = stream.read(1024)
+        head = stream.read(1 << 10)
     if there == 0 or (head.lstrip().startswith(b"solid") and b"facet" in head):
         return
     count = int.from_bytes(head[80:84], "little") if there >= _STL_HEAD else 0

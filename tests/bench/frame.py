@@ -14,7 +14,7 @@ from bench.measure import Row, barred, paired, seconds
 
 
 def frame(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
-    """The urban street at its own tolerance, the living street at the default one; coarse ones if quick."""
+    """Measure the urban street at its own tolerance, the living street at the default one; coarse ones if quick."""
     for name, tolerance in (("urban", None), ("living_street", 0.5)):
         yield from whole(rc.Scene.load(scenes / f"{name}.toml"), name, 3.0 if quick else tolerance, repeats)
 

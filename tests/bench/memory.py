@@ -57,7 +57,7 @@ gather.done().quiet
 
 
 def memory(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
-    """A bare start with all libraries, two frames, and many tubes. Once each: memory does not scatter as time does."""
+    """Measure a bare start with all libraries, two frames and many tubes, each once: memory scatters less than time."""
     _, idle, _, row = _row("start, all imported", _NOTHING)
     yield row
     for name, tolerance in (("urban", None), ("living_street", 0.5)):

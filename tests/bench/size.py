@@ -43,7 +43,7 @@ Job = tuple[str, Callable[[], rc.Scene], dict[str, Any]]
 
 
 def _hidden(ball: trimesh.Trimesh, x: float = 12.0, wall: bool = True, speed: float = 0.0) -> Job:
-    """A plate or a ball seen and a ball of ever more triangles out of sight: the tubes that count are the same."""
+    """Return a job: a plate or a ball, and hidden behind it a ball of ever more triangles. The tubes are the same."""
     front: dict[str, Any] = {"shape": "plate", "params": {"width": 3.0, "height": 3.0}, "yaw_deg": 180.0}
     if not wall:
         front = {"mesh": trimesh.creation.icosphere(subdivisions=3, radius=1.8)}
@@ -56,7 +56,7 @@ def _hidden(ball: trimesh.Trimesh, x: float = 12.0, wall: bool = True, speed: fl
 
 
 def _moved(ball: trimesh.Trimesh) -> Job:
-    """The same as it stands a little later each time, so that what is kept with a scene serves no more."""
+    """Return the job at a slightly later time each run, so that nothing kept with the scene can be used again."""
     name, scene, settings = _hidden(ball, speed=1e-3)
     steps = itertools.count(1)
     return name, lambda: scene().at(1e-3 * next(steps)), settings

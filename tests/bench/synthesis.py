@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.fft
-from echoes import echoes, make_radar
+from support.echoes import echoes, make_radar
 
 from bench.direct import recurrent_sum
 from bench.measure import Row, against, barred, rounds

@@ -59,12 +59,15 @@ class Plane:
         self.p = face[0]
 
     def mirror(self, points):
+        """Return the mirror images of points (..., 3)."""
         return points - 2 * ((points - self.p) @ self.n)[..., None] * self.n
 
     def side(self, homogeneous):
+        """Return the height of (x, y, z, w) over the plane; w = 0 is a direction."""
         return self.n @ homogeneous[:3] - homogeneous[3] * (self.n @ self.p)
 
     def image(self, homogeneous):
+        """Return the mirror image of (x, y, z, w)."""
         return np.append(homogeneous[:3] - 2 * self.side(homogeneous) * self.n, homogeneous[3])
 
 
@@ -229,7 +232,7 @@ def _last_face(part, n, order, planes, k, tx, rx, form):
 
 
 def po_image(end, turn, offset):
-    """An end seen in the mirrors, as (direction, distance) from the origin."""
+    """Return an end seen in the mirrors, as (direction, distance) from the origin."""
     if np.isinf(end[1]):
         return turn @ end[0], np.inf
     place = turn @ (end[0] * end[1]) + offset

@@ -18,7 +18,7 @@ def _riccati(x, count):
 
 
 def coefficients(radius, k, eps=None):
-    """a_n (electric) and b_n (magnetic), n = 1.., of a sphere; eps None is a perfect conductor."""
+    """Return a_n (electric) and b_n (magnetic), n = 1.., of a sphere; eps None is a perfect conductor."""
     x = k * radius
     count = _order(x)
     psi, zeta = _riccati(x, count)

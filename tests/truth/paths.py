@@ -103,7 +103,7 @@ def _basis(travel):
 
 
 def _bounce(travel, face, through=False):
-    """(new direction, 3 x 3 matrix of the field) at a face."""
+    """Return (new direction, 3 x 3 matrix of the field) at a face."""
     n = face.n if travel @ face.n < 0 else -face.n
     out = travel if through else travel - 2 * (travel @ n) * n
     s = np.cross(travel, n)

@@ -15,7 +15,7 @@ NODES, CYCLES = 20, 4.0
 
 
 def direction(azimuth, elevation=0.0):
-    """Unit vector of azimuth and elevation [rad]."""
+    """Return the unit vector of azimuth and elevation [rad]."""
     return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
 
 
@@ -154,7 +154,7 @@ def triangles(corners, k, tx, rx=None, geometry=None, form="huygens", rtol=1e-7)
 
 
 def unit_normal(p):
-    """Unit normal of a planar polygon."""
+    """Return the unit normal of a planar polygon."""
     n = np.sum(np.cross(p, np.roll(p, -1, axis=0)), axis=0)
     return n / np.linalg.norm(n)
 

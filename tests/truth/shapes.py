@@ -48,7 +48,7 @@ def superquadric(axes, e1, e2, m, n):
 
 
 def fine_superquadric(axes, e1, e2, m=100, n=200):
-    """The same by polar angles, which crowd its points nowhere, with its own normals."""
+    """Return the same surface by polar angles, which crowd its points nowhere, with its own normals."""
     v, u = np.linspace(-np.pi / 2, np.pi / 2, m + 1)[1:-1, None], np.linspace(0, 2 * np.pi, n, endpoint=False)
 
     def round_(angle, e):
@@ -123,6 +123,7 @@ def case(rng, i):
 
 
 def sigma(s):
+    """Return the radar cross section [m^2] of a scattering matrix, VV."""
     return 4.0 * np.pi * abs(s[0, 0]) ** 2
 
 

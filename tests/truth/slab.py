@@ -10,7 +10,7 @@ import numpy as np
 
 
 def _admittance(cos_i, eps):
-    """Normal wave number over k, and tangential admittances (s, p) of a medium over that of vacuum."""
+    """Return the normal wave number over k, and tangential admittances (s, p) of a medium over that of vacuum."""
     normal = np.sqrt(np.asarray(eps, complex) - (1.0 - np.asarray(cos_i) ** 2))
     normal = np.where(normal.imag > 0, -normal, normal)
     return normal, normal, eps / normal

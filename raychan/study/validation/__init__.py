@@ -1,0 +1,1 @@
+"""Validation: the papers' tables and claims, judged figure by figure."""

@@ -1,0 +1,26 @@
+"""The error that a map states against a far finer launch: in scenes, cell by cell, as `test_rcs.py` does for bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.places import SCENES
+
+import raychan as rc
+from raychan.channel.error import stated_error
+
+
+@pytest.mark.parametrize("name", ["living_street", "urban"])
+def test_a_maps_stated_error_covers_the_true_one_in_most_cells(name):
+    scene = rc.Scene.load(SCENES / f"{name}.toml")
+    silent = replace(scene.radar, noise=False)
+    result = rc.simulate(scene, tolerance_db=1.0, max_bounces=2)
+    # A check launch has thrice the tolerance asked for, and its own lattice of cuts: this one has 0.25 dB.
+    fine = rc.transfer(rc.trace(scene, tolerance_db=0.25 / 3.0, max_bounces=2, check=True), scene.radar)
+    found, true = (rc.range_doppler(rc.synthesize(p, silent), silent).power for p in (result.paths, fine))
+    rows = found > 20.0 * result.rdmap.noise
+    stated = np.array([stated_error(complex(a), b) for a, b in np.sqrt([found[rows], result.error.power[rows]]).T])
+    off = np.abs(10.0 * np.log10(found[rows] / true[rows]))
+    assert rows.sum() > 100
+    assert np.mean(off <= stated) > 0.9
+    assert np.median(off) < 0.3

@@ -1,0 +1,158 @@
+"""Results survive the disk, and others can read them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from support.results import paths, result
+
+from raychan.records import REFLECT, SCATTER
+from raychan.run.output_files import StoreError
+from raychan.run.storage import COLUMNS, load_result, save_result
+from raychan.units import C0
+
+CHAIN = [(2, REFLECT), (3, SCATTER), (2, REFLECT)]
+
+
+@pytest.fixture
+def made():
+    p = paths([9.0, 5.0], [-7.0, 1.0], [1e-5 + 2e-5j, 3e-6], [CHAIN, [(1, SCATTER)]])
+    return result(p, [(9.0, -7.0, 5e-10), (5.0, 1.0, 9e-12)])
+
+
+def records(r):
+    return [r.paths, r.paths.ways, r.profile, r.cube, r.rdmap, r.detections]
+
+
+def test_what_is_stored_comes_back_bit_for_bit(made, tmp_path):
+    save_result(made, tmp_path)
+    back = load_result(tmp_path)
+    for was, now in zip(records(made), records(back), strict=True):
+        for f in (f for f in dataclasses.fields(was) if f.name != "ways"):
+            old, new = getattr(was, f.name), getattr(now, f.name)
+            assert np.asarray(old).dtype == np.asarray(new).dtype
+            np.testing.assert_array_equal(new, old, err_msg=f.name)
+    for name in ("provenance", "receiver", "seed", "timings", "ledger", "warnings", "scene"):
+        assert getattr(back, name) == getattr(made, name), name
+
+
+def test_a_result_without_paths_or_detections_is_stored_too(tmp_path):
+    save_result(result(paths([], [], [], []), []), tmp_path)
+    back = load_result(tmp_path / "result.nc")
+    assert (len(back.paths.delay), len(back.detections.range)) == (0, 0)
+    assert (tmp_path / "detections.csv").read_text() == ",".join(COLUMNS) + "\n"
+
+
+def test_groups_open_in_xarray_and_as_plain_hdf5_with_units(made, tmp_path):
+    save_result(made, tmp_path)
+    with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf", group="paths") as data:
+        assert data["length"].attrs["units"] == "m"
+        np.testing.assert_array_equal(data["amplitude_im"], made.paths.amplitude.imag)
+    with h5py.File(tmp_path / "result.nc") as file:
+        assert set(file) >= {"paths", "profile", "cube", "rdmap", "detections"}
+        names: list[str] = []
+        file.visit(names.append)
+        kinds = {n: file[n].dtype.kind for n in names if isinstance(file[n], h5py.Dataset) and n.count("/") == 1}
+        text = {n for n, kind in kinds.items() if kind not in "fiu"}
+        assert text == {"detections/label", "detections/bodies"}, "else only real numbers, which MATLAB's h5read takes"
+
+
+def test_a_file_of_the_former_form_is_read(made, tmp_path):
+    save_result(made, tmp_path)
+    with h5py.File(tmp_path / "result.nc", "a") as file:
+        paths = file["paths"]
+        paths["delay"] = paths["length"][:] / C0
+        paths["range_rate"] = 0.5 * paths["length_rate"][:]
+        del paths["length"], paths["length_rate"]
+        file.attrs["format"] = 2
+    back = load_result(tmp_path).paths
+    np.testing.assert_allclose(back.length, made.paths.length, rtol=1e-15)
+    np.testing.assert_array_equal(back.length_rate, made.paths.length_rate)
+
+
+def test_map_and_profile_have_range_and_range_rate_as_coordinates_and_plot_with_named_axes(made, tmp_path):
+    save_result(made, tmp_path)
+    file = tmp_path / "result.nc"
+    for group in ("rdmap", "error"):
+        with xr.open_dataset(file, group=group) as data:
+            assert data["power"].dims == ("range_rate", "range")
+            np.testing.assert_array_equal(data.indexes["range"], made.rdmap.range)
+            np.testing.assert_array_equal(data.indexes["range_rate"], made.rdmap.rate)
+    with xr.open_dataset(file, group="rdmap") as data:
+        best = data.power_dbm.isel(data.power.argmax(...))
+        assert (float(best.range), float(best.range_rate)) == pytest.approx((9.0, -7.0), abs=0.2)
+        assert float(best) == pytest.approx(-63.01, abs=0.01) and best.attrs["units"] == "dBm"
+        axes = data.power.plot().axes
+        assert axes.get_xlabel() == "range [m]" and "range rate" in axes.get_ylabel() and "m s-1" in axes.get_ylabel()
+    with xr.open_dataset(file, group="profile") as data:
+        assert data["power"].dims == ("range",) and np.array_equal(data.indexes["range"], made.profile.range)
+    with xr.open_dataset(file, group="cube") as data:
+        assert data["samples_re"].dims == ("antenna", "chirp", "sample")
+        assert float(data.chirp_time[1]) == made.receiver.waveform.repetition
+        assert float(data.sample_time[-1]) == pytest.approx(30e-6 * 127 / 128)
+
+
+def test_detections_say_in_the_file_what_made_them_and_how_sure_they_are(made, tmp_path):
+    save_result(made, tmp_path)
+    with xr.open_dataset(tmp_path / "result.nc", group="detections") as data:
+        assert data.label.values.tolist() == [why.label for why in made.provenance]
+        assert data.bodies.values.tolist() == [why.bodies for why in made.provenance]
+        assert data.bodies.values[0] == "truck.tail > walker > truck.tail"
+        np.testing.assert_array_equal(data.error_db, [why.error_db for why in made.provenance])
+        for name in ("converged", "folded"):
+            if hasattr(made.detections, name):
+                assert data[name].dtype == bool
+                np.testing.assert_array_equal(data[name], getattr(made.detections, name))
+
+
+UDUNITS = {"1", "m", "m s-1", "s", "W", "V", "rad", "dB", "dBm"}  # and decibels, which it has not
+"""Each was parsed by UDUNITS-2."""
+
+
+def test_every_variable_has_a_name_for_people_and_a_unit_that_udunits_parses(made, tmp_path):
+    save_result(made, tmp_path)
+    with h5py.File(tmp_path / "result.nc") as file:
+        assert file.attrs["Conventions"] == "CF-1.11"
+        for group in ("paths", "profile", "cube", "rdmap", "error", "detections"):
+            with xr.open_dataset(tmp_path / "result.nc", group=group, decode_cf=False) as data:
+                for name, column in data.variables.items():
+                    assert column.attrs["long_name"], name
+                    kind = column.dtype.kind
+                    free = kind not in "fiu" or "flag_values" in column.attrs
+                    assert free or column.attrs["units"] in UDUNITS, (group, name, column.attrs.get("units"))
+    with xr.open_dataset(tmp_path / "result.nc", group="rdmap") as data:
+        assert data.range_rate.attrs["standard_name"] == "radial_velocity_of_scatterers_away_from_instrument"
+
+
+def test_a_long_scene_text_is_kept_whole(made, tmp_path):
+    text = "# öäü\n" * 40_000
+    save_result(dataclasses.replace(made, text=text, path="street.toml"), tmp_path)
+    assert load_result(tmp_path).text == text
+
+
+def test_csv_and_summary_say_what_the_record_holds(made, tmp_path):
+    save_result(made, tmp_path)
+    head, first, _ = (tmp_path / "detections.csv").read_text().splitlines()
+    assert head == (
+        "range_m,range_rate_mps,speed_mps,azimuth_deg,snr_db,power_dbm,error_db,converged,folded,true_range_m,"
+        "true_range_rate_mps,label,bodies"
+    )
+    assert first.startswith("9.0000,-7.0000,0.0000,,30.00,-63.01,")
+    assert ",true,false,8.99" in first  # mid frame it has come nearer
+    assert first.endswith(",multipath,truck.tail > walker > truck.tail")
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["labels"] == {"direct": 1, "multipath": 1, "clutter": 0}
+    assert summary["left_out"] == {"diffraction": "unknown"}
+
+
+def test_a_file_that_is_not_ours_is_refused(tmp_path):
+    with pytest.raises(StoreError, match="no such file"):
+        load_result(tmp_path)
+    (tmp_path / "result.nc").write_bytes(b"not a netCDF file")
+    with pytest.raises(StoreError, match="cannot be read"):
+        load_result(tmp_path)

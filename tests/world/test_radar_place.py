@@ -1,0 +1,107 @@
+"""Where a radar stands to a body: outside, inside, on its surface, or in the plane of a facet."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+import trimesh
+from support.facets import box, quad
+
+import raychan as rc
+from raychan.world.errors import SceneError
+from raychan.world.point_in_body import Place, in_plane_of, place_of
+
+F = 77e9
+SCENE = """
+[radar]
+position = {at}
+[radar.waveform]
+carrier_ghz = 77.0
+bandwidth_mhz = 1000.0
+chirp_us = 30.0
+repetition_us = 40.0
+chirps = 8
+samples = 64
+[[bodies]]
+name = "plate"
+shape = "plate"
+params = {{ width = 1.0, height = 1.0 }}
+position = [4.0, 0.0, 0.0]
+"""
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_point_is_inside_a_convex_body_where_it_lies_behind_all_its_faces(seed):
+    rng = np.random.default_rng(seed)
+    hull = trimesh.convex.convex_hull(rng.normal(size=(30, 3)))
+    corners = np.array(hull.triangles)
+    for p in rng.normal(size=(60, 3)):
+        behind = (((p - corners[:, 0]) * hull.face_normals).sum(axis=1) < 0.0).all()
+        assert place_of(corners, p) == (Place.INSIDE if behind else Place.OUTSIDE)
+    weights = rng.dirichlet(np.ones(3), len(corners))
+    assert all(place_of(corners, p) == Place.ON for p in np.einsum("fi,fic->fc", weights, corners))
+
+
+def test_an_open_box_has_no_inside():
+    closed = np.array(box((-1, -1, -1), (1, 1, 1)).triangles)
+    assert place_of(closed, np.zeros(3)) == Place.INSIDE
+    assert place_of(closed[:-2], np.zeros(3)) == Place.OUTSIDE
+
+
+def test_a_body_turned_inside_out_still_has_an_inside():
+    corners = np.array(box((-1, -1, -1), (1, 1, 1)).triangles)[:, ::-1]
+    assert place_of(corners, np.full(3, 0.2)) == Place.INSIDE
+
+
+def test_facets_whose_plane_holds_a_point_are_counted():
+    corners = np.array(box((-1, -1, -1), (1, 1, 1)).triangles)
+    assert in_plane_of(corners, np.array([5.0, 1.0, 0.3])) == 2
+    assert in_plane_of(corners, np.array([5.0, 1.1, 0.3])) == 0
+
+
+@pytest.mark.parametrize(("distance", "word"), [(0.4, "inside"), (1.0, "on")])
+def test_a_radar_inside_a_mesh_or_on_it_is_an_error_of_rcs(distance, word):
+    with pytest.raises(ValueError, match=f"is {word} the mesh"):
+        rc.rcs(box((-1, -1, -1), (1, 1, 1)), F, 0.0, distance=distance)
+    with pytest.raises(ValueError, match=f"is {word} the mesh"):
+        rc.rcs(box((-1, -1, -1), (1, 1, 1)), F, 0.0, distance=5.0, rx_azimuth_deg=90.0, rx_distance=distance)
+
+
+def test_a_radar_in_the_plane_of_a_sheet_sees_nothing_of_it_and_divides_by_no_zero():
+    sheet = quad([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = rc.rcs(sheet, F, [0.0, 30.0], 0.0, distance=5.0)
+    assert (found.sigma < 1e-9).all()
+
+
+@pytest.mark.parametrize("shape", ["sheet", "box"])
+def test_a_radar_in_the_plane_of_a_face_is_told_and_divides_by_no_zero(shape):
+    mesh = box((3, -1, -1), (5, 1, 1)) if shape == "box" else quad([[3, -1, 1], [5, -1, 1], [5, 1, 1], [3, 1, 1]])
+    scene = rc.Scene(bodies=[rc.Body(name="thing", mesh=mesh)], frequency=F)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = rc.specular_paths(scene, (0.0, 0.0, 1.0), (0.5, 0.2, 1.0), max_bounces=2)
+    assert np.isfinite(found.gain).all() and len(found.length) >= 1
+
+
+def test_a_scene_tells_of_facets_that_the_radar_sees_edge_on(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        SCENE.format(at="[0.0, 0.0, 0.5]")
+        .replace('"plate"\nparams', '"box"\nparams')
+        .replace("width = 1.0, height = 1.0", "length = 1.0, width = 1.0, height = 1.0")
+    )
+    scene = rc.Scene.load(file)
+    z = scene.bodies[0].geometry.bounds[1, 2]
+    file.write_text(file.read_text().replace("[0.0, 0.0, 0.5]", f"[0.0, 0.0, {z}]"))
+    assert any("in the plane of 2 facets of 'plate'" in w for w in rc.Scene.load(file).warnings)
+
+
+def test_a_radar_on_a_plate_is_an_error_of_the_scene(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(SCENE.format(at="[4.0, 0.1, 0.1]"))
+    with pytest.raises(SceneError, match="on the surface of 'plate'"):
+        rc.Scene.load(file)
