@@ -123,7 +123,7 @@ def echoes(length: Floats, amplitude: Complexes, delay_rate: Floats, place: Floa
     n = len(length)
     none, look = np.full((n, 1), -1, np.int16), np.zeros((n, 3))
     return Paths.of(
-        length=length, amplitude=amplitude, length_rate=C0 * delay_rate, departure=look, arrival=look, body=none, part=none,
-        kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32), body_names=(), part_names=(),
-        tx=place, rx=place,
+        length=length, amplitude=amplitude, length_rate=C0 * delay_rate, departure=look, arrival=look, body=none,
+        part=none, kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32), body_names=(),
+        part_names=(), tx=place, rx=place,
     )  # fmt: skip
