@@ -126,9 +126,9 @@ def _bodies(scene: Any) -> Table:
         if len(corners) and facets.role[b] != 1:
             size = " x ".join(f"{x:.2f}" for x in np.ptp(corners, axis=0))
             near = f"{np.linalg.norm(corners - place, axis=1).min():.2f}"
-        place = ", ".join(f"{x:.2f}" for x in facets.origin[b])
+        origin = ", ".join(f"{x:.2f}" for x in facets.origin[b])
         speed = ", ".join(f"{x:g}" for x in facets.velocity[b])
-        rows.append((name, role, f"{len(corners) // 3}", size, place, speed, near))
+        rows.append((name, role, f"{len(corners) // 3}", size, origin, speed, near))
     heads = ("body", "role", "facets", "extent m", "origin m", "velocity m/s", "nearest corner m")
     return show.table("Bodies", heads, rows, left=(0, 1))
 

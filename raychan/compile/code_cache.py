@@ -48,6 +48,7 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
     """The cached code of one function, one file for each signature."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
+        """Find the folder; RuntimeError where none can be written to."""
         super().__init__(function)
         self.source: Any = self._impl.locator.get_source_stamp()
         self.folder = Path(self._cache_path)
@@ -104,7 +105,12 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
         if not self._impl.check_cachable(data):
             return
         key = self._index_key(sig, data.codegen)
-        content = dumps((self._stamp, key, self._impl.reduce(data)))
+        try:
+            reduced = self._impl.reduce(data)
+        except RuntimeError:
+            # A Ctrl-C cut off the generation of code, in a callback from LLVM that cannot raise; it is repeated.
+            return
+        content = dumps((self._stamp, key, reduced))
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._clear()

@@ -17,7 +17,7 @@ from numba.core import config
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
-from raychan.compile.code_cache import CodeCache
+from raychan.compile.code_cache import CodeCache, unkept
 
 _CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
 _CONSTANTS = int, float, complex, str, tuple
@@ -54,8 +54,14 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def compiled(function: Callable[..., Any]) -> Any:
         made: Any = numba.njit(**options)(function)
         if keep and not _UNCOMPILED:
+            try:
+                cache = CodeCache(function)
+            except RuntimeError as reason:  # no folder can be written to: every process compiles for itself
+                unkept.append(str(reason))
+                made.stamp = hashlib.sha256(_within_reach(function, function.__code__.co_filename)).digest()
+                return made
             made.__class__ = Kernel
-            made._cache = made.kept = CodeCache(function)
+            made._cache = made.kept = cache
             made.stamp = made.kept.stamped(hashlib.sha256(_within_reach(function, made.kept.source)).digest())
             KERNELS.append(made)
         return made

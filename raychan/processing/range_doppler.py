@@ -38,7 +38,8 @@ def range_doppler(
     if min(pad) < 1 or any(int(p) != p for p in pad):
         raise ValueError(f"pad = {pad}: whole numbers from 1 on wanted")
     taper_r, taper_v = window(range_window, samples), window(rate_window, chirps)
-    cells_r, cells_v = int(pad[0]) * samples, int(pad[1]) * chirps
+    # One chirp has one rate: padded, all rows would be equal.
+    cells_r, cells_v = int(pad[0]) * samples, int(pad[1]) * chirps if chirps > 1 else 1
     image = 1.0 if waveform.complex_sampling else 2.0
     workers = os.cpu_count() or 1
 

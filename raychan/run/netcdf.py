@@ -64,6 +64,7 @@ _SCALARS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_res
     "unambiguous_range": "m",
     "unambiguous_rate": "m s-1",
 }
+_CELL = ("rate_cell", "range_cell")
 _TOLD = ("label", "bodies", "error_db", "converged", "folded")
 
 
@@ -96,6 +97,8 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
             if name not in data and kind is Paths and name in _FORMER:
                 former, factor = _FORMER[name]
                 values[f.name] = factor * data[former].values
+            elif f.name == "cell" and "cell" not in data:
+                values[f.name] = np.stack([data[axis].values for axis in _CELL], axis=1)
             elif "axes" not in f.metadata:
                 told = data.attrs[f.name]
                 values[f.name] = tuple(json.loads(told)) if isinstance(told, str) else float(told)
@@ -123,6 +126,11 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
     for f in columns(type(record)):
         value = record.ways.vertices[record.way] if f.name == "vertices" else getattr(record, f.name)
         if "axes" in f.metadata:
+            if f.name == "cell":  # a column each, so that a table of detections has a row each
+                for k, axis in enumerate(_CELL):
+                    about = {"units": "1", "long_name": f"index of the peak along {axis.split('_')[0]}"}
+                    _variable(group, axis, (_ROWS[name],), value[:, k], about, packed)
+                continue
             _column(group, name, f, value, packed)
         else:
             group.attrs[f.name] = json.dumps(value) if isinstance(value, tuple) else value

@@ -61,7 +61,8 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
     that the command does not write stay there. Where `out` cannot be renamed (a mount, the current directory), files
     are moved into it one by one. Raises: StoreError for errors of the disk, or where a file of someone else is in the
     way."""
-    out = Path(out).resolve()
+    with _disk_errors(Path(out)):
+        out = Path(out).resolve()
     made = _make_parents(out.parent)
     try:
         with _disk_errors(out):

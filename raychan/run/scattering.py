@@ -43,13 +43,14 @@ def scattering(geometry: Geometry, leg: Leg, out: Leg, frequency: float, bounces
 def reciprocal_scattering(
     geometry: Geometry, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement
 ) -> Complexes:
-    """Return the scattering amplitudes (bounces, 2, 2) [m] of one launch, reciprocal by construction: for different
-    ends the mean over both directions."""
+    """Return the scattering amplitudes (bounces, 2, 2) [m] of one launch, reciprocal by construction.
+
+    Over several bounces physical optics is not reciprocal; the mean over both directions is. For one and the same end
+    the other direction is the transposed matrix.
+    """
     s = scattering(geometry, leg, out, frequency, bounces, rule)
-    if out != leg:
-        # Over several bounces physical optics is not reciprocal; the mean of both directions is.
-        s = 0.5 * (s + scattering(geometry, out, leg, frequency, bounces, rule).transpose(0, 2, 1))
-    return s
+    back = s if out == leg else scattering(geometry, out, leg, frequency, bounces, rule)
+    return 0.5 * (s + back.transpose(0, 2, 1))
 
 
 def _basis(look: Floats) -> Complexes:

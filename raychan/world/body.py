@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, Union
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from raychan.world.motion import Motion
 if TYPE_CHECKING:
     import trimesh
 
-MeshLike: TypeAlias = "Mesh | trimesh.Trimesh | trimesh.Scene | str | Path"
+MeshLike: TypeAlias = Union[Mesh, "trimesh.Trimesh", "trimesh.Scene", str, Path]
 """A mesh of ours, one of trimesh, or the name of a file."""
 ROLES = {role.name.lower(): role for role in Role}
 

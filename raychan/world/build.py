@@ -13,6 +13,9 @@ from raychan.world.schema import BodyTable, MaterialTable
 _FORM = ("shape", "params", "mesh", "unit", "up", "forward", "scale", "crease_deg")
 
 
+_LARGEST = 16 << 20  # bytes of a scene file; 10,000 bodies take 2 MB
+
+
 def scene_text(path: str | Path) -> tuple[str, Path]:
     """Return the text of a scene file, or of the scene of that name that comes with raychan, and the file.
 
@@ -21,7 +24,12 @@ def scene_text(path: str | Path) -> tuple[str, Path]:
     file = bundled.found(path)
     overrides.refuse_mesh(file)
     try:
-        return file.read_text(encoding="utf-8"), file
+        if file.exists() and not file.is_file():
+            raise SceneError("is not a file", file=file, allowed="a text file in TOML")
+        if file.exists() and file.stat().st_size > _LARGEST:
+            raise SceneError("is too large for a scene file", file=file, allowed=f"at most {_LARGEST >> 20} MB")
+        # Some editors begin a text with a byte order mark.
+        return file.read_text(encoding="utf-8-sig"), file
     except FileNotFoundError:
         more = f", or {nearest(file.stem, bundled.names())}" if bundled.names() else ""
         raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
