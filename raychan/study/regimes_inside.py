@@ -23,7 +23,7 @@ _MATERIALS = Materials(
     roughness=np.zeros(2),
 )
 _CELL = 0.15  # m
-SharedRows = tuple[Floats, int]
+Sheet = tuple[Floats, int]
 """Corners (4, 3) [m] of a plane quadrilateral, and its row of the materials: 0 glass, 1 metal."""
 
 
@@ -83,12 +83,12 @@ def _corner() -> Row:
     """Return two large mirrors at right angles, of two bodies, over the same as one."""
     foot, up = np.array([8.0, 0.0, -0.5]), np.array([0.0, 0.0, 1.0])
     one, two = np.array([-0.7, 0.7, 0.0]), np.array([-0.7, -0.7, 0.0])
-    sides: list[SharedRows] = [(rectangle(foot, up, one)[0], 1), (rectangle(foot, two, up)[0], 1)]
+    sides: list[Sheet] = [(rectangle(foot, up, one)[0], 1), (rectangle(foot, two, up)[0], 1)]
     a, b = (_at(_paths(_facets(sides, whole), 2, 0.5), 8.0) for whole in (True, False))
     return same_db("two mirrors at right angles, 1 m", abs(b) ** 2, abs(a) ** 2, 0.02, "one body")
 
 
-def _box(size: Floats | tuple[float, ...], at: Floats, kinds: object, turn: Floats | None = None) -> list[SharedRows]:
+def _box(size: Floats | tuple[float, ...], at: Floats, kinds: object, turn: Floats | None = None) -> list[Sheet]:
     """Return the sides of a box, front (-x) and back first, each facing outward."""
     a, b, c = 0.5 * np.asarray(size, float)
     p = np.array([[x, y, z] for x in (-a, a) for y in (-b, b) for z in (-c, c)])
@@ -97,7 +97,7 @@ def _box(size: Floats | tuple[float, ...], at: Floats, kinds: object, turn: Floa
     return [(p[list(s)], int(k)) for s, k in zip(sides, np.asarray(kinds), strict=True)]
 
 
-def _facets(sheets: list[SharedRows], whole: bool) -> Facets:
+def _facets(sheets: list[Sheet], whole: bool) -> Facets:
     """Return the facets of sheets, as parts of one body or a body each."""
     v = np.concatenate([p[[[0, 1, 2], [0, 2, 3]]] for p, _ in sheets])
     normal = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])

@@ -64,7 +64,7 @@ class Item(Table):
     figure: tuple[Figure, ...] = ()
 
 
-class SharedRows(Table):
+class PrintedTable(Table):
     """A table as it stands in tables.toml."""
 
     number: int
@@ -116,7 +116,7 @@ class _Study(Table):
 
 
 class _Tables(Table):
-    table: tuple[SharedRows, ...]
+    table: tuple[PrintedTable, ...]
 
 
 class _Claims(Table):
@@ -175,7 +175,7 @@ def _read(kind: type[Table], file: Path) -> Any:
     return checked(kind, overrides.parsed(text, file), file)
 
 
-def _item(sheet: SharedRows, study: _Study, file: Path) -> Item:
+def _item(sheet: PrintedTable, study: _Study, file: Path) -> Item:
     name = f"T{sheet.number}"
     figures = [*_keyed(name, sheet.figure)]
     for row in sheet.rows:
@@ -185,7 +185,7 @@ def _item(sheet: SharedRows, study: _Study, file: Path) -> Item:
     return Item(id=name, text=sheet.title, where=f"table {sheet.number}", note=sheet.note, figure=tuple(figures))
 
 
-def _cell(name: str, sheet: SharedRows, column: Column, row: dict[str, Any], study: _Study, file: Path) -> Figure:
+def _cell(name: str, sheet: PrintedTable, column: Column, row: dict[str, Any], study: _Study, file: Path) -> Figure:
     """Return the figure of a cell: the column's, with what the row's cell says over it."""
     target = str(row.get("target", ""))
     given = row[column.key]
