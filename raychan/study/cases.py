@@ -159,7 +159,7 @@ def car(quick: bool = False) -> Target:
 
 
 def urban(path: Path | None = None, quick: bool = False) -> Street:
-    """The urban scene; reference: its map by a finer run on another lattice of cuts."""
+    """Return the urban scene; reference: its map by a finer run on another lattice of cuts."""
     here = path or Path(__file__).parents[2] / "scenes" / "urban.toml"
     fine = 0.5 if quick else 0.2
     return Street("urban", "urban scene", here, f"tubes cut for {fine:g} dB, another lattice of cuts", fine)

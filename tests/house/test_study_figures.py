@@ -8,7 +8,7 @@ import tomllib
 
 from support.places import ROOT
 
-NUMBER = re.compile(r"(?<![\w.])\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?(?![\w])")
+NUMBER = re.compile(r"(?<![\w.])\d(?:[\d_]*\d)?\.?\d*(?:[eE][-+]?\d+)?(?![\w])")
 CHANCE = {128.0, 1.25, 1.95}
 """Three digits that mean something else where they stand: sizes of blocks and grids, a default, shapes of cars."""
 
