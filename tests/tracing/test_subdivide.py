@@ -82,7 +82,6 @@ def shares_inside(tubes, i, source, ends, margin=0.0, steps=4000):
     return inside.reshape(len(ends), steps).mean(axis=1) * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
 
-@pytest.mark.compiled(reason="half a minute as plain Python")
 def test_outline_found_between_mirror_and_nowhere_is_that_of_which_most_lies_inside_the_tube():
     rng = np.random.default_rng(2)
     ball, box = trimesh.creation.icosphere(2, 0.8), trimesh.creation.box((0.5, 0.4, 1.0))
