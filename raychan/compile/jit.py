@@ -71,10 +71,14 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 def _open(value: Any) -> Any:
     """Return an argument with writable views of its arrays, in tuples or alone."""
-    if isinstance(value, tuple):
-        opened = map(_open, value)
-        return tuple(opened) if type(value) is tuple else type(value)(*opened)
-    if type(value) is not np.ndarray or value.flags.writeable:
+    if type(value) is np.ndarray:
+        if value.flags.writeable:
+            return value
+    elif type(value) is tuple:
+        return tuple(map(_open, value))
+    elif isinstance(value, tuple):
+        return type(value)(*map(_open, value))
+    else:
         return value
     seen = value.view()
     try:

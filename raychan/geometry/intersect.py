@@ -103,10 +103,11 @@ def offset_origins(rays, centre, radius, relative, size):  # type: ignore[no-unt
     Args: rays as `CastRays`; centre (3,), radius [m] of a bounding sphere of all facets; relative offset in parts of a
     coordinate; size [m] that a coordinate counts at least.
     """
-    n = len(rays.origin)
+    origin, direction, skip, starts = rays
+    n = len(origin)
     ahead, offset = np.empty(n), np.empty(n)
     for i in range(n):
-        x, d, start = rays.origin[i], rays.direction[i], rays.start[i]
+        x, d, start = origin[i], direction[i], starts[i]
         along = 0.0
         for c in range(3):
             along += (centre[c] - x[c]) * d[c]
@@ -120,7 +121,7 @@ def offset_origins(rays, centre, radius, relative, size):  # type: ignore[no-unt
         for c in range(3):
             most = max(most, abs(x[c] + at * d[c] - centre[c]))
         offset[i] = relative * (size + most)
-        ahead[i] = at + (offset[i] if at == start and (rays.skip[i] >= 0 or start > 0.0) else 0.0)
+        ahead[i] = at + (offset[i] if at == start and (skip[i] >= 0 or start > 0.0) else 0.0)
     return ahead, offset
 
 
@@ -168,7 +169,7 @@ def _on_facet(v, n, x, d, t, offset):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _instead_of_grazed(j, hit, x, d, ahead, offset, shapes):  # type: ignore[no-untyped-def]
+def _instead_of_grazed(j, hit, x, d, ahead, offset, vertices, first, normal):  # type: ignore[no-untyped-def]
     """Return the facet that counts instead of one that a ray runs along: the nearest that its companions meet, -1 for
     none; -2 if they run along one too."""
     h, old = -1, np.inf
@@ -176,28 +177,11 @@ def _instead_of_grazed(j, hit, x, d, ahead, offset, shapes):  # type: ignore[no-
         other = hit[3 * j + s]
         if other < 0:
             continue
-        new = plane_distance(shapes.normal[other], shapes.first[other], x, 0.0, d)
-        if other == hit[3 * j] or not _on_facet(shapes.vertices[other], shapes.normal[other], x, d, new, offset):
+        new = plane_distance(normal[other], first[other], x, 0.0, d)
+        if other == hit[3 * j] or not _on_facet(vertices[other], normal[other], x, d, new, offset):
             return -2
         if ahead < new < old:
             h, old = other, new
-    return h
-
-
-@njit(cache=True, forceinline=True)
-def _nearer_of_companions(j, h, hit, x, d, ahead, offset, edge, shapes):  # type: ignore[no-untyped-def]
-    """Return facet h (-1: none), or one that a companion met nearer and that the ray meets too, or misses by `edge` of
-    its offset at most."""
-    for s in range(1, 3):
-        other = hit[3 * j + s]
-        if other < 0 or other == h:
-            continue
-        old = np.inf if h < 0 else plane_distance(shapes.normal[h], shapes.first[h], x, ahead, d)
-        v, n = shapes.vertices[other], shapes.normal[other]
-        new = plane_distance(n, shapes.first[other], x, ahead, d)
-        at = ahead + new
-        if 0.0 < new < old - offset and _on_facet(v, n, x, d, at, offset) and contains(v, n, x, at, d, edge * offset):
-            h = other
     return h
 
 
@@ -214,25 +198,40 @@ def resolve_hits(todo, hit, rays, ahead, offset, shapes, limits, facet, distance
     hit is the surface left.
     """
     edge, nearest = limits
+    # Taken out of the tuples once: each access counts a reference.
+    origin, direction, skip, start = rays
+    vertices, first, normal = shapes
     again = np.empty(len(todo), np.int64)
     count = 0
     for j in range(len(todo)):
         i = todo[j]
-        x, d = rays.origin[i], rays.direction[i]
+        x, d = origin[i], direction[i]
         h = hit[3 * j]
-        t = plane_distance(shapes.normal[h], shapes.first[h], x, 0.0, d) if h >= 0 else 0.0
-        if h >= 0 and not _on_facet(shapes.vertices[h], shapes.normal[h], x, d, t, offset[i]):
-            h = _instead_of_grazed(j, hit, x, d, ahead[i], offset[i], shapes)
+        t = plane_distance(normal[h], first[h], x, 0.0, d) if h >= 0 else 0.0
+        if h >= 0 and not _on_facet(vertices[h], normal[h], x, d, t, offset[i]):
+            h = _instead_of_grazed(j, hit, x, d, ahead[i], offset[i], vertices, first, normal)
             if h == -2:
                 offset[i] *= 2.0
                 again[count] = i
                 count += 1
                 continue
-        h = _nearer_of_companions(j, h, hit, x, d, ahead[i], offset[i], edge, shapes)
+        for s in range(1, 3):
+            other = hit[3 * j + s]
+            if other < 0 or other == h:
+                continue
+            old = np.inf if h < 0 else plane_distance(normal[h], first[h], x, ahead[i], d)
+            new = plane_distance(normal[other], first[other], x, ahead[i], d)
+            at = ahead[i] + new
+            if (
+                0.0 < new < old - offset[i]
+                and _on_facet(vertices[other], normal[other], x, d, at, offset[i])
+                and contains(vertices[other], normal[other], x, at, d, edge * offset[i])
+            ):
+                h = other
         if h < 0:
             continue
-        t = plane_distance(shapes.normal[h], shapes.first[h], x, 0.0, d)
-        if h != rays.skip[i] and t > rays.start[i] + nearest:
+        t = plane_distance(normal[h], first[h], x, 0.0, d)
+        if h != skip[i] and t > start[i] + nearest:
             facet[i], distance[i] = h, t
             continue
         ahead[i] = max(t, ahead[i]) + 2.0 * offset[i]

@@ -157,19 +157,21 @@ def _write_history(i, used, tubes, history, retrace, planes, out):  # type: igno
     mirrors alone each vertex moves to where the centre ray meets its plane (subdivision moved the centre)."""
     place, normal_of, facet_of, kind_of, before = history
     first, normal, _ = planes
+    vertices, normals, facet, _, kind = out
+    moves = retrace and tubes.flat[i]
     at = tubes.last[i]
     px, py, pz = tubes.points[i, 3, 0], tubes.points[i, 3, 1], tubes.points[i, 3, 2]
     kx, ky, kz = tubes.k[i, 3, 0], tubes.k[i, 3, 1], tubes.k[i, 3, 2]
     for s in range(used - 1, -1, -1):
         f = facet_of[at]
-        out.facet[i, s], out.kind[i, s] = f, kind_of[at]
+        facet[i, s], kind[i, s] = f, kind_of[at]
         for c in range(3):
-            out.vertices[i, s, c], out.normals[i, s, c] = place[at, c], normal_of[at, c]
-        if retrace and tubes.flat[i]:
+            vertices[i, s, c], normals[i, s, c] = place[at, c], normal_of[at, c]
+        if moves:
             t = plane_distance(normal[f], first[f], (px, py, pz), 0.0, (-kx, -ky, -kz))
             if abs(t) < 1e300:
                 px, py, pz = px - t * kx, py - t * ky, pz - t * kz
-            out.vertices[i, s, 0], out.vertices[i, s, 1], out.vertices[i, s, 2] = px, py, pz
+            vertices[i, s, 0], vertices[i, s, 1], vertices[i, s, 2] = px, py, pz
             if kind_of[at] == _REFLECT:
                 x, y, z = normal_of[at]
                 turn = 2.0 * (kx * x + ky * y + kz * z)
@@ -211,24 +213,26 @@ def interactions(tubes, history, retrace, planes, legs, out):  # type: ignore[no
     `Interactions`.
     """
     body_of = planes[2]
-    d = out.kind.shape[1]
+    # Taken out of the tuples once: each access counts a reference.
+    vertices, normals, facet, body, kind = out
+    d = kind.shape[1]
     for i in range(len(tubes.facet)):
         used, here = tubes.slots[i], tubes.points[i, 3]
         _write_history(i, used, tubes, history, retrace, planes, out)
         for c in range(3):
-            out.vertices[i, used, c], out.normals[i, used, c] = here[c], tubes.normals[i, 3, c]
-        out.facet[i, used], out.kind[i, used] = tubes.facet[i], _SCATTER
+            vertices[i, used, c], normals[i, used, c] = here[c], tubes.normals[i, 3, c]
+        facet[i, used], kind[i, used] = tubes.facet[i], _SCATTER
         used += 1
         if legs.passed.shape[1] > 0:
             used = _write_layers_out(i, used, here, planes, legs, out)
         for j in range(len(legs.facets) - 1, -1, -1):
             for c in range(3):
-                out.vertices[i, used, c], out.normals[i, used, c] = legs.corners[i, j, c], legs.normals[j, c]
-            out.facet[i, used], out.kind[i, used] = legs.facets[j], _REFLECT
+                vertices[i, used, c], normals[i, used, c] = legs.corners[i, j, c], legs.normals[j, c]
+            facet[i, used], kind[i, used] = legs.facets[j], _REFLECT
             used += 1
         for s in range(used):
-            out.body[i, s] = body_of[out.facet[i, s]] if out.facet[i, s] >= 0 else -1
+            body[i, s] = body_of[facet[i, s]] if facet[i, s] >= 0 else -1
         for s in range(used, d):
-            out.facet[i, s], out.body[i, s], out.kind[i, s] = -1, -1, 0
+            facet[i, s], body[i, s], kind[i, s] = -1, -1, 0
             for c in range(3):
-                out.vertices[i, s, c], out.normals[i, s, c] = legs.end[c], 0.0
+                vertices[i, s, c], normals[i, s, c] = legs.end[c], 0.0

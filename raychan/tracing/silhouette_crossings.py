@@ -8,7 +8,6 @@ across the axis along which it runs most, and tests the edges that it finds ther
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,33 +101,6 @@ def _grid_of(geometry: Geometry) -> EdgeGrid:
     return EdgeGrid(edges, planes, first, index, low, cell, shape, bool(cut_off), occupied)
 
 
-class _Tube(NamedTuple):
-    """One tube in the search: its rays (4, 3), source (3,), whether there is one (flat) and whether rays count as
-    parallel; whether its centre ray lands, on the plane through `point` of this `normal`, times `sign` towards the
-    mirror; how far ahead [m] of the source it stands."""
-
-    points: Floats
-    directions: Floats
-    source: Floats
-    flat: bool
-    parallel: bool
-    lands: bool
-    point: Floats
-    normal: Floats
-    sign: float
-    ahead: float
-
-
-class _Work(NamedTuple):
-    """Arrays for work: the last tube that tested each edge (e,); normals of a tube's sides (3, 3), its section (4, 3),
-    and distances of its corners (3,)."""
-
-    tested: Ints
-    sides: Floats
-    section: Floats
-    side: Floats
-
-
 @njit(cache=True, forceinline=True)
 def _steepest(k):  # type: ignore[no-untyped-def]
     """Return the axis along which a ray runs most."""
@@ -138,142 +110,100 @@ def _steepest(k):  # type: ignore[no-untyped-def]
     return axis
 
 
-@njit(cache=True, forceinline=True)
-def _part_between(a, b, tube):  # type: ignore[no-untyped-def]
-    """Return from where to where (0 to 1) segment ab lies beyond a tube's mirror and before the plane of landing."""
-    da, db, ha, hb = -_TOUCHING, -_TOUCHING, -_TOUCHING, -_TOUCHING
-    centre, k = tube.points[3], tube.directions[3]
-    for c in range(3):
-        da += (a[c] - centre[c]) * k[c]
-        db += (b[c] - centre[c]) * k[c]
-        ha += tube.sign * (a[c] - tube.point[c]) * tube.normal[c]
-        hb += tube.sign * (b[c] - tube.point[c]) * tube.normal[c]
-    begin, end = above(da, db)
-    low_end, high_end = above(ha, hb) if tube.lands else (0.0, 1.0)
-    return max(begin, low_end), min(end, high_end)
-
-
-@njit(cache=True, forceinline=True)
-def _section_at(a, b, middle, tube, work):  # type: ignore[no-untyped-def]
-    """Write the section of a tube off a curved mirror at a place of segment ab, with its sides: rays count as parallel,
-    in the section that they have there."""
-    depth = 0.0
-    for c in range(3):
-        depth += (a[c] + middle * (b[c] - a[c]) - tube.points[3, c]) * tube.directions[3, c]
-    for q in range(3):
-        for c in range(3):
-            work.section[q, c] = tube.points[q, c] + depth * (tube.directions[q, c] - tube.directions[3, c])
-    pyramid(work.section, tube.source, tube.directions[3], True, work.sides)
-
-
-@njit(cache=True, forceinline=True)
-def _length_inside(a, b, best, tube, work):  # type: ignore[no-untyped-def]
-    """Return how long a part of segment ab [m] lies inside a tube, with the corners' distances in work.side; 0 if no
-    longer than `best` [m] or if it does not part the corners."""
-    begin, end = _part_between(a, b, tube)
-    size = size_of(a, b)
-    if (end - begin) * size <= best:
-        return 0.0
-    k = tube.directions[3]
-    if not tube.flat:
-        _section_at(a, b, 0.5 * (begin + end), tube, work)
-    scale = scale_at(a, b, tube.source, k, tube.parallel, tube.ahead)
-    begin, end = within(a, b, work.section, work.sides, scale, begin, end)
-    part = (end - begin) * size
-    if part > best and apart(a, b, work.section, tube.source, k, tube.parallel, work.side):
-        return part
-    return 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _search_cells(i, tube, grid, begin, end, best, work, out):  # type: ignore[no-untyped-def]
-    """Return the longest part [m] of a silhouette edge inside tube i, of the edges in the cells from `begin` to `end`
-    (3,) and of `best` [m] found before; write the corners' distances from a longer one into out (3,)."""
-    k, w = tube.directions[3], 0.0 if tube.parallel else 1.0
-    x = -k[0] if tube.parallel else tube.source[0]
-    y = -k[1] if tube.parallel else tube.source[1]
-    z = -k[2] if tube.parallel else tube.source[2]
-    if end[2] <= begin[2]:
-        return best
-    for ci in range(begin[0], end[0]):
-        for cj in range(begin[1], end[1]):
-            row = (ci * grid.shape[1] + cj) * grid.shape[2]
-            for at in range(grid.first[row + begin[2]], grid.first[row + end[2]]):
-                e = grid.entries[at]
-                # An edge is a silhouette where its faces look to different sides of the source.
-                p, q = grid.planes[e, 0], grid.planes[e, 1]
-                one = p[0] * x + p[1] * y + p[2] * z - w * p[3]
-                other = q[0] * x + q[1] * y + q[2] * z - w * q[3]
-                if (one > 0.0) == (other > 0.0) or work.tested[e] == i:
-                    continue
-                work.tested[e] = i
-                part = _length_inside(grid.edges[e, 0], grid.edges[e, 1], best, tube, work)
-                if part > best:
-                    best = part
-                    copy_to(out, work.side)
-    return best
-
-
-@njit(cache=True, error_model="numpy")
-def _follow(i, tube, reach, grid, centre, radius, begin, end, work, out):  # type: ignore[no-untyped-def]
-    """Follow tube i through the grid as far as `reach` [m]; write the corners' distances from the longest crossing into
-    out (3,).
-
-    Args: centre (b, 3), radius (b,) [m] of spheres about bodies, outside of which there is no edge; begin, end (3,) for
-    work.
-    """
-    points, ks = tube.points, tube.directions
-    k = ks[3]
-    # Not constants: the compiler would make `layer_cells` anew for each of those.
-    single, many = np.int64(1), np.int64(BLOCK)
-    wide, spread = widths(points, ks)
-    near, far_end = span_through_spheres(points, ks, wide, spread, reach, centre, radius)
-    axis = _steepest(k)
-    for q in range(3):
-        if ks[q, axis] * math.copysign(1.0, k[axis]) <= ALONG:
-            far_end = min(far_end, _WIDEST_FAN * grid.cell / spread)
-    best = 0.0
-    low_layer, high_layer = layer_range(points, ks, axis, near, far_end, grid)
-    count = high_layer - low_layer + 1 if far_end > near else 0
-    clear_until = 0
-    for s in range(count):
-        if s < clear_until:
-            continue
-        # From the mirror on: what is far off is left out where the tube grows too wide.
-        layer = low_layer + s if k[axis] > 0.0 else high_layer - s
-        if s % BLOCK == 0:
-            block = layer if k[axis] > 0.0 else layer - BLOCK + 1
-            layer_cells(points, ks, axis, block, many, near, far_end, grid, begin, end)
-            if not any_occupied(grid.occupied, begin, end):
-                clear_until = s + BLOCK
-                continue
-        room = layer_cells(points, ks, axis, layer, single, near, far_end, grid, begin, end)
-        # The outermost layers of a grid that is cut off hold all that lies beyond: no width tells anything there.
-        if room > _WIDEST_LAYER and not (grid.cut_off and (layer == 0 or layer == grid.shape[axis] - 1)):
-            break
-        best = _search_cells(i, tube, grid, begin, end, best, work, out)
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def _longest_crossings(rows, rays, far, extent, planes, grid, centre, radius, out):  # type: ignore[no-untyped-def]
     """Write into `rows` of out (n, 3) the corners' distances from the silhouette edge of which the longest part lies
-    inside each tube. Args: as for `SilhouetteCrossings.find`; extent [m] reach of rays that hit nothing."""
-    tested = np.full(len(grid.edges), -1, np.int32)
-    source, work = np.empty(3), _Work(tested, np.empty((3, 3)), np.empty((4, 3)), np.empty(3))
-    begin, end = np.empty(3, np.int64), np.empty(3, np.int64)
+    inside each tube. Args: as for `SilhouetteCrossings.find`; extent [m] reach of rays that hit nothing; centre (b, 3),
+    radius (b,) [m] of spheres about bodies, outside of which there is no edge."""
+    # Arrays are taken out of the tuples once, and the loop is one function: each access, and each call with arrays,
+    # counts references, which makes the loop 2.7 times slower.
+    all_points, all_directions, length, flat, hit, reach = rays
+    _, plane_point, plane_normal = planes
+    edges, edge_planes, first, entries, _, cell, shape, cut_off, occupied = grid
+    tested = np.full(len(edges), -1, np.int32)
+    side, source, sides, section = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 3))
+    begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
+    # Not constants: the compiler would make `layer_cells` anew for each of those.
+    single, many = np.int64(1), np.int64(BLOCK)
     for i in rows:
-        points, k = rays.points[i], rays.directions[i, 3]
-        lands, flat = rays.hit[i, 3] >= 0, rays.flat[i]
-        parallel = far or not flat
+        points, ks = all_points[i], all_directions[i]
+        middle, k = points[3], ks[3]
+        lands = hit[i, 3] >= 0
+        parallel = far or not flat[i]
         for c in range(3):
-            source[c] = points[3, c] - rays.length[i, 3] * k[c]
-        f = max(rays.hit[i, 3], 0)
-        sign = -1.0 if dot(k, planes.normal[f]) > 0.0 else 1.0
-        ahead = pyramid(points, source, k, parallel, work.sides)
+            source[c] = middle[c] - length[i, 3] * k[c]
+        normal, landing = plane_normal[max(hit[i, 3], 0)], plane_point[max(hit[i, 3], 0)]
+        sign = -1.0 if dot(k, normal) > 0.0 else 1.0
+        ahead = pyramid(points, source, k, parallel, sides)
         for q in range(4):
-            copy_to(work.section[q], points[q])
-        tube = _Tube(
-            points, rays.directions[i], source, flat, parallel, lands, planes.point[f], planes.normal[f], sign, ahead
-        )
-        reach = rays.reach[i, 3] if lands else extent
-        _follow(i, tube, reach, grid, centre, radius, begin, end, work, out[i])
+            copy_to(section[q], points[q])
+        wide, spread = widths(points, ks)
+        far_end = reach[i, 3] if lands else extent
+        near, far_end = span_through_spheres(points, ks, wide, spread, far_end, centre, radius)
+        axis = _steepest(k)
+        for q in range(3):
+            if ks[q, axis] * math.copysign(1.0, k[axis]) <= ALONG:
+                far_end = min(far_end, _WIDEST_FAN * cell / spread)
+        (x, y, z), w = (-k, 0.0) if parallel else (source, 1.0)
+        best = 0.0
+        low_layer, high_layer = layer_range(points, ks, axis, near, far_end, grid)
+        count = high_layer - low_layer + 1 if far_end > near else 0
+        clear_until = 0
+        for s in range(count):
+            if s < clear_until:
+                continue
+            # From the mirror on: what is far off is left out where the tube grows too wide.
+            layer = low_layer + s if k[axis] > 0.0 else high_layer - s
+            if s % BLOCK == 0:
+                block = layer if k[axis] > 0.0 else layer - BLOCK + 1
+                layer_cells(points, ks, axis, block, many, near, far_end, grid, begin_cell, end_cell)
+                if not any_occupied(occupied, begin_cell, end_cell):
+                    clear_until = s + BLOCK
+                    continue
+            room = layer_cells(points, ks, axis, layer, single, near, far_end, grid, begin_cell, end_cell)
+            # The outermost layers of a grid that is cut off hold all that lies beyond: no width tells anything there.
+            if room > _WIDEST_LAYER and not (cut_off and (layer == 0 or layer == shape[axis] - 1)):
+                break
+            for ci in range(begin_cell[0], end_cell[0]):
+                for cj in range(begin_cell[1], end_cell[1]):
+                    row = (ci * shape[1] + cj) * shape[2]
+                    if end_cell[2] <= begin_cell[2]:
+                        continue
+                    for at in range(first[row + begin_cell[2]], first[row + end_cell[2]]):
+                        e = entries[at]
+                        # An edge is a silhouette where its faces look to different sides of the source.
+                        one = edge_planes[e, 0, 0] * x + edge_planes[e, 0, 1] * y + edge_planes[e, 0, 2] * z
+                        other = edge_planes[e, 1, 0] * x + edge_planes[e, 1, 1] * y + edge_planes[e, 1, 2] * z
+                        one, other = one - w * edge_planes[e, 0, 3], other - w * edge_planes[e, 1, 3]
+                        if (one > 0.0) == (other > 0.0) or tested[e] == i:
+                            continue
+                        tested[e] = i
+                        a, b = edges[e, 0], edges[e, 1]
+                        # The part beyond the mirror, and before the plane of landing.
+                        da, db, ha, hb = -_TOUCHING, -_TOUCHING, -_TOUCHING, -_TOUCHING
+                        for c in range(3):
+                            da += (a[c] - middle[c]) * k[c]
+                            db += (b[c] - middle[c]) * k[c]
+                            ha += sign * (a[c] - landing[c]) * normal[c]
+                            hb += sign * (b[c] - landing[c]) * normal[c]
+                        begin, end = above(da, db)
+                        low_end, high_end = above(ha, hb) if lands else (0.0, 1.0)
+                        begin, end = max(begin, low_end), min(end, high_end)
+                        size = size_of(a, b)
+                        if (end - begin) * size <= best:
+                            continue
+                        if not flat[i]:
+                            # Off a curved mirror rays count as parallel, in the section that the tube has here.
+                            depth = 0.0
+                            for c in range(3):
+                                depth += (a[c] + 0.5 * (begin + end) * (b[c] - a[c]) - middle[c]) * k[c]
+                            for q in range(3):
+                                for c in range(3):
+                                    section[q, c] = points[q, c] + depth * (ks[q, c] - k[c])
+                            pyramid(section, source, k, True, sides)
+                        scale = scale_at(a, b, source, k, parallel, ahead)
+                        begin, end = within(a, b, section, sides, scale, begin, end)
+                        part = (end - begin) * size
+                        if part > best and apart(a, b, section, source, k, parallel, side):
+                            best = part
+                            copy_to(out[i], side)

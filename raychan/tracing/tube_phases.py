@@ -105,15 +105,14 @@ def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refine
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def _length_at_middle(i, c, tubes, facets, image, far, middle):  # type: ignore[no-untyped-def]
-    """Write the middle of edge c of tube i; return the length there [m]: straight to the curved surface on the first
+def _length_at_middle(c, points, k, length, bary, v, b, image, far, middle):  # type: ignore[no-untyped-def]
+    """Write the middle of edge c of a tube; return the length there [m]: straight to the curved surface on the first
     facet, later on the chord by the cubic Hermite rule."""
     d = (c + 1) % 3
-    points, k, length = tubes.points[i], tubes.k[i], tubes.length[i]
-    if tubes.bary.shape[1] == 3:
-        w, f = tubes.bary[i], tubes.facet[i]
+    if len(bary) == 3:
+        w = bary
         x, y, z = 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2])
-        place_on(facets.vertices[f], facets.edge_curvature[f], x, y, z, middle)
+        place_on(v, b, x, y, z, middle)
         return length_to(middle, image, far)
     turned = 0.0
     for x in range(3):
@@ -123,26 +122,23 @@ def _length_at_middle(i, c, tubes, facets, image, far, middle):  # type: ignore[
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def _largest_amplitude(i, tubes, facets, antenna, wavenumber, back, look):  # type: ignore[no-untyped-def]
-    """Return the amplitude [1/m] that a tube scatters if all in phase, `back` [m] from the end, and the factor by which
-    antenna and material lower it."""
-    images, out_far, mirrors, table = antenna
-    p, q, r = tubes.points[i, 0], tubes.points[i, 1], tubes.points[i, 2]
+def _area_across(points, k):  # type: ignore[no-untyped-def]
+    """Return twice the area of a tube's corners (3, 3) or more as seen along k (3,), with its sign [m^2]."""
+    p, q, r = points[0], points[1], points[2]
     ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    k = tubes.k[i, 3]
-    across = (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
-    gain = weight(tubes.points[i, 3], images, out_far, mirrors, table, look)
-    if facets.lossy[tubes.facet[i]]:
-        cosine = 0.0
-        for c in range(3):
-            cosine += tubes.normals[i, 3, c] * k[c]
-        kind, eps, thickness, roughness = facets.materials
-        j = facets.material[tubes.facet[i]]
-        r_s, r_p, _, _ = coefficients(kind[j], eps[j], thickness[j], roughness[j], abs(cosine), wavenumber)
-        gain *= max(abs(r_s), abs(r_p))
-    share = wavenumber / (4.0 * math.pi) * abs(across) * tubes.strength[i] * tubes.spread[i]
-    return share / (1.0 if out_far else back), gain
+    return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
+
+
+@njit(cache=True, forceinline=True, error_model="numpy")
+def _reflection(j, materials, normal, k, wavenumber):  # type: ignore[no-untyped-def]
+    """Return the larger of |R_s|, |R_p| of material j for a ray along k (3,)."""
+    kind, eps, thickness, roughness = materials
+    cosine = 0.0
+    for c in range(3):
+        cosine += normal[c] * k[c]
+    r_s, r_p, _, _ = coefficients(kind[j], eps[j], thickness[j], roughness[j], abs(cosine), wavenumber)
+    return max(abs(r_s), abs(r_p))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -156,30 +152,41 @@ def phases(tubes, facets, image, far, antenna, wavenumber, limits, out):  # type
     image (3,) of the end by which they came, or the direction to it when far; antenna of the leg out (see
     `image_paths.weight`); limits (phase, turn, most_bend) as for `edge_to_cut`; out as `PhaseColumns`.
     """
-    images, out_far, mirrors, _ = antenna
+    images, out_far, mirrors, table = antenna
     out_image = images[len(mirrors)]
     phase, turn, most_bend = limits
+    # Taken out of the tuples once: each access counts a reference.
+    corners, ks, lengths, normals, facet, bary, strength, spread = tubes
+    vertices, edge_curvature, lossy, material, materials = facets
+    all_six, all_bend, bound, in_phase, rough, whole = out
     middle, look = np.empty(3), np.empty(3)
-    for i in range(len(tubes.facet)):
-        points, six, bend = tubes.points[i], out.six[i], out.bend[i]
+    for i in range(len(facet)):
+        points, k, length, f = corners[i], ks[i], lengths[i], facet[i]
+        six, bend = all_six[i], all_bend[i]
         low, high = np.inf, -np.inf
         for c in range(3):
-            six[c] = wavenumber * (tubes.length[i, c] + length_to(points[c], out_image, out_far))
+            six[c] = wavenumber * (length[c] + length_to(points[c], out_image, out_far))
             low, high = min(low, six[c]), max(high, six[c])
         span = high - low
-        out.length[i] = (six[0] + six[1] + six[2]) / 3.0 / wavenumber
+        whole[i] = (six[0] + six[1] + six[2]) / 3.0 / wavenumber
         for c in range(3):
-            there = _length_at_middle(i, c, tubes, facets, image, far, middle)
+            there = _length_at_middle(
+                c, points, k, length, bary[i], vertices[f], edge_curvature[f], image, far, middle
+            )
             six[3 + c] = wavenumber * (there + length_to(middle, out_image, out_far))
             bend[c] = six[3 + c] - 0.5 * (six[c] + six[(c + 1) % 3])
             low, high = min(low, six[3 + c]), max(high, six[3 + c])
         back = length_to(points[3], out_image, out_far)
-        miss = wavenumber * (tubes.length[i, 3] + back) - (six[0] + six[1] + six[2]) / 3.0
+        miss = wavenumber * (length[3] + back) - (six[0] + six[1] + six[2]) / 3.0
         miss -= (bend[0] + bend[1] + bend[2]) * (4.0 / 9.0)
-        share, gain = _largest_amplitude(i, tubes, facets, antenna, wavenumber, back, look)
-        out.in_phase[i] = gain * share
-        out.bound[i] = gain * (share / (1.0 + 0.5 * span))
+        gain = weight(points[3], images, out_far, mirrors, table, look)
+        if lossy[f]:
+            gain *= _reflection(material[f], materials, normals[i, 3], k[3], wavenumber)
+        share = wavenumber / (4.0 * math.pi) * abs(_area_across(points, k[3])) * strength[i] * spread[i]
+        share /= 1.0 if out_far else back
+        in_phase[i] = gain * share
+        bound[i] = gain * (share / (1.0 + 0.5 * span))
         off = max(abs(miss) / phase, max(abs(bend[0]), abs(bend[1]), abs(bend[2])) / most_bend)
         for c in range(3):
-            off = max(off, distance(tubes.normals[i, c], tubes.normals[i, 3]) / turn)
-        out.rough[i] = off / (1.0 + 0.5 * (high - low))
+            off = max(off, distance(normals[i, c], normals[i, 3]) / turn)
+        rough[i] = off / (1.0 + 0.5 * (high - low))
