@@ -33,7 +33,7 @@ class Receiver:
     ego_speed: float
     """Scalar own speed [m/s] that was added to the range rate."""
     background: tuple[str, ...] = ()
-    """Names of bodies that are not targets: the ground and the radar's own carrier."""
+    """Names of bodies that are not targets: the ground and the radar's own vehicle."""
 
 
 @dataclass(frozen=True)

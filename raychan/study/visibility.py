@@ -60,7 +60,7 @@ def visibility(result: Result, target: str) -> Visibility:
     Args: result of a run with its scene; target a body's name. A path counts as direct or multipath by the
     rule for the labels of detections; as diffracted where it met an edge, by the scene's model or, where that leaves
     diffraction out, by single wedges (UTD).
-    Raises: ValueError for an unknown body, the ground, or the radar's own carrier.
+    Raises: ValueError for an unknown body, the ground, or the radar's own vehicle.
     """
     scene = check_target(result.scene, target)
     facets, points, radar = scene.facets(0.0), scene.points(0.0), scene.radar

@@ -175,7 +175,7 @@ def test_two_keys_make_a_grid_with_the_last_fastest(scene, tmp_path):
 def test_the_ground_and_the_radars_own_carrier_are_no_targets():
     other = TEXT.replace('name = "walker"', 'name = "ego"') + '[[bodies]]\nname = "road"\nshape = "ground"\n'
     for target in ("ego", "road"):
-        with pytest.raises(ValueError, match=f"'{target}' is the ground or the radar's own carrier"):
+        with pytest.raises(ValueError, match=f"'{target}' is the ground or the radar's own vehicle"):
             sweep(Scene.from_text(other), target)
 
 

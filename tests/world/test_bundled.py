@@ -89,4 +89,4 @@ def test_the_readme_of_a_package_index_has_no_address_that_leads_nowhere(monkeyp
     told: dict = {}
     hook().update(told)
     assert not re.search(r"\]\((?!https?:)", told["readme"]["text"])
-    assert "An urban street and the ways its waves took" in told["readme"]["text"]
+    assert "An urban street and the paths of its waves" in told["readme"]["text"]
