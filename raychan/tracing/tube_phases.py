@@ -170,9 +170,7 @@ def phases(tubes, facets, image, far, antenna, wavenumber, limits, out):  # type
         span = high - low
         whole[i] = (six[0] + six[1] + six[2]) / 3.0 / wavenumber
         for c in range(3):
-            there = _length_at_middle(
-                c, points, k, length, bary[i], vertices[f], edge_curvature[f], image, far, middle
-            )
+            there = _length_at_middle(c, points, k, length, bary[i], vertices[f], edge_curvature[f], image, far, middle)
             six[3 + c] = wavenumber * (there + length_to(middle, out_image, out_far))
             bend[c] = six[3 + c] - 0.5 * (six[c] + six[(c + 1) % 3])
             low, high = min(low, six[3 + c]), max(high, six[3 + c])
