@@ -136,23 +136,23 @@ def _transfer(  # type: ignore[no-untyped-def]
         for p in range(ins):
             copy_to(arriving[p], e_tx[i, p])
         k_in = _over_mirrors(
-            arriving, k_in, 0, at, 1, vertices[i], normals[i], kind[i], material[i], used, rx, table, k
+            arriving, k_in, i, 0, at, 1, vertices, normals, kind, material, used, rx, table, k
         )  # fmt: skip
         if at == used:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
-            _couple(out[i], whole, e_rx[i], arriving)
+            _couple(i, out, whole, e_rx[i], arriving)
             continue
         # Out: the receiver's field by reciprocity, over the rest of the route backwards.
         k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
         for q in range(outs):
             copy_to(leaving[q], e_rx[i, q])
         k_out = _over_mirrors(
-            leaving, k_out, used - 1, at, -1, vertices[i], normals[i], kind[i], material[i], used, rx, table, k
+            leaving, k_out, i, used - 1, at, -1, vertices, normals, kind, material, used, rx, table, k
         )  # fmt: skip
         if kind[i, at] == POINT:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
             whole *= (sigma[i] / (4.0 * np.pi)) ** 0.5 * spread_out[i]
-            _couple(out[i], whole, leaving, arriving)
+            _couple(i, out, whole, leaving, arriving)
             continue
         normal = _vec(normals[i, at])
         ci = _coefficients(table, material[i, at], k_in, normal, k)
@@ -164,50 +164,51 @@ def _transfer(  # type: ignore[no-untyped-def]
             phases[c6] = k * lengths[i, c6]
         triangle_terms(phases, _LINEAR, terms)
         _scatter(
-            out[i], scale, terms, wave, arriving, leaving, (k_in, k_out), normal, (ci, co), area[i], taper[i],
-            elements[i],
+            i, out, scale, terms, wave, arriving, leaving, (k_in, k_out), normal, (ci, co), area[i], taper, elements,
         )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _over_mirrors(  # type: ignore[no-untyped-def]
-    e, heading, first, stop, step, vertices, normals, kind, material, used, end, table, k
+    e, heading, i, first, stop, step, vertices, normals, kind, material, used, end, table, k
 ):
-    """Send fields e (p, 3) over mirrors and layers first, first + step, ... short of stop, in place; return the
-    direction in which they leave the last."""
+    """Send fields e (p, 3) of route i over mirrors and layers first, first + step, ... short of stop, in place; return
+    the direction in which they leave the last."""
     for j in range(first, stop, step):
-        c = _coefficients(table, material[j], heading, normals[j], k)
-        _passed(e, heading, _vec(normals[j]), c, kind[j] == TRANSMIT)
-        heading = _heading(vertices[j], vertices[j + step] if j + step < used else end)
+        normal = _vec(normals[i, j])
+        c = _coefficients(table, material[i, j], heading, normal, k)
+        _passed(e, heading, normal, c, kind[i, j] == TRANSMIT)
+        heading = _heading(vertices[i, j], vertices[i, j + step] if j + step < used else end)
     return heading
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _coefficients(table, row, heading, normal, k):  # type: ignore[no-untyped-def]
     """Return the Fresnel coefficients of a material for a wave that arrives along `heading`."""
     kind, eps, thickness, roughness = table
     return coefficients(kind[row], eps[row], thickness[row], roughness[row], _cosine(heading, normal), k)
 
 
-@njit(cache=True)
-def _couple(out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
-    """Write gains (q, p, ...) of a route without a footprint: fields arriving (p, 3) onto receiving (q, 3)."""
+@njit(cache=True, forceinline=True)
+def _couple(i, out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
+    """Write gains (n, q, p, ...) of route i without a footprint: fields arriving (p, 3) onto receiving (q, 3)."""
     for p in range(len(arriving)):
         for q in range(len(receiving)):
-            out[q, p, 0] = whole * dot(_vec(receiving[q]), _vec(arriving[p]))
+            out[i, q, p, 0] = whole * dot(_vec(receiving[q]), _vec(arriving[p]))
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _scatter(  # type: ignore[no-untyped-def]
-    out, scale, terms, wave, arriving, leaving, directions, normal, fresnel, area, taper, elements
+    i, out, scale, terms, wave, arriving, leaving, directions, normal, fresnel, area, taper, elements
 ):
-    """Add to gains (q, p, 1 or 3) what a footprint scatters, its three phase-integral terms weighted by the currents.
+    """Add to gains (n, q, p, 1 or 3) what the footprint of route i scatters, its three phase-integral terms weighted by
+    the currents.
 
     Source: physical optics, Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5; Ufimtsev 2014, ch. 1 (the two
     waves of which its currents are the sum).
     """
     (k_in, k_out), (ci, co) = directions, fresnel
-    apart = out.shape[2] == 3
+    apart = out.shape[3] == 3
     to, mean = (-k_out[0], -k_out[1], -k_out[2]), 0j
     for p in range(len(arriving)):
         for q in range(len(leaving)):
@@ -216,15 +217,15 @@ def _scatter(  # type: ignore[no-untyped-def]
                 mean = area * huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
             for c3 in range(3):
                 if wave == HUYGENS:
-                    couple = mean * taper[c3]
+                    couple = mean * taper[i, c3]
                 elif wave == REFLECTED:
-                    couple = reflected_wave(e, k_in, to, _vec(elements[c3]), ci[0], ci[1], g)
+                    couple = reflected_wave(e, k_in, to, _vec(elements[i, c3]), ci[0], ci[1], g)
                 else:
-                    couple = shadow_wave(e, k_in, to, _vec(elements[c3]), ci[2], ci[3], g)
-                out[q, p, c3 if apart else 0] += scale * couple * terms[c3]
+                    couple = shadow_wave(e, k_in, to, _vec(elements[i, c3]), ci[2], ci[3], g)
+                out[i, q, p, c3 if apart else 0] += scale * couple * terms[c3]
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _passed(e, k, normal, c, through):  # type: ignore[no-untyped-def]
     """Send fields e (p, 3) that travel along k through a layer or off a mirror, in place."""
     for p in range(len(e)):
