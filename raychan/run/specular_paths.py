@@ -11,6 +11,7 @@ from raychan.channel.transfer import departures, rates, transfer
 from raychan.poses import theta_phi
 from raychan.records import NONE, REFLECT, TRANSMIT, ExactWays, Facets, Routes, SpecularPaths
 from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.routes import Interactions, ray_routes
 from raychan.world.geometry import Geometry
 from raychan.world.point_in_body import Place, place_of
 from raychan.world.scene import Scene
@@ -116,26 +117,9 @@ def _exact(geometry: Geometry, tx: Floats, rx: Floats, chains: list[Chain], slot
     shape = (n, slots)
     facet = column[2].reshape(shape).astype(np.int32)
     body = geometry.facets.body[np.maximum(facet, 0)] if len(geometry.facets.body) else facet
-    return Routes(
-        tx=tx,
-        rx=rx,
-        far=False,
-        vertices=column[0].reshape(*shape, 3).astype(float),
-        normals=column[1].reshape(*shape, 3).astype(float),
-        facet=facet,
-        body=np.where(facet >= 0, body, -1).astype(np.int16),
-        kind=column[3].reshape(shape).astype(np.int8),
-        scatter=np.full(n, -1, np.int8),
-        points=np.zeros((n, 6, 3)),
-        lengths=np.repeat(length[:, None], 6, axis=1).reshape(n, 6),
-        length=length,
-        taper=np.ones((n, 3)),
-        area=np.zeros(n),
-        spread_in=1.0 / length,
-        spread_out=np.ones(n),
-        caustics=np.zeros(n, np.int8),
-        sigma=np.zeros(n),
-    )
+    vertices, normals = (x.reshape(*shape, 3).astype(float) for x in column[:2])
+    bodies, kind = np.where(facet >= 0, body, -1).astype(np.int16), column[3].reshape(shape).astype(np.int8)
+    return ray_routes(tx, rx, Interactions(vertices, normals, facet, bodies, kind), length)
 
 
 def _one(geometry: Geometry, leg: Leg, rx: Floats, slots: int, layers: int):  # type: ignore[no-untyped-def]

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import length_to
 from raychan.radar.beam_kernels import field_towards
+from raychan.vectors import length_to
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
-from raychan.geometry.curved_patches import length_to
+from raychan.vectors import length_to
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

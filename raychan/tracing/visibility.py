@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.tracing.beyond_horizon import exit_points
 from raychan.tracing.edge_crossings import meeting_lines
 from raychan.tracing.legs import Leg, View
+from raychan.tracing.radiation import exit_points
 from raychan.tracing.shadow_edges import shadow_edges_of
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.world.geometry import Geometry
