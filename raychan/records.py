@@ -91,7 +91,7 @@ class Routes(Record):
     area: Floats = column("n", unit="m2", doc="footprint area seen; 0 without footprint")
     spread_in: Floats = column("n", unit="1/m", doc="field spreading tx to scatterer (1/L in free space)")
     spread_out: Floats = column("n", unit="1/m", doc="field spreading rx to scatterer")
-    caustics: Ints = column("n", np.int8, doc="caustics passed on the way in; each advances the phase by pi/2")
+    caustics: Ints = column("n", np.int8, doc="caustics passed on the leg in; each advances the phase by pi/2")
     sigma: Floats = column("n", unit="m2", doc="RCS of a POINT vertex; 0 else")
 
 
@@ -121,8 +121,8 @@ class DiffractedRoutes(Record):
 
 
 @dataclass(frozen=True)
-class Ways(Record):
-    """Where paths went; a row a way, d slots a chain. Float32 but for specular paths (`ExactWays`)."""
+class Trajectories(Record):
+    """Where paths went; a row a trajectory, d slots a chain. Float32 but for specular paths (`ExactTrajectories`)."""
 
     departure: Vectors = column("w 3", np.float32, doc="unit direction of departure, world axes")
     arrival: Floats = column("w 3", doc="unit direction towards which the receiver looks, world axes")
@@ -133,8 +133,8 @@ class Ways(Record):
 
 
 @dataclass(frozen=True)
-class ExactWays(Ways):
-    """Ways in double precision."""
+class ExactTrajectories(Trajectories):
+    """Trajectories in double precision."""
 
     departure: Floats = column("w 3", doc="unit direction of departure, world axes")
     vertices: Floats = column("w d 3", unit="m", doc="unused slots repeat the receiver")
@@ -144,14 +144,15 @@ class ExactWays(Ways):
 class PropagationPaths(Record):
     """What all paths have, simulated or specular; a row a path, d the most interactions.
 
-    `length` and `length_rate` are of the whole way from transmitter to receiver; half of them, `range` and
-    `range_rate`, is what a monostatic radar reads. Paths over the corners of one footprint share a row of `ways`.
+    `length` and `length_rate` are of the whole path from transmitter to receiver; half of them, `range` and
+    `range_rate`, is what a monostatic radar reads. Paths over the corners of one footprint share a row of
+    `trajectories`.
     """
 
-    length: Floats = column("n", unit="m", doc="from transmitter to receiver, the whole way")
+    length: Floats = column("n", unit="m", doc="from transmitter to receiver, the whole path")
     length_rate: Floats = column("n", unit="m/s", doc="rate of the length; positive = growing")
-    way: NDArray[np.int32] = column("n", np.int32, doc="row of `ways`")
-    ways: Ways
+    trajectory: NDArray[np.int32] = column("n", np.int32, doc="row of `trajectories`")
+    trajectories: Trajectories
     body_names: tuple[str, ...]
     part_names: tuple[str, ...]
     tx: Floats = column("3", unit="m")
@@ -175,17 +176,17 @@ class PropagationPaths(Record):
     @property
     def departure(self) -> Vectors:
         """Unit directions of departure (n, 3), world axes."""
-        return self.ways.departure[self.way]
+        return self.trajectories.departure[self.trajectory]
 
     @property
     def arrival(self) -> Floats:
         """Unit directions (n, 3) towards which the receiver looks, world axes."""
-        return self.ways.arrival[self.way]
+        return self.trajectories.arrival[self.trajectory]
 
     @property
     def body(self) -> NDArray[np.int16]:
         """Bodies met (n, d) as rows of `body_names`, -1 in unused slots."""
-        return self.ways.body[self.way]
+        return self.trajectories.body[self.trajectory]
 
     @property
     def bodies(self) -> NDArray[np.str_]:
@@ -195,17 +196,17 @@ class PropagationPaths(Record):
     @property
     def part(self) -> NDArray[np.int16]:
         """Parts met (n, d) as rows of `part_names`, -1 in unused slots."""
-        return self.ways.part[self.way]
+        return self.trajectories.part[self.trajectory]
 
     @property
     def kind(self) -> NDArray[np.int8]:
         """What happened at each vertex (n, d): values of InteractionType, NONE in unused slots."""
-        return self.ways.kind[self.way]
+        return self.trajectories.kind[self.trajectory]
 
     @property
     def vertices(self) -> Vectors:
         """Vertices (n, d + 2, 3) [m] from transmitter to receiver; unused slots repeat the receiver."""
-        inner = self.ways.vertices[self.way]
+        inner = self.trajectories.vertices[self.trajectory]
         first, last = (np.broadcast_to(x.astype(inner.dtype), (len(inner), 1, 3)) for x in (self.tx, self.rx))
         return np.concatenate([first, inner, last], axis=1)
 
@@ -220,15 +221,15 @@ class Paths(PropagationPaths):
 
     @classmethod
     def of(cls, **columns: object) -> Paths:
-        """Return paths of columns of which each has a row a path, those of `Ways` among them."""
-        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)}
+        """Return paths of columns of which each has a row a path, those of `Trajectories` among them."""
+        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in dataclasses.fields(Trajectories)}
         rows: dict[str, Any] = columns
-        return cls(way=np.arange(len(rows["length"]), dtype=np.int32), ways=Ways(**held), **rows)
+        return cls(trajectory=np.arange(len(rows["length"]), dtype=np.int32), trajectories=Trajectories(**held), **rows)
 
 
 @dataclass(frozen=True)
 class SpecularPaths(PropagationPaths):
-    """Exact paths between two points with isotropic ends, shortest first; each has a way of its own."""
+    """Exact paths between two points with isotropic ends, shortest first; each has a trajectory of its own."""
 
     gain: NDArray[np.complex128] = column(
         "n 2 2", np.complex128, doc="rows the receiver's V, H, columns the transmitter's; lambda/4 pi L and phase in"

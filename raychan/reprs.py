@@ -136,10 +136,10 @@ def _columns(record: Any) -> Facts:
 
 
 def _paths(p: Any) -> Facts:
-    bodies = np.unique(p.ways.body[p.ways.body >= 0])
+    bodies = np.unique(p.trajectories.body[p.trajectories.body >= 0])
     met = [p.body_names[b] for b in bodies]
     gain = p.amplitude if hasattr(p, "amplitude") else p.gain[np.abs(p.gain) > 0.0]
-    depth = (p.ways.kind > 0).sum(axis=1)
+    depth = (p.trajectories.kind > 0).sum(axis=1)
     lines = [
         ("range", span(p.range, "m")),
         ("range rate", span(p.range_rate, "m/s")),

@@ -13,7 +13,7 @@ from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
-from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Ways
+from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Trajectories
 
 Floats = NDArray[np.float64]
 
@@ -43,8 +43,8 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
         length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
         amplitude=np.concatenate([a[whole].sum(axis=1), a[rows].ravel()]),
         length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, v).ravel()]),
-        way=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
-        ways=Ways(
+        trajectory=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
+        trajectories=Trajectories(
             departure=away.astype(np.float32),
             arrival=look,
             body=routes.body,
@@ -83,35 +83,37 @@ def join(parts: list[Paths]) -> Paths:
     """Return all paths of several sets as one record, chains as long as the longest."""
     if len(parts) == 1:
         return parts[0]
-    begin = np.cumsum([0] + [len(p.ways.kind) for p in parts[:-1]])
-    slots = max(p.ways.kind.shape[1] for p in parts)
+    begin = np.cumsum([0] + [len(p.trajectories.kind) for p in parts[:-1]])
+    slots = max(p.trajectories.kind.shape[1] for p in parts)
     empty = {"body": -1, "part": -1, "kind": 0, "vertices": parts[0].rx}
-    ways: dict[str, Any] = {}
-    for f in dataclasses.fields(Ways):
-        held = [getattr(p.ways, f.name) for p in parts]
+    trajectories: dict[str, Any] = {}
+    for f in dataclasses.fields(Trajectories):
+        held = [getattr(p.trajectories, f.name) for p in parts]
         if f.name in empty:
             out = np.empty((sum(map(len, held)), slots, *held[0].shape[2:]), held[0].dtype)
             for first, some in zip(begin, held, strict=True):
                 out[first : first + len(some), : some.shape[1]] = some
                 out[first : first + len(some), some.shape[1] :] = empty[f.name]
-            ways[f.name] = out
+            trajectories[f.name] = out
         else:
-            ways[f.name] = np.concatenate(held)
+            trajectories[f.name] = np.concatenate(held)
     rows: dict[str, Any] = {
         name: np.concatenate([getattr(p, name) for p in parts]) for name in ("length", "length_rate", "amplitude")
     }
-    way = np.concatenate([p.way + np.int32(first) for p, first in zip(parts, begin, strict=True)])
-    return dataclasses.replace(parts[0], **rows, way=way, ways=Ways(**ways))
+    trajectory = np.concatenate([p.trajectory + np.int32(first) for p, first in zip(parts, begin, strict=True)])
+    return dataclasses.replace(parts[0], **rows, trajectory=trajectory, trajectories=Trajectories(**trajectories))
 
 
 def strongest(paths: Paths, most: int) -> Paths:
-    """Return the paths of the ways, `most` at most, that carry most power; in their order."""
-    power = np.bincount(paths.way, np.abs(paths.amplitude) ** 2, len(paths.ways.kind))
+    """Return the paths of the trajectories, `most` at most, that carry most power; in their order."""
+    power = np.bincount(paths.trajectory, np.abs(paths.amplitude) ** 2, len(paths.trajectories.kind))
     if len(power) <= most:
         return paths
     keep = np.zeros(len(power), bool)
     keep[np.argsort(-power, kind="stable")[:most]] = True
-    rows, number = keep[paths.way], np.cumsum(keep, dtype=np.int32) - 1
-    ways = Ways(**{f.name: getattr(paths.ways, f.name)[keep] for f in dataclasses.fields(Ways)})
+    rows, number = keep[paths.trajectory], np.cumsum(keep, dtype=np.int32) - 1
+    trajectories = Trajectories(
+        **{f.name: getattr(paths.trajectories, f.name)[keep] for f in dataclasses.fields(Trajectories)}
+    )
     columns = {name: getattr(paths, name)[rows] for name in ("length", "length_rate", "amplitude")}
-    return dataclasses.replace(paths, **columns, way=number[paths.way[rows]], ways=ways)
+    return dataclasses.replace(paths, **columns, trajectory=number[paths.trajectory[rows]], trajectories=trajectories)

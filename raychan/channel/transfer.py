@@ -13,11 +13,11 @@ from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
 from raychan.em.phase_integral import triangle_terms
 from raychan.em.physical_optics import huygens, reflected_wave, shadow_wave
-from raychan.em.polarization import dot, reflect, transmit
-from raychan.geometry.curved_patches import copy_to
+from raychan.em.polarization import reflect, transmit
 from raychan.parallel import parallel_for
 from raychan.records import POINT, TRANSMIT, Facets, Materials, Routes
 from raychan.units import C0
+from raychan.vectors import copy_to, dot
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -64,7 +64,7 @@ def run(
     With --frames, DIR holds frame_0000, frame_0001, ..., each such a directory and written as soon as it is ready, and
     detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 is what a run without --frames gives.
     """
-    from raychan.run.resources import check_demand, long_run
+    from raychan.run.rules import check_demand, long_run
     from raychan.world.scene import Scene
 
     if frame_interval is not None and frames is None:

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.em.polarization import Vec, cross, dot
+from raychan.vectors import Vec, cross, dot
 
 ROOT_J = cmath.exp(0.25j * math.pi)
 CONDUCTOR = (-1.0 + 0j, 1.0 + 0j)
@@ -93,22 +93,6 @@ def wedge_coefficients(
     soft = direct + r_0[0] * at_0 + r_n[0] * at_n
     hard = direct + r_0[1] * at_0 + r_n[1] * at_n
     return scale * soft, scale * hard
-
-
-@njit(cache=True)
-def edge_point(tx: Vec, rx: Vec, origin: Vec, edge: Vec) -> float:
-    """Return the point of diffraction along an edge [m from origin]: the shortest path over the line.
-
-    Source: Keller (1962), J. Opt. Soc. Am. 52(2): equal angles of both rays to the edge.
-    """
-    a = (tx[0] - origin[0], tx[1] - origin[1], tx[2] - origin[2])
-    b = (rx[0] - origin[0], rx[1] - origin[1], rx[2] - origin[2])
-    along_a, along_b = dot(a, edge), dot(b, edge)
-    off_a, off_b = cross(a, edge), cross(b, edge)
-    far_a, far_b = math.sqrt(dot(off_a, off_a)), math.sqrt(dot(off_b, off_b))
-    if far_a + far_b == 0.0:
-        return 0.5 * (along_a + along_b)
-    return (along_a * far_b + along_b * far_a) / (far_a + far_b)
 
 
 @njit(cache=True)

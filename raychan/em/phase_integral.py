@@ -12,8 +12,7 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.em.gauss_quadrature import mean_parts, points_for
-from raychan.em.phasor import unit_phasor
+from raychan.em.phasor import mean_parts, points_for, unit_phasor
 
 _TURN = 0.5 / math.pi
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from raychan.compile.jit import njit
-from raychan.em.polarization import Vec, cross, dot, mirror, reflect, transmit
+from raychan.em.polarization import mirror, reflect, transmit
+from raychan.vectors import Vec, cross, dot
 
 
 @njit(cache=True)

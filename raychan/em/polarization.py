@@ -3,23 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from raychan.compile.jit import njit
-
-Vec = tuple[Any, Any, Any]
-
-
-@njit(cache=True, forceinline=True)
-def dot(a, b):  # type: ignore[no-untyped-def]
-    """Return a . b without conjugation."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True, forceinline=True)
-def cross(a, b):  # type: ignore[no-untyped-def]
-    """Return a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+from raychan.vectors import Vec, cross, dot
 
 
 @njit(cache=True)

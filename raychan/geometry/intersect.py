@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
+from raychan.vectors import plane_distance
 
 _FAR = 32.0  # radii of the bounding sphere beyond which an origin is moved towards it; not measured
 _GRAZING = 1e-9  # sine of the angle under which a ray runs along a facet: far from the origin rounding is of this size
@@ -41,18 +42,6 @@ class FacetShapes(NamedTuple):
     vertices: Floats
     first: Floats
     normal: Floats
-
-
-@njit(cache=True, forceinline=True)
-def plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
-    """Return the distance from x + along d to the plane through v of normal n, along d."""
-    slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
-    if slope == 0.0:
-        return np.inf
-    height = 0.0
-    for c in range(3):
-        height += n[c] * (v[c] - (x[c] + along * d[c]))
-    return height / slope
 
 
 @njit(cache=True, nogil=True)

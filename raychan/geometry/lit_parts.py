@@ -8,7 +8,8 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import copy_corners, dot, middle, place_on
+from raychan.geometry.curved_patches import copy_corners, middle, place_on
+from raychan.vectors import dot
 
 
 @njit(cache=True, forceinline=True)

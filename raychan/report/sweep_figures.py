@@ -102,9 +102,9 @@ def _hidden(axes: Any, done: Sweep, x: Floats, order: NDArray[np.int64]) -> None
     stack = [shares[n] for n in names]
     labels = [f"behind {n}" for n in names]
     colours = [PALETTE[(4 + i) % len(PALETTE)] for i in range(len(names))]
-    veiled = np.array([100.0 * (s.found.occlusion.veiled or 0.0) for s in done.steps])
-    if veiled.any():
-        stack, labels, colours = [*stack, veiled], [*labels, "behind glass or\nthin layers only"], [*colours, "#9fc5d8"]
+    layers = np.array([100.0 * (s.found.occlusion.behind_layers or 0.0) for s in done.steps])
+    if layers.any():
+        stack, labels, colours = [*stack, layers], [*labels, "behind glass or\nthin layers only"], [*colours, "#9fc5d8"]
     base = np.zeros(len(x))
     for share, label, colour in zip(stack, labels, colours, strict=True):
         if len(x) == 1:

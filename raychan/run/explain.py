@@ -110,8 +110,8 @@ def _paths_in(result: Result, row: int, column: int, known: Chains | None = None
     place = float(result.rdmap.range[column]), float(result.rdmap.rate[row])
     wave, at = waves_in(paths, response_of(receiver), *place)
     order = np.argsort(-np.abs(wave), kind="stable")
-    amplitude, way = paths.amplitude[order], paths.way[order]
-    kind = paths.ways.kind
+    amplitude, trajectory = paths.amplitude[order], paths.trajectory[order]
+    kind = paths.trajectories.kind
     return CellPaths(
         row=order.astype(np.int32),
         power=np.abs(amplitude) ** 2 * receiver.power,
@@ -119,9 +119,9 @@ def _paths_in(result: Result, row: int, column: int, known: Chains | None = None
         wave=wave[order] * np.sqrt(receiver.power),
         range=at[order],
         rate=paths.range_rate[order],
-        departure=np.stack(angles(paths.ways.departure), axis=1)[way],
-        arrival=np.stack(angles(paths.ways.arrival), axis=1)[way],
-        interactions=((kind != NONE) & (kind != TRANSMIT)).sum(axis=1)[way],
+        departure=np.stack(angles(paths.trajectories.departure), axis=1)[trajectory],
+        arrival=np.stack(angles(paths.trajectories.arrival), axis=1)[trajectory],
+        interactions=((kind != NONE) & (kind != TRANSMIT)).sum(axis=1)[trajectory],
         chain=known.part[order],
         chains=known.names,
         met=_met(paths, known),
@@ -131,10 +131,10 @@ def _paths_in(result: Result, row: int, column: int, known: Chains | None = None
 def _met(paths: Paths, known: Chains) -> tuple[tuple[str, ...], ...]:
     """Return what happened to the waves of each chain, in order."""
     first = np.zeros(len(known.names), np.int64)
-    first[known.part[::-1]] = paths.way[::-1]
+    first[known.part[::-1]] = paths.trajectory[::-1]
     return tuple(
-        tuple(f"{_VERBS[k]} {name.strip('()')}" for k, name in zip(paths.ways.kind[way], names, strict=False))
-        for way, names in zip(first, known.names, strict=True)
+        tuple(f"{_VERBS[k]} {name.strip('()')}" for k, name in zip(paths.trajectories.kind[at], names, strict=False))
+        for at, names in zip(first, known.names, strict=True)
     )
 
 

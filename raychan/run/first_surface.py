@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from raychan.channel.transfer import REFLECTED, SHADOW, FieldOf, transfer
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.footprints import elements
-from raychan.tracing.horizon import LIT
 from raychan.tracing.legs import Leg
-from raychan.tracing.return_leg import resolve_return_leg
+from raychan.tracing.radiation import LIT
 from raychan.tracing.routes import routes_of
+from raychan.tracing.shooting import resolve_return_leg
 from raychan.tracing.tubes import Tubes
 from raychan.world.geometry import Geometry
 

@@ -44,10 +44,14 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
     bodies: list[tuple[str, ...]] = []
     targets: list[int] = []
     known: dict[tuple[str, ...], int] = {}
-    ways = paths.ways
+    trajectories = paths.trajectories
     first, index = _alike(paths)
     for row in first:
-        met = [link for link in zip(ways.body[row], ways.part[row], ways.kind[row], strict=True) if link[2]]
+        met = [
+            link
+            for link in zip(trajectories.body[row], trajectories.part[row], trajectories.kind[row], strict=True)
+            if link[2]
+        ]
         names.append(tuple(_name(paths, b, p, k) for b, p, k in met))
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
         left = [b for b in bodies[-1] if b not in background]
@@ -103,7 +107,7 @@ def _explained(
         error_db = figure(cell.power, cell.error)  # of noise: what launches differ by against what is seen
         return Explanation(*place, cell.power, predicted, error_db, CLUTTER, ())
     shares /= shares.sum()
-    # The ground beside a target adds to its return, so what leads is the target over all its ways.
+    # The ground beside a target adds to its return, so what leads is the target over all its paths.
     leading = np.argmax(np.abs(_sums(known.targets, summed, int(known.targets.max()) + 1)))
     paths_in, size, ranges, rates = sizes
     # There and back again are equal but for rounding: in the order of their chains, then.
@@ -170,10 +174,10 @@ def response_of(receiver: Receiver) -> PointSpread:
 
 def _alike(paths: Paths) -> tuple[Ints, Ints]:
     """Return one way of each chain that a path took, and the chain of each path (n,); slot by slot, for speed."""
-    ways = paths.ways
-    code, most = np.zeros(len(ways.kind), np.int64), 1
+    trajectories = paths.trajectories
+    code, most = np.zeros(len(trajectories.kind), np.int64), 1
     width = (len(paths.body_names) + 1) * (len(paths.part_names) + 1) * len(InteractionType)
-    for body, part, kind in zip(ways.body.T, ways.part.T, ways.kind.T, strict=True):
+    for body, part, kind in zip(trajectories.body.T, trajectories.part.T, trajectories.kind.T, strict=True):
         if not kind.any():
             break
         if most > np.iinfo(np.int64).max // width:
@@ -182,12 +186,12 @@ def _alike(paths: Paths) -> tuple[Ints, Ints]:
         slot = (body + 1) * np.int64(len(paths.part_names) + 1) + part + 1
         code, most = code * width + np.where(kind > 0, slot * len(InteractionType) + kind, 0), most * width
     taken = np.zeros(len(code), bool)
-    taken[paths.way] = True
+    taken[paths.trajectory] = True
     rows = np.flatnonzero(taken)
     _, first, inverse = np.unique(code[rows], return_index=True, return_inverse=True)
     chain = np.full(len(code), -1, np.int64)
     chain[rows] = inverse
-    return rows[first], chain[paths.way]
+    return rows[first], chain[paths.trajectory]
 
 
 def _sums(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
@@ -212,8 +216,10 @@ def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver
     if len(targets) > 1:
         return MULTIPATH
     # Over the ground and one target: an echo of the target, or a ghost behind it if the way round is long.
-    way = paths.way[row]
-    index = [paths.body_names[b] in targets for b in paths.ways.body[way]]
-    straight = np.linalg.norm(paths.ways.vertices[way][index] - 0.5 * (paths.tx + paths.rx), axis=1).min()
+    trajectory = paths.trajectory[row]
+    index = [paths.body_names[b] in targets for b in paths.trajectories.body[trajectory]]
+    straight = np.linalg.norm(
+        paths.trajectories.vertices[trajectory][index] - 0.5 * (paths.tx + paths.rx), axis=1
+    ).min()
     detour = 0.5 * paths.length[row] - straight
     return DIRECT if detour < max(receiver.waveform.range_resolution, _DEPTH) else MULTIPATH

@@ -36,13 +36,13 @@ class Choice:
 
 def interactions(paths: Paths) -> NDArray[np.int64]:
     """Return the number of interactions (n,) of each path, transmissions through thin layers not counted."""
-    kind = paths.ways.kind
-    return np.asarray(((kind > 0) & (kind != TRANSMIT)).sum(axis=1))[paths.way]
+    kind = paths.trajectories.kind
+    return np.asarray(((kind > 0) & (kind != TRANSMIT)).sum(axis=1))[paths.trajectory]
 
 
 def layers(paths: Paths) -> NDArray[np.int64]:
     """Return the number of transmissions through thin layers (n,) of each path."""
-    return np.asarray((paths.ways.kind == TRANSMIT).sum(axis=1))[paths.way]
+    return np.asarray((paths.trajectories.kind == TRANSMIT).sum(axis=1))[paths.trajectory]
 
 
 def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> float:
@@ -82,7 +82,7 @@ def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db
                     f"{n} {name}: strongest cell {db(level / limit):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
                 )
         chosen.append(keep)
-    level = peak(paths, (paths.ways.kind == DIFFRACT).any(axis=1)[paths.way], radar, settings)
+    level = peak(paths, (paths.trajectories.kind == DIFFRACT).any(axis=1)[paths.trajectory], radar, settings)
     say = "needed" if level > limit else "not needed"
     why.append(
         f"diffraction: strongest cell {db(max(level / limit, 1e-30)):+.0f} dB of what {tolerance_db:g} dB allow: {say}"

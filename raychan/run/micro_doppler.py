@@ -172,8 +172,8 @@ class _Frame:
             known = Traced(join(parts), tuple(found))
         turned = [take(r, self.touches(r.body, r.kind)) for r in known.routes if isinstance(r, Routes)]
         routes = tuple(r for r in turned if len(r.kind))
-        ways = known.paths.ways
-        rest = ~self.touches(ways.body, ways.kind) | (ways.kind == DIFFRACT).any(axis=1)
+        trajectories = known.paths.trajectories
+        rest = ~self.touches(trajectories.body, trajectories.kind) | (trajectories.kind == DIFFRACT).any(axis=1)
         if self.progress:
             self.progress(len(self.times) / self.most)
         return Keyframe(
@@ -181,7 +181,7 @@ class _Frame:
             now,
             routes,
             tuple(strengths(r, geometry.facets, now.radar, carrier) for r in routes),
-            take(known.paths, rest[known.paths.way]),
+            take(known.paths, rest[known.paths.trajectory]),
         )
 
     def touches(self, body: NDArray[np.signedinteger], kind: NDArray[np.signedinteger]) -> NDArray[np.bool_]:

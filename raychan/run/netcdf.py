@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler, Ways
+from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler, Trajectories
 from raychan.run.result import ExplainedDetections, Result
 from raychan.units import C0, dbm
 
@@ -116,7 +116,8 @@ def columns(kind: Any) -> list[dataclasses.Field[Any]]:
     """Return the columns of a record; in a file paths have all of them a row a path."""
     if kind is not Paths:
         return list(dataclasses.fields(kind))
-    return [f for f in dataclasses.fields(Paths) if f.name not in ("way", "ways")] + list(dataclasses.fields(Ways))
+    own = [f for f in dataclasses.fields(Paths) if f.name not in ("trajectory", "trajectories")]
+    return [*own, *dataclasses.fields(Trajectories)]
 
 
 def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> None:
@@ -124,7 +125,7 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
     record = getattr(result, name)
     wave = result.receiver.waveform
     for f in columns(type(record)):
-        value = record.ways.vertices[record.way] if f.name == "vertices" else getattr(record, f.name)
+        value = record.trajectories.vertices[record.trajectory] if f.name == "vertices" else getattr(record, f.name)
         if "axes" in f.metadata:
             if f.name == "cell":  # a column each, so that a table of detections has a row each
                 for k, axis in enumerate(_CELL):

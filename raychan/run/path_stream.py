@@ -59,8 +59,8 @@ class Launched:
     def moved(self, shift: NDArray[np.float64]) -> Launched:
         """Return the same for a scene that has moved on as one, by a shift (3,) [m]."""
         paths = self.paths
-        ways = paths.ways.replace(vertices=(paths.ways.vertices + shift).astype(np.float32))
-        there = paths.replace(ways=ways, tx=paths.tx + shift, rx=paths.rx + shift)
+        trajectories = paths.trajectories.replace(vertices=(paths.trajectories.vertices + shift).astype(np.float32))
+        there = paths.replace(trajectories=trajectories, tx=paths.tx + shift, rx=paths.rx + shift)
         return replace(self, paths=there, sums=(self.quiet.samples, self.response))
 
 
@@ -72,14 +72,14 @@ class PathStream:
         self._held: list[Paths] = []
         self._kept: list[Paths] = []
         self._sums: tuple[Any, Any] | None = None
-        self._ways = self._count = 0
+        self._trajectories = self._count = 0
 
     def add(self, paths: Paths) -> None:
         """Add a batch."""
         self._held.append(paths)
         self._count += len(paths.delay)
-        self._ways += len(paths.ways.kind)
-        if self._ways > _MOST:
+        self._trajectories += len(paths.trajectories.kind)
+        if self._trajectories > _MOST:
             self._flush()
 
     def _flush(self) -> None:
@@ -89,7 +89,7 @@ class PathStream:
         before = self._sums or (np.zeros(brought[0].shape, np.complex128), 0.0)
         self._sums = before[0] + brought[0], before[1] + brought[1]
         self._kept = [strongest(join([*self._kept, every]), _KEPT)]
-        self._held, self._ways = [], 0
+        self._held, self._trajectories = [], 0
 
     def done(self) -> Launched:
         """Return the paths of all batches; there must be at least one."""

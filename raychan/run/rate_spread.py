@@ -26,8 +26,8 @@ _UNEXPLAINED = 0.1  # of a cell's power: a cell with less from turning bodies is
 
 def meets(paths: Paths, turns: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which paths (n,) meet one of the bodies `turns` (b,)."""
-    body, kind = paths.ways.body, paths.ways.kind
-    return np.asarray((turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))[paths.way]
+    body, kind = paths.trajectories.body, paths.trajectories.kind
+    return np.asarray((turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))[paths.trajectory]
 
 
 def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -19,10 +19,9 @@ from raychan.run.messages import counts, told, uncut
 from raychan.run.micro_doppler import needed, retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
-from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
-from raychan.run.resources import check_demand
+from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, noise_stream, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
-from raychan.run.rules import asked, changed, check_rule, fine_rule
+from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
 from raychan.run.unmodelled import ledger
@@ -54,6 +53,11 @@ class Channel:
     turned: Retraced | None = None
     """Samples of a frame that was traced more than once."""
 
+    @property
+    def quiet(self) -> Cube:
+        """The samples of the frame without noise."""
+        return self.turned.cube if self.turned else self.launched.quiet
+
 
 def simulate(
     scene: Scene,
@@ -70,7 +74,8 @@ def simulate(
     """
     SEED.check("seed", seed, whole=True)
     clock = Clock(progress)
-    return result_of(scene, channel_of(scene, tolerance_db, max_bounces, clock), seed, clock)
+    channel = channel_of(scene, tolerance_db, max_bounces, clock)
+    return result_of(scene, channel, seed, clock)
 
 
 def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clock: Clock) -> Channel:
@@ -86,7 +91,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     if model.mode == "auto":
         # The check launch, with all mechanisms, tells which of them the fine one needs.
         with clock.stage("check"):
-            others, more = launch(changed(checked, diffraction=True))
+            others, more = launch(replace(checked, diffraction=True))
             chosen = choose(others.paths, radar, settings, noise_of_cell(radar, settings), model.tolerance_db)
             model = chosen.applied_to(model)
     rule = fine_rule(radar, settings, model)
@@ -127,18 +132,15 @@ def _launch(
 
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
     """Return what the receiver makes of a channel, and how each detection came about."""
-    # Streams are numbered by stage, so that one more random stage leaves the others as they are.
-    noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
         noise = radar.noise_power if radar.noise else 0.0
         pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
-        quiet = channel.turned.cube if channel.turned else channel.launched.quiet
-        cube = noisy(quiet, radar, noise_rng)
+        cube = noisy(channel.quiet, radar, noise_stream(seed))
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
-        error = _error_of(channel, quiet, radar, settings)
+        error = _error_of(channel, radar, settings)
     windows = settings.range_window, settings.rate_window
     names = background(channel.geometry.facets)
     receiver = Receiver(radar.waveform, *windows, radar.power, radar.ego_speed, names)
@@ -190,12 +192,12 @@ def _explained(
     return reasons, left_out
 
 
-def _error_of(channel: Channel, quiet: Cube, radar: Radar, settings: Any) -> MapError:
+def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:
     """Return how wrong the map may be: what the two launches differ by, and what no launch cuts."""
     below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(radar, settings)
     turned = channel.turned
     if turned is None:
-        return MapError(map_error(quiet, channel.others.quiet, radar, settings).power + below)
+        return MapError(map_error(channel.quiet, channel.others.quiet, radar, settings).power + below)
     paths, others = channel.launched.paths, channel.others.paths
     brought, doubt = (quiet_map(x, radar, settings) for x in (turned.turning, turned.error))
     share = launch_share(paths, others, turned.turns, radar)

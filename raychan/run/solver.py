@@ -11,7 +11,7 @@ from raychan.channel.ends import RadarEnds
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.beam_table import beam_of
 from raychan.records import DiffractedRoutes, Facets, Paths, Points, Routes
-from raychan.tracing.edge_diffraction import diffracted_routes
+from raychan.tracing.point_targets import diffracted_routes
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Progress, Stats, launch_routes
 from raychan.tracing.tubes import Refinement

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from raychan.channel.transfer import departures, rates, transfer
 from raychan.poses import theta_phi
-from raychan.records import NONE, REFLECT, TRANSMIT, ExactWays, Facets, Routes, SpecularPaths
+from raychan.records import NONE, REFLECT, TRANSMIT, ExactTrajectories, Facets, Routes, SpecularPaths
 from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.routes import Interactions, ray_routes
 from raychan.world.geometry import Geometry
 from raychan.world.point_in_body import Place, place_of
 from raychan.world.scene import Scene
@@ -116,26 +117,9 @@ def _exact(geometry: Geometry, tx: Floats, rx: Floats, chains: list[Chain], slot
     shape = (n, slots)
     facet = column[2].reshape(shape).astype(np.int32)
     body = geometry.facets.body[np.maximum(facet, 0)] if len(geometry.facets.body) else facet
-    return Routes(
-        tx=tx,
-        rx=rx,
-        far=False,
-        vertices=column[0].reshape(*shape, 3).astype(float),
-        normals=column[1].reshape(*shape, 3).astype(float),
-        facet=facet,
-        body=np.where(facet >= 0, body, -1).astype(np.int16),
-        kind=column[3].reshape(shape).astype(np.int8),
-        scatter=np.full(n, -1, np.int8),
-        points=np.zeros((n, 6, 3)),
-        lengths=np.repeat(length[:, None], 6, axis=1).reshape(n, 6),
-        length=length,
-        taper=np.ones((n, 3)),
-        area=np.zeros(n),
-        spread_in=1.0 / length,
-        spread_out=np.ones(n),
-        caustics=np.zeros(n, np.int8),
-        sigma=np.zeros(n),
-    )
+    vertices, normals = (x.reshape(*shape, 3).astype(float) for x in column[:2])
+    bodies, kind = np.where(facet >= 0, body, -1).astype(np.int16), column[3].reshape(shape).astype(np.int8)
+    return ray_routes(tx, rx, Interactions(vertices, normals, facet, bodies, kind), length)
 
 
 def _one(geometry: Geometry, leg: Leg, rx: Floats, slots: int, layers: int):  # type: ignore[no-untyped-def]
@@ -189,13 +173,13 @@ def _one(geometry: Geometry, leg: Leg, rx: Floats, slots: int, layers: int):  # 
     )
 
 
-def _there(geometry: Geometry, at: Floats, way: Floats, gap: float, mirror: Mirror) -> int:
-    """Return the facet of a mirror that a ray, `gap` [m] long along `way`, meets at its end, or -1.
+def _there(geometry: Geometry, at: Floats, d: Floats, gap: float, mirror: Mirror) -> int:
+    """Return the facet of a mirror that a ray, `gap` [m] long along d (3,), meets at its end, or -1.
 
     -1: there is none, or another body's facet lies in the same place and counts instead.
     """
     step = min(1e-3, 0.5 * gap)
-    hit, t = geometry.cast((at - step * way)[None], way[None], np.array([-1], np.int32))
+    hit, t = geometry.cast((at - step * d)[None], d[None], np.array([-1], np.int32))
     if hit[0] >= 0 and geometry.plane[hit[0]] == geometry.plane[mirror.facet]:
         return int(hit[0])
     if hit[0] >= 0 and abs(t[0] - step) < geometry.touch:
@@ -258,7 +242,7 @@ def specular_paths(
     deep = int(used.sum(axis=1).max(initial=0))
     part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else routes.facet
     away, look = departures(routes)
-    ways = ExactWays(
+    trajectories = ExactTrajectories(
         departure=away[order],
         arrival=look[order],
         body=np.where(used, routes.body[order], -1)[:, :deep],
@@ -270,8 +254,8 @@ def specular_paths(
         length=routes.length[order],
         length_rate=2.0 * rates(routes, facets, ends[2], ends[3])[order],
         gain=gain[order],
-        way=np.arange(len(order), dtype=np.int32),
-        ways=ways,
+        trajectory=np.arange(len(order), dtype=np.int32),
+        trajectories=trajectories,
         body_names=facets.body_names,
         part_names=facets.part_names,
         tx=ends[0],

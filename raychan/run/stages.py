@@ -9,7 +9,7 @@ import numpy as np
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
-from raychan.run.receiver import detections_in, map_of
+from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude, noise_stream
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
 from raychan.signal.baseband import synthesize as samples_of
@@ -67,7 +67,8 @@ def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
     """
     carrier = radar.waveform.carrier
     own = replace(routes.rule.refinement, wavenumber=2.0 * np.pi * carrier / C0, cell=C0 / radar.waveform.bandwidth)
-    problem = routes.rule.refusal(rule_of(radar, radar.processing, own, routes.rule.bounces))
+    noise = noise_equivalent_amplitude(radar, radar.processing)
+    problem = routes.rule.refusal(rule_of(radar, noise, own, routes.rule.bounces))
     if problem:
         raise ValueError(f"these routes do not serve this radar: {problem}")
     facets = routes.geometry.facets
@@ -80,8 +81,7 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
     """
     SEED.check("seed", seed, whole=True)
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    return samples_of(paths, radar, rng)
+    return samples_of(paths, radar, noise_stream(seed))
 
 
 def range_doppler(cube: Cube, radar: Radar) -> RangeDoppler:

@@ -32,7 +32,7 @@ def strongest_bend(
             continue
         sag = 0.25 * np.linalg.norm(geometry.edge_curvature[rows], axis=2)
         phase = 2.0 * k * float(np.sqrt(np.average((sag**2).mean(axis=1), weights=geometry.area[rows])))
-        met = ((paths.ways.body == body) & (paths.ways.kind > 0)).any(axis=1)[paths.way]
+        met = ((paths.trajectories.body == body) & (paths.trajectories.kind > 0)).any(axis=1)[paths.trajectory]
         changed = min(phase, _OPPOSED) ** 2 * peak(paths, met, radar, settings)
         if changed > found[2]:
             found = (name, phase, changed)

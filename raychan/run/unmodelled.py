@@ -223,10 +223,10 @@ def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
         return Entry(NOTHING, "exact", "no path")
     size = np.abs(paths.amplitude)
     strong = np.flatnonzero(size > 1e-3 * size.max())
-    nearest = np.full(len(paths.ways.kind), np.inf)
-    np.minimum.at(nearest, paths.way[strong], np.maximum(0.5 * paths.length[strong], 0.5))
+    nearest = np.full(len(paths.trajectories.kind), np.inf)
+    np.minimum.at(nearest, paths.trajectory[strong], np.maximum(0.5 * paths.length[strong], 0.5))
     taken = np.flatnonzero(np.isfinite(nearest))
-    body, away = paths.ways.body[taken], paths.ways.departure[taken].astype(float)
+    body, away = paths.trajectories.body[taken], paths.trajectories.departure[taken].astype(float)
     used = body >= 0
     body = np.maximum(body, 0)
     used &= facets.role[body] != MIRROR

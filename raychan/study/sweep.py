@@ -215,7 +215,7 @@ def cells(step: Step) -> list[str]:
         "" if seen is None else seen.label,
         *told,
         str(len(step.found.detections)),
-        *(_number(x, 5) for x in (hidden.blocked, hidden.error, hidden.veiled)),
+        *(_number(x, 5) for x in (hidden.blocked, hidden.error, hidden.behind_layers)),
         " ".join(f"{name}:{share:.5f}" for name, share in hidden.by),
         hidden.point or "",
         *(_number(None if level is None else level.margin_db, 2) for level in levels.values()),

@@ -119,7 +119,7 @@ def ways_of(result: Result, known: Chains, target: str) -> np.ndarray[Any, np.dt
         if target in bodies:
             way = (
                 DIFFRACTED
-                if (paths.ways.kind[paths.way[row]] == DIFFRACT).any()
+                if (paths.trajectories.kind[paths.trajectory[row]] == DIFFRACT).any()
                 else label_of(paths, row, bodies, result.receiver)
             )
             kind[g] = WAYS.index(way)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from raychan.em.phase_integral import quadratic_means
 from raychan.parallel import parallel_for
-from raychan.tracing.tube_phases import Phases
+from raychan.tracing.radiation import Phases
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 

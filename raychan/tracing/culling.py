@@ -17,9 +17,9 @@ from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
 from raychan.poses import sizes
 from raychan.tracing.cache import cache_of
-from raychan.tracing.edge_crossings import dot
 from raychan.tracing.legs import Leg
 from raychan.tracing.occluders import Occluders
+from raychan.vectors import dot
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]

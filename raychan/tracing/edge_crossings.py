@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import copy_to
+from raychan.vectors import copy_to, dot
 
 _MOST_EDGES = 64  # around a plane: beyond, bisecting the tube is taken to be cheaper than testing each; not measured
 _INSIDE = 1e-3  # of a tube's half width: an edge nearer than this to the tube's side does not clip it; not measured
@@ -38,12 +38,6 @@ class FacetPlanes(NamedTuple):
     number: NDArray[np.int32]
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
-
-
-@njit(cache=True, forceinline=True)
-def dot(a, b):  # type: ignore[no-untyped-def]
-    """Return a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, forceinline=True)

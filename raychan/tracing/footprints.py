@@ -77,7 +77,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
     """
     points, k, normals, length, facet, bary = tubes
     facing, vertices, edge_curvature, curved = facets
-    six, lengths, whole, taper, area, way_out = out
+    six, lengths, whole, taper, area, back_length = out
     bent = bary.shape[1] == 3
     flat, element = np.empty(3), np.empty(3)
     back_k, back = np.empty((4, 3)), np.empty(4)
@@ -89,7 +89,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
             lengths[i, 3 + j] = half_way[i, j] + _back(middle[i, j], image, far, element)
             for c in range(3):
                 six[i, j, c], six[i, 3 + j, c] = points[i, j, c], middle[i, j, c]
-        whole[i], way_out[i] = length[i, 3] + back[3], back[3]
+        whole[i], back_length[i] = length[i, 3] + back[3], back[3]
         p, q, r = points[i, 0], points[i, 1], points[i, 2]
         size = 0.0
         for c in range(3):

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import length_to
 from raychan.radar.beam_kernels import field_towards
+from raychan.vectors import length_to
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -85,7 +85,7 @@ def stretch(i, rows, points, corners, images, at, normal, far, reach):  # type: 
     """Return the `rows` whose path may go along stretch i (from mirror i - 1 to mirror i), with its starts (k, 3) [m],
     unit directions (k, 3) and lengths (k,) [m]: both ends of a stretch lie on the lit sides of its mirrors.
 
-    Args: points (n, 3) [m], corners (n, m, 3) [m] mirror points on the ways to them; reach [m] from which rays come
+    Args: points (n, 3) [m], corners (n, m, 3) [m] mirror points of the legs to them; reach [m] from which rays come
     when far.
     """
     m, k = len(at), 0

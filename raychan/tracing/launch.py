@@ -17,10 +17,9 @@ from raychan.geometry.lit_parts import lit_parts
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
-from raychan.tracing.horizon import OBLIQUE
 from raychan.tracing.legs import Leg, View
+from raychan.tracing.radiation import OBLIQUE, phases_of, radiating
 from raychan.tracing.subdivide import subdivide
-from raychan.tracing.tube_phases import phases_of
 from raychan.tracing.tubes import CENTRE, MOST_BEND, Refinement, Tubes, launch_tubes, unit
 from raychan.tracing.visibility import centre_visibility, tube_visibility
 from raychan.world.geometry import Geometry
@@ -44,11 +43,11 @@ def launch(
     """
     f = geometry.facets
     shape = f.vertices, f.normals, geometry.edge_curvature
-    ways = leg.image, leg.far, out.image, out.far
+    images = leg.image, leg.far, out.image, out.far
     allowed = pieces & (geometry.piece_role == SCATTERER)
     allowed[leg.pieces(geometry)] = False
     facet = seed_facets(geometry, leg, allowed)
-    for part, bary in _bisect_for_phase(geometry, facet, shape, ways, found, not more):
+    for part, bary in _bisect_for_phase(geometry, facet, shape, images, found, not more):
         part, bary = lit_parts(part, bary, *shape, geometry.both_sides, leg.image, leg.far)
         tubes = launch_tubes(geometry, leg, part, bary)
         if leg.mirrors:
@@ -60,27 +59,27 @@ def _prune_facing_away(
     geometry: Geometry, leg: Leg, out: Leg, others: list[Leg], tubes: Tubes, found: Contributions
 ) -> Tubes:
     """Return the tubes that face the end of `out`, and of the rest those that count over it or one of the others."""
-    _, facing = out.radiating(tubes.points, tubes.k, tubes.normals, OBLIQUE)
+    _, facing = radiating(out, tubes, OBLIQUE)
     away = np.flatnonzero(~facing)
     some, best, length = tubes.take(away), np.zeros(len(away)), np.zeros(len(away))
     for other in [out, *others] if len(away) else []:
-        share, _ = other.radiating(some.points, some.k, some.normals, OBLIQUE)
+        share, _ = radiating(other, some, OBLIQUE)
         ph = phases_of(geometry, leg, other, some, found.rule)
         better = ph.bound * share > best
         best[better], length[better] = (ph.bound * share)[better], ph.length[better]
-    keep = facing.copy()
-    keep[away[found.that_count(OBLIQUE_SHARE * best, length, 0)]] = True
-    return tubes.take(keep)
+    counts = facing.copy()
+    counts[away[found.that_count(OBLIQUE_SHARE * best, length, 0)]] = True
+    return tubes.take(counts)
 
 
 def _bisect_for_phase(
-    geometry: Geometry, facet: Ints, shape: Any, ways: Any, found: Contributions, across: bool
+    geometry: Geometry, facet: Ints, shape: Any, images: Any, found: Contributions, across: bool
 ) -> Iterator[tuple[Ints, Floats]]:
     """Bisect tubes at the edge on which the two-way phase bends most, until it is quadratic; yield facets and corners
     of the parts in batches, so that memory does not grow with their number.
 
-    Args: facet (n,); shape, ways as for `edge_to_cut`; across whether only an edge's length across the rays is bounded:
-    tubes that bounce again need to be short along them too.
+    Args: facet (n,); shape, images as for `edge_to_cut`; across whether only an edge's length across the rays is
+    bounded: tubes that bounce again need to be short along them too.
     """
     rule = found.rule
     limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
@@ -93,7 +92,7 @@ def _bisect_for_phase(
             half = len(facet) // 2
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
-        edge = edge_to_cut(facet, bary, *(*shape, *ways, *limits))
+        edge = edge_to_cut(facet, bary, *(*shape, *images, *limits))
         more = found.budget.affords_phase(geometry, facet, edge >= 0)
         ready = ~more
         if held + np.count_nonzero(ready) > _BATCH:
@@ -113,12 +112,12 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
 
 def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, more: bool) -> Tubes:
     """Return the tubes that are seen; those of which only some rays are seen are subdivided while they matter."""
-    kept: list[Tubes] = []
+    parts: list[Tubes] = []
     rule = found.rule
 
-    def keep(view: View, ready: Bools) -> None:
-        kept.append(tubes.take(ready))
-        _write_leg(geometry, kept[-1], leg, view.corners[ready], view.passed[ready], rule)
+    def take_seen(view: View, ready: Bools) -> None:
+        parts.append(tubes.take(ready))
+        _write_leg(geometry, parts[-1], leg, view.corners[ready], view.passed[ready], rule)
 
     ph = phases_of(geometry, leg, out, tubes, rule)
     # What returns little by itself may still carry the next bounces.
@@ -131,7 +130,7 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     found.add(ph.take(view.seen))
     ready = geometry.convex_alone or found.budget.spent(geometry)
     matters = (ph.bound > found.prune_threshold(ph.length)) & (not ready)
-    keep(view, view.seen & ~matters)
+    take_seen(view, view.seen & ~matters)
     known: View | None = view.take(matters)
     tubes, matters = tubes.take(matters), matters[matters]
     for level in range(rule.levels + 1):
@@ -139,12 +138,12 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
             break
         s = tube_visibility(geometry, leg, tubes, matters, True, rule, level < GAP_LEVELS, known)
         split = found.budget.affords(geometry, tubes.facet, s.mixed & matters & (level < rule.levels))
-        keep(s.centre, ~split & s.centre.seen)
+        take_seen(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)
         tubes, _ = subdivide(geometry, leg, tubes, rows, s.side, True, rule.jitter)
         ph = phases_of(geometry, leg, out, tubes, rule)
         known, matters = None, ph.bound > found.prune_threshold(ph.length)
-    return Tubes.join(kept)
+    return Tubes.join(parts)
 
 
 def _write_leg(geometry: Geometry, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints, rule: Refinement) -> None:

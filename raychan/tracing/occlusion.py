@@ -24,7 +24,7 @@ class Occlusion:
     """Of the whole silhouette, as if nothing were in the way [sr]; 0 for a body seen edge on."""
     blocked: float | None
     """Share behind something opaque; None for a body without a silhouette."""
-    veiled: float | None
+    behind_layers: float | None
     """Share seen through thin layers (glass, bumper) alone."""
     error: float
     """Of the shares, by sampling: twice the standard deviation, and no less than one sample."""
@@ -57,7 +57,7 @@ def occlusion(facets: Facets, points: Points, eye: Floats, body: str, layers: in
         np.broadcast_to(eye, (len(seen), 3)), directions[seen], distance[seen], np.full(len(seen), _SLACK),
         np.full(len(seen), -1, np.int32), own[hit[seen]].astype(np.int32), layers, np.full(len(seen), index),
     )  # fmt: skip
-    hides, veils = blocker >= 0, reached & (passed >= 0).any(axis=1)
+    hides, behind = blocker >= 0, reached & (passed >= 0).any(axis=1)
     outline = weight[seen]
     whole = float(outline.sum())
     point = _point(scene, points, eye, index, layers)
@@ -70,7 +70,7 @@ def occlusion(facets: Facets, points: Points, eye: Floats, body: str, layers: in
     return Occlusion(
         solid_angle=whole,
         blocked=blocked,
-        veiled=float(outline[veils].sum()) / whole,
+        behind_layers=float(outline[behind].sum()) / whole,
         error=_error(residual, whole, len(seen)),
         by=tuple((facets.body_names[b], float(shares[b])) for b in np.argsort(-shares, kind="stable") if shares[b] > 0),
         point=point,
@@ -139,11 +139,11 @@ def _point(scene: RayCaster, points: Points, eye: Floats, body: int, layers: int
     mine = np.flatnonzero(points.body == body)
     if not len(mine):
         return None
-    way = points.position[mine[:1]] - eye
-    far = np.linalg.norm(way, axis=1)
+    towards = points.position[mine[:1]] - eye
+    far = np.linalg.norm(towards, axis=1)
     none = np.full(1, -1, np.int32)
     reached, _, blocker = scene.walk(
-        eye[None], way / far[:, None], far, np.full(1, _SLACK), none, none, layers, np.full(1, body)
+        eye[None], towards / far[:, None], far, np.full(1, _SLACK), none, none, layers, np.full(1, body)
     )
     if reached[0]:
         return ""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
-from raychan.geometry.curved_patches import length_to
+from raychan.vectors import length_to
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -102,7 +102,7 @@ def contribution_bounds(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write what tubes may scatter straight back, all in phase (`in_phase`) and by how their corners' phases run
     (`bound`) (n,) [1/m], and the two-way length `whole` (n,) [m]: k A / (4 pi r) times the field there, over one plus
-    half the span of phase. See `tube_phases.phases`, which knows the edges' middles too."""
+    half the span of phase. See `radiation.phases`, which knows the edges' middles too."""
     for i in range(len(facet)):
         low, high, total = np.inf, -np.inf, 0.0
         for c in range(3):

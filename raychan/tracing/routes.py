@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import copy_to
-from raychan.geometry.intersect import plane_distance
 from raychan.parallel import parallel_for
 from raychan.records import REFLECT, SCATTER, TRANSMIT, Routes
 from raychan.tracing.footprints import footprints
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import Tubes, edge_middles, slices
+from raychan.vectors import copy_to, plane_distance
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -76,7 +75,7 @@ def routes_of(
     facet, body = np.empty((n, slots), np.int32), np.empty((n, slots), np.int16)
     kind = np.empty((n, slots), np.int8)
     points, lengths, taper = np.empty((n, 6, 3)), np.empty((n, 6)), np.empty((n, 3))
-    length, area, way_out = np.empty((3, n))
+    length, area, back_length = np.empty((3, n))
     written = Interactions(vertices, normals, facet, body, kind)
     columns = [getattr(tubes, name) for name in RouteTubes._fields]
     mirrors = np.array([x.normal for x in out.mirrors]).reshape(m, 3), np.array([x.facet for x in out.mirrors], int)
@@ -94,7 +93,7 @@ def routes_of(
         footprints(
             tuple(getattr(tubes, x)[at] for x in ("points", "k", "normals", "length", "facet", "bary")), middle[at],
             half_way[at], shape, out.image, out.far,
-            tuple(x[at] for x in (points, lengths, length, taper, area, way_out)),
+            tuple(x[at] for x in (points, lengths, length, taper, area, back_length)),
         )  # fmt: skip
 
     parallel_for(n, some)
@@ -114,13 +113,41 @@ def routes_of(
         taper=taper,
         area=area,
         spread_in=tubes.spread,
-        spread_out=out.spread(way_out),
+        spread_out=out.spread(back_length),
         caustics=tubes.caustics,
         sigma=np.zeros(n),
     )
 
 
-def same_way_back(tubes: Tubes, mirrors: int, layers: int) -> tuple[Floats, Ints]:
+def ray_routes(tx: Floats, rx: Floats, rows: Interactions, length: Floats, **given: Any) -> Routes:
+    """Return routes of single rays, which have no footprint: specular paths, and targets given by their RCS.
+
+    Args: tx, rx (3,) [m]; rows their interactions; length (n,) [m] of each; given columns in place of those of a
+    specular path: scatter, spread_in, spread_out, sigma.
+    """
+    n = len(length)
+    specular: dict[str, Any] = {
+        "scatter": np.full(n, -1, np.int8),
+        "spread_in": 1.0 / length,
+        "spread_out": np.ones(n),
+        "sigma": np.zeros(n),
+    }
+    return Routes(
+        tx=tx,
+        rx=rx,
+        far=False,
+        **rows._asdict(),
+        points=np.zeros((n, 6, 3)),
+        lengths=np.repeat(length[:, None], 6, axis=1),
+        length=length,
+        taper=np.ones((n, 3)),
+        area=np.zeros(n),
+        caustics=np.zeros(n, np.int8),
+        **(specular | given),
+    )
+
+
+def leg_of_arrival(tubes: Tubes, mirrors: int, layers: int) -> tuple[Floats, Ints]:
     """Return the mirror points (n, m, 3) [m] and the layers (n, l) on the leg out of first-bounce tubes that leave by
     the leg over which they came, from their history."""
     corners = np.zeros((len(tubes), mirrors, 3))

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import copy_to
 from raychan.geometry.edge_grid import grid_bounds, restore_starts
 from raychan.parallel import parallel_for
 from raychan.tracing.cache import cache_of
-from raychan.tracing.edge_crossings import above, apart, dot, pyramid, scale_at, size_of, within
+from raychan.tracing.edge_crossings import above, apart, pyramid, scale_at, size_of, within
 from raychan.tracing.legs import Leg
+from raychan.vectors import copy_to, dot
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]

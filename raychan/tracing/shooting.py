@@ -1,4 +1,4 @@
-"""Shooting and bouncing rays: tubes from their launch to their last bounce, out over every leg, as Routes."""
+"""Shooting and bouncing rays: tubes from their launch to their last bounce, and over every return leg, as Routes."""
 
 from __future__ import annotations
 
@@ -8,19 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.poses import sizes
 from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions
-from raychan.tracing.horizon import FACING, OBLIQUE
-from raychan.tracing.launch import launch
-from raychan.tracing.legs import Leg
-from raychan.tracing.mirrors import reachable
-from raychan.tracing.return_leg import resolve_return_leg
-from raychan.tracing.routes import routes_of, same_way_back
-from raychan.tracing.tube_phases import phases_of
+from raychan.tracing.launch import GAP_LEVELS, OBLIQUE_SHARE, launch
+from raychan.tracing.legs import Leg, View, reachable
+from raychan.tracing.radiation import FACING, LIT, OBLIQUE, Phases, phases_of, radiating
+from raychan.tracing.routes import leg_of_arrival, routes_of
+from raychan.tracing.subdivide import bisect, subdivide
 from raychan.tracing.tubes import Refinement, Tubes
+from raychan.tracing.visibility import BISECT, CLIP, KEEP, choose_actions, tube_visibility
 from raychan.world.geometry import Geometry
 
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 
@@ -88,9 +90,9 @@ def _followed(
 
 
 def _returned(
-    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, own: Bools, first: bool, veiled: bool, found: Contributions
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, own: Bools, first: bool, behind: bool, found: Contributions
 ) -> Iterator[Routes]:
-    """Yield the routes of tubes, of those chosen by `own` (n,), that an outgoing leg sees; `veiled`: only those that
+    """Yield the routes of tubes, of those chosen by `own` (n,), that an outgoing leg sees; `behind`: only those that
     it sees through a layer."""
     rule, piece = found.rule, geometry.piece[tubes.facet]
     may = reachable(geometry, out).copy()
@@ -101,16 +103,76 @@ def _returned(
     if not len(rows):
         return
     some = tubes.take(rows)
-    if first and out == leg and not veiled:
-        corners, passed = same_way_back(some, len(leg.mirrors), rule.layers)
+    if first and out == leg and not behind:
+        corners, passed = leg_of_arrival(some, len(leg.mirrors), rule.layers)
         if not geometry.convex_alone:
-            found.add(phases_of(geometry, leg, out, some, rule))
+            ph = phases_of(geometry, leg, out, some, rule)
+            found.add(ph)
     else:
         some, corners, passed = resolve_return_leg(
-            geometry, leg, out, some, found, first, veiled, OBLIQUE if first else FACING
+            geometry, leg, out, some, found, first, behind, OBLIQUE if first else FACING
         )
     if len(some):
         yield routes_of(geometry, leg, out, some, first, corners, passed)
+
+
+def resolve_return_leg(
+    geometry: Geometry,
+    leg: Leg,
+    out: Leg,
+    tubes: Tubes,
+    found: Contributions,
+    first: bool = False,
+    behind: bool = False,
+    which: int = FACING,
+) -> tuple[Tubes, Floats, Ints]:
+    """Subdivide tubes until their phase over `out` is quadratic and its end sees all or nothing of each.
+
+    Args: first whether they stand on their first surface; behind: only what is seen through a layer is returned; which
+    of them radiate (see `tracing.radiation`). What is seen is added to `found`. Returns: the tubes that are seen, and
+    mirror points (n, m, 3) [m] and layers (n, l) of their leg out.
+    """
+    resolved: list[tuple[Tubes, View, Phases]] = []
+    rule = found.rule
+    for level in range(rule.levels + 1):
+        share, facing = radiating(out, tubes, which)
+        rows = np.flatnonzero(share > 0.0)
+        tubes, share, facing = tubes.take(rows), share[rows], facing[rows]
+        ph = phases_of(geometry, leg, out, tubes, rule)
+        if which == OBLIQUE and not facing.all():
+            # Beyond the horizon tubes are mostly out of phase with their neighbours, and few count.
+            weak = np.flatnonzero(~facing)
+            left = found.that_count(OBLIQUE_SHARE * ph.bound[weak] * share[weak], ph.length[weak], 0)
+            rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
+            tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
+        matters = (ph.bound > found.prune_threshold(ph.length)) & (not found.budget.spent(geometry))
+        # In a scene currents beyond the horizon are weak: their visibility is tested by their centres alone.
+        tested = matters if which == LIT else matters & facing
+        view = tube_visibility(geometry, out, tubes, tested, first, rule, level < GAP_LEVELS, facing_away=~facing)
+        cut = matters if level < rule.levels else np.zeros_like(matters)
+        if behind:
+            view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
+        how = facing, view.centre.seen, view.some, view.mixed, ph.rough
+        what = choose_actions(*how, cut)
+        wanted = (what == BISECT) | (what == CLIP)
+        cut &= ~wanted | found.budget.affords(geometry, tubes.facet, wanted)
+        what = choose_actions(*how, cut)
+        ready, bent, shaded = (np.flatnonzero(what == w) for w in (KEEP, BISECT, CLIP))
+        resolved.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
+        if not len(bent) and not len(shaded):
+            break
+        # Where the phase bends on no edge, the longest is bisected.
+        lengths = sizes(tubes.points[bent, :3] - np.roll(tubes.points[bent, :3], -1, axis=1))
+        bend = np.abs(ph.bend[bent])
+        edge = np.argmax(np.where((ph.rough[bent] > 1.0)[:, None], bend, lengths), axis=1)
+        halved = bisect(geometry, leg, tubes, bent, edge, first, rule.jitter)
+        parted, _ = subdivide(geometry, leg, tubes, shaded, view.side, first, rule.jitter)
+        tubes = Tubes.join([halved, parted])
+    some, views, phases = zip(*resolved, strict=True)
+    if not geometry.convex_alone:
+        found.add(Phases.join(list(phases)))
+    seen = View.join(list(views))
+    return Tubes.join(list(some)), seen.corners, seen.passed
 
 
 @dataclass(frozen=True)

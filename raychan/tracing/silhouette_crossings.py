@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import copy_to
 from raychan.geometry.edge_grid import EdgeGrid, fill_grid, grid_bounds, pack_edges
 from raychan.geometry.grid_traversal import (
     ALONG,
@@ -27,17 +26,8 @@ from raychan.geometry.grid_traversal import (
 from raychan.parallel import parallel_for
 from raychan.records import MIRROR
 from raychan.tracing.cache import cache_of
-from raychan.tracing.edge_crossings import (
-    FacetPlanes,
-    TubeRays,
-    above,
-    apart,
-    dot,
-    pyramid,
-    scale_at,
-    size_of,
-    within,
-)
+from raychan.tracing.edge_crossings import FacetPlanes, TubeRays, above, apart, pyramid, scale_at, size_of, within
+from raychan.vectors import copy_to, dot
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]

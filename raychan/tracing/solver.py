@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Contributions
-from raychan.tracing.edge_diffraction import diffracted_routes
-from raychan.tracing.legs import Leg
-from raychan.tracing.mirrors import legs_over, reachable
-from raychan.tracing.point_targets import point_routes
+from raychan.tracing.legs import Leg, legs_over, reachable
+from raychan.tracing.point_targets import diffracted_routes, point_routes
+from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.shooting import tube_routes
 from raychan.tracing.tubes import Refinement
@@ -98,24 +97,5 @@ def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Route
     kind, body = np.zeros((n, d), np.int8), np.full((n, d), -1, np.int16)
     for i, (foot, m, _) in enumerate(rows):
         vertices[i, 0], normals[i, 0], facet[i, 0], kind[i, 0], body[i, 0] = foot, m.normal, m.facet, REFLECT, m.body
-    length = np.array([2.0 * h for _, _, h in rows])
-    return Routes(
-        tx=legs[0].end,
-        rx=legs[0].end,
-        far=False,
-        vertices=vertices,
-        normals=normals,
-        facet=facet,
-        body=body,
-        kind=kind,
-        scatter=np.full(n, -1, np.int8),
-        points=np.zeros((n, 6, 3)),
-        lengths=np.repeat(length[:, None], 6, axis=1),
-        length=length,
-        taper=np.ones((n, 3)),
-        area=np.zeros(n),
-        spread_in=1.0 / length,
-        spread_out=np.ones(n),
-        caustics=np.zeros(n, np.int8),
-        sigma=np.zeros(n),
-    )
+    length = np.array([2.0 * height for _, _, height in rows])
+    return ray_routes(legs[0].end, legs[0].end, Interactions(vertices, normals, facet, body, kind), length)

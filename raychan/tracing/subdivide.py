@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import distance, largest
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import CENTRE, Tubes, first_rays
+from raychan.vectors import distance, largest
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -208,27 +208,27 @@ def part_rays(  # type: ignore[no-untyped-def]
     lengths follow the cubic Hermite rule, the centre's is the mean of parabolas along the three medians."""
     for i in range(len(parent)):
         j = parent[i]
-        p, way, normal = out_points[i], out_k[i], out_normals[i]
+        p, direction, normal = out_points[i], out_k[i], out_normals[i]
         for c in range(3):
-            p[3, c], way[3, c], normal[3, c] = 0.0, 0.0, 0.0
+            p[3, c], direction[3, c], normal[3, c] = 0.0, 0.0, 0.0
         for q in range(3):
             w = weights[i, q]
             _mean(w, points[j], p[q])
-            _mean(w, k[j], way[q])
+            _mean(w, k[j], direction[q])
             _mean(w, normals[j], normal[q])
-            _to_unit(way[q])
+            _to_unit(direction[q])
             _to_unit(normal[q])
             out_length[i, q] = _length_on(w, points[j], k[j], length[j])
             for c in range(3):
                 p[3, c] += p[q, c] / 3.0
-                way[3, c] += way[q, c]
+                direction[3, c] += direction[q, c]
                 normal[3, c] += normal[q, c]
-        _to_unit(way[3])
+        _to_unit(direction[3])
         _to_unit(normal[3])
         total = 0.0
         for q in range(3):
             reach = 0.0
             for c in range(3):
-                reach += (way[q, c] + way[3, c]) * (p[3, c] - p[q, c])
+                reach += (direction[q, c] + direction[3, c]) * (p[3, c] - p[q, c])
             total += out_length[i, q] + 0.5 * reach
         out_length[i, 3] = total / 3.0

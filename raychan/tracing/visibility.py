@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.tracing.beyond_horizon import exit_points
 from raychan.tracing.edge_crossings import meeting_lines
 from raychan.tracing.legs import Leg, View
+from raychan.tracing.radiation import exit_points
 from raychan.tracing.shadow_edges import shadow_edges_of
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.world.geometry import Geometry
@@ -268,7 +268,7 @@ def choose_actions(facing, seen, some, mixed, rough, matters):  # type: ignore[n
     part of it is seen.
 
     Args: facing (n,) whether it faces the end; seen (n,) by its centre ray, `some` (n,) by any, `mixed` (n,) in part;
-    rough (n,) see `tube_phases.phases`; matters (n,) whether it may be subdivided.
+    rough (n,) see `radiation.phases`; matters (n,) whether it may be subdivided.
     """
     out = np.empty(len(seen), np.int8)
     for i in range(len(seen)):

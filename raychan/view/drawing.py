@@ -211,9 +211,11 @@ def rays_in(result: Result, cell: Explanation) -> tuple[Ray, ...]:
 
 
 def _ray(paths: Paths, row: int, chain: tuple[str, ...], watts: float, why: Explanation | None) -> Ray:
-    way = paths.way[row]
-    used = int((paths.ways.kind[way] > 0).sum())
-    points = np.concatenate([paths.tx[None], paths.ways.vertices[way, :used].astype(float), paths.rx[None]])
+    trajectory = paths.trajectory[row]
+    used = int((paths.trajectories.kind[trajectory] > 0).sum())
+    points = np.concatenate(
+        [paths.tx[None], paths.trajectories.vertices[trajectory, :used].astype(float), paths.rx[None]]
+    )
     label, converged = ("", True) if why is None else (why.label, why.converged)
     return Ray(" > ".join(chain) or "line of sight", points, float(dbm(watts)), label, converged)
 

@@ -18,9 +18,9 @@ from raychan.geometry.silhouettes import silhouette_edges
 from raychan.geometry.triangles import cluster_bounds, edge_curvatures, extents, half_edge_ends
 from raychan.parallel import cached
 from raychan.records import MIRROR, PEC, Facets
-from raychan.world.inner_spheres import closed_pieces, inner_spheres_of
+from raychan.world.inner_spheres import inner_spheres_of
 from raychan.world.ray_caster import RayCaster
-from raychan.world.scene_topology import SceneTopology
+from raychan.world.scene_topology import SceneTopology, closed_pieces
 from raychan.world.static_geometry import StaticGeometry, columns, computed_once
 from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from raychan.geometry.closed_surfaces import clearance, crossed_cells, winding
-from raychan.world.topology import MeshTopology
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -21,19 +20,6 @@ _CELLS = 24  # along the longest side of the grid in which spheres are searched;
 _TRIES = 3 * _MOST  # places tried; not measured
 _WINDING_ERROR = 0.01  # of a winding number from a whole one: facets that disagree on what is outside have more
 _INNER = 0.999  # of the distance to the nearest facet: rounding of a ray must not pass between
-
-
-def closed_pieces(topology: MeshTopology, opaque: Bools) -> Bools:
-    """Return which facets (n,) belong to pieces that are closed and opaque (n,) all over."""
-    piece = topology.piece
-    # Two sheets upon each other share every edge twice, but enclose nothing.
-    closed = np.zeros(len(opaque), bool)
-    one_plane = np.empty(len(opaque), topology.plane.dtype)
-    one_plane[piece] = topology.plane
-    closed[piece[topology.plane != one_plane[piece]]] = True
-    closed[piece[~opaque]] = False
-    closed[piece[topology.rim // 3]] = False
-    return np.asarray(closed[piece])
 
 
 def inner_spheres_of(v: Floats) -> tuple[Floats, Floats]:

@@ -14,8 +14,9 @@ from scipy.sparse.csgraph import connected_components
 
 from raychan.world import degenerate_faces
 from raychan.world.errors import SceneError
-from raychan.world.inner_spheres import closed_pieces, inner_spheres_of
+from raychan.world.inner_spheres import inner_spheres_of
 from raychan.world.merge_coplanar import merge_flat
+from raychan.world.scene_topology import closed_pieces
 from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
 from raychan.world.vertex_normals import folds, smoothed
 

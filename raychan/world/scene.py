@@ -22,8 +22,7 @@ from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
-from raychan.world.point_targets import points_of
-from raychan.world.posed import posed, stack
+from raychan.world.posed import points_of, posed, stack
 from raychan.world.radar_mount import mount, processing_of, radar_of
 from raychan.world.schema import BodyTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked

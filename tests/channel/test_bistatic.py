@@ -14,8 +14,8 @@ from raychan.run.rcs import rcs
 from raychan.run.rcs_refinement import refinements
 from raychan.run.scattering import scattering
 from raychan.run.single_body import facets_of
-from raychan.tracing.beyond_horizon import exit_points
 from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.radiation import exit_points
 from raychan.tracing.shooting import tube_routes
 from raychan.units import C0
 from raychan.world.geometry import Geometry

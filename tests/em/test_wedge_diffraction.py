@@ -8,6 +8,7 @@ from scipy.special import jv, wofz
 from truth import slab
 
 from raychan.em import diffraction
+from raychan.tracing.point_targets import edge_point
 
 SOFT, HARD = 0, 1
 PEC = np.array([-1.0 + 0j, 1.0 + 0j])
@@ -163,7 +164,7 @@ def test_edge_point_makes_the_way_shortest():
     for _ in range(20):
         tx, rx, origin, edge = rng.normal(size=(4, 3))
         edge /= np.linalg.norm(edge)
-        t = diffraction.edge_point(tuple(tx), tuple(rx), tuple(origin), tuple(edge))
+        t = edge_point(tuple(tx), tuple(rx), tuple(origin), tuple(edge))
         point = origin + t * edge
         k_in, k_out = point - tx, rx - point
         assert abs(edge @ k_in / np.linalg.norm(k_in) - edge @ k_out / np.linalg.norm(k_out)) < 1e-9
@@ -209,7 +210,7 @@ def test_diffracted_channel_is_reciprocal():
             np.array([2 * np.cos(a), 2 * np.sin(a), za]) @ axes,
             np.array([3 * np.cos(b), 3 * np.sin(b), zb]) @ axes,
         ]
-        point = edge * diffraction.edge_point(*(tuple(p) for p in ends), (0.0, 0.0, 0.0), tuple(edge))
+        point = edge * edge_point(*(tuple(p) for p in ends), (0.0, 0.0, 0.0), tuple(edge))
         matrices = []
         for tx, rx in (ends, ends[::-1]):
             s_in, s_out = np.linalg.norm(point - tx), np.linalg.norm(rx - point)

@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[2] / "raychan"
 STOREYS = (
     ("units", "parallel", "compile"),
-    ("poses", "reprs", "kinds"),
+    ("poses", "reprs", "kinds", "vectors"),
     ("columns",),
     ("records",),
     ("em", "geometry"),

@@ -54,7 +54,7 @@ class Tags(HTMLParser):
 
 
 def every(made):
-    return [made, *(getattr(made, f.name) for f in dataclasses.fields(made)), made.paths.ways]
+    return [made, *(getattr(made, f.name) for f in dataclasses.fields(made)), made.paths.trajectories]
 
 
 def test_a_repr_is_short_and_holds_no_dump_of_an_array(made):

@@ -38,7 +38,7 @@ def test_samples_profile_and_error_are_those_of_all_paths(both):
 def test_the_strongest_paths_are_kept_and_it_is_told(both):
     every, some = both
     assert 0 < len(some.paths.delay) < len(every.paths.delay)
-    assert len(some.paths.ways.kind) <= 40
+    assert len(some.paths.trajectories.kind) <= 40
     assert np.abs(some.paths.amplitude).max() == pytest.approx(np.abs(every.paths.amplitude).max())
     assert every.warnings == () and f"{len(every.paths.delay):,} paths" in some.warnings[0]
     for a, b in zip(every.provenance, some.provenance, strict=True):
@@ -48,8 +48,8 @@ def test_the_strongest_paths_are_kept_and_it_is_told(both):
 def test_all_corners_of_the_ways_that_carry_most_are_kept():
     paths = rc.simulate(scene()).paths
     kept = path_stream.strongest(paths, 20)
-    power = np.bincount(paths.way, np.abs(paths.amplitude) ** 2)
+    power = np.bincount(paths.trajectory, np.abs(paths.amplitude) ** 2)
     least = np.sort(power)[-20]
-    rows = power[paths.way] >= least
+    rows = power[paths.trajectory] >= least
     assert kept.delay == pytest.approx(paths.delay[rows])
     assert kept.vertices == pytest.approx(paths.vertices[rows])

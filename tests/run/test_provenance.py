@@ -125,8 +125,9 @@ def test_labels(chain, label, interactions):
 def test_a_long_way_over_the_ground_is_a_ghost_and_a_short_one_adds_to_the_target():
     p = paths([9.0, 9.0, 9.0], [0, 0, 0], [2.0, 1.5, 1.5], [DIRECT_SUV, BY_GROUND, BY_GROUND[::-1]])
     assert (cell(p, 9.0, 0.0).label, cell(p, 9.0, 0.0).bodies) == ("direct", "suv.tail")
-    near = p.ways.vertices - np.float32([1.0, 0.0, 0.0])  # the target stands a metre before where its echo seems to be
-    ghost = take(p.replace(ways=p.ways.replace(vertices=near)), [1, 2])
+    # The target stands a metre before where its echo seems to be.
+    near = p.trajectories.vertices - np.float32([1.0, 0.0, 0.0])
+    ghost = take(p.replace(trajectories=p.trajectories.replace(vertices=near)), [1, 2])
     assert cell(ghost, 9.0, 0.0).label == "multipath"
 
 

@@ -26,14 +26,14 @@ def made():
 
 
 def records(r):
-    return [r.paths, r.paths.ways, r.profile, r.cube, r.rdmap, r.detections]
+    return [r.paths, r.paths.trajectories, r.profile, r.cube, r.rdmap, r.detections]
 
 
 def test_what_is_stored_comes_back_bit_for_bit(made, tmp_path):
     save_result(made, tmp_path)
     back = load_result(tmp_path)
     for was, now in zip(records(made), records(back), strict=True):
-        for f in (f for f in dataclasses.fields(was) if f.name != "ways"):
+        for f in (f for f in dataclasses.fields(was) if f.name != "trajectories"):
             old, new = getattr(was, f.name), getattr(now, f.name)
             assert np.asarray(old).dtype == np.asarray(new).dtype
             np.testing.assert_array_equal(new, old, err_msg=f.name)

@@ -88,9 +88,9 @@ def result(p: Paths, where, text: str = "", differ=0.01) -> Result:
 
 def assert_same(a: Result, b: Result) -> None:
     """Assert that all in two results that is random or measured is equal to the last bit."""
-    for name in ("paths", "paths.ways", "profile", "cube", "rdmap", "error", "detections"):
+    for name in ("paths", "paths.trajectories", "profile", "cube", "rdmap", "error", "detections"):
         one, other = operator.attrgetter(name)(a), operator.attrgetter(name)(b)
         for f in dataclasses.fields(one):
-            if f.name != "ways":
+            if f.name != "trajectories":
                 x, y = getattr(one, f.name), getattr(other, f.name)
                 np.testing.assert_array_equal(x, y, err_msg=f"{name}.{f.name}")

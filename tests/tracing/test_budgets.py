@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import raychan as rc
 from raychan.cli import app
-from raychan.run.resources import demand
+from raychan.run.rules import demand
 from raychan.run.single_body import facets_of
 from raychan.tracing import solver
 from raychan.tracing.contributions import Contributions

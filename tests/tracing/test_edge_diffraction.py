@@ -11,7 +11,7 @@ from raychan.channel.edge_diffraction import leg_field
 from raychan.poses import theta_phi
 from raychan.records import DIFFRACT
 from raychan.run.solver import solve
-from raychan.tracing.edge_diffraction import wedge_legs
+from raychan.tracing.point_targets import wedge_legs
 from raychan.tracing.settings import refinement
 from raychan.units import C0
 from raychan.world.geometry import Geometry

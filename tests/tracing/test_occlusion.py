@@ -71,7 +71,7 @@ def test_a_plate_half_covered_by_another_is_half_blocked():
 def test_a_target_in_the_clear_is_not_blocked_and_behind_a_wall_wholly():
     target = box((10, -0.3, 0), (10.3, 0.3, 1.8))
     clear = seen([target, box((12, -3, 0), (13, 3, 4)), ground(height=-0.5)], role=[0, 0, 1])
-    assert (clear.blocked, clear.veiled, clear.by) == (0.0, 0.0, ())
+    assert (clear.blocked, clear.behind_layers, clear.by) == (0.0, 0.0, ())
     hidden = seen([target, box((5, -9, -9), (5.2, 9, 9))])
     assert hidden.blocked == 1.0
     assert hidden.by == (("body1", pytest.approx(1.0)),)
@@ -99,13 +99,13 @@ def test_shares_of_blockers_match_rectangles_within_the_stated_error():
     assert inside >= 54  # the stated error is to hold in 95 of 100
 
 
-def test_the_first_opaque_body_counts_and_glass_only_veils():
+def test_the_first_opaque_body_counts_and_glass_is_told_apart():
     target, pane, wall = plate(10, -1, 1, -1, 1), plate(4, -3, 0, -3, 3), plate(6, -0.3, 3, -3, 3)
     found = seen([target, pane, wall], materials=[PEC, GLASS, PEC])
     # The pane covers the left half; the wall, 3/5 of the way, hides what lies right of y = -0.5.
     assert found.by == (("body2", pytest.approx(0.75, abs=0.01)),)
-    assert found.veiled == pytest.approx(0.25, abs=0.01)
-    assert found.blocked + found.veiled == pytest.approx(1.0, abs=1e-12)
+    assert found.behind_layers == pytest.approx(0.25, abs=0.01)
+    assert found.blocked + found.behind_layers == pytest.approx(1.0, abs=1e-12)
     opaque = seen([target, pane, wall], materials=[PEC, GLASS, PEC], layers=0)
     assert dict(opaque.by)["body1"] == pytest.approx(0.5, abs=0.01)
 
@@ -156,6 +156,6 @@ def test_the_studys_pedestrian_stands_behind_metal_but_for_head_and_foot():
     found = occlusion(scene.facets(), scene.points(), scene.radar.position, "pedestrian")
     # The scene's comment: 93 % behind metal and tyre, 3 % through a window, 4 % under the car.
     assert found.blocked == pytest.approx(0.93, abs=0.01)
-    assert found.veiled == pytest.approx(0.03, abs=0.01)
+    assert found.behind_layers == pytest.approx(0.03, abs=0.01)
     assert found.by[0][0] == "car"
     assert found.point == "car.front_door_left"

@@ -11,8 +11,8 @@ from support.facets import facets, quad
 from truth import corner, po
 
 import raychan
-from raychan.em.gauss_quadrature import mean_parts, points_for
 from raychan.em.phase_integral import triangle_terms
+from raychan.em.phasor import mean_parts, points_for
 from raychan.run.rcs_refinement import refinements
 from raychan.run.single_body import facets_of
 from raychan.tracing.footprints import element_of

@@ -12,7 +12,7 @@ from support.scene_texts import PLATE
 import raychan as rc
 from raychan.cli import invoke
 from raychan.processing.cfar import fitting_guard
-from raychan.run import resources
+from raychan.run import rules
 from raychan.world import limits, schema
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit
@@ -165,7 +165,7 @@ def test_the_memory_foreseen_holds_what_a_run_takes_and_not_three_times_it(scene
     rc.simulate(large)
     taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert taken < resources.demand(large).memory < 3.0 * taken
+    assert taken < rules.demand(large).memory < 3.0 * taken
 
 
 @pytest.mark.parametrize(
@@ -178,15 +178,15 @@ def test_the_memory_foreseen_holds_what_a_run_takes_and_not_three_times_it(scene
     ],
 )
 def test_what_needs_too_much_memory_is_refused_by_the_key_that_mends_it(scene, monkeypatch, changes, key):
-    monkeypatch.setattr(resources, "allowed_memory", lambda: 2.7e6)
+    monkeypatch.setattr(rules, "allowed_memory", lambda: 2.7e6)
     with pytest.raises(SceneError) as caught:
-        resources.check_demand(rc.Scene.load(scene).override(changes))
+        rules.check_demand(rc.Scene.load(scene).override(changes))
     assert caught.value.key == key and "at most" in caught.value.allowed
 
 
 def test_a_long_run_is_told_and_a_short_one_is_not(scene):
     short = rc.Scene.load(scene)
-    assert resources.long_run(short) == []
-    (said,) = resources.long_run(short, frames=100_000)
+    assert rules.long_run(short) == []
+    (said,) = rules.long_run(short, frames=100_000)
     assert "min" in said and "memory" in said
-    assert replace(resources.demand(short), seconds=5.0).text.startswith("roughly 5 s")
+    assert replace(rules.demand(short), seconds=5.0).text.startswith("roughly 5 s")

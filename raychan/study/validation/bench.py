@@ -144,16 +144,16 @@ class Bench:
 
 def over(result: Result, parts: tuple[str, ...], via: tuple[str, ...] = ()) -> Mask:
     """Return which paths (n,) go over one of `parts` and all of `via`; without `via`, over no other target."""
-    paths, ways = result.paths, result.paths.ways
-    met = ways.kind > 0
-    touched = [(_is(p, ways.body, ways.part, paths) & met).any(axis=1) for p in (*parts, *via)]
+    paths, trajectories = result.paths, result.paths.trajectories
+    met = trajectories.kind > 0
+    touched = [(_is(p, trajectories.body, trajectories.part, paths) & met).any(axis=1) for p in (*parts, *via)]
     led = np.any(touched[: len(parts)], axis=0)
     if via:
-        return np.asarray((led & np.all(touched[len(parts) :], axis=0))[paths.way])
+        return np.asarray((led & np.all(touched[len(parts) :], axis=0))[paths.trajectory])
     own = {p.split(".")[0] for p in parts} | set(background(result.require_scene().facets(0.0)))
     strange = [i for i, name in enumerate(paths.body_names) if name not in own]
-    led &= ~(np.isin(ways.body, strange) & met & (ways.kind != TRANSMIT)).any(axis=1)
-    return np.asarray(led[paths.way])
+    led &= ~(np.isin(trajectories.body, strange) & met & (trajectories.kind != TRANSMIT)).any(axis=1)
+    return np.asarray(led[paths.trajectory])
 
 
 def peak_snr(result: Result, ways: Mask, at: float, room: float) -> float:

@@ -1,7 +1,8 @@
-"""How the two-way phase runs over tubes on their last surface, and bounds on what each may scatter.
+"""What tubes on their last surface radiate to an end: which of them, with what two-way phase, and how much at most.
 
 The phase is known at six points, corners and edge middles, through which it is quadratic: what the phase integral
 (`em.phase_integral`) takes. Where a quadratic misses the centre, or the surface turns too far, the tube is `rough`.
+Currents beyond the horizon radiate through the body on which they flow, to where their ray leaves it.
 """
 
 from __future__ import annotations
@@ -15,17 +16,24 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
-from raychan.geometry.curved_patches import distance, length_to, place_on
+from raychan.geometry.curved_patches import place_on
 from raychan.parallel import parallel_for
 from raychan.tracing.image_paths import weight
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, row_numbers, slices
+from raychan.vectors import distance, length_to
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
 
 _PARALLEL_FROM = 4096  # tubes from which on a second thread pays; not measured
+_MOST_MET = 64  # facets met within overlapping bodies before a ray is dropped; not measured
+
+FACING, OBLIQUE, LIT = 0, 1, 2
+"""Which tubes radiate: those that face the end; also those whose reflected wave reaches beyond the horizon; all that
+are lit."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +94,13 @@ class PhaseColumns(NamedTuple):
     in_phase: Floats
     rough: Floats
     length: Floats
+
+
+def radiating(out: Leg, tubes: Tubes, which: int) -> tuple[Floats, Bools]:
+    """Return what share (n,) of their obliquity tubes have towards the end of `out`, and which (n,) face it (see
+    `radiating_share`)."""
+    share, facing = radiating_share(tubes.points, tubes.k, tubes.normals, out.image, out.far, which)
+    return share, facing
 
 
 def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
@@ -188,3 +203,59 @@ def phases(tubes, facets, image, far, antenna, wavenumber, limits, out):  # type
         for c in range(3):
             off = max(off, distance(normals[i, c], normals[i, 3]) / turn)
         rough[i] = off / (1.0 + 0.5 * (high - low))
+
+
+@njit(cache=True, nogil=True)
+def radiating_share(points, k, normals, image, far, which):  # type: ignore[no-untyped-def]
+    """Return what share of the obliquity cos_i of tubes (n,) is left towards an end, 0 where they do not radiate, and
+    whether they face it.
+
+    Args: points, k, normals (n, 4, 3) of arriving tubes, the centre last; image (3,) [m] of the end, or the direction
+    to it when far; which of FACING, OBLIQUE, LIT. The reflected wave's obliquity is (cos_i + r . n) / 2 towards r: it
+    goes on beyond the horizon r . n = 0 and ends where it changes its sign (Ufimtsev 2014, ch. 1).
+    """
+    share, facing = np.empty(len(points)), np.empty(len(points), np.bool_)
+    for i in range(len(points)):
+        size, towards, cosine = 0.0, 0.0, 0.0
+        for c in range(3):
+            d = image[c] if far else image[c] - points[i, 3, c]
+            size += d * d
+            towards += d * normals[i, 3, c]
+            cosine -= k[i, 3, c] * normals[i, 3, c]
+        towards /= math.sqrt(size)
+        facing[i] = towards > 0.0
+        if facing[i] or which == LIT:
+            share[i] = 1.0
+        else:
+            left = 0.5 * (cosine + towards) if which == OBLIQUE else 0.0
+            share[i] = left / cosine if left > 0.0 else 0.0
+    return share, facing
+
+
+def exit_points(geometry: Geometry, leg: Leg, points: Floats, facet: Ints) -> tuple[Floats, Ints]:
+    """Return points (n, 3) [m] and facets (n,), moved along the ray to the end to where it leaves the bodies, for rays
+    that enter them.
+
+    A closed body does not hide its own currents: in physical optics they radiate in free space (Ufimtsev 2014, ch. 1).
+    What stands behind its other side hides them as it hides all else.
+    """
+    d, length = leg.rays(points)
+    inward = np.einsum("ij,ij->i", d, geometry.normal[facet]) > 0.0
+    rows = np.flatnonzero(geometry.closed_opaque[facet] & inward)
+    points, facet = points.copy(), facet.copy()
+    outward, far = -d[rows], np.full(len(rows), np.inf) if leg.far else length[rows]
+    skip, start, depth = facet[rows], np.zeros(len(rows)), np.ones(len(rows), int)
+    for _ in range(_MOST_MET):
+        if not len(rows):
+            break
+        hit, t = geometry.cast(points[rows], outward, skip, start)
+        met = (hit >= 0) & (t < far)
+        leaves = np.einsum("ij,ij->i", outward, geometry.normal[hit]) > 0.0
+        depth += np.where(met & geometry.closed_opaque[hit], np.where(leaves, -1, 1), 0)
+        out = met & (depth <= 0)
+        points[rows[out]] += t[out, None] * outward[out]
+        facet[rows[out]] = hit[out]
+        on = met & ~out
+        start = np.where(on, t + geometry.touch, 0.0)[on]
+        rows, outward, far, skip, depth = rows[on], outward[on], far[on], skip[on], depth[on]
+    return points, facet
