@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.em.fresnel import coefficients_array
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
+from raychan.run.ledger import NOTHING, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, peak
 from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import strongest_bend
@@ -20,20 +20,6 @@ from raychan.world.body import Body
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
-
-UNKNOWN = "unknown"
-NOTHING = "none"
-"""Level of an effect that the scene does not have, or that is modelled."""
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One effect: `level_db` [dB] against the weakest detection, 'unknown' where there is no estimate, 'none' where
-    there is no effect; `kind` 'estimate', 'bound', 'exact' or 'none'; `how` it was found."""
-
-    level_db: float | str
-    kind: str
-    how: str
 
 
 def ledger(
@@ -45,7 +31,7 @@ def ledger(
     model: Any,
     weakest: float,
     bodies: Collection[Body] = (),
-) -> dict[str, Any]:
+) -> dict[str, Entry]:
     """Return the unmodelled effects by name, each against the weakest detection's power [W].
 
     Args: settings, the scene's processing; model, what was modelled; bodies of the scene.

@@ -83,7 +83,7 @@ def check_target(scene: Scene | None, target: str) -> Scene:
 
 def is_background(body: Body) -> bool:
     """Tell whether a body is never a target (see run.chain.background)."""
-    return bool(body.kind == MIRROR or body.name.startswith("ego"))
+    return bool(body.resolved_role == MIRROR or body.name.startswith("ego"))
 
 
 def led_by(result: Result, target: str) -> tuple[int, ...]:

@@ -119,7 +119,7 @@ class Body:
         return moved
 
     @property
-    def kind(self) -> Role:
+    def resolved_role(self) -> Role:
         """What it does besides blocking: as `role` says; else the ground mirrors, a body of given RCS blocks."""
         if self.role is not None:
             if self.role not in ROLES:

@@ -27,8 +27,8 @@ class Limit:
     def allowed(self) -> str:
         """What is allowed, and why, as messages say it."""
         unit = f" {self.unit}" if self.unit else ""
-        ends = f"above {self.low:g} and at most" if self.above else f"between {self.low:g} and"
-        return f"{ends} {self.high:g}{unit}: {self.why}"
+        ends = f"above {_exact(self.low)} and at most" if self.above else f"between {_exact(self.low)} and"
+        return f"{ends} {_exact(self.high)}{unit}: {self.why}"
 
     @property
     def text(self) -> str:
@@ -50,6 +50,11 @@ class Limit:
     def times(self, factor: float, unit: str) -> Limit:
         """Return the same limits in another unit, smaller by a factor."""
         return Limit(self.low * factor, self.high * factor, unit, self.why, self.above)
+
+
+def _exact(value: float) -> str:
+    """Return a number in short form; a whole one with all digits where the short form is another number."""
+    return f"{value:,}" if isinstance(value, int) and float(f"{value:g}") != value else f"{value:g}"
 
 
 LENGTH = Limit(0.0, 1e6, "m", "a scene is no wider than a radar's horizon", above=True)

@@ -81,10 +81,10 @@ class Scene(Described):
         self.materials = dict(materials or {})
         self._data: dict[str, Any] | None = None
         self._tables: Sequence[BodyTable] = ()
-        # Cache of what other modules derive from the bodies at time 0, by class; shared by scenes with the same bodies.
-        self.kept: dict[Any, Any] = {}
+        # What `geometry_of` derives from the bodies at time 0, by class; shared by scenes with the same bodies.
+        self._derived: dict[Any, Any] = {}
         # Cache of the static bodies' geometry, shared by this scene at all times.
-        self._still: dict[type, StaticGeometry | None] = {}
+        self._static: dict[type, StaticGeometry | None] = {}
         try:
             self._prepare()
         except SceneError as e:
@@ -131,7 +131,7 @@ class Scene(Described):
         )
         scene._data, scene._tables = dict(data), tables.bodies
         if like is not None and scene._stands_as(like):
-            scene.kept = like.kept
+            scene._derived = like._derived
         return scene
 
     def to_toml(self) -> str:
@@ -157,7 +157,7 @@ class Scene(Described):
 
     def __getstate__(self) -> dict[str, Any]:
         # Caches stay behind: a copy, perhaps in another process, makes its own.
-        return self.__dict__ | {"kept": {}, "_still": {}}
+        return self.__dict__ | {"_derived": {}, "_static": {}}
 
     def _stands_as(self, other: Scene) -> bool:
         """Tell whether both scenes have the same bodies at the same places, of the same materials."""
@@ -175,7 +175,7 @@ class Scene(Described):
             seen.add(body.name)
             try:
                 self._chosen(body)
-                _ = body.motion, body.kind
+                _ = body.motion, body.resolved_role
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.bodies = over_seams(self.bodies)
@@ -199,8 +199,8 @@ class Scene(Described):
             return self
         moved = copy(self)
         moved.bodies = tuple(b.at(time) for b in self.bodies)
-        moved.kept = self.kept if moved._stands_as(self) else {}
-        moved._still = self._still
+        moved._derived = self._derived if moved._stands_as(self) else {}
+        moved._static = self._static
         if self.radar_table is not None:
             there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
             moved.radar_table = self.radar_table.model_copy(update={"position": there.tolist()})
@@ -214,7 +214,7 @@ class Scene(Described):
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
         return moved
 
-    def bare(self) -> Scene:
+    def without_caches(self) -> Scene:
         """Return a copy without caches, for results that outlive the run."""
         return copy(self)
 
@@ -264,16 +264,16 @@ class Scene(Described):
         return list(materials), list(parts), rows
 
     @property
-    def still(self) -> StaticGeometry | None:
+    def static_geometry(self) -> StaticGeometry | None:
         """Geometry of the static bodies, shared by all instants; None where it does not pay."""
-        if StaticGeometry not in self._still:
-            self._still[StaticGeometry] = StaticGeometry.of(self.bodies)
-        still = self._still[StaticGeometry]
-        return still and still.at(self.bodies)
+        if StaticGeometry not in self._static:
+            self._static[StaticGeometry] = StaticGeometry.of(self.bodies)
+        static = self._static[StaticGeometry]
+        return static and static.at(self.bodies)
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        return posed(self.bodies, self._index, self.frequency, time, self.still)
+        return posed(self.bodies, self._index, self.frequency, time, self.static_geometry)
 
     @property
     def topology(self) -> list[MeshTopology]:
@@ -285,7 +285,7 @@ class Scene(Described):
         """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of balls inside bodies at time 0."""
         found = []
         for i, b in enumerate(self.bodies):
-            if b.kind != MIRROR:
+            if b.resolved_role != MIRROR:
                 centre, radius = b.geometry.inner_spheres(tuple(m.kind != LAYER for m in self._chosen(b)))
                 found.append((b.motion.to_world(centre), radius, np.full(len(radius), i, np.int32)))
         centres, radii, owners = zip(*found, strict=True) if found else ((), (), ())

@@ -11,7 +11,7 @@ from raychan.world.quantities import (
     Angle,
     Bandwidth,
     Beam,
-    Bearing,
+    Bearings,
     Bounces,
     Carrier,
     CellPair,
@@ -23,8 +23,8 @@ from raychan.world.quantities import (
     Level,
     Loss,
     Noise,
-    Offset,
-    Pad,
+    Offsets,
+    PadPair,
     Permittivity,
     Pfa,
     Place,
@@ -161,7 +161,7 @@ class RadarTable(Table):
     tx_antenna: str | AntennaTable | None = None
     rx_antenna: str | AntennaTable | None = None
     polarization: Literal["V", "H"] = "V"
-    elements_mm: Annotated[list[Offset], Field(min_length=1, max_length=4096)] = [[0.0, 0.0, 0.0]]
+    elements_mm: Offsets = [[0.0, 0.0, 0.0]]
     """Receiver phase centres in the antenna's frame."""
     waveform: WaveformTable
 
@@ -171,7 +171,7 @@ class ProcessingTable(Table):
 
     range_window: Window = "hann"
     rate_window: Window = "hann"
-    pad: tuple[Pad, Pad] = (2, 2)
+    pad: PadPair = (2, 2)
     """Zero padding along range and range rate, as a multiple of the samples."""
     cfar: Literal["ca", "os"] = "os"
     pfa: Pfa = 1e-7
@@ -232,7 +232,7 @@ class BodyTable(Table):
     turn_rate_dps: Turn = 0.0
     spin_dps: Spin = [0.0, 0.0, 0.0]
     """About the body's own axes, as of a wheel: about its origin."""
-    rcs_dbsm: Rcs | Annotated[list[Bearing], Field(min_length=2)] | None = None
+    rcs_dbsm: Rcs | Bearings | None = None
     """Makes the body a point target: a figure, or [azimuth_deg, dBsm] pairs seen from its heading."""
     rcs_point: Place | None = None
     """Where it stands, body frame; default the middle of the body."""

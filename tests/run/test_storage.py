@@ -147,7 +147,7 @@ def test_csv_and_summary_say_what_the_record_holds(made, tmp_path):
     assert first.endswith(",multipath,truck.tail > walker > truck.tail")
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["labels"] == {"direct": 1, "multipath": 1, "clutter": 0}
-    assert summary["left_out"] == {"diffraction": "unknown"}
+    assert summary["left_out"] == {"diffraction": {"level_db": "unknown", "kind": "none", "how": ""}}
 
 
 def test_a_file_that_is_not_ours_is_refused(tmp_path):
