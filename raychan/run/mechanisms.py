@@ -1,4 +1,4 @@
-"""Choice of mechanisms for `model.mode = "auto"`: those that a tolerance needs, found by a coarse launch with all."""
+"""Choice of mechanisms for `model.mode = "auto"`: those that the tolerance needs, by a coarse launch with all."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from raychan.run.result import Contribution, Explanation, Receiver, Result
 from raychan.units import dbm
 
 FORMAT = 3
-_READS = (2, FORMAT)  # form 2 has delay and range rate of paths instead of length and its rate
+_READS = (2, FORMAT)  # format 2 has delay and range rate of paths instead of length and its rate
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
 CONTENTS = Contents(
     names=("result.nc", "detections.csv", "summary.json", *PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
@@ -49,7 +49,7 @@ _JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
 def save_result(result: Result, directory: str | Path) -> None:
     """Write result.nc, detections.csv and summary.json into an existing directory.
 
-    Use inside `output_files.staging`, which makes all files appear at once. Raises: StoreError where the disk refuses.
+    Use inside `output_files.staging`, which makes all files appear at once. Raises: StoreError for errors of the disk.
     """
     directory = Path(directory)
     try:

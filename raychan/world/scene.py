@@ -44,7 +44,7 @@ class Scene(Described):
     Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar an object, a table as
     in a scene file, or None; processing of the receiver, an object or a table (default the radar's own); model a table
     of what is modelled; materials by name, which bodies may use; folder to which file names refer.
-    Raises: SceneError for a scene that cannot be.
+    Raises: SceneError for a scene that cannot be simulated.
 
     >>> Scene(bodies=[Body(name="wall", shape="plate", position=(10, 0, 0))]).frequency
     77000000000.0
@@ -156,11 +156,11 @@ class Scene(Described):
         return self._of(overrides.changed(self._data, changes, self.path), self.path, text, self)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Caches stay behind: a copy, perhaps in another process, makes its own.
+        # Without caches: a copy, perhaps in another process, makes its own.
         return self.__dict__ | {"_derived": {}, "_static": {}}
 
     def _stands_as(self, other: Scene) -> bool:
-        """Tell whether both scenes have the same bodies at the same places, of the same materials."""
+        """Return whether both scenes have the same bodies at the same places, of the same materials."""
         alike = len(self.bodies) == len(other.bodies) and all(map(is_, self.bodies, other.bodies))
         return alike and (self.materials, self.frequency) == (other.materials, other.frequency)
 
@@ -170,7 +170,7 @@ class Scene(Described):
         for body in self.bodies:
             if body.name in seen:
                 raise SceneError(
-                    "two bodies of one name", key=f"bodies.{body.name}", allowed="a name of its own for each"
+                    "two bodies have this name", key=f"bodies.{body.name}", allowed="a different name for each"
                 )
             seen.add(body.name)
             try:
@@ -224,7 +224,7 @@ class Scene(Described):
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What a user should know: odd meshes, materials out of range, overlaps, nothing in view, aliased targets."""
+        """Warnings: odd meshes, materials out of range, overlaps, bodies out of view, aliased targets."""
         said = [note for body in self.bodies for note in body.notes()]
         used = {
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
@@ -282,7 +282,7 @@ class Scene(Described):
 
     @property
     def inner_spheres(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
-        """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of balls inside bodies at time 0."""
+        """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of spheres inside bodies at time 0."""
         found = []
         for i, b in enumerate(self.bodies):
             if b.resolved_role != MIRROR:
