@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _COMPILING = "compiling"
 _LONG = 3.0  # s: compiling for longer prints a line where there is no progress bar
 _SOME = ("azimuth deg", "error dB", "folded: true m", "true m/s")  # columns shown only where a row has a value
-_WIDE = 150  # columns where the output is no terminal, so that no line is cut
+_WIDE = 150  # columns of output to a file or pipe: no table line is cut
 
 
 class Interrupted(Exception):

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _NEAR = 4.0  # resolution cells: wider than the main lobe of any window; farther paths add by side lobes only
-_EQUAL = 1.0 + 1e-6  # factor by which an unfolded place is preferred
+_EQUAL = 1.0 + 1e-6  # factor on the power of unfolded places, so that they win over equal folded ones
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from raychan.run.ledger import NOTHING, ModelChoice
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 
-_LEVEL = 1e-4  # of the sum of all amplitudes: accuracy of the levels of whole mechanisms
+_LEVEL = 1e-4  # of the sum of all amplitudes: error of the transform that gives a mechanism's level (not measured)
 
 
 def interactions(paths: Paths) -> NDArray[np.int64]:

@@ -22,7 +22,7 @@ _MATERIALS = Materials(
     thickness=np.array([_THICK, 0.0]),
     roughness=np.zeros(2),
 )
-_CELL = 0.15  # m
+_CELL = 0.15  # m: width of the Gaussian range response
 Sheet = tuple[Floats, int]
 """Corners (4, 3) [m] of a plane quadrilateral, and its row of the materials: 0 glass, 1 metal."""
 

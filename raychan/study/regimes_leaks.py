@@ -15,7 +15,7 @@ from raychan.world.shapes import SHAPES, build
 Ints = NDArray[np.int64]
 
 _CHUNK = 1 << 17  # rays at a time: bounds memory (other sizes not measured)
-_SLANT = 0.02  # least cosine of the angle of incidence
+_SLANT = 0.02  # least cosine of the angle of incidence: flatter rays may rightly miss after rounding
 _TARGETS = ("edges", "vertices", "corner rays of tubes")
 
 

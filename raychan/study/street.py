@@ -30,7 +30,7 @@ from raychan.world.scene import Scene
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-_FINE_SAG = 1e-4  # m: largest distance of flat facets from the surface, for the lattice methods
+_FINE_SAG = 1e-4  # m: largest distance of flat facets from the surface, for the lattice methods (not measured)
 _NEAR = 3.0  # m: below it, and as much from the far end, to which ranges fold, the map holds ground clutter only
 _OWN = "ego"  # prefix of bodies that carry the radar
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from raychan.report.canvas import collections, figure, save, style
 from raychan.view.drawing import Drawing
 
-_DASH = 0.015  # of the scene's diagonal
+_DASH = 0.015  # length of a dash over the scene's diagonal
 _MOST = 6000  # triangles drawn of a shape: matplotlib sorts and paints them one by one (not measured)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from raychan.view.drawing import Drawing
 
-_SIZE = (2000, 1125)
+_SIZE = (2000, 1125)  # pixels
 _MAP = "plasma"
 _POWER = "received power [dBm]"
 _DASH = 8.0  # length of a dash, and of the gap after it, in radii of a ray
