@@ -23,12 +23,12 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-_LINEAR = 1e-4  # rad: deviation from a linear phase up to which a piece of the footprint is integrated in closed form
+_LINEAR = 1e-4  # rad: a part of a footprint is integrated in closed form if its phase is linear to this (not measured)
 
 
 @dataclass(frozen=True)
 class Poses:
-    """Where bodies and radar are at instants t: a point x of body b is then at turn[t, b] @ (x - origin[b]) +
+    """Poses of bodies and radar at instants t: a point x of body b moves to turn[t, b] @ (x - origin[b]) +
     place[t, b]."""
 
     origin: Floats
@@ -41,14 +41,14 @@ class Poses:
     """Radar positions (t, 3) [m]."""
 
 
-_SOON = 1e-4  # s: time over which a rate is a difference quotient; its error is far below a rate cell for any turn
+_SOON = 1e-4  # s: interval of the difference quotient that gives a rate; its error is far below a rate cell
 
 
 def corner_rates(routes: Routes, rows: NDArray[np.int64], facets: Facets, velocity: Floats) -> Floats:
     """Return range rates (r, 3) [m/s] through the corners of some footprints: half the rate of the route's length.
 
-    Rates differ over a body that turns or crosses. Neighbouring tubes have terms at a shared corner that cancel, and go
-    on to cancel only if both have the rate of that corner.
+    Rates differ over a body that turns or crosses. The terms of neighbouring tubes at a shared corner cancel; over slow
+    time they cancel only if both have the rate of that corner.
     Args: rows (r,) of the routes; velocity (3,) [m/s] of the radar.
     """
     late = _SOON * np.array([-0.5, 0.5])[:, None, None]
@@ -78,17 +78,17 @@ def _turned(turn: Floats) -> Floats:
 
 
 def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> Complexes:
-    """Return the gains (n,) of routes without carrier phase and without the phase integral over the footprint."""
+    """Return the gains (n,) of routes, with neither carrier phase nor the phase integral over the footprint."""
     n = len(routes.kind)
     bare: Routes = routes.replace(lengths=np.zeros((n, 6)), length=np.zeros(n), taper=np.ones((n, 3)))
     ends: list[Any] = [lambda d, f=f: np.asarray(f(d))[:, None] for f in (radar.tx_field, radar.rx_field)]
     return transfer(bare, facets, frequency, *ends)[:, 0, 0]
 
 
-def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:
-    """Return lengths [m] and amplitudes (t, n, 3) of routes at later instants, by corners of their footprint.
+def extrapolated(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:
+    """Return lengths [m] and amplitudes (t, n, 3) of routes at later instants, a part for each corner of the footprint.
 
-    Routes without a footprint, or whose footprint is short in range, have one part; the others have amplitude 0.
+    Routes without a footprint, or with one that is short in range, have a single part: the others have amplitude 0.
     Args: strength (n,) from `strengths`; poses of bodies and radar at the instants; frequency [Hz].
     """
     shape = (len(poses.radar), len(routes.kind), 3)
@@ -108,7 +108,7 @@ def carried(routes: Routes, strength: Complexes, poses: Poses, frequency: float)
 
 @njit(cache=True, forceinline=True)
 def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
-    """Return where body b has carried a point."""
+    """Return the place of a point that moves with body b."""
     u, v, w = x[0] - origin[b, 0], x[1] - origin[b, 1], x[2] - origin[b, 2]
     return (
         turn[b, 0, 0] * u + turn[b, 0, 1] * v + turn[b, 0, 2] * w + place[b, 0],
@@ -119,7 +119,7 @@ def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _image(source, vertex, normal, b, turn, origin, place):  # type: ignore[no-untyped-def]
-    """Mirror a point in the plane of a vertex where body b has carried it."""
+    """Return the image of a point in the plane of a vertex that has moved with body b."""
     p = _moved(vertex, b, turn, origin, place)
     x = turn[b, 0, 0] * normal[0] + turn[b, 0, 1] * normal[1] + turn[b, 0, 2] * normal[2]
     y = turn[b, 1, 0] * normal[0] + turn[b, 1, 1] * normal[1] + turn[b, 1, 2] * normal[2]

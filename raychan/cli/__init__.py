@@ -23,8 +23,8 @@ from raychan.cli.view import view
 
 _HELP = """Simulate a radar: from a scene to a range-Doppler map whose detections name the bodies they come from.
 
-A scene file (TOML) gives the bodies with their places, materials and motion, and the radar. raychan traces the waves, \
-synthesises the receiver's samples, and processes them as a radar does.
+A scene file (TOML) gives the bodies with their positions, materials and motion, and the radar. raychan traces the \
+waves, synthesises the receiver's samples, and processes them as a radar does.
 
 [bold]raychan info scenes/urban.toml[/]
   [dim]bodies, link budget and resolutions[/]
@@ -39,7 +39,7 @@ Ranges are in metres, speeds in m/s; a positive range rate means receding.
 
 Exit code 0: done
   1: validate found a difference that is not listed, or a listed one that is gone
-  2: wrong input; the message says where
+  2: wrong input; the message says what, where, and what is allowed
   130: interrupted, 143: ended by SIGTERM; the message says what was written"""
 
 _STOPPED = "interrupted; nothing was written"
@@ -139,7 +139,7 @@ def invoke(argv: list[str]) -> int:
 
         _unprinted()
         if isinstance(error, OSError) and error.errno and not error.filename:
-            return _fail(f"standard output: {error.strerror}")  # files are told of by their names
+            return _fail(f"standard output: {error.strerror}")  # errors of files have a file name
         if isinstance(error, SceneError | OSError):
             return _fail(str(error))
         raise
@@ -147,7 +147,7 @@ def invoke(argv: list[str]) -> int:
 
 def _unprinted() -> int | None:
     """Flush standard output; return the exit code where it cannot be written."""
-    if sys.stdout is None:  # closed by whoever started the command
+    if sys.stdout is None:  # closed by the calling process
         return None
     try:
         sys.stdout.flush()

@@ -26,7 +26,7 @@ def explain(
     range: Annotated[
         float | None,
         typer.Option(
-            "--range", help="Range in m: the nearest detection within a resolution cell of it.", metavar="M",
+            "--range", help="Range in m; the nearest detection within a resolution cell is taken.", metavar="M",
             show_default=False,
         ),
     ] = None,
@@ -37,15 +37,14 @@ def explain(
     detection: Annotated[
         int | None,
         typer.Option(
-            help="The detection of this number instead: 1 is the first that `raychan run` lists, and the first row of "
-            "detections.csv.",
+            help="Number of a detection instead: 1 is the first in the list of `raychan run` and in detections.csv.",
             metavar="N",
         ),
     ] = None,
     cell: Annotated[
         bool,
         typer.Option(
-            "--cell", help="The map cell at --range and --speed (without --speed the strongest) instead of a detection."
+            "--cell", help="Explain the map cell at --range and --speed (strongest if not given), not a detection."
         ),
     ] = False,
     paths: Annotated[
@@ -54,8 +53,8 @@ def explain(
 ) -> None:  # fmt: skip
     """List the paths, with their bodies, that make a detection or a map cell, and the contribution of each.
 
-    The power and phase of each path itself (at the frame's start) are shown beside those of its contribution to the
-    cell, where all paths add coherently. Angles are azimuth and elevation in world axes.
+    Each path has two powers and phases: those of its contribution to the cell, in which all paths add coherently, and
+    its own at the start of the frame. Angles are azimuth and elevation in world axes.
     """
     from raychan.run.explain import explain as explain_result
     from raychan.run.output_files import StoreError
@@ -84,7 +83,7 @@ def _head(why: CellExplanation, searched: bool) -> list[str]:
 
     taken = f"detection {why.detection}" if why.detection else "map cell"
     if searched and not why.detection:
-        taken = "no detection within a cell of it; the map cell itself"
+        taken = "no detection within a resolution cell; map cell"
     others = ", ".join(map(str, why.others[:_OTHERS])) + (" ..." if len(why.others) > _OTHERS else "")
     also = f" (detection {others} within a cell too)" if others else ""
     lines = [
@@ -93,7 +92,7 @@ def _head(why: CellExplanation, searched: bool) -> list[str]:
     ]
     if why.folded:
         rate = "" if math.isnan(why.true_rate) else f", {why.true_rate:+.2f} m/s"
-        lines.append(f"folded: truly at {why.true_range:.2f} m{rate}, beyond what the waveform tells apart")
+        lines.append(f"folded: truly at {why.true_range:.2f} m{rate}, outside the waveform's unambiguous range or rate")
     return lines
 
 
@@ -151,6 +150,5 @@ def _listed(paths: CellPaths, most: int) -> Table:
 def _sum(why: CellExplanation) -> str:
     from raychan.units import dbm
 
-    within = f"within {why.error_db:.2f} dB" if why.converged else "not converged: error unknown"
-    tail = " by their refinement" if why.converged else ""
-    return f"the paths alone give {dbm(why.predicted):.1f} dBm, {within}{tail}"
+    error = f"stated error {why.error_db:.2f} dB" if why.converged else "not converged: error unknown"
+    return f"sum of the paths: {dbm(why.predicted):.1f} dBm, {error}"

@@ -16,7 +16,7 @@ _WORDS = {
     "tx_gain": "transmit gain",
     "rx_gain": "receive gain",
     "eirp": "EIRP",
-    "max_path_loss": "most one-way loss to that noise, receive gain aside",
+    "max_path_loss": "largest one-way loss, receive gain left out",
     "noise": "noise in a sample (kT0 F fs)",
     "coherent_gain": "gain of chirps x samples",
     "sensitivity": "noise in a cell of the map (rectangular windows)",
@@ -45,7 +45,7 @@ def info(
     up: Annotated[
         str | None,
         typer.Option(
-            help="The mesh file's axis that points up; y for GLB and z else if not given.", show_default=False
+            help="Axis of the mesh file that points up; if not given, y for GLB and z for others.", show_default=False
         ),
     ] = None,
 ) -> None:
@@ -63,7 +63,7 @@ def info(
         return
     for option, value in (("--unit", unit), ("--up", up)):
         if value is not None:
-            raise typer.BadParameter(f"{source} is no mesh file ({', '.join(SUFFIXES)})", param_hint=option)
+            raise typer.BadParameter(f"{source} is not a mesh file ({', '.join(SUFFIXES)})", param_hint=option)
     from raychan.world.radar_mount import antenna_of, antenna_table, is_antenna
 
     if is_antenna(source):
@@ -174,7 +174,7 @@ def _radar(radar: Any) -> list[Table]:
 
 
 def _chirp(w: Any) -> list[tuple[str, str]]:
-    # A map's rates are those of the ramp's middle.
+    # A map measures range rates at the frequency of the ramp's middle.
     of_middle = w.carrier / w.middle
     return [
         ("carrier, bandwidth", f"{w.carrier / 1e9:g} GHz, {w.bandwidth / 1e6:g} MHz"),

@@ -13,7 +13,7 @@ from raychan.world.limits import Limit
 
 
 def within(limit: Limit, whole: bool = False) -> Callable[[Any], Any]:
-    """Return the check of an option's number; one that is not given passes."""
+    """Return the check that an option's number is within a limit; an option that is not given passes."""
 
     def check(value: Any) -> Any:
         if value is not None and (problem := limit.problem(value, whole)):
@@ -31,7 +31,7 @@ def meant(limit: Limit, option: str, value: Any, whole: bool = False) -> None:
         raise typer.BadParameter(str(error)) from None
 
 
-# typer takes [m] for a style of its own and swallows it: in help, units are words.
+# typer takes [m] for markup and drops it: in help texts units are words.
 _SCENE = "Scene file (TOML), or the name of a bundled one, such as urban."
 SceneFile = Annotated[Path, typer.Argument(help=_SCENE, metavar="SCENE", show_default=False)]
 Seed = Annotated[
@@ -41,7 +41,7 @@ Seed = Annotated[
 Tolerance = Annotated[
     float | None,
     typer.Option(
-        help="Error in dB to which tubes are refined; the scene's own if not given.",
+        help="Error in dB to which tubes are refined; if not given, the scene's own.",
         metavar="DB",
         callback=within(limits.TOLERANCE_DB),
     ),
@@ -49,7 +49,7 @@ Tolerance = Annotated[
 MaxBounces = Annotated[
     int | None,
     typer.Option(
-        help="Interactions along a path; the scene's own if not given.",
+        help="Most interactions along a path; if not given, the scene's own.",
         metavar="N",
         callback=within(limits.BOUNCES, True),
     ),

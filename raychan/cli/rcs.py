@@ -40,23 +40,26 @@ def rcs(
     ] = 77.0,
     azimuth: Annotated[
         str,
-        typer.Option(help="Azimuth in degrees from target to radar: one, or first:last:step.", metavar="A[:B:STEP]"),
+        typer.Option(help="Azimuth in degrees, target to radar: one angle, or first:last:step.", metavar="A[:B:STEP]"),
     ] = "0",
-    elevation: Annotated[str, typer.Option(help="Elevation in degrees, likewise.", metavar="A[:B:STEP]")] = "0",
+    elevation: Annotated[str, typer.Option(help="Elevation in degrees, in the same form.", metavar="A[:B:STEP]")] = "0",
     polarization: Annotated[str, typer.Option(help="Receive then transmit: VV, VH, HV or HH.")] = "VV",
     distance: Annotated[
         str, typer.Option(help="Radar's distance from the target's origin in metres, or inf.", metavar="M")
     ] = "inf",
     material: Annotated[str, typer.Option(help="Material of the whole body, such as pec or glass.")] = "pec",
     tolerance: Annotated[
-        float, typer.Option(help="Error in dB to refine to.", metavar="DB", callback=within(limits.TOLERANCE_DB))
+        float,
+        typer.Option(
+            help="Error in dB to which tubes are refined.", metavar="DB", callback=within(limits.TOLERANCE_DB)
+        ),
     ] = 0.25,
     max_bounces: Annotated[
-        int, typer.Option(help="Bounces along a path.", metavar="N", callback=within(limits.BOUNCES, True))
+        int, typer.Option(help="Most bounces along a path.", metavar="N", callback=within(limits.BOUNCES, True))
     ] = 3,
     unit: Annotated[str, typer.Option(help="Unit of the mesh file: m, cm, mm, inch, ft.")] = "m",
     up: Annotated[
-        str | None, typer.Option(help="The file's axis that points up; y for GLB and z else if not given.")
+        str | None, typer.Option(help="Axis of the file that points up; if not given, y for GLB and z for others.")
     ] = None,
     scale: Annotated[
         float, typer.Option(help="Further factor on the mesh's size.", callback=within(limits.SCALE))
@@ -64,7 +67,7 @@ def rcs(
     crease: Annotated[
         float | None,
         typer.Option(
-            help="Folds of the mesh under this angle are smooth; 20 if not given.",
+            help="Crease angle in degrees: folds of the mesh below it are smooth; 20 if not given.",
             metavar="DEG",
             callback=within(limits.CREASE),
         ),
@@ -85,13 +88,13 @@ def rcs(
         writable(file, endings)
     az, el = angles(azimuth, "--azimuth"), angles(elevation, "--elevation")
     if len(az) * len(el) > MOST_ANGLES:
-        raise typer.BadParameter(f"{len(az) * len(el)} angles wanted; at most {MOST_ANGLES} can be")
+        raise typer.BadParameter(f"{len(az) * len(el)} angles; at most {MOST_ANGLES} are allowed")
     if polar:
         can_be_polar(plot, len(az), len(el))
     if shape is not None and (unit != "m" or up is not None or scale != 1.0):
         raise typer.BadParameter("--unit, --up and --scale are for mesh files: a built-in shape is in metres, z up")
     if shape is not None and crease is not None:
-        raise typer.BadParameter("--crease is for mesh files: a built-in shape knows which of its folds are edges")
+        raise typer.BadParameter("--crease is for mesh files: a built-in shape defines its edges itself")
     mesh, name = _target(source or [], shape, unit, up, scale, crease)
     grid = np.meshgrid(az, el)
     far = metres(distance, "--distance")
@@ -151,7 +154,7 @@ def _target(
         from raychan.world.mesh_io import load
 
         if len(source) != 1:
-            raise typer.BadParameter("one mesh file is wanted, or --shape NAME with its parameters")
+            raise typer.BadParameter("give one mesh file, or --shape NAME with its parameters")
         angle = CREASE_DEG if crease is None else crease
         return load(source[0], unit=unit, up=up, scale=scale, crease_deg=angle), Path(source[0]).name
     from raychan.world.shapes import build
@@ -163,7 +166,7 @@ def _parameter(text: str) -> tuple[str, Any]:
     """Return the name and value of a shape's parameter written KEY=VALUE."""
     key, sign, value = text.partition("=")
     if not sign:
-        raise typer.BadParameter(f"'{text}' is no parameter of a shape; write KEY=VALUE, as radius=0.3")
+        raise typer.BadParameter(f"'{text}' is not a parameter of a shape; write KEY=VALUE, such as radius=0.3")
     if value.lower() in ("true", "false"):
         return key, value.lower() == "true"
     try:

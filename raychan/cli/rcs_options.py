@@ -23,7 +23,9 @@ def angles(text: str, option: str) -> Any:
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 3) or not np.isfinite(numbers).all():
-        raise typer.BadParameter(f"{option}: '{text}' is neither a number of degrees nor first:last:step, as -30:30:1")
+        raise typer.BadParameter(
+            f"{option}: '{text}' is neither a number of degrees nor first:last:step, such as -30:30:1"
+        )
     for number in numbers:
         meant(limits.ANGLE, option, number)
     if len(numbers) == 1:
@@ -33,7 +35,7 @@ def angles(text: str, option: str) -> Any:
         raise typer.BadParameter(f"{option}: '{text}' never ends: the step must lead from the first angle to the last")
     count = (last - first) / step
     if count > MOST_ANGLES:
-        raise typer.BadParameter(f"{option}: '{text}' asks for {count:.3g} angles; at most {MOST_ANGLES} can be")
+        raise typer.BadParameter(f"{option}: '{text}' asks for {count:.3g} angles; at most {MOST_ANGLES} are allowed")
     return first + step * np.arange(int(count + 1e-9) + 1)
 
 
@@ -56,7 +58,7 @@ def can_be_polar(plot: Path | None, azimuths: int, elevations: int) -> None:
     if plot is None:
         raise typer.BadParameter("it needs --plot", param_hint="--polar")
     if azimuths > 1 and elevations > MOST_CUTS:
-        raise typer.BadParameter(f"{elevations} cuts wanted; at most {MOST_CUTS} can be", param_hint="--polar")
+        raise typer.BadParameter(f"{elevations} cuts; at most {MOST_CUTS} are allowed", param_hint="--polar")
 
 
 def metres(text: str, option: str) -> float:

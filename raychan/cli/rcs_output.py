@@ -47,10 +47,10 @@ def table_of(title: str, rows: list[Row]) -> Table:
 
 
 def further_bounces(found: Rcs, most: int, tolerance: float) -> list[str]:
-    """Return a line on what bounces beyond the last allowed one may change, where that matters: it is in no error."""
+    """Return a line on the change by bounces beyond the last allowed one, where it may exceed the tolerance."""
     import numpy as np
 
-    beyond = f"what further bounces bring is not in the error (--max-bounces, now {most})"
+    beyond = f"the error does not include further bounces (--max-bounces, now {most})"
     if most == 1:
         if np.isnan(found.further_db[found.sigma > 0.0]).any():
             return [f"the body is not convex: {beyond}"]
@@ -59,12 +59,12 @@ def further_bounces(found: Rcs, most: int, tolerance: float) -> list[str]:
     if not last:
         return []
     change = float(np.nanmax(found.further_db))
-    estimate = f"one that brings as much as the last allowed one changes up to {change:.2g} dB"
+    estimate = f"a bounce as strong as the last allowed one changes the RCS by up to {change:.2g} dB"
     return [f"at {last} of {found.bounces.size} angles {beyond}: {estimate}"]
 
 
 def uncertainties(mesh: Mesh, found: Rcs, tolerance: float) -> list[str]:
-    """Return a line each on folds of the mesh that may be read otherwise, and on angles that missed the tolerance."""
+    """Return a line each on folds of the mesh that may be edges, and on angles that missed the tolerance."""
     from raychan.world.creases import uncertain_folds
 
     lines = [text for text in [uncertain_folds(mesh, "--crease")] if text]

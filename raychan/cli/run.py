@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def _directory(text: str) -> Path:
     """Return a directory's path. Raises: typer.BadParameter for an empty name, as of an unset variable."""
     if not str(text).strip():
-        raise typer.BadParameter("it is empty: name the directory for the results")
+        raise typer.BadParameter("the name is empty: name a directory for the results")
     return Path(text)
 
 
@@ -40,7 +40,7 @@ def run(
     frames: Annotated[
         int | None,
         typer.Option(
-            help="Simulate a sequence of N frames: poses advance by velocities and turn rates.",
+            help="Simulate a sequence of N frames; poses advance by velocities and turn rates.",
             metavar="N",
             callback=within(limits.FRAMES, True),
         ),
@@ -48,7 +48,7 @@ def run(
     frame_interval: Annotated[
         float | None,
         typer.Option(
-            help="Seconds from frame to frame; without pause if not given.",
+            help="Seconds from frame to frame; if not given, frames follow without a pause.",
             metavar="S",
             callback=within(limits.INTERVAL),
         ),
@@ -59,10 +59,11 @@ def run(
     Without SCENE: list the bundled scenes.
 
     Writes result.nc (netCDF-4: the whole result), detections.csv, summary.json (timings, error reached, unmodelled
-    effects) and three pictures. They replace those of an earlier run at once when all is done; other files in DIR stay.
+    effects) and three pictures. They replace those of an earlier run, all at once at the end; other files in DIR stay.
 
-    With --frames, DIR holds frame_0000, frame_0001, ..., each such a directory and written as soon as it is ready, and
-    detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 is what a run without --frames gives.
+    With --frames, DIR holds a directory of these files for each frame, frame_0000, frame_0001, ..., written as soon as
+    it is ready, and detections.csv of all frames. Frame k draws its noise with seed + k; frame 0 equals a run without
+    --frames.
     """
     from raychan.run.rules import check_demand, long_run
     from raychan.world.scene import Scene
@@ -73,7 +74,7 @@ def run(
         _list()
         return
     if out is None:
-        raise typer.BadParameter("it is missing: name the directory for the results", param_hint="--out")
+        raise typer.BadParameter("missing: name a directory for the results", param_hint="--out")
     loaded = Scene.load(scene).override(set_ or [])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
     check_demand(loaded)

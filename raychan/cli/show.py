@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from raychan.run.result import Result
 
 _COMPILING = "compiling"
-_LONG = 3.0  # s of compiling from which a line says so where there is no progress bar
+_LONG = 3.0  # s: compiling for longer prints a line where there is no progress bar
 _SOME = ("azimuth deg", "error dB", "folded: true m", "true m/s")  # columns shown only where a row has a value
-_WIDE = 150  # columns where the output is no terminal, so that no line is cut
+_WIDE = 150  # columns of output to a file or pipe: no table line is cut
 
 
 class Interrupted(Exception):
-    """Ctrl-C in a command that keeps finished results; the message says which."""
+    """Ctrl-C in a command that keeps its finished results; the message says which."""
 
 
 class _Console(Console):
@@ -35,7 +35,7 @@ class _Console(Console):
 
 def console() -> Console:
     """Return the console of standard output."""
-    if sys.stdout is None:  # closed by whoever started the command
+    if sys.stdout is None:  # closed by the calling process
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     return _Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
 
@@ -105,8 +105,8 @@ def _known(value: float, digits: str) -> str:
 
 @contextmanager
 def progress(quiet: bool = False, kernels: str = "run") -> Iterator[Callable[[str, float], None]]:
-    """Yield a function (stage, share done) that shows progress: bars on a terminal; elsewhere only a line where kernels
-    must be compiled first. Args: quiet shows nothing; kernels names the list of those compiled ahead."""
+    """Yield a function (stage, share done) that shows progress: bars on a terminal, elsewhere one line if kernels must
+    be compiled first. Args: quiet shows nothing; kernels names the list of kernels to compile ahead."""
     from raychan.compile.ahead import helped
     from raychan.compile.progress import lost, missing
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 study = typer.Typer(
     no_args_is_help=True,
-    help="Studies: error against effort; stability where methods fail; one body in varied scenes.",
+    help="Studies: error against effort; checks where ray methods fail; one body in varied scenes.",
 )
 
 
@@ -35,7 +35,7 @@ def tradeoff(
         typer.Option("--case", help="Only this case; may be repeated.", metavar="NAME", show_default=False),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer settings and a coarser truth for the heavy cases.")
+        bool, typer.Option("--quick", help="Fewer settings, and coarser references for the largest cases.")
     ] = False,
     beside: Annotated[
         Path | None,

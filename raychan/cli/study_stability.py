@@ -18,12 +18,12 @@ def stability(
         bool, typer.Option("--quick", help="Leave out the largest cases: 1e5 rays at edges, not 1e7; no 1e7 paths.")
     ] = False,
     only: Annotated[
-        list[str] | None, typer.Option("--only", help="Try this regime only; may be repeated.", metavar="REGIME")
+        list[str] | None, typer.Option("--only", help="Run only this regime; may be repeated.", metavar="REGIME")
     ] = None,
 ) -> None:
     """Run checks in regimes where ray methods fail, and list expected and computed values.
 
-    Writes stability.md, stability.csv and figures. Failures are listed; the exit code is 0 nevertheless.
+    Writes stability.md, stability.csv and figures. Failures are listed; the exit code is 0 also then.
     """
     from raychan.report.stability_figures import FIGURES, pictures
     from raychan.run.output_files import Contents, staging
@@ -48,4 +48,4 @@ def stability(
         title = f"{len(failed)} failure{'' if len(failed) == 1 else 's'}"
         screen.print(show.table(title, ("regime", "case", "expected", "seen", "unit", "cause"), rows, left=(0, 1, 5)))
     total = sum(len(t.outcome.rows) for t in done)
-    screen.print(f"{total - len(failed)} of {total} checks pass; all of it: {out / 'stability.md'}", soft_wrap=True)
+    screen.print(f"{total - len(failed)} of {total} checks pass; full report: {out / 'stability.md'}", soft_wrap=True)

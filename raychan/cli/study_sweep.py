@@ -34,7 +34,7 @@ def sweep(
     times: Annotated[
         str | None,
         typer.Option(
-            help="Times in seconds to which all bodies and the radar move on, by their velocities.",
+            help="Times in seconds; all bodies and the radar move on by their velocities.",
             metavar="START:STOP:STEPS",
         ),
     ] = None,
@@ -43,7 +43,7 @@ def sweep(
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,
 ) -> None:
-    """Follow one body through varied scenes: how much of it is hidden, by which bodies, and whether it is detected.
+    """Follow one body through varied scenes: its hidden share, the bodies that hide it, and its detections.
 
     Without --vary and --times the scene is simulated as it is. Levels of the direct, multipath and diffracted returns
     of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png."""
@@ -81,12 +81,12 @@ def _table(done: Sweep) -> Table:
     heads += [f"{way}\ndB" for way in WAYS]
     n = len(done.axes)
     rows = [[*(f"{v:g}" for v in s.values), *_cells(s)] for s in done.steps]
-    title = f"{done.target}; levels are over the weakest that is reported"
+    title = f"{done.target}; levels are over the weakest reported one"
     return show.table(title, heads, rows, left=(n, n + 6))
 
 
 def _head(key: str, unit: str) -> str:
-    """Return a key over two lines, for it is longer than its values."""
+    """Return a key over two lines, as it is longer than its values."""
     words = key.removeprefix("bodies.").split(".")
     return (
         f"{'.'.join(words[:-2])}\n{'.'.join(words[-2:])} {unit}".strip() if len(words) > 2 else f"{key} {unit}".strip()

@@ -23,7 +23,7 @@ def validate(
         list[str] | None,
         typer.Option(
             "--only",
-            help="Only this table or claim, as T10 or C023; may be repeated.",
+            help="Only this table or claim, such as T10 or C023; may be repeated.",
             metavar="ID",
             show_default=False,
         ),
@@ -32,7 +32,7 @@ def validate(
         float,
         typer.Option(
             "--tolerance",
-            help="Error of the launches to aim at, in dB.",
+            help="Error in dB to which tubes are refined.",
             metavar="DB",
             callback=within(limits.TOLERANCE_DB),
         ),
@@ -54,7 +54,7 @@ def validate(
     from raychan.report.validation_page import page
     from raychan.report.validation_report import markdown
     from raychan.run.output_files import Contents, staging, write_whole
-    from raychan.study.validation.sections import ablations, budgets, ghosts, turns
+    from raychan.study.validation.sections import ablations, array_gains, budgets, ghosts
     from raychan.study.validation.validate import validate as run
 
     contents = Contents(("report.md", "report.html", "report-*.png"), signs=("report.html",))
@@ -64,7 +64,7 @@ def validate(
         if done.whole:
             from raychan.report.validation_figures import pictures
 
-            people, by_azimuth = budgets(done.bench, "street"), turns(done.bench)
+            people, by_azimuth = budgets(done.bench, "street"), array_gains(done.bench)
             sections = (ablations(done.bench), ghosts(done.bench), people, by_azimuth)
             figures = {name: path.name for name, path in pictures(done, people, by_azimuth, stage).items()}
         text = markdown(done, sections, figures)
@@ -90,6 +90,6 @@ def _say(done: Validation, out: Path) -> None:
     counts = [sum(c.verdict == v for c in done.checks) for v in (AGREES, DIFFERS, UNTESTABLE)]
     screen.print(
         f"{len(done.checks)} figures: {counts[0]} agree, {counts[1]} differ, {counts[2]} cannot be tested as printed; "
-        f"{done.seconds:.0f} s; all of it: {out / 'report.md'}",
+        f"{done.seconds:.0f} s; full report: {out / 'report.md'}",
         soft_wrap=True,
     )

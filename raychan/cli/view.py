@@ -39,15 +39,15 @@ def view(
     detection: Annotated[
         int | None,
         typer.Option(
-            help="Show only the rays of the detection of this number, as `raychan run` lists it.", metavar="N"
+            help="Show only the rays of the detection with this number in the list of `raychan run`.", metavar="N"
         ),
     ] = None,
 ) -> None:
     """Show a scene, and the rays of a result coloured by the power they bring.
 
     Without --screenshot or --html a window opens, where a click on a ray prints the bodies along it. With --range or
-    --detection only the rays of one detection are shown (those of the map cell where no detection is within a cell),
-    and bodies that they do not meet are transparent. Rays of a detection that is not converged are dashed.
+    --detection only the rays of one detection are shown (of the map cell at --range if no detection is near), and
+    bodies that they do not meet are transparent. Rays of a detection that is not converged are dashed.
     """
     drawing = _drawing(source, range, speed, detection)
     if screenshot is not None:
@@ -63,7 +63,7 @@ def view(
         print(page(drawing, html))
     if screenshot is None and html is None:
         if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-            raise typer.BadParameter("there is no display here; ask for --screenshot FILE.png or --html FILE.html")
+            raise typer.BadParameter("there is no display; use --screenshot FILE.png or --html FILE.html")
         from raychan.view.render import window
 
         window(drawing)
@@ -83,7 +83,7 @@ def _drawing(source: Path, range: float | None, speed: float | None, detection: 
     if source.is_dir() or source.suffix == ".nc":
         result = load_result(source)
         if result.scene is None:
-            why = "a mesh or antenna file moved, or it was made in Python"
+            why = "a mesh or antenna file has moved, or the scene was made in Python"
             raise StoreError(f"{source}: its scene cannot be read again ({why})")
         try:
             cell = explain(result, range, speed, detection=detection) if wanted else None
@@ -93,5 +93,5 @@ def _drawing(source: Path, range: float | None, speed: float | None, detection: 
             show.warn(["no path explains this cell: noise"])
         return drawing_of(result.scene, result, cell)
     if wanted:
-        raise typer.BadParameter(f"{source} is a scene; a directory that `raychan run` wrote has cells to show")
+        raise typer.BadParameter(f"{source} is a scene; --range and --detection need a directory of `raychan run`")
     return drawing_of(Scene.load(source))

@@ -100,7 +100,7 @@ def drawn_as(made: Any, suffix: str, flat: bool = False) -> memoryview:
 
 
 def outlined(width: float = 2.0, colour: str = "black") -> list[Any]:
-    """Return path effects that put an outline round text or lines, so that they read on any ground."""
+    """Return path effects that put an outline round text or lines, so that they are legible on any background."""
     from matplotlib import patheffects
 
     return [patheffects.withStroke(linewidth=width, foreground=colour)]
@@ -146,7 +146,7 @@ class Placer:
         size = note.get_window_extent(renderer)
         point = self.axes.transData.transform((x, y))
         places = _places(0.5 * size.width / per_point, 0.5 * size.height / per_point, above)
-        for own in (8.0 * per_point, np.inf):  # if no line is free, it may cross what is drawn
+        for own in (8.0 * per_point, np.inf):  # second try: the label's line may cross what is drawn
             for place in places:
                 note.set_position(place)
                 note.update_positions(renderer)

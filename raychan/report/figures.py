@@ -17,9 +17,9 @@ from raychan.units import dbm, watt
 
 Floats = NDArray[np.float64]
 
-_DYNAMIC_DB = 90.0  # most that is drawn below the peak
-_LABELS = 12  # detections named at most
-_PEAKS = 10  # peaks of the profile named at most
+_DYNAMIC_DB = 90.0  # largest span drawn below the peak
+_LABELS = 12  # most detections that are named
+_PEAKS = 10  # most peaks of the profile that are named
 
 
 def rdmap_picture(result: Result, path: str | Path | None = None, axes: Any = None) -> Path | None:
@@ -57,7 +57,7 @@ def rdmap_picture(result: Result, path: str | Path | None = None, axes: Any = No
 
 
 def levels(m: RangeDoppler, power: Floats) -> tuple[float, float]:
-    """Return the span of power worth drawing of a map [dBm]."""
+    """Return the span [dBm] of a map's colour scale: from the noise, or 90 dB below the peak, to the peak."""
     floor = dbm(m.noise) - 3.0 if m.noise > 0.0 else -np.inf
     top = np.ceil(power.max() / 5.0) * 5.0
     low = np.floor(max(floor, top - _DYNAMIC_DB) / 5.0) * 5.0
@@ -126,7 +126,7 @@ def _mark_detections(result: Result, axes: Any) -> None:
     if d.folded.any():
         axes.plot(
             d.range[d.folded], d.rate[d.folded], "s", ms=13, mfc="none", mec="white", mew=1.2, ls="none",
-            label=f"folded, truly elsewhere ({int(d.folded.sum())})", path_effects=outlined(2.4),
+            label=f"folded, true place elsewhere ({int(d.folded.sum())})", path_effects=outlined(2.4),
         )  # fmt: skip
 
 
@@ -145,7 +145,7 @@ def _name_detections(result: Result, axes: Any) -> None:
         if near or len(named) >= _LABELS:
             continue
         named.append((name, float(d.range[i]), float(d.rate[i])))
-        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB{_truly(why)}"
+        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB{_true_place(why)}"
         look: dict[str, Any] = {
             "color": MARKS[why.label][1],
             "fontsize": 7,
@@ -174,10 +174,10 @@ def _name_peaks(result: Result, axes: Any, power: Floats, far: float) -> None:
             continue
         named.add(name)
         axes.plot(at, height, "o", ms=3.5, color="#225588")
-        placer.label(at, height, f"{name}\n{at:.2f} m{_truly(why)}", fontsize=7, color="#222222", above=True)
+        placer.label(at, height, f"{name}\n{at:.2f} m{_true_place(why)}", fontsize=7, color="#222222", above=True)
 
 
-def _truly(why: Explanation) -> str:
+def _true_place(why: Explanation) -> str:
     """Return the true place of a folded echo, as a further line of its label."""
     if not why.folded:
         return ""

@@ -11,7 +11,7 @@ from raychan.report.canvas import PALETTE, drawn_as, figure, style
 
 Floats = NDArray[np.float64]
 
-_ROUNDING_DB = 20.0 * np.log10(np.finfo(float).eps)  # below the peak: a pattern is only rounding error there
+_ROUNDING_DB = 20.0 * np.log10(np.finfo(float).eps)  # relative to the peak: lower values are rounding errors
 MOST_CUTS = 8
 """Most cuts that are drawn as lines; more are drawn as a map."""
 
@@ -28,7 +28,7 @@ def rcs_picture(
     """Draw RCS against angle and return the file's bytes; many elevations and azimuths at once become a map.
 
     Args: azimuth (a,) and elevation (e,) [deg], dbsm and error_db (e, a) [dBsm, dB]; title a line; suffix of the file;
-    polar: angle round a circle, which at most MOST_CUTS cuts can be. One angle is written as a figure.
+    polar: in polar coordinates, at most MOST_CUTS cuts. A single angle is written as a number.
     """
     dbsm = np.where(dbsm > dbsm.max() + _ROUNDING_DB, dbsm, -np.inf)
     with style():
@@ -47,9 +47,9 @@ def _figure(made: Any, azimuth: float, elevation: float, dbsm: float, error: flo
     axes = made.add_subplot()
     axes.set_axis_off()
     axes.set_title(title)
-    sure = "error unknown" if np.isnan(error) else f"± {error:.2g} dB"
+    error_text = "error unknown" if np.isnan(error) else f"± {error:.2g} dB"
     large = f"{dbsm:.2f} dBsm" if np.isfinite(dbsm) else "no return"
-    small = f"{sure}\n{10.0 ** (0.1 * dbsm):.4g} m²\nazimuth {azimuth:g} deg, elevation {elevation:g} deg"
+    small = f"{error_text}\n{10.0 ** (0.1 * dbsm):.4g} m²\nazimuth {azimuth:g} deg, elevation {elevation:g} deg"
     axes.text(0.5, 0.62, large, ha="center", va="center", fontsize=34, transform=axes.transAxes)
     axes.text(0.5, 0.28, small, ha="center", va="center", fontsize=12, linespacing=1.6, transform=axes.transAxes)
 
@@ -116,7 +116,7 @@ def _line(axes: Any, angle: Floats, dbsm: Floats, error: Floats, colour: str, la
 
 
 def _map(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Floats, title: str) -> None:
-    """Draw RCS over both angles, and contours where the stated error passes 1 dB; what returns nothing stays white."""
+    """Draw RCS over both angles, with contours of a stated error of 1 dB; angles without a return stay white."""
     axes = made.add_subplot()
     axes.set_title(title)
     shown = np.where(np.isfinite(dbsm), dbsm, np.nan)

@@ -1,4 +1,4 @@
-"""What `.plot()` of a result, a map or a profile draws, for a notebook or a window."""
+"""The pictures of `.plot()` of a result, a map or a profile, for a notebook or a window."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def draw(thing: Any, axes: Any = None) -> Any:
 
 
 def _two() -> tuple[Any, Any]:
-    """Return axes for map and profile that stay where they are: labels are placed for good when the map is drawn."""
+    """Return axes of fixed position for map and profile: labels are placed when the map is drawn and must not move."""
     made = show_figure(8.2, 8.2, layout=None)
     made.subplots_adjust(left=0.1, right=0.97, bottom=0.07, top=0.96, hspace=0.28)
     return tuple(made.subplots(2, 1, height_ratios=(4.6, 3.6)))

@@ -12,7 +12,7 @@ from raychan.report.canvas import PALETTE, figure, save, style
 from raychan.study.stability import Tried
 
 _GOOD, _BAD = "#228833", "#cc3311"
-_MOST = 1e4  # tolerances beyond which a failure is drawn at the edge
+_MOST = 1e4  # error over tolerance beyond which a failure is drawn at the edge
 
 _OVERVIEW = "overview.png"
 _FILES = {
@@ -29,7 +29,7 @@ FIGURES = (_OVERVIEW, *_FILES.values())
 
 
 def pictures(done: Sequence[Tried], folder: Path) -> list[Path]:
-    """Draw what the regimes tried give to draw, and return the files."""
+    """Draw the figures of the regimes that were run, and return the files."""
     curves = {t.regime.key: t.outcome.curves for t in done if t.outcome.curves}
     draw: dict[str, Callable[[dict[str, Any], Path], Path]] = {
         "grazing": _grazing,
@@ -47,7 +47,7 @@ def pictures(done: Sequence[Tried], folder: Path) -> list[Path]:
 
 
 def _overview(done: Sequence[Tried], path: Path) -> Path:
-    """Draw every check as a mark: how far off it is, in its own tolerances."""
+    """Draw every check as a mark at its error over its tolerance."""
     with style():
         made = figure(8.2, 0.6 + 0.27 * len(done))
         axes = made.add_subplot()
@@ -162,7 +162,7 @@ def _layers(c: dict[str, Any], path: Path) -> Path:
         low = film[:, i] < 1.0
         axes.plot(c["thickness"][low], film[low, i], "-", lw=0.9, color=PALETTE[i], label=f"|{name}| film, first order")
     axes.set(xscale="log", yscale="log", ylim=(1e-14, 3.0), xlabel="thickness [m]", ylabel="reflection")
-    axes.set_title("A glass layer from nothing to a kilometre")
+    axes.set_title("A glass layer from 1e-15 m to 1 km")
     axes.legend(ncols=2)
     axes.grid(alpha=0.25, lw=0.5)
     return save(made, path, flat=True)
@@ -171,7 +171,7 @@ def _layers(c: dict[str, Any], path: Path) -> Path:
 def _paths(c: dict[str, Any], path: Path) -> Path:
     made = figure(7.2, 3.2)
     some = c["count"] > 0
-    for i, (key, label) in enumerate((("seconds", "time [s]"), ("gigabytes", "memory held at most [GB]"))):
+    for i, (key, label) in enumerate((("seconds", "time [s]"), ("gigabytes", "largest memory [GB]"))):
         axes = made.add_subplot(1, 2, i + 1)
         axes.plot(c["count"][some], c[key][some], "o-", ms=4, lw=0.9, color=PALETTE[i])
         axes.set(xscale="log", yscale="log", xlabel="paths", ylabel=label)
@@ -211,7 +211,7 @@ def _array(c: dict[str, Any], path: Path) -> Path:
     made = figure(5.6, 3.2)
     axes = made.add_subplot()
     axes.plot(c["distance"], c["phase"], "o-", ms=4, lw=0.9, color=PALETTE[0])
-    axes.axhline(np.pi / 8, color=_BAD, lw=0.8, ls="--", label="pi/8, the custom")
+    axes.axhline(np.pi / 8, color=_BAD, lw=0.8, ls="--", label="pi/8, the usual far-field limit")
     axes.set(
         xscale="log",
         yscale="log",

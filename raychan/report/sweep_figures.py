@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 _LOOK = {DIRECT: ("o", PALETTE[0]), MULTIPATH: ("^", PALETTE[2]), DIFFRACTED: ("s", PALETTE[5])}
 _CLUTTER = ("X", PALETTE[7])
-_DEEPEST_DB = 40.0  # below the threshold levels are no longer drawn
+_DEEPEST_DB = 40.0  # levels this far below the threshold are not drawn
 _GREY = "#d9d9d9"
 
 
@@ -47,14 +47,14 @@ def _lines(done: Sweep, path: Path) -> Path:
 
 def _levels(axes: Any, done: Sweep, x: Floats, order: NDArray[np.int64]) -> None:
     """Draw the detections with their stated errors over the levels of the three ways."""
-    least = done.steps[0].noise_db
+    least = done.steps[0].min_snr_db
     lowest = least
     for way in WAYS:
         level = np.full(len(x), np.nan)
         for i, step in enumerate(done.steps):
             found = step.found.levels[way]
             if found is not None and found.margin_db is not None:
-                level[i] = found.margin_db + step.noise_db
+                level[i] = found.margin_db + step.min_snr_db
         shown = np.where(level > least - _DEEPEST_DB, level, np.nan)
         if np.isfinite(shown).any():
             lowest = min(lowest, float(np.nanmin(shown)))
@@ -93,7 +93,7 @@ def _levels(axes: Any, done: Sweep, x: Floats, order: NDArray[np.int64]) -> None
 
 
 def _hidden(axes: Any, done: Sweep, x: Floats, order: NDArray[np.int64]) -> None:
-    """Draw who blocks how much of the outline, stacked, and what is seen through layers."""
+    """Draw which bodies block which share of the outline, stacked, and the share seen through layers."""
     shares: dict[str, Floats] = {}
     for i, step in enumerate(done.steps):
         for name, part in step.found.occlusion.by:

@@ -33,15 +33,14 @@ def case_picture(rows: Sequence[Row], path: Path) -> Path:
             axes.set_xlabel("rays, all views" if key == "rays" else "seconds, all views")
         left.set_ylabel("rms error [dB]")
         made.suptitle(f"{rows[0].title}\n", fontsize=11, fontweight="bold")
-        left.set_title(f"truth: {rows[0].truth}", fontsize=7, loc="left", fontweight="normal", color="#555555")
+        left.set_title(f"reference: {rows[0].truth}", fontsize=7, loc="left", fontweight="normal", color="#555555")
         handles, names = left.get_legend_handles_labels()
         made.legend(handles, names, loc="outside lower center", ncols=4)
         return save(made, path, flat=True)
 
 
 def summary_picture(rows: Sequence[Row], path: Path, earlier: Sequence[Row] = ()) -> Path:
-    """Draw all cases, error against seconds, with the front of settings that none beats, and that of an `earlier`
-    run."""
+    """Draw all cases, error against seconds, with their Pareto fronts and those of an `earlier` run."""
     cases = list(dict.fromkeys(r.case for r in rows))
     across = min(3 if len(cases) <= 6 else 4, len(cases))
     down = -(-len(cases) // across)
@@ -90,14 +89,14 @@ def _shown(error: float) -> float:
 
 
 def _lines(axes: Any, rows: Sequence[Row], key: str) -> None:
-    """Draw every method as a marked line over its settings; the default as a star; what no truth can tell, shaded."""
+    """Draw every method as a marked line over its settings; the default as a star; the reference's error, shaded."""
     for method in METHODS:
         mine = sorted((r for r in rows if r.method == method), key=lambda r: float(getattr(r, key)))
         x = [max(float(getattr(r, key)), 1e-5) for r in mine]
         mark, colour = _LOOK[method]
         axes.plot(x, [_shown(r.error_db) for r in mine], marker=mark, color=colour, ms=5, lw=1.2, label=method)
     _defaults(axes, rows, key, mfc="#ffd54a", mew=0.8, label="default setting")
-    axes.axhspan(_LOW / 2, rows[0].truth_db, color="#eeeeee", lw=0, zorder=0, label="closer than the truth is known")
+    axes.axhspan(_LOW / 2, rows[0].truth_db, color="#eeeeee", lw=0, zorder=0, label="below the error of the reference")
     axes.set(xscale="log", yscale="log", ylim=(_LOW * 0.8, _HIGH * 1.3))
     axes.set_xlim(*_span([max(float(getattr(r, key)), 1e-5) for r in rows]))
     axes.set_yticks(_TICKS, [f"{t:g}" for t in _TICKS])

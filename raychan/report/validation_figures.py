@@ -1,4 +1,4 @@
-"""Figures of the validation report: ranges and speeds, levels, the ghost, pedestrians' link budget, gain by azimuth."""
+"""Figures of the validation report: ranges and speeds, levels, ghost, link budget of pedestrians, array gain."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from raychan.report.canvas import PALETTE, Placer, figure, outlined, save, style
 from raychan.study.validation.data import POINT
 from raychan.study.validation.formulas import both_ways
 from raychan.study.validation.judge import DIFFERS, UNTESTABLE, Check
-from raychan.study.validation.sections import Budget, Turn
+from raychan.study.validation.sections import ArrayGain, Budget
 from raychan.study.validation.validate import Validation
 from raychan.units import db
 
@@ -19,19 +19,19 @@ _FACES = {"agrees": PALETTE[0], DIFFERS: PALETTE[7], UNTESTABLE: "#aaaaaa"}
 _GHOST_RUNS = ("occluded", "no_car", "no_truck", "two_interactions")
 
 
-def pictures(done: Validation, budgets: list[Budget], turns: list[Turn], folder: Path) -> dict[str, Path]:
+def pictures(done: Validation, budgets: list[Budget], gains: list[ArrayGain], folder: Path) -> dict[str, Path]:
     """Draw the report's figures into a folder; return them by name."""
     return {
         "offs": _offs(done, folder / "report-offs.png"),
         "levels": _levels(done, folder / "report-levels.png"),
         "ghost": _ghost(done, folder / "report-ghost.png"),
         "pedestrians": _pedestrians(done, budgets, folder / "report-pedestrians.png"),
-        "array": _array(done, turns, folder / "report-array.png"),
+        "array": _array(done, gains, folder / "report-array.png"),
     }
 
 
 def _offs(done: Validation, path: Path) -> Path:
-    """Draw ours less theirs of all detected ranges and speeds, in tolerances."""
+    """Draw simulated less printed ranges and speeds, in tolerances."""
     with style():
         made = figure(7.6, 3.4)
         for axes, (measure, title) in zip(
@@ -46,7 +46,7 @@ def _offs(done: Validation, path: Path) -> Path:
             axes.axvspan(-1.0, 1.0, color="#4477aa", alpha=0.1, lw=0)
             axes.axvline(0.0, color="#666666", lw=0.7)
             axes.set_yticks(np.arange(len(tables)), tables)
-            axes.set(xlabel="ours less theirs, in tolerances", title=title, xlim=(-2.2, 2.2))
+            axes.set(xlabel="simulated less printed, in tolerances", title=title, xlim=(-2.2, 2.2))
             axes.grid(axis="x", alpha=0.25, lw=0.5)
         axes.invert_yaxis()
         return save(made, path, flat=True)
@@ -68,7 +68,7 @@ def _is(check: Check, measure: str) -> bool:
 
 
 def _levels(done: Validation, path: Path) -> Path:
-    """Draw our SNR over the printed one: pedestrians of given RCS, and bodies whose shape the study does not print."""
+    """Draw simulated SNR over the printed one: pedestrians of given RCS, and bodies whose shape is not printed."""
     kinds = {
         "pedestrians and ghost: RCS printed": (True, "o", PALETTE[0]),
         "bodies: shape not printed": (False, "s", PALETTE[2]),
@@ -79,14 +79,14 @@ def _levels(done: Validation, path: Path) -> Path:
         low, high = 0.0, 60.0
         axes.plot([low, high], [low, high], color="#666666", lw=0.8)
         for name, (given, mark, colour) in kinds.items():
-            pairs = [(c.figure.theirs, *_ours(done, c)) for c in done.checks if _level_of(done, c) == given]
+            pairs = [(c.figure.printed, *_simulated(done, c)) for c in done.checks if _level_of(done, c) == given]
             for seen in (True, False):
                 xy = np.array([(t, o) for t, o, s in pairs if s is seen and o is not None]).reshape(-1, 2)
                 label = name if seen else None
                 axes.plot(*xy.T, mark, color=colour, ms=4.5, mfc=colour if seen else "none", ls="none", label=label)
         _threshold(axes, done, "street")
         axes.set(
-            xlabel="SNR printed, patch [dB]", ylabel="SNR ours [dB]   (hollow: not detected, without noise)",
+            xlabel="printed SNR, patch [dB]", ylabel="simulated SNR [dB]   (hollow: not detected, no noise)",
             xlim=(low, high), ylim=(low, high), title="Levels, tables 10, 13 and 14",
         )  # fmt: skip
         axes.legend(loc="upper left")
@@ -106,7 +106,7 @@ def _threshold(axes: Any, done: Validation, run: str, label: bool = True) -> Non
 
 
 def _level_of(done: Validation, check: Check) -> bool | None:
-    """Say whether a check is a patch SNR of a target of given RCS (True), of a body (False), or something else."""
+    """Return whether a check is a patch SNR of a target of given RCS (True) or of a body (False); None for others."""
     item, _, rest = check.key.partition("/")
     target = rest.split("/")[0]
     if item not in ("T10", "T13", "T14") or check.figure.measure[0] != "snr" or check.key.endswith("snr_1"):
@@ -114,15 +114,15 @@ def _level_of(done: Validation, check: Check) -> bool | None:
     return done.study.targets[target].reference == POINT
 
 
-def _ours(done: Validation, check: Check) -> tuple[float | None, bool]:
-    if check.ours is not None:
-        return float(check.ours), True
+def _simulated(done: Validation, check: Check) -> tuple[float | None, bool]:
+    if check.simulated is not None:
+        return float(check.simulated), True
     _, run, target = check.figure.measure
     return done.bench.level(run, target), False
 
 
 def _ghost(done: Validation, path: Path) -> Path:
-    """Draw the strongest cell at each range of the map, as the scene stands and without what makes the ghost."""
+    """Draw the map's strongest cell at each range, for the printed scene and without parts that make the ghost."""
     marks = [(done.bench.expected_range(t), name) for t, name in _MARKS.items()]
     near, far = min(at for at, _ in marks) - 2.5, max(at for at, _ in marks) + 3.5
     with style():
@@ -172,7 +172,7 @@ def _pedestrians(done: Validation, budgets: list[Budget], path: Path) -> Path:
         axes.plot(r, [b.link["snr_db"] for b in budgets], "_", color="black", ms=10, mew=1.5, label="link budget")
         for seen, face in ((True, PALETTE[0]), (False, "none")):
             rows = [b for b in budgets if b.whole is not None and b.detected is seen]
-            label = "ours" if seen else "ours, not detected (without noise)"
+            label = "simulated" if seen else "simulated, not detected (without noise)"
             axes.plot(
                 [b.link["range"] for b in rows], [b.whole for b in rows], "o", mec=PALETTE[0], mfc=face, ms=5,
                 ls="none", label=label,
@@ -191,39 +191,39 @@ def _pedestrians(done: Validation, budgets: list[Budget], path: Path) -> Path:
         return save(made, path, flat=True)
 
 
-def _array(done: Validation, turns: list[Turn], path: Path) -> Path:
-    """Draw the gain of array over patch against azimuth: the patterns, our simulation, the printed changes."""
+def _array(done: Validation, gains: list[ArrayGain], path: Path) -> Path:
+    """Draw the gain of array over patch against azimuth: by the patterns, simulated, printed."""
     angle = np.arange(0.0, 72.0, 0.02)
     with style():
         made = figure(7.6, 4.4)
         axes = made.add_subplot()
         axes.plot(angle, both_ways(done.bench, angle), color="#999999", lw=0.8, label="patterns of table 7, both ways")
-        at = np.array([abs(t.azimuth) for t in turns])
-        for t, x in zip(turns, at, strict=True):
-            if t.ours is not None:
-                axes.plot([x, x], [t.printed, t.ours], color="#cccccc", lw=0.8, zorder=1)
+        at = np.array([abs(t.azimuth) for t in gains])
+        for t, x in zip(gains, at, strict=True):
+            if t.simulated is not None:
+                axes.plot([x, x], [t.printed, t.simulated], color="#cccccc", lw=0.8, zorder=1)
         for seen, face in ((True, PALETTE[0]), (False, "none")):
-            rows = [t for t in turns if t.detected is seen and t.ours is not None]
-            label = "ours" if seen else "ours, not detected with both (levels without noise)"
+            rows = [t for t in gains if t.detected is seen and t.simulated is not None]
+            label = "simulated" if seen else "simulated, not detected with both (levels without noise)"
             axes.plot(
-                [abs(t.azimuth) for t in rows], [t.ours for t in rows], "o", mec=PALETTE[0], mfc=face, ms=5, ls="none",
-                label=label,
+                [abs(t.azimuth) for t in rows], [t.simulated for t in rows], "o", mec=PALETTE[0], mfc=face, ms=5,
+                ls="none", label=label,
             )  # fmt: skip
-        axes.plot(at, [t.printed for t in turns], "D", color=PALETTE[2], ms=4.5, ls="none", label="printed, table 16")
+        axes.plot(at, [t.printed for t in gains], "D", color=PALETTE[2], ms=4.5, ls="none", label="printed, table 16")
         axes.set_xscale("function", functions=(lambda x: np.sqrt(np.maximum(x, 0.0)), np.square))
         axes.set_xticks([0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 40, 50, 60, 70])
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
         axes.minorticks_off()
         axes.set(xlabel="azimuth off boresight, inferred [deg]", ylabel="array less patch [dB]", ylim=(-45.0, 48.0))
         axes.set_xlim(0.0, 72.0)
-        axes.set_title("What the array gains over the patch")
+        axes.set_title("Gain of the array over the patch")
         axes.legend(loc="upper center", frameon=True, edgecolor="none", framealpha=0.9)
         axes.grid(alpha=0.25, lw=0.5)
         placer = Placer(axes)
         placer.prepare()
-        placer.avoid(at, np.array([t.printed for t in turns]), 6.0)
-        placer.avoid(at, np.array([t.printed if t.ours is None else t.ours for t in turns]), 6.0)
-        for t, x in zip(turns, at, strict=True):
+        placer.avoid(at, np.array([t.printed for t in gains]), 6.0)
+        placer.avoid(at, np.array([t.printed if t.simulated is None else t.simulated for t in gains]), 6.0)
+        for t, x in zip(gains, at, strict=True):
             placer.label(
                 x, t.printed, t.title.replace("pedestrian", "ped."), fontsize=7.5, color="#333333",
                 path_effects=outlined(2.0, "white"),

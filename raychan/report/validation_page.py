@@ -25,11 +25,11 @@ _PAGE = """<!doctype html>
 _CLASSES = (("agrees", "agrees"), ("differs", "differs"), ("cannot be tested", "untestable"))
 
 
-_SHOWN = 0.6  # CSS pixels for a dot of a figure: the text of figures is then as large as that of the page
+_SHOWN = 0.6  # CSS pixels for a dot of a figure: text in figures is then as large as on the page
 
 
 def page(markdown: str, folder: Path, title: str) -> str:
-    """Return the page of Markdown whose images stand in `folder`, where the page is to stand too."""
+    """Return the page of Markdown; its images are in `folder`, where the page is to be written too."""
     from markdown_it import MarkdownIt
 
     body = MarkdownIt("commonmark", {"html": False}).enable("table").render(markdown)

@@ -1,4 +1,4 @@
-"""The validation report as Markdown: theirs beside ours, table by table, claim by claim; what differs and why."""
+"""The validation report as Markdown: printed and simulated figures by table and claim, with the known differences."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from raychan.radar.pattern import characteristics
 from raychan.report.validation_page import anchor
 from raychan.study.validation.formulas import ARRAY, both_ways
 from raychan.study.validation.judge import AGREES, DIFFERS, UNTESTABLE, Check, of_item, shown, verdict
-from raychan.study.validation.sections import Ablation, Budget, Ghost, Turn
+from raychan.study.validation.sections import Ablation, ArrayGain, Budget, Ghost
 from raychan.study.validation.validate import Validation
 
 _LINK = (("range", 2), ("azimuth_deg", 1), ("rcs_dbsm", 2), ("gain_dbi", 2), ("snr_db", 1))
-_HEADS = ("theirs", "ours", "difference", "tolerance", "verdict")
+_HEADS = ("printed", "simulated", "difference", "tolerance", "verdict")
 
 
 def markdown(
     done: Validation,
-    sections: tuple[list[Ablation], list[Ghost], list[Budget], list[Turn]] | None,
+    sections: tuple[list[Ablation], list[Ghost], list[Budget], list[ArrayGain]] | None,
     figures: dict[str, str],
 ) -> str:
     """Return the report.
@@ -31,9 +31,9 @@ def markdown(
     """
     lines = [*_overview(done)]
     if sections:
-        made, ghosts, budgets, turns = sections
+        made, ghosts, budgets, gains = sections
         lines += [*_ablations(made, figures), *_ghosts(done, ghosts), *_budgets(budgets, figures)]
-        lines += _turns(done, turns, figures)
+        lines += _array_gains(done, gains, figures)
     lines += [*_tables(done, figures), *_claims(done), *_known(done)]
     if done.bench.results:
         lines += _runs(done)
@@ -63,18 +63,18 @@ def _head(done: Validation) -> list[str]:
     tolerance = "each scene's own" if coarse is None else f"{coarse:g} dB"
     lines = [
         "# Validation", "",
-        "A ray-tracing study of 77 GHz FMCW radar in urban traffic, held against raychan: what its tables print, what "
-        "it claims, and what we get. Written by `raychan validate`; the scenes stand in `scenes/`, the printed figures "
-        "in `validation/`. The study's ranges and speeds are inputs of the scenes, so that their agreement tests the "
-        "chain from the wave to the detection; lateral places and shapes are inferred. One noise figure serves all "
-        "scenes; nothing is fitted per target.", "",
+        "The tables and claims of a ray-tracing study of 77 GHz FMCW radar in urban traffic, compared with simulations "
+        "by raychan. Written by `raychan validate`; the scenes are in `scenes/`, the printed figures in `validation/`. "
+        "The study's ranges and speeds are inputs of the scenes: their agreement tests the chain from the wave to the "
+        "detection. Lateral positions and shapes of bodies are inferred. All scenes have one noise figure; nothing is "
+        "fitted per target.", "",
         f"**{len(done.checks)} figures: {counts[AGREES]} agree, {counts[DIFFERS]} differ, {counts[UNTESTABLE]} cannot "
-        f"be tested as printed.** Every difference is known by name and has a reason: "
+        f"be tested as printed.** Every difference is listed by name with its reason: "
         f"{'yes' if not done.problems else 'no, see below'}.", "",
         f"raychan {__version__}, launch tolerance {tolerance}, {done.seconds:.0f} s.", "",
     ]  # fmt: skip
     if done.problems:
-        lines += ["## What is wrong", "", *(f"- {p}" for p in done.problems), ""]
+        lines += ["## Problems", "", *(f"- {p}" for p in done.problems), ""]
     return lines
 
 
@@ -94,24 +94,24 @@ def _link(item: str) -> str:
 
 def _cells(check: Check) -> tuple[str, ...]:
     f = check.figure
-    ours = shown(check.ours)
-    if check.ours is None and f.measure[0] == "antenna":
-        ours = "none"
+    simulated = shown(check.simulated)
+    if check.simulated is None and f.measure[0] == "antenna":
+        simulated = "none"
     if check.note and check.verdict != UNTESTABLE:
-        ours += f" ({check.note})"
+        simulated += f" ({check.note})"
     off = "" if check.difference is None else _difference(check.difference)
     said = check.verdict + (f" ({check.known})" if check.known else "")
-    return f"{_theirs(f.theirs)} {f.unit}".strip(), ours, off, _tolerance(check), said
+    return f"{_printed(f.printed)} {f.unit}".strip(), simulated, off, _tolerance(check), said
 
 
 def _difference(off: float) -> str:
-    """Return two digits that count, but no more than four decimals: '+0.012', '-12', '+759,164'."""
+    """Return two significant digits, but no more than four decimals: '+0.012', '-12', '+759,164'."""
     if abs(off) < 0.5e-4:
         return "0"
     return f"{off:+,.{min(4, max(0, 1 - math.floor(math.log10(abs(off)))))}f}"
 
 
-def _theirs(value: object) -> str:
+def _printed(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else shown(value)  # type: ignore[arg-type]
 
 
@@ -127,7 +127,7 @@ def _tolerance(check: Check) -> str:
 
 
 def _why(done: Validation, checks: Iterable[Check]) -> list[str]:
-    """Return a sentence for each known difference among checks, and for each reason not to test."""
+    """Return a line for each known difference of the checks, and for each reason why some cannot be tested."""
     checks = list(checks)
     known = {k.id: k.reason for k in done.study.known}
     lines = [f"- differs, {name}: {known[name]}" for name in dict.fromkeys(c.known for c in checks) if name]
@@ -142,8 +142,8 @@ def _tables(done: Validation, figures: dict[str, str]) -> list[str]:
     if items and "offs" in figures:
         lines += [
             f"![Ranges and speeds]({figures['offs']})", "",
-            "All detected ranges and speeds of the tables, ours less theirs, in tolerances (shaded: agrees; at the "
-            "right edge: a cross, not detected; a dot, beyond the axis).", "",
+            "All ranges and speeds of the tables: simulated less printed, in tolerances. Shaded: agrees. At the right "
+            "edge, a cross: not detected; a dot: beyond the axis.", "",
             f"![Levels]({figures['levels']})", "",
         ]  # fmt: skip
     for item in items:
@@ -182,9 +182,9 @@ def _ablations(made: Sequence[Ablation], figures: dict[str, str]) -> list[str]:
     heads = ("scene", "ghost, both ways over the truck", "direct return", "ghost, one way over the truck", "detections")
     return [
         "## What makes the ghost", "",
-        "The occluded pedestrian, changed one thing at a time: where each echo is detected, its SNR and stated error;"
-        " where it is not (below the threshold, or merged with something stronger), the SNR of its paths alone, noise "
-        "left out.", "",
+        "The scene of the occluded pedestrian with one change at a time: range, SNR and stated error of each echo; "
+        "where it is not detected (below the threshold, or merged with a stronger echo), the SNR of its paths alone, "
+        "without noise.", "",
         f"![Ghost]({figures['ghost']})", "",
         *table(heads, rows),
     ]  # fmt: skip
@@ -197,7 +197,7 @@ def _ghosts(done: Validation, ghosts: Sequence[Ghost]) -> list[str]:
         for g in ghosts
     ]  # fmt: skip
     heads = ("run", "range m", "SNR dB", "leading path", "detected less path m", "range bin m", "explained")
-    intro = "Every detection over more than one target, in all runs, and the path whose length explains its range."
+    intro = "All multipath detections of all runs, and the path whose length explains the range of each."
     return ["## Every ghost and its path", "", intro, "", *table(heads, rows)]
 
 
@@ -213,44 +213,46 @@ def _budgets(budgets: Sequence[Budget], figures: dict[str, str]) -> list[str]:
         given = (f"{link[key]:.{n}f}" for key, n in _LINK)
         rows.append((b.title, *given, direct, whole, *printed, budget_off, off))
     heads = (
-        "", "range m", "azimuth deg", "RCS dBsm", "gain dBi", "link budget", "ours, direct path", "ours, all paths",
-        "printed, 1 GHz", "printed, 4 GHz", "budget less printed", "ours less printed",
+        "", "range m", "azimuth deg", "RCS dBsm", "gain dBi", "link budget", "simulated, direct path",
+        "simulated, all paths", "printed, 1 GHz", "printed, 4 GHz", "budget less printed", "simulated less printed",
     )  # fmt: skip
     return [
         "## Pedestrians against the link budget", "",
         "SNR in dB with the patch at 4 GHz. Link budget: P G² λ² σ / ((4π)³ R⁴) over the noise k T0 F f_s of a "
-        "sample, plus the gain of chirps and samples with Hann windows; the noise figure F is that of all scenes, and "
-        "there is no other free number. The direct path alone must give the same; ground and neighbours make the rest. "
-        "Azimuths are inferred. Printed levels do not fall with range.", "",
+        "sample, plus the gain of chirps and samples with Hann windows; the noise figure F is that of all scenes and "
+        "the only free number. The direct path alone must agree with it; ground and neighbouring bodies add the "
+        "difference to all paths. Azimuths are inferred. Printed levels do not fall with range.", "",
         f"![Pedestrians]({figures['pedestrians']})", "",
         *table(heads, rows),
     ]  # fmt: skip
 
 
-def _gained(turn: Turn) -> str:
-    if turn.ours is None:
+def _gained(gain: ArrayGain) -> str:
+    if gain.simulated is None:
         return "no path"
-    return f"{turn.ours:+.1f}" + ("" if turn.detected else " (level, not detected with both)")
+    return f"{gain.simulated:+.1f}" + ("" if gain.detected else " (level, not detected with both)")
 
 
-def _turns(done: Validation, turns: Sequence[Turn], figures: dict[str, str]) -> list[str]:
+def _array_gains(done: Validation, gains: Sequence[ArrayGain], figures: dict[str, str]) -> list[str]:
     edge = 0.5 * characteristics(done.bench.scene(ARRAY).radar.tx).hpbw_h_deg
     most, at_edge = both_ways(done.bench, np.array([0.0, edge]))
     rows = [
         (t.title, f"{t.azimuth:.1f}", f"{t.pattern:+.1f}", _gained(t), f"{t.printed:+g}",
          "" if t.needs is None else f"{t.needs:.2f}")
-        for t in turns
+        for t in gains
     ]  # fmt: skip
-    heads = ("", "azimuth deg, inferred", "patterns there", "ours", "printed", "azimuth for the printed change, deg")
+    heads = (
+        "", "azimuth deg, inferred", "by the patterns", "simulated", "printed", "azimuth for the printed change, deg",
+    )  # fmt: skip
     return [
         "## The array against the patch, by azimuth", "",
-        "Change of SNR in dB from patch to 16 x 16 array. At boresight it is "
-        f"{most:.1f} dB, twice the difference of the two gains, and noise is the same; "
-        f"half that beam's width off boresight, at {edge:.2f} deg, it is {at_edge:.1f} dB. "
-        "The study puts pedestrians 4 to 7 and car 3 in the main beam, yet its printed changes belong to the flank of "
-        "the beam or beyond (last column: the least azimuth at which the patterns give the printed change). Ours "
-        "follows the patterns at the inferred azimuths; where it does not, waves over the ground, which the array "
-        "dims, and other parts of a wide body play a part.", "",
+        "Change of SNR in dB from patch to 16 x 16 array, at equal noise. At boresight it is "
+        f"{most:.1f} dB, twice the difference of the two gains; "
+        f"half the array's beam width off boresight, at {edge:.2f} deg, it is {at_edge:.1f} dB. "
+        "The study puts pedestrians 4 to 7 and car 3 in the main beam, but its printed changes occur at the flank of "
+        "the beam or outside it (last column: the least azimuth at which the patterns give the printed change). The "
+        "simulated change follows the patterns at the inferred azimuths, except where waves over the ground, which the "
+        "array attenuates, or other parts of a wide body contribute.", "",
         f"![Array]({figures['array']})", "",
         *table(heads, rows),
     ]  # fmt: skip
@@ -265,5 +267,5 @@ def _runs(done: Validation) -> list[str]:
         worst = d.error_db[d.converged].max(initial=0.0)
         figures = f"{result.stats['rays']:,}", str(len(d.range)), f"{worst:.1f}", str(int((~d.converged).sum()))
         rows.append((given.title, f"{given.scene}.toml", how, *figures, f"{sum(result.timings.values()):.0f}"))
-    heads = ("run", "scene", "changed", "rays", "detections", "greatest stated error dB", "not converged", "s")
+    heads = ("run", "scene", "changed", "rays", "detections", "largest stated error dB", "not converged", "s")
     return ["## Runs", "", *table(heads, rows)]

@@ -1,4 +1,4 @@
-"""Folding: whether an echo appears in a map at its place, at an alias of it, or as a mirror image of real sampling."""
+"""Folding: whether an echo appears in a map at its true place, at an alias, or as a mirror image of real sampling."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from raychan.run.point_spread import PointSpread
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_NEAR = 4.0  # resolution cells: wider than the main lobe of any window; side lobes do not show what feeds a cell
-_EQUAL = 1.0 + 1e-6  # factor by which an unfolded place is preferred
+_NEAR = 4.0  # resolution cells: wider than the main lobe of any window; farther paths add by side lobes only
+_EQUAL = 1.0 + 1e-6  # factor on the power of unfolded places, so that they win over equal folded ones
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Where the paths behind a cell are: range [m] mid frame and range rate [m/s]; NaN where unknown."""
+    """True place of the paths behind a cell: range [m] at mid frame and range rate [m/s]; NaN where unknown."""
 
     range: float = math.nan
     rate: float = math.nan

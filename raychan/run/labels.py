@@ -1,4 +1,4 @@
-"""Where a cell of the map came from: the paths that feed it, by the bodies they met, and the cell's label."""
+"""Labels and provenance of map cells: the paths that contribute to a cell, by the chains of bodies they met."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explana
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
-_LEAST_SHARE = 0.005
-_DIGITS = 9
-_DEPTH = 0.3  # m: an echo over the ground no further behind its target than a road user is deep is no ghost
-_UNEXPLAINED = 0.1  # a cell whose paths give less than this share of its power is noise
+_LEAST_SHARE = 0.005  # of a cell's power: weaker chains are not listed (not measured)
+_DIGITS = 9  # decimals to which shares are compared: a chain and its reverse differ by rounding
+_DEPTH = 0.3  # m: an echo over the ground less than this behind its target, the depth of a person, is no ghost
+_UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
 
 @dataclass(frozen=True)
 class Chains:
-    """The paths of a run sorted by the chain of parts that they met, and these by the targets among them."""
+    """The paths of a run grouped by their chains of parts, and these chains by the targets in them."""
 
     part: Ints
     """Chain of parts of each path (n,)."""
     names: tuple[tuple[str, ...], ...]
     bodies: tuple[tuple[str, ...], ...]
-    """Bodies met, in order, but for thin layers passed."""
+    """Bodies met, in order, without thin layers passed."""
     targets: Ints
-    """Chain of targets, the ground and the radar's carrier left out, of each chain of parts; there and back are one."""
+    """Chain of targets of each chain of parts, without ground and radar carrier; a chain and its reverse are one."""
 
 
 def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
-    """Return the paths sorted by chain; bounces of one body on itself count as one link of a chain of targets."""
+    """Return the paths grouped by chain; successive bounces on one body are one link of a chain of targets."""
     names: list[tuple[str, ...]] = []
     bodies: list[tuple[str, ...]] = []
     targets: list[int] = []
@@ -56,7 +56,7 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
         left = [b for b in bodies[-1] if b not in background]
         link = tuple(b for i, b in enumerate(left) if i == 0 or b != left[i - 1])
-        # There and back again are one way: equal by reciprocity.
+        # A chain and its reverse have equal gains, by reciprocity.
         targets.append(known.setdefault(min(link, link[::-1]), len(known)))
     return Chains(index, tuple(names), tuple(bodies), np.array(targets, np.int64))
 
@@ -71,12 +71,12 @@ def explain_cell(
     power: float,
     error: float = 0.0,
 ) -> Explanation:
-    """Return which paths make a cell.
+    """Return the explanation of a cell by its paths.
 
-    Args: known the paths' chains; range [m]; rate [m/s], or None for a cell of the power-delay profile; power [W] that
-    the receiver sees there; error [W] by which two launches of tubes differ there.
-    Each path counts with its amplitude times the response of both windows at its distance from the cell; paths over
-    the same chain add as waves, chains as powers.
+    Args: known the paths' chains; range [m]; rate [m/s], or None for a cell of the power-delay profile; power [W] of
+    the cell; error [W], the difference of two launches of tubes there.
+    Each path contributes its amplitude times the response of both windows at its distance from the cell; paths of one
+    chain add coherently, the shares of chains are their powers.
     """
     wave, at = waves_in(paths, response, range, rate)
     sums = cell_sums(known.part, len(known.names), wave, at, paths.range_rate)
@@ -86,7 +86,7 @@ def explain_cell(
 
 @dataclass(frozen=True)
 class _Cell:
-    """A cell to explain: the power that it shows and that by which two launches differ there, both [W]."""
+    """A cell to explain: its power, and the difference of two launches there, both [W]."""
 
     shown: Shown
     power: float
@@ -96,7 +96,7 @@ class _Cell:
 def _explained(
     paths: Paths, known: Chains, response: PointSpread, sums: Any, cell: _Cell, receiver: Receiver
 ) -> Explanation:
-    """Return the explanation of a cell by the sums over chains that it has of `Sums`, reported at its place."""
+    """Return the explanation of a cell from the sums over chains of `cell_sums`, at its reported place."""
     summed, sizes, strongest = sums
     whole = complex(summed.sum())
     predicted = abs(whole) ** 2 * receiver.power
@@ -104,13 +104,13 @@ def _explained(
     place = range, rate, rate + receiver.ego_speed
     shares = np.abs(summed) ** 2
     if predicted < _UNEXPLAINED * cell.power or not shares.sum() > 0.0:
-        error_db = figure(cell.power, cell.error)  # of noise: what launches differ by against what is seen
+        error_db = figure(cell.power, cell.error)  # of noise: the launches' difference against the cell's power
         return Explanation(*place, cell.power, predicted, error_db, CLUTTER, ())
     shares /= shares.sum()
-    # The ground beside a target adds to its return, so what leads is the target over all its paths.
+    # The ground beside a target adds to its return: the leading target is that of the largest sum over all its chains.
     leading = np.argmax(np.abs(_sums(known.targets, summed, int(known.targets.max()) + 1)))
     paths_in, size, ranges, rates = sizes
-    # There and back again are equal but for rounding: in the order of their chains, then.
+    # A chain and its reverse differ by rounding only; among these the order of chains decides.
     order = np.argsort(-shares.round(_DIGITS), kind="stable")
     first = order[known.targets[order] == leading][0]
     order = np.append(first, order[order != first])
@@ -138,9 +138,9 @@ def _explained(
 def waves_in(
     paths: Paths, response: PointSpread, range: float, rate: float | None
 ) -> tuple[NDArray[np.complexfloating[Any, Any]], Floats]:
-    """Return what each path brings to a cell (n,), and the range at which it stands (n,) [m].
+    """Return the contribution of each path to a cell (n,), and its range (n,) [m].
 
-    A path brings its amplitude times the response of both windows at its distance from the cell.
+    A path contributes its amplitude times the response of both windows at its distance from the cell.
     Args: range [m] and rate [m/s] of the cell; None for a cell of the power-delay profile.
     """
     if rate is not None:
@@ -152,7 +152,7 @@ def waves_in(
 def provenance(
     paths: Paths, rdmap: RangeDoppler, detections: Detections, receiver: Receiver, error: Floats
 ) -> tuple[Explanation, ...]:
-    """Return one explanation for each detection, of the cell where its peak stands, at the place that it reports."""
+    """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate."""
     known, response = chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
@@ -173,7 +173,7 @@ def response_of(receiver: Receiver) -> PointSpread:
 
 
 def _alike(paths: Paths) -> tuple[Ints, Ints]:
-    """Return one way of each chain that a path took, and the chain of each path (n,); slot by slot, for speed."""
+    """Return a trajectory of each chain, and the chain of each path (n,); slot by slot, for speed."""
     trajectories = paths.trajectories
     code, most = np.zeros(len(trajectories.kind), np.int64), 1
     width = (len(paths.body_names) + 1) * (len(paths.part_names) + 1) * len(InteractionType)
@@ -215,7 +215,7 @@ def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver
         return DIRECT
     if len(targets) > 1:
         return MULTIPATH
-    # Over the ground and one target: an echo of the target, or a ghost behind it if the way round is long.
+    # Over the ground and one target: an echo of the target, or a ghost behind it if the detour is long.
     trajectory = paths.trajectory[row]
     index = [paths.body_names[b] in targets for b in paths.trajectories.body[trajectory]]
     straight = np.linalg.norm(

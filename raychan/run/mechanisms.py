@@ -1,9 +1,8 @@
-"""Choice of mechanisms for `model.mode = "auto"`: those that a tolerance needs, found by a coarse launch with all."""
+"""Choice of mechanisms for `model.mode = "auto"`: those that the tolerance needs, by a coarse launch with all."""
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,25 +12,11 @@ from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, TRANSMIT, Paths
+from raychan.run.ledger import NOTHING, ModelChoice
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 
-_LEVEL = 1e-4  # of the sum of all amplitudes: accuracy of the levels of whole mechanisms
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The mechanisms to model, and a line each on why."""
-
-    bounces: int
-    transmissions: int
-    diffraction: bool
-    why: tuple[str, ...]
-
-    def applied_to(self, model: Any) -> Any:
-        """Return the model settings with what was chosen."""
-        kept = {"max_bounces": self.bounces, "max_transmissions": self.transmissions, "diffraction": self.diffraction}
-        return model.model_copy(update=kept)
+_LEVEL = 1e-4  # of the sum of all amplitudes: error of the transform that gives a mechanism's level (not measured)
 
 
 def interactions(paths: Paths) -> NDArray[np.int64]:
@@ -54,7 +39,7 @@ def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> 
     return float(rdmap.power.max())
 
 
-def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db: float) -> Choice:
+def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db: float) -> ModelChoice:
     """Return the fewest bounces and layers that keep every detectable return within the tolerance.
 
     Args: paths of a launch with all mechanisms; noise [W] of a cell of the map (0: 80 dB under the strongest cell
@@ -66,7 +51,7 @@ def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db
     limit = float(weakest) * (10.0 ** (tolerance_db / 20.0) - 1.0) ** 2
     why, chosen = [], []
     if limit == 0.0:
-        return Choice(1, 0, False, ("nothing returns, and no noise is there to measure it by: nothing is needed",))
+        return _choice(1, 0, False, ["nothing returns and there is no noise: no mechanism is needed"], tolerance_db)
     for name, count, least in (
         ("interactions", interactions(paths), 1),
         ("thin layers passed", layers(paths), 0),
@@ -87,4 +72,9 @@ def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db
     why.append(
         f"diffraction: strongest cell {db(max(level / limit, 1e-30)):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
     )
-    return Choice(chosen[0], chosen[1], level > limit, tuple(why))
+    return _choice(chosen[0], chosen[1], level > limit, why, tolerance_db)
+
+
+def _choice(bounces: int, transmissions: int, diffraction: bool, why: list[str], tolerance_db: float) -> ModelChoice:
+    how = f"chosen by a coarse launch with all mechanisms for a tolerance of {tolerance_db:g} dB"
+    return ModelChoice(NOTHING, "estimate", how, bounces, transmissions, diffraction, tuple(why))

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from raychan.records import RangeDoppler
+from raychan.run.ledger import Entry
 from raychan.run.result import ExplainedDetections, Result
-from raychan.run.unmodelled import Entry
 from raychan.tracing.solver import Stats
 from raychan.world.geometry import Geometry
 
@@ -54,7 +54,7 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
     return said
 
 
-def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Any]) -> list[str]:
+def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Entry]) -> list[str]:
     """Return the lines that stand below the table of detections: on the tolerance, and on what was left out."""
     said = []
     stated = counts(found, tolerance_db)
@@ -70,7 +70,9 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
     return said
 
 
-def told(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: Mapping[str, Any]) -> list[str]:
+def told(
+    found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: Mapping[str, Entry]
+) -> list[str]:
     """Return all lines on detections."""
     return [*warned(found, tolerance_db, rdmap), *noted(found, tolerance_db, ledger)]
 
@@ -108,10 +110,10 @@ def marks(found: ExplainedDetections) -> str:
     return "".join(f", {n} {word}" for word, n in counted.items() if n)
 
 
-def _above(ledger: Mapping[str, Any]) -> Iterable[tuple[float, str, str]]:
+def _above(ledger: Mapping[str, Entry]) -> Iterable[tuple[float, str, str]]:
     """Give the level [dB] and name of each mechanism that the ledger puts above the weakest detection."""
     for name, entry in ledger.items():
-        if isinstance(entry, Entry) and isinstance(entry.level_db, float) and entry.level_db >= _LEAST_DB:
+        if isinstance(entry.level_db, float) and entry.level_db >= _LEAST_DB:
             yield entry.level_db, name, "at most " if entry.kind == "bound" else ""
 
 

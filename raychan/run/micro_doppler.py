@@ -1,8 +1,8 @@
 """Micro-Doppler: the samples of a frame in which bodies turn, from as few tracings as the tolerance allows.
 
 The scene is traced at some chirps, the keyframes. Between two of them the routes of both are extrapolated as their
-bodies turn (see channel.slow_time), and the samples are blended from one to the other. Another keyframe is put in the
-middle as long as the two differ by more than the tolerance; their difference is the stated error.
+bodies turn (see channel.slow_time), and the samples are blended from one to the other. Where the two differ by more
+than the tolerance, another keyframe is traced in the middle; their difference is the stated error.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join
-from raychan.channel.slow_time import Poses, carried, strengths
+from raychan.channel.slow_time import Poses, extrapolated, strengths
 from raychan.channel.transfer import departures
 from raychan.columns import take
 from raychan.radar.radar import Radar
@@ -34,12 +34,12 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Samples = NDArray[np.complexfloating[Any, Any]]
 
-# Single values not measured.
-_CHIRPS = 48  # chirps per keyframe at least: bounds the number of tracings
+# Trade time against error; single values not measured.
+_CHIRPS = 48  # least chirps per keyframe: bounds the number of tracings
 _AT_ONCE = 64  # chirps whose routes are held in memory at once
 _FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
-_HELPS = 0.5  # of the error power before: a keyframe in between that leaves more does not help
-_NEEDED = 1.0  # rad of phase that constant rates leave out over a frame, from which `auto` uses keyframes
+_HELPS = 0.5  # of the error power before: a keyframe that leaves more is the last one in its segment
+_NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
 
 
 def turning(scene: Scene) -> NDArray[np.bool_]:
@@ -54,8 +54,8 @@ def moving(scene: Scene) -> NDArray[np.bool_]:
 
 
 def bend(scene: Scene, edge: float) -> float:
-    """Return the phase [rad] over a frame that paths of constant rates leave out: by the turn of a body's outermost
-    point, and across a tube of a given edge [m]."""
+    """Return the phase error [rad] of constant rates over a frame: at the outermost point of a turning body, by its
+    centripetal acceleration, and across a tube of a given edge [m]."""
     wave, worst = scene.radar.waveform, 0.0
     k, half = 4.0 * np.pi / wave.wavelength, 0.5 * wave.frame_duration
     for body in (b for b, t in zip(scene.bodies, turning(scene), strict=True) if t):
@@ -86,8 +86,8 @@ def retraced(
     """Return the samples of a frame in which bodies turn.
 
     Args: rule by which each tracing is pruned, from where the radar is then; model the scene's, whose `retrace` is
-    "auto" or the number of tracings, when bodies that only move are carried on too; first the paths at the frame's
-    start, if they are known; progress is told the share done.
+    "auto" or the number of tracings (then bodies that only move are extrapolated too); first the paths at the
+    frame's start, if they are known; progress is called with the share done.
     """
     work = _Frame(scene, rule, model, progress)
     last = scene.radar.waveform.n_chirps - 1
@@ -131,7 +131,7 @@ class _Frame:
         start, end = segment.start, segment.end
         key = self.keyframe((start.chirp + end.chirp) // 2)
         left, right = reach(key.chirp - start.chirp), reach(end.chirp - key.chirp)
-        c = self.carried(key, key.chirp - left, key.chirp + right)
+        c = self.extrapolated(key, key.chirp - left, key.chirp + right)
         return (
             Segment(start, key, segment.a[:, :, : left + 1], c[:, :, : left + 1]),
             Segment(key, end, c[:, :, left:], segment.b[:, :, -right - 1 :]),
@@ -146,8 +146,8 @@ class _Frame:
     def segment(self, start: Keyframe, end: Keyframe) -> Segment:
         """Return the segment between two keyframes."""
         far = reach(end.chirp - start.chirp)
-        a = self.carried(start, start.chirp, start.chirp + far)
-        return Segment(start, end, a, self.carried(end, end.chirp - far, end.chirp))
+        a = self.extrapolated(start, start.chirp, start.chirp + far)
+        return Segment(start, end, a, self.extrapolated(end, end.chirp - far, end.chirp))
 
     def done(self, segments: list[Segment]) -> Retraced:
         """Return the frame of segments in order."""
@@ -188,7 +188,7 @@ class _Frame:
         """Return which sequences of interactions (n, d) meet a turning body."""
         return np.asarray((self.turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))
 
-    def carried(self, key: Keyframe, first: int, last: int) -> Samples:
+    def extrapolated(self, key: Keyframe, first: int, last: int) -> Samples:
         """Return the samples (2, antenna, chirp, sample) of a keyframe's paths extrapolated to chirps first to last: of
         those that meet turning bodies, and of all others."""
         wave = self.radar.waveform
@@ -208,7 +208,7 @@ class _Frame:
                 count = min(_AT_ONCE, last + 1 - start)
                 # One instant more than chirps: the rate is the change from chirp to chirp.
                 poses = self.poses(key, np.arange(start, start + count + 1))
-                lengths, amplitudes = carried(routes, strength, poses, wave.carrier)
+                lengths, amplitudes = extrapolated(routes, strength, poses, wave.carrier)
                 rows = slice(start - first, start - first + count)
                 for layer, near in zip(out[0], nearer.T, strict=True):
                     layer[rows] += self.ramps(lengths - near[:, None], amplitudes * self.turn(near)[:, None])

@@ -1,8 +1,8 @@
 """The records of a result as netCDF-4 by the CF conventions, and back.
 
 Each record is a group, each column a variable with its unit; range and range rate are coordinates. A complex column is
-two real ones, `_re` and `_im`, so that xarray, MATLAB's h5read and any HDF5 reader open it alike. What is told of each
-detection (label, bodies, error) stands beside its columns.
+two real ones, `_re` and `_im`, so that xarray, MATLAB's h5read and any HDF5 reader open it alike. Label, bodies and
+stated error of each detection are variables beside its columns.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ GROUPS: dict[str, Any] = {
 _AXES = {"a": "antenna", "c": "chirp", "s": "sample", "v": "range_rate", "r": "range", "p": "peak", "d": "vertex"}
 _ROWS = {"paths": "path", "detections": "detection"}
 _CALLED = {"rate": "range_rate", "true_rate": "true_range_rate"}
-"""Columns that have another name in a file than in their record."""
+"""Columns with another name in the file than in their record."""
 _FORMER = {"length": ("delay", C0), "length_rate": ("range_rate", 2.0)}
-"""What files of form 2 have instead, and the factor on it."""
+"""Columns that files of format 2 have instead, and the factor on them."""
 _UNITS = {"sqrt(W)": "V"}
-"""As UDUNITS writes them: waves at 1 ohm. It has no decibel, which is written dB."""
+"""Units as UDUNITS writes them, for waves at 1 ohm. UDUNITS has no decibel: it is written dB."""
 _TITLES = {
     "rate": "range rate, receding positive",
     "speed": "speed over ground",
@@ -54,9 +54,9 @@ _TITLES = {
 _STANDARD = {"rate": "radial_velocity_of_scatterers_away_from_instrument"}
 _KINDS = ("none", "reflect", "transmit", "scatter", "point_target", "diffract")
 _COMMENTS = {
-    "length": "the whole way; range is half of it, delay is length / c",
-    "length_rate": "of the whole way; range rate is half of it",
-    "vertices": "where the interactions are, tx and rx left out; unused slots repeat rx",
+    "length": "the whole path; range is half of it, delay is length / c",
+    "length_rate": "of the whole path; range rate is half of it",
+    "vertices": "places of the interactions, without tx and rx; unused slots repeat rx",
     "body": "row of the attribute body_names; -1 in unused slots",
     "part": "row of the attribute part_names; -1 in unused slots",
 }
@@ -80,14 +80,14 @@ def as_netcdf(result: Result, attrs: dict[str, Any]) -> memoryview:
     with h5py.File(made, "w") as held, h5netcdf.File(held, "w") as file:
         file.attrs.update({"Conventions": CONVENTIONS, "title": "raychan result"} | attrs)
         for name in GROUPS:
-            # Unused slots of chains make up most of the paths, and shrink to nothing; samples are noise and do not.
+            # Most slots of paths are unused and compress well; samples are noise and do not.
             packed = name == "paths" and len(result.paths.delay) > 0
             _write(file.create_group(name), name, result, {"compression": 1, "shuffle": True} if packed else {})
     return made.getbuffer()
 
 
 def read_record(file: Path, group: str, kind: Any) -> Any:
-    """Return the record of a group of a file. Raises: OSError, KeyError, ValueError for a file that is another's."""
+    """Return the record of a group of a file. Raises: OSError, KeyError, ValueError for a file of another origin."""
     import xarray as xr
 
     with xr.open_dataset(file, engine="h5netcdf", group=group, decode_cf=False) as data:
@@ -113,7 +113,7 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
 
 
 def columns(kind: Any) -> list[dataclasses.Field[Any]]:
-    """Return the columns of a record; in a file paths have all of them a row a path."""
+    """Return the columns of a record; in a file all columns of paths have a row for each path."""
     if kind is not Paths:
         return list(dataclasses.fields(kind))
     own = [f for f in dataclasses.fields(Paths) if f.name not in ("trajectory", "trajectories")]
@@ -121,7 +121,7 @@ def columns(kind: Any) -> list[dataclasses.Field[Any]]:
 
 
 def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> None:
-    """Write one record, its coordinates and what goes with it."""
+    """Write one record with its coordinates and attributes."""
     record = getattr(result, name)
     wave = result.receiver.waveform
     for f in columns(type(record)):
@@ -158,7 +158,7 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
 
 
 def _column(group: Any, name: str, f: dataclasses.Field[Any], value: Any, packed: dict[str, Any]) -> None:
-    """Write a column of a record: the two parts of a complex one, truths as 0 and 1."""
+    """Write a column of a record: a complex one as two, booleans as 0 and 1."""
     axes = [_ROWS[name] if a in "nw" else _AXES.get(a) or _fixed(f.name, a) for a in f.metadata["axes"]]
     title = _TITLES.get(f.name, f.name.replace("_", " "))
     if name == "error" and f.name == "power":
@@ -189,7 +189,7 @@ def _fixed(column: str, size: str) -> str:
 
 
 def _decibels(group: Any, record: Any) -> None:
-    """Write the power once more in dBm, for pictures; nothing at all is NaN."""
+    """Write the power also in dBm, for plots; zero power is NaN."""
     level = np.full(record.power.shape, np.nan, np.float32)
     some = record.power > 0.0
     level[some] = dbm(record.power[some])
@@ -198,7 +198,7 @@ def _decibels(group: Any, record: Any) -> None:
 
 
 def _told(group: Any, result: Result) -> None:
-    """Write what is told of each detection, unless the record has it as a column."""
+    """Write label, bodies and error of each detection, unless the record has them as columns."""
     for name in (n for n in _TOLD if n not in group.variables):
         if all(hasattr(why, name) for why in result.provenance):
             values = np.array([getattr(why, name) for why in result.provenance])

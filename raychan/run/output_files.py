@@ -1,7 +1,7 @@
 """Atomic writing of files and folders: either all is written or nothing is changed.
 
-Everything is built beside its place and renamed into it. What a killed process left behind is removed by the next
-writer of the same place: everything under construction is locked by its process, so what is not locked is stale.
+Files are written beside their place and renamed into it. Unfinished ones are locked by their process; those without a
+lock are left over from a killed process, and the next writer of the same place removes them.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class StoreError(OSError):
 class Contents:
     """Patterns of the names that a command writes into a folder of its own.
 
-    names: all that it may write; those of an earlier run are replaced. signs: at least one of these is in every such
-    folder; in a folder without any, files of these names belong to someone else and are not touched. A pattern 'a_*/'
-    is a folder with the same contents."""
+    names: all that it may write; those of an earlier run are replaced. signs: every such folder has at least one of
+    these; in a folder without any, files of these names are foreign and stay untouched. A pattern 'a_*/' is a folder
+    with the same contents."""
 
     names: tuple[str, ...]
     signs: tuple[str, ...]
@@ -59,7 +59,7 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
 
     After any error, Ctrl-C included, the temporary directory is removed and `out` is unchanged. Files in an old `out`
     that the command does not write stay there. Where `out` cannot be renamed (a mount, the current directory), files
-    are moved into it one by one. Raises: StoreError for errors of the disk, or where a file of someone else is in the
+    are moved into it one by one. Raises: StoreError for errors of the disk, or where a foreign file is in the
     way."""
     with _disk_errors(Path(out)):
         out = Path(out).resolve()
@@ -109,7 +109,7 @@ def _part(path: Path, content: bytes | memoryview) -> Iterator[str | None]:
     try:
         with _disk_errors(path):
             if path.is_dir():
-                raise StoreError(f"{path}: is a directory; a file is wanted")
+                raise StoreError(f"{path}: is a directory; name a file")
             if path.exists() and not path.is_file():
                 path.write_bytes(content)
             else:
@@ -148,19 +148,19 @@ def _disk_errors(path: Path, stage: Path | None = None) -> Iterator[None]:
 
 
 def _check(out: Path, what: Contents) -> None:
-    """Raise StoreError where files of someone else are in the way."""
+    """Raise StoreError where foreign files are in the way."""
     if not out.is_dir():
         if out.exists():
-            raise StoreError(f"{out}: is a file; a directory is wanted")
+            raise StoreError(f"{out}: is a file; name a directory")
         return
     signed = what.signed(out)
     for entry in (e for e in out.iterdir() if not is_mark(e)):
         plain = entry.is_symlink() or not entry.is_dir()
         if not plain and any(fnmatch(entry.name, n) for n in what.names if not n.endswith("/")):
-            raise StoreError(f"{entry}: is a directory where a file is to be; move it away or name another folder")
+            raise StoreError(f"{entry}: is a directory in the place of a file; move it away or name another folder")
         if plain and not signed and what.owns(entry):
             raise StoreError(
-                f"{entry}: stands there, and {out} is no folder of results; move it away or name another folder"
+                f"{entry}: exists, and {out} is not a folder of results; move it away or name another folder"
             )
 
 
@@ -193,7 +193,7 @@ def _file_by_file(stage: Path, out: Path, what: Contents) -> None:
 
 
 def _strip(folder: Path, what: Contents) -> None:
-    """Remove what the command wrote from a folder, the signs first: without them it is no result."""
+    """Remove the command's files from a folder, the signs first: a folder without signs is not taken for a result."""
     for old in sorted(folder.iterdir(), key=lambda e: not any(fnmatch(e.name, s) for s in what.signs)):
         if what.owns(old):
             _remove(old)

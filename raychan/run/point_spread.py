@@ -18,9 +18,9 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 Sums = tuple[Complexes, Floats, NDArray[np.int64]]
 
-_FINE = 64  # points of the tabulated window response per resolution cell
-_LEAST = 1e-3  # of a cell's amplitude: most that all paths left out may add to it
-_STEP = 0.25  # range cells that a path may move within one part of the frame
+_FINE = 64  # points of the tabulated window response per resolution cell (not measured)
+_LEAST = 1e-3  # of a cell's amplitude: largest sum of the paths left out (speed against error; not measured)
+_STEP = 0.25  # range cells that a path may move within one part of the frame (speed against error; not measured)
 
 
 class PointSpread:

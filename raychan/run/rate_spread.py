@@ -14,9 +14,9 @@ from raychan.records import Detections, Paths
 from raychan.run.convergence import figure
 from raychan.run.folding import aliased
 from raychan.run.labels import Chains, chains, label_of, response_of
+from raychan.run.ledger import Entry
 from raychan.run.result import Contribution, Explanation, Receiver
 from raychan.run.segments import Retraced
-from raychan.run.unmodelled import Entry
 from raychan.signal.baseband import synthesize
 from raychan.units import db
 

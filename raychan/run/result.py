@@ -14,6 +14,7 @@ from raychan.columns import column
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler
 from raychan.reprs import Described, PlottedTwice
+from raychan.run.ledger import Entry
 
 if TYPE_CHECKING:
     from raychan.world.scene import Scene
@@ -128,8 +129,8 @@ class Result(Described, PlottedTwice):
     error: MapError
     seed: int
     timings: dict[str, float] = field(default_factory=dict)
-    ledger: Mapping[str, object] = field(default_factory=dict)
-    """What was left out, by mechanism: entries with `level_db` over the weakest detection (see run.unmodelled)."""
+    ledger: Mapping[str, Entry] = field(default_factory=dict)
+    """What was left out, by mechanism: entries with `level_db` over the weakest detection (see run.ledger)."""
     stats: dict[str, float] = field(default_factory=dict)
     """Counts: rays, tubes, tracings; tolerance asked for and reached [dB]."""
     warnings: tuple[str, ...] = ()

@@ -73,9 +73,9 @@ def reach(chirps: int) -> int:
 
 @dataclass(frozen=True)
 class Segment:
-    """The chirps from one keyframe to the next, both included. `a` and `b` (2, antenna, chirp, sample) are the samples
-    extrapolated from the first over three quarters of them, and from the last backwards: of bodies that turn, and of
-    all others."""
+    """The chirps from one keyframe to the next, both included. `a` (2, antenna, chirp, sample): samples extrapolated
+    from the first keyframe over three quarters of the chirps, for bodies that turn and for all others; `b`: the same
+    from the last keyframe backwards."""
 
     start: Keyframe
     end: Keyframe
@@ -103,8 +103,9 @@ class Segment:
     def error(self) -> Samples:
         """Return the error of the blend: the difference of a and b where both are known, scaled to the whole segment.
 
-        An echo that appears between two keyframes is wrong over 0.42 of the segment at most. The random part of each
-        launch differs from tracing every chirp by 0.92 of the power of the difference of a and b.
+        An echo that appears between two keyframes is wrong over at most 0.42 of the segment. The random part of each
+        launch differs from tracing every chirp by 0.92 of the power of the difference of a and b (command of this
+        measurement not recorded).
         """
         count = self.chirps
         known, out = self.a.shape[2], np.zeros((*self.a.shape[:2], count, self.a.shape[3]), complex)
@@ -119,7 +120,7 @@ def joined(parts: list[Samples]) -> Samples:
 
 
 def echoes(length: Floats, amplitude: Complexes, delay_rate: Floats, place: Floats) -> Paths:
-    """Return paths without a history, whose delays grow by `delay_rate` [s/s]."""
+    """Return paths without interactions, whose delays grow by `delay_rate` [s/s]."""
     n = len(length)
     none, look = np.full((n, 1), -1, np.int16), np.zeros((n, 3))
     return Paths.of(

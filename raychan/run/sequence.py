@@ -1,4 +1,4 @@
-"""Sequences: poses advance by their velocities and turn rates, frame by frame; one result each, none kept."""
+"""Sequences of frames: poses advance by velocities and turn rates; each frame gives a result, which is not kept."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def frames(
     step = scene.radar.waveform.frame_duration if interval is None else interval
     INTERVAL.check("interval", step)
     for k in range(count):
-        scene.at(k * step)  # a radar that would run into a body is told before the first frame is computed
+        scene.at(k * step)  # a radar that would enter a body is an error before the first frame is computed
     return _frames(scene, count, step, seed, tolerance_db, max_bounces, progress)
 
 
@@ -68,30 +68,30 @@ def _frames(
     max_bounces: int | None,
     progress: Progress | None,
 ) -> Iterator[Frame]:
-    cached = carried(scene)
+    once = moves_as_one(scene)
     first: Channel | None = None
     for k in range(count):
         time, clock = k * step, Clock(progress)
         now = scene.at(time)
-        if first is not None and cached:
-            channel = _carried_on(first, now, time)
+        if first is not None and once:
+            channel = _shifted(first, now, time)
         else:
             channel = channel_of(now, tolerance_db, max_bounces, clock)
-            first = channel if cached else None
+            first = channel if once else None
         result = result_of(now, channel, seed + k, clock)
-        # What was built for this frame goes before the next builds its own.
+        # Frees the memory of this frame before the next is built.
         del channel, now
         yield Frame(k, time, result)
 
 
-def carried(scene: Scene) -> bool:
-    """Tell whether all bodies move with the radar, so that its channel stays as it is."""
+def moves_as_one(scene: Scene) -> bool:
+    """Return whether all bodies move with the radar, so that its channel does not change."""
     own = np.asarray(scene.radar.velocity, float)
     return all(np.array_equal(b.motion.velocity, own) and not b.motion.spin().any() for b in scene.bodies)
 
 
-def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
-    """Return the channel of a scene that has moved as one."""
+def _shifted(channel: Channel, scene: Scene, time: float) -> Channel:
+    """Return the channel of a scene whose bodies and radar have all moved alike for a time [s]."""
     shift = time * np.asarray(scene.radar.velocity, float)
 
     points = scene.points()
@@ -109,8 +109,8 @@ def _carried_on(channel: Channel, scene: Scene, time: float) -> Channel:
 class Store:
     """A directory of frames: frame_0000, frame_0001, ..., each as `raychan run` writes it, and detections.csv of all.
 
-    The first frame takes the place of what an earlier run left, all at once. From then on a frame is there whole or
-    not at all, and detections.csv tells of those that are there. Raises: StoreError where the disk refuses.
+    The first frame replaces the results of an earlier run, all at once. Each further frame is written whole or not at
+    all, and detections.csv lists the frames that are there. Raises: StoreError for errors of the disk.
     """
 
     def __init__(self, directory: str | Path) -> None:
@@ -138,7 +138,7 @@ class Store:
         self.count += 1
 
     def _append(self, lines: bytes) -> None:
-        """Add lines to the list of detections, or leave it as it was."""
+        """Append lines to detections.csv, or leave it unchanged."""
         path = self.directory / "detections.csv"
         try:
             with open(path, "ab", buffering=0) as file:

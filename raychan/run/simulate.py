@@ -14,7 +14,8 @@ from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
 from raychan.run.labels import provenance
-from raychan.run.mechanisms import Choice, choose
+from raychan.run.ledger import Entry, ModelChoice
+from raychan.run.mechanisms import choose
 from raychan.run.messages import counts, told, uncut
 from raychan.run.micro_doppler import needed, retraced
 from raychan.run.path_stream import Launched, PathStream
@@ -47,7 +48,7 @@ class Channel:
     """The check launch, coarser and on another lattice: it tells how wrong the fine one may be."""
     model: Any
     """The scene's, with what was asked for and what mode = "auto" chose."""
-    chosen: Choice | None
+    chosen: ModelChoice | None
     stats: dict[str, Any]
     warnings: tuple[str, ...] = ()
     turned: Retraced | None = None
@@ -168,7 +169,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *channel.warnings,
             *told(known, tolerance, rdmap, left_out),
         ),
-        scene=scene.bare(),
+        scene=scene.without_caches(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
@@ -176,7 +177,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
 
 def _explained(
     scene: Scene, channel: Channel, rdmap: RangeDoppler, found: Detections, receiver: Receiver, error: MapError
-) -> tuple[tuple[Explanation, ...], dict[str, Any]]:
+) -> tuple[tuple[Explanation, ...], dict[str, Entry]]:
     """Return where each detection came from, and the ledger of what the run left out."""
     radar, settings, turned = scene.radar, scene.processing, channel.turned
     paths, model = channel.launched.paths, channel.model

@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from raychan.radar.waveform import Waveform
+from raychan.run.ledger import entry_of
 from raychan.run.netcdf import GROUPS, as_netcdf, read_record
 from raychan.run.output_files import Contents, StoreError, csv_bytes
 from raychan.run.result import Contribution, Explanation, Receiver, Result
 from raychan.units import dbm
 
 FORMAT = 3
-_READS = (2, FORMAT)  # form 2 has delay and range rate of paths instead of length and its rate
+_READS = (2, FORMAT)  # format 2 has delay and range rate of paths instead of length and its rate
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
 CONTENTS = Contents(
     names=("result.nc", "detections.csv", "summary.json", *PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
@@ -48,7 +49,7 @@ _JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
 def save_result(result: Result, directory: str | Path) -> None:
     """Write result.nc, detections.csv and summary.json into an existing directory.
 
-    Use inside `files.staging`, which makes the whole appear at once. Raises: StoreError where the disk refuses.
+    Use inside `output_files.staging`, which makes all files appear at once. Raises: StoreError for errors of the disk.
     """
     directory = Path(directory)
     try:
@@ -90,7 +91,7 @@ def load_result(path: str | Path) -> Result:
         receiver=Receiver(**receiver),
         seed=int(attrs["seed"]),
         timings=held["timings"],
-        ledger=held["ledger"],
+        ledger={name: entry_of(e) for name, e in held["ledger"].items()},
         stats=held["stats"],
         warnings=tuple(held["warnings"]),
         scene=_scene(text, where),

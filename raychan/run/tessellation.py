@@ -12,7 +12,7 @@ from raychan.records import BLOCKER, Paths
 from raychan.run.mechanisms import peak
 from raychan.world.geometry import Geometry
 
-_OPPOSED = 2.0  # of a field: largest change by a phase, at pi
+_OPPOSED = 2.0  # of a field's amplitude: largest change by a phase, at pi
 
 
 def strongest_bend(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.em.fresnel import coefficients_array
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
+from raychan.run.ledger import NOTHING, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, peak
 from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import strongest_bend
@@ -20,20 +20,6 @@ from raychan.world.body import Body
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
-
-UNKNOWN = "unknown"
-NOTHING = "none"
-"""Level of an effect that the scene does not have, or that is modelled."""
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One effect: `level_db` [dB] against the weakest detection, 'unknown' where there is no estimate, 'none' where
-    there is no effect; `kind` 'estimate', 'bound', 'exact' or 'none'; `how` it was found."""
-
-    level_db: float | str
-    kind: str
-    how: str
 
 
 def ledger(
@@ -45,7 +31,7 @@ def ledger(
     model: Any,
     weakest: float,
     bodies: Collection[Body] = (),
-) -> dict[str, Any]:
+) -> dict[str, Entry]:
     """Return the unmodelled effects by name, each against the weakest detection's power [W].
 
     Args: settings, the scene's processing; model, what was modelled; bodies of the scene.
@@ -97,7 +83,7 @@ def _transmission(paths: Paths, radar: Radar, settings: Any, weakest: float) -> 
     last = peak(paths, passes == most, radar, settings)
     loss = peak(paths, passes == max(most - 1, 0), radar, settings)
     ratio = min(last / loss, 1.0) if loss > 0.0 else 1.0
-    how = f"paths through {most} layers are in; one more, by their ratio to {most - 1}"
+    how = f"strongest cell through {most} layers times its ratio to {most - 1}: one layer more"
     return Entry(float(db(max(last * ratio, 1e-40) / weakest)), "estimate", how)
 
 
@@ -128,7 +114,7 @@ def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     power = radar.power * gain * wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
     at = int(np.argmax(power))
     name = geometry.facets.body_names[geometry.facets.body[geometry.plane_edge_facet[at]]]
-    how = f"strongest edge's fringe field, L^2/pi broadside, if it were seen: on {name} at {r[at]:.1f} m"
+    how = f"fringe field of the strongest edge, L^2/pi broadside, without occlusion: on {name} at {r[at]:.1f} m"
     return Entry(float(db(power[at] / weakest)), "bound", how)
 
 
@@ -146,8 +132,8 @@ def _around(geometry: Geometry, points: Points, radar: Radar, settings: Any, mod
 
 
 def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
-    """Return the entry of diffuse scattering: the power that roughness takes from the specular reflection, radiated by
-    Lambert's law, of the strongest range cell."""
+    """Return the entry of diffuse scattering, of the strongest range cell: the power that roughness takes from the
+    specular reflection (Ament, Proc. IRE 41, 1953), scattered by Lambert's law."""
     f = geometry.facets
     m = f.materials
     rough = m.roughness[f.material] > 0.0
@@ -168,9 +154,7 @@ def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     summed = np.bincount(cell, power)
     best = int(np.argmax(summed))
     where = best * radar.waveform.range_resolution
-    how = (
-        f"power that roughness takes from the mirror, by Lambert's law, strongest range cell ({where:.1f} m), all rates"
-    )
+    how = f"power lost by roughness, scattered by Lambert's law, in the strongest range cell ({where:.1f} m), all rates"
     return Entry(float(db(max(summed[best], 1e-40) / weakest)), "estimate", how)
 
 
@@ -204,14 +188,14 @@ def _samples(
 def _tessellation(
     paths: Paths, geometry: Geometry, bodies: Collection[Body], radar: Radar, settings: Any, weakest: float
 ) -> Entry:
-    """Return the entry of smoothed facets, if the body is truly flat-faced."""
+    """Return the entry of smoothed facets: the change of the strongest echo if they are flat."""
     estimated = {b.name for b in bodies if b.geometry.crease_deg is not None}
     if not estimated:
-        return Entry(NOTHING, "exact", "every body knows its surface")
+        return Entry(NOTHING, "exact", "no body has estimated normals")
     name, phase, changed = strongest_bend(paths, geometry, estimated, radar, settings)
     if not name:
-        return Entry(NOTHING, "exact", "no body that returns has smoothed facets")
-    how = f"facets of {name} are taken for smooth: against flat ones {phase:.2g} rad (rms) of its strongest cell"
+        return Entry(NOTHING, "exact", "no echo comes from smoothed facets")
+    how = f"facets of {name} are taken as smooth: {phase:.2g} rad (rms) from flat ones, of its strongest cell"
     return Entry(float(db(changed / weakest)), "estimate", how)
 
 
@@ -234,9 +218,9 @@ def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     along = np.einsum("ndi,ni->nd", relative, away)
     across = np.einsum("ndi,ndi->nd", relative, relative) - along**2
     turning = np.linalg.norm(facets.spin, axis=1)[body]
-    # Lever arm of turning bodies: at most a few metres of a vehicle.
+    # Lever arm of turning bodies: 2.5 m, of a vehicle (not measured).
     bend = np.where(used, across / nearest[taken, None] + turning**2 * 2.5, 0.0).max(axis=1)
     phase = 2.0 * np.pi / radar.waveform.wavelength * bend * frame**2 / 4.0
     worst = float(phase.max(initial=0.0))
-    how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level against the return that has it"
+    how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level relative to the echo that has it"
     return Entry(float(db(max(worst, 1e-15) ** 2)), "bound", how)

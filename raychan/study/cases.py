@@ -45,8 +45,9 @@ class Target:
     around_deg: float = 45.0
     """Azimuths on either side of +x over which the mean RCS is taken."""
     heavy: bool = False
+    """Whether a run takes so long that fewer settings are tried."""
     hard: bool = False
-    """Whether point samples converge so slowly that finer ones than elsewhere are tried."""
+    """Whether point samples converge so slowly that more of them are tried."""
     truth_db: float = 0.05
     """Error of the reference [dB]."""
 
@@ -65,7 +66,7 @@ class Street:
     source: str
     tolerance_db: float
     truth_db: float = 0.0
-    """Return the error of the reference [dB], found when it is computed."""
+    """Error of the reference [dB], known once it is computed."""
 
 
 def plate() -> Target:
@@ -87,7 +88,7 @@ def plate() -> Target:
 
 
 def sphere() -> Target:
-    """Sphere of 0.5 m radius at 12 m; reference: high-frequency limit with the near-field factor."""
+    """Sphere of 0.5 m radius at 12 m; reference: geometrical optics of a spherical wave, D from the centre."""
     mesh, fine = build("sphere", {"radius": 0.5}), build("sphere", {"radius": 0.5, "max_sag": 2e-5})
     views = np.array([[7.0, 3.0, 12.0], [33.0, 11.0, 12.0], [61.0, -8.0, 12.0]])
     truth = np.full(len(views), np.pi * 0.25 * (12.0 / 11.5) ** 2)
@@ -106,12 +107,12 @@ def sphere() -> Target:
 
 
 def dihedral() -> Target:
-    """Dihedral of 0.1 m on boresight, far field; reference: its aperture, plus the echo of each face alone."""
+    """Dihedral of 0.1 m on boresight, far field; reference: its aperture (Knott et al. 2004), and each face alone."""
     size = 0.1
     mesh = build("dihedral", {"size": size, "height": size})
     views = np.array([[0.0, 0.0, _FAR]])
-    # Both bounces: an aperture of sqrt(2) a b in the plane of the edge. One bounce, which turns the field over, off
-    # each face at 45 deg: the integral of its currents along the face.
+    # Two bounces: an aperture of width sqrt(2) a and height b. One bounce, of opposite sign, off each face at 45 deg:
+    # the integral of its currents along the face.
     turn = 1j * np.sqrt(2.0) * WAVENUMBER
     faces = np.sqrt(2.0) * size * (np.exp(turn * size) - 1.0) / turn
     amplitude = WAVENUMBER / (2.0 * np.pi) * (np.sqrt(2.0) * size**2 - faces)
@@ -126,8 +127,8 @@ def trihedral() -> Target:
     boresight."""
     mesh = build("trihedral", {"size": 0.2})
     views = np.array([[0.0, 0.0, _FAR], [7.0, 4.0, _FAR], [-11.0, 6.0, _FAR]])
-    # A method other than the one under test: a million uniform tubes a view, on two lattices. A test compares it with
-    # the closed form on boresight.
+    # The reference is another method than the one under test: about a million uniform tubes a view, on two lattices. A
+    # test compares it with the closed form on boresight.
     facets = facets_of(mesh, "pec", FREQUENCY)
     ends = [direction(*np.radians(v[:2])) * v[2] for v in views]
     found = np.array([[_uniform(facets, end, n) for end in ends] for n in (600_000, 1_100_000)])
@@ -145,7 +146,7 @@ def car(quick: bool = False) -> Target:
     """Parametric car at 12 m, all metal; reference: a converged run."""
     mesh, fine = build("car"), build("car", {"max_sag": 1e-4})
     views = np.array([[15.0, 0.0, 12.0], [70.0, 0.0, 12.0]])
-    # Not the launches under test, which would be compared with themselves: another lattice of cuts, and a finer rule.
+    # Another lattice of cuts and a finer rule than the launches under test, which must not be their own reference.
     geometry = Geometry(facets_of(mesh, "pec", FREQUENCY))
     rules = [replace(r, jitter=0.21) for r in refinements(geometry, FREQUENCY)][0 if quick else 1 : 2 if quick else 3]
     found = []
@@ -165,7 +166,7 @@ def urban(path: Path | None = None, quick: bool = False) -> Street:
     return Street("urban", "urban scene", here, f"tubes cut for {fine:g} dB, another lattice of cuts", fine)
 
 
-_FAR = 1000.0
+_FAR = 1000.0  # m: a corner of 0.2 m sees a plane wave from here
 
 TARGETS: dict[str, Callable[..., Any]] = {
     "plate": plate,
@@ -191,7 +192,7 @@ def _uniform(facets: Facets, end: Floats, rays: int) -> float:
 
 
 def _plate_near(size: float, azimuth_deg: float, elevation_deg: float, distance: float) -> float:
-    """Return the RCS [m^2] of a square plate facing +x by Gauss-Legendre quadrature of its currents (J = 2 n x H_i)."""
+    """Return the RCS [m^2] of a square plate facing +x by Gauss-Legendre quadrature of its currents 2 n x H_i."""
     end = distance * direction(np.radians(azimuth_deg), np.radians(elevation_deg))
     x, w = np.polynomial.legendre.leggauss(16)
     panels = 160

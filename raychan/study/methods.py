@@ -19,7 +19,7 @@ from raychan.run.scattering import scattering
 from raychan.run.single_body import facets_of
 from raychan.study.cases import FREQUENCY, WAVENUMBER, Target, vertical
 from raychan.study.ray_lattice import Window, echoes
-from raychan.study.specular_points import glints
+from raychan.study.specular_points import specular_points
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
 from raychan.world.mesh import Mesh
@@ -34,7 +34,7 @@ POINT, UNIFORM, ADAPTIVE, MIRRORS, POINTS = (
 METHODS = (ADAPTIVE, UNIFORM, POINT, MIRRORS, POINTS)
 DEFAULT_TOLERANCE_DB = 0.25
 """The default of `raychan.rcs`."""
-_MOST_POINTS = 2_000_000  # point samples a view, for targets that converge slowly
+_MOST_POINTS = 2_000_000  # point samples a view, for targets that converge slowly: sphere and car
 
 
 @dataclass(frozen=True)
@@ -84,24 +84,24 @@ def launched(target: Target, step: int) -> Run:
     return Run(np.array(out), float(geometry.rays), perf_counter() - since)
 
 
-def mirrors(target: Target, finely: float) -> Run:
+def mirrors(target: Target, fine: int) -> Run:
     """Return the RCS by the specular points of single reflections, on the plain (0) or the fine (1) mesh."""
     since = perf_counter()
-    tracer = RayCaster(facets_of(target.fine if finely else target.mesh, "pec", FREQUENCY))
+    tracer = RayCaster(facets_of(target.fine if fine else target.mesh, "pec", FREQUENCY))
     out = []
     for end in target.ends():
-        total = glints(tracer, end, WAVENUMBER).field.sum()
+        total = specular_points(tracer, end, WAVENUMBER).field.sum()
         out.append(4.0 * np.pi * abs(total * (end @ end)) ** 2)
     return Run(np.array(out), max(float(tracer.rays), 1.0), perf_counter() - since)
 
 
-def as_points(target: Target, aspects: float) -> Run:
-    """Return the RCS of a point target with the mean RCS over `aspects` directions, from a table made beforehand.
+def as_points(target: Target, aspects: int) -> Run:
+    """Return the RCS of a point target that has the mean RCS over `aspects` directions, from a table made beforehand.
 
-    Time and rays are those of its use: a look-up and one visibility ray a view.
+    Time and rays count its use only: a look-up and one visibility ray a view.
     """
     around = target.around_deg
-    table = mean_rcs(target.mesh, int(aspects), float(target.views[0, 2]), target.bounces, around)
+    table = mean_rcs(target.mesh, aspects, float(target.views[0, 2]), target.bounces, around)
     since = perf_counter()
     value = np.array([table for _ in target.ends()])
     return Run(value, len(target.views), perf_counter() - since)
@@ -131,8 +131,8 @@ class Effort:
 
 
 def efforts(quick: bool, heavy: bool = False, hard: bool = False) -> list[Effort]:
-    """Return all settings of all methods for targets; fewer when quick or when the target is heavy, more point samples
-    when it is hard."""
+    """Return all settings of all methods for a target: fewer if quick or if the target is heavy, more point samples if
+    it is hard."""
     counts = (1_000, 16_000, 128_000) if quick else (1_000, 4_000, 16_000, 64_000, 256_000, 700_000)
     tolerances = (DEFAULT_TOLERANCE_DB,) if quick or heavy else (1.0, DEFAULT_TOLERANCE_DB, 0.1)
     made = []

@@ -32,13 +32,13 @@ _PO = "closed form: physical optics, one sinc an axis (Balanis 2012, eq. 11-44)"
 
 
 def grazing(quick: bool) -> Outcome:
-    """Try incidence up to 89.9 deg: side lobes and mirror direction of a plate, and a ground seen from low above."""
+    """Check incidence up to 89.9 deg: side lobes and mirror direction of a plate, and a road at grazing incidence."""
     rows: list[Row] = []
     lobes, mirror = [], []
     k = 2.0 * np.pi / LAMBDA
     for angle in _ANGLES:
         s = np.sin(np.radians(angle))
-        # A width near 0.1 m that puts the crest of a side lobe at this very angle.
+        # A width near 0.1 m whose pattern has the crest of a side lobe at this angle.
         width = 0.1 if s == 0.0 else (round(k * 0.1 * s / np.pi - 0.5) + 0.5) * np.pi / (k * s)
         plate = build("plate", {"width": float(width), "height": 0.05})
         back = rcs(plate, FREQUENCY, angle, tolerance_db=0.05, max_bounces=1)
@@ -54,7 +54,7 @@ def grazing(quick: bool) -> Outcome:
 
 
 def _ground() -> list[Row]:
-    """Return how two points low over a ground see each other at 0.1 deg and less of grazing."""
+    """Return checks of the two-ray path between points low over a road, at grazing angles of 1, 0.1 and 0.01 deg."""
     rows = []
     eps, far_away = complex(3.18, -0.52 / (2 * np.pi * FREQUENCY * EPS0)), 200.0
     road = Material(3.18, 0.52)
@@ -69,7 +69,7 @@ def _ground() -> list[Row]:
                 Row(f"two rays at {low:g} deg over a road", 2, len(p.length), 0, "paths", "closed form: images")
             )
             continue
-        # Written with the conjugate, so that nothing cancels.
+        # The difference of squares over the sum: no cancellation.
         extra = 4 * h * h / (np.hypot(far_away, 2 * h) + far_away)
         phase = abs(float(p.length[1] - p.length[0]) - extra) * 2 * np.pi / LAMBDA
         rows.append(
@@ -85,7 +85,7 @@ def _ground() -> list[Row]:
 
 
 def edge_on(quick: bool) -> Outcome:
-    """Try plates seen along their plane, alone and as faces of bodies."""
+    """Check plates seen along their plane, alone and as faces of bodies."""
     plate = build("plate", {"width": 0.1, "height": 0.05})
     rows = []
     for angle in (90.0, -90.0):
@@ -143,7 +143,7 @@ def exchange(quick: bool) -> Outcome:
         rows.append(
             Row(
                 f"{name}, four polarisations", 0.0, worst, 0.1, "dB", "symmetry: reciprocity",
-                note=f"by the mean of both ways; one way alone differs by {abs(one_way[-1]):.2f} dB",
+                note=f"mean of both directions; one direction alone differs by {abs(one_way[-1]):.2f} dB",
             )
         )  # fmt: skip
     rooms, missing, apart = 5 if quick else 25, 0, 0.0
@@ -154,7 +154,7 @@ def exchange(quick: bool) -> Outcome:
         if len(go.length) != len(come.length):
             missing += abs(len(go.length) - len(come.length))
             continue
-        # phi-hat turns its sign with the direction of travel, theta-hat does not.
+        # phi-hat changes its sign with the direction of travel, theta-hat does not.
         turned = np.transpose(come.gain, (0, 2, 1)) * np.array([[1, -1], [-1, 1]])
         apart = max(apart, float(np.abs(go.gain - turned).max() / np.abs(go.gain).max()))
     rows.append(Row(f"paths in {rooms} random rooms, count", 0, missing, 0, "paths", "symmetry: reciprocity"))

@@ -73,8 +73,8 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Regime:
-    """A situation in which ray methods fail: `key` for files, `title` for people, `run` (quick) that runs its
-    checks."""
+    """A situation in which ray methods fail: `key` for options and files, `title` for reports, and the function `run`
+    (quick) that returns its checks."""
 
     key: str
     title: str
@@ -115,7 +115,7 @@ def amplitudes(
 
 
 def geometry_of(mesh: Any, material: Any = "pec") -> Geometry:
-    """Return the surface of one body at the origin."""
+    """Return the geometry of one body at the origin."""
     return Geometry(facets_of(mesh, material, FREQUENCY))
 
 
@@ -139,7 +139,7 @@ def rectangle(corner: Any, u: Any, v: Any) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def sheet(*pieces: tuple[Floats, NDArray[np.int64]], mend: bool = True) -> Mesh:
-    """Return one mesh of several pieces (vertices, faces); `mend` checks winding as for a file, else all is kept."""
+    """Return one mesh of several pieces (vertices, faces); `mend` checks their winding as for a file."""
     base, vertices, faces = 0, [], []
     for v, f in pieces:
         vertices.append(v)
@@ -164,7 +164,8 @@ def plate_far(width: float, height: float, azimuth_deg: float) -> float:
 def plate_near(width: float, height: float, distance: float) -> float:
     """Return sigma [m2] of a plate seen from `distance` [m] on its axis: quadrature of exp(-2jkr) cos / r^2.
 
-    4 pi D^4 |E|^2, by Gauss-Legendre panels of at most 2 cycles of phase; ArithmeticError unless two grids agree.
+    Physical optics (Balanis 2012, sec. 7.10), 4 pi D^4 |E|^2, by Gauss-Legendre panels of at most 2 cycles of phase.
+    Raises: ArithmeticError unless two grids agree.
     """
     values = []
     for finer in (1.0, 1.4):

@@ -1,4 +1,4 @@
-"""Regime of bistatic angles: from the transmitter's side round to straight behind the body."""
+"""Regime of bistatic angles: from near backscatter to forward scatter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PO = "closed form: mean of physical optics both ways, one sinc (Balanis 2012, s
 
 
 def bistatic(quick: bool) -> Outcome:
-    """Try a plate and a sphere at all bistatic angles to straight through."""
+    """Check a plate and a sphere at bistatic angles from 20 deg to forward scatter at 180 deg."""
     rows: list[Row] = []
     width, height = 0.1, 0.05
     plate = build("plate", {"width": width, "height": height})
@@ -20,7 +20,7 @@ def bistatic(quick: bool) -> Outcome:
     for angle in angles:
         turn = np.radians(angle)
         shape = width * height * np.sinc(width * np.sin(turn) / LAMBDA)
-        # At normal incidence the mean of 2 n x H there and back is 1 + |cos| in either plane, of one size.
+        # At normal incidence the currents 2 n x H, averaged over both directions, give 0.5 (1 + |cos|) in both planes.
         exact = 4 * np.pi * (shape * 0.5 * (1.0 + abs(np.cos(turn))) / LAMBDA) ** 2
         seen = rcs(plate, FREQUENCY, 0.0, rx_azimuth_deg=angle, tolerance_db=0.05)
         rows.append(same_db(f"plate at {angle:g} deg", float(seen.sigma), float(exact), 0.05, _PO))

@@ -1,4 +1,4 @@
-"""Regimes of what a wave can enter: closed bodies with panes, and one thing drawn as one body or as several."""
+"""Regimes of transparent surfaces: closed bodies with panes, and the same surfaces as one body or as several."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _MATERIALS = Materials(
     thickness=np.array([_THICK, 0.0]),
     roughness=np.zeros(2),
 )
-_CELL = 0.15  # m
+_CELL = 0.15  # m: width of the Gaussian range response
 Sheet = tuple[Floats, int]
 """Corners (4, 3) [m] of a plane quadrilateral, and its row of the materials: 0 glass, 1 metal."""
 
 
 @dataclass(frozen=True)
-class _Eye:
+class _IsotropicRadar:
     """An isotropic radar at the origin."""
 
     position: Floats = field(default_factory=lambda: np.zeros(3))
@@ -42,8 +42,8 @@ class _Eye:
 
 
 def panes(quick: bool) -> Outcome:
-    """Look into glass boxes: the front returns as its pane alone, the back as it would, weaker by passing the front
-    twice."""
+    """Check glass boxes: the front returns what its pane alone returns, the back the same less the loss of passing the
+    front twice."""
     rows = []
     passed = coefficients(LAYER, _GLASS, _THICK, 0.0, 1.0, K)[2] ** 2
     near, size = 9.0, 0.3
@@ -60,7 +60,7 @@ def panes(quick: bool) -> Outcome:
 
 
 def joined_or_split(quick: bool) -> Outcome:
-    """Draw the same panes and sheets of metal as one body and as several: the answer may differ by its stated error."""
+    """Model the same panes and metal sheets as one body and as several: levels may differ by their stated errors."""
     rng = np.random.default_rng(11)
     rows = []
     for i in range(4 if quick else 10):
@@ -80,7 +80,7 @@ def joined_or_split(quick: bool) -> Outcome:
 
 
 def _corner() -> Row:
-    """Return two large mirrors at right angles, of two bodies, over the same as one."""
+    """Return the check of two large mirrors at right angles: two bodies against one."""
     foot, up = np.array([8.0, 0.0, -0.5]), np.array([0.0, 0.0, 1.0])
     one, two = np.array([-0.7, 0.7, 0.0]), np.array([-0.7, -0.7, 0.0])
     sides: list[Sheet] = [(rectangle(foot, up, one)[0], 1), (rectangle(foot, two, up)[0], 1)]
@@ -127,7 +127,7 @@ def _paths(facets: Facets, bounces: int, tolerance_db: float, jitter: float = 0.
         sigma=np.zeros((0, 2)), heading=np.zeros(0),
     )  # fmt: skip
     rule = refinement(FREQUENCY, tolerance_db, layers=4, jitter=jitter)
-    return solve(facets, points, _Eye(), FREQUENCY, rule, bounces)[0]
+    return solve(facets, points, _IsotropicRadar(), FREQUENCY, rule, bounces)[0]
 
 
 def _at(paths: Paths, distance: float) -> complex:
@@ -136,7 +136,7 @@ def _at(paths: Paths, distance: float) -> complex:
 
 
 def _profile(paths: Paths, ranges: Floats) -> Complexes:
-    """Return the amplitudes at ranges (n,) [m] of a receiver whose cells are Gaussians."""
+    """Return the amplitudes at ranges (n,) [m] of a receiver with a Gaussian range response."""
     away = (paths.range[None] - ranges[:, None]) / _CELL
     return np.asarray(np.exp(-(away**2)) @ paths.amplitude)
 

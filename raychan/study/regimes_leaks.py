@@ -1,4 +1,4 @@
-"""Leaks of the ray caster: rays aimed at shared edges, at vertices, and where the corner rays of tubes go."""
+"""Leaks of the ray caster: rays aimed at shared edges, at vertices, and at the corners of tubes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from raychan.world.shapes import SHAPES, build
 
 Ints = NDArray[np.int64]
 
-_CHUNK = 1 << 17
-_SLANT = 0.02  # least cosine of the angle of incidence
+_CHUNK = 1 << 17  # rays at a time: bounds memory (other sizes not measured)
+_SLANT = 0.02  # least cosine of the angle of incidence: flatter rays may rightly miss after rounding
 _TARGETS = ("edges", "vertices", "corner rays of tubes")
 
 
@@ -32,8 +32,8 @@ def leaks(quick: bool) -> Outcome:
     """Aim rays from outside at edges that two faces share, at vertices, and 2 % off them; count those that pass
     through.
 
-    A ray that goes too far, rounded to float32, is intersected with every face in float64: if it meets a nearer one,
-    the ray caster leaked; if not, rounding had moved it past a silhouette edge."""
+    A ray that hits too far away is rounded to float32 and intersected with every face in float64. If it meets a nearer
+    face, the ray caster leaked; if not, rounding moved it past a silhouette edge."""
     total = 100_000 if quick else 10_000_000
     rng = np.random.default_rng(7)
     rows: list[Row] = []
@@ -57,9 +57,9 @@ def leaks(quick: bool) -> Outcome:
 def _row(name: str, target: str, c: _Count) -> Row:
     notes = []
     if c.leaks:
-        notes.append(f"{c.leaks} rays, as float32 has them, do meet a nearer face in float64, but Embree gives none")
+        notes.append(f"{c.leaks} rays, rounded to float32, meet a nearer face in float64 that Embree does not report")
     if c.moved:
-        notes.append(f"{c.moved} more were moved past an outline by float32")
+        notes.append(f"{c.moved} were moved past a silhouette edge by rounding to float32")
     what = f"{name}, {target}: {c.rays} rays"
     return Row(what, 0.0, 1e6 * c.leaks / max(c.rays, 1), 0.0, "per million", "topology: no gap", "; ".join(notes))
 
@@ -154,7 +154,7 @@ class _Fan:
         self.border[start[odd]] = self.border[end[odd]] = True
 
     def turns(self, normal: Floats, at: Ints, d: Floats) -> tuple[Floats, Floats]:
-        """Return the least and greatest n.d over the faces of vertices `at`; both signs where a border lets rays by."""
+        """Return the least and greatest n.d over the faces of vertices `at`; -1 and 1 at boundary edges."""
         low, high = np.full(len(at), np.inf), np.full(len(at), -np.inf)
         begin, stop = self.first[at], self.first[at + 1]
         for i in range(int((stop - begin).max(initial=0))):

@@ -17,7 +17,7 @@ _FRESNEL = "closed form: Fresnel"
 
 
 def brewster(quick: bool) -> Outcome:
-    """Try the angle at which nothing of one polarisation is reflected, in the kernel, on paths and on a plate."""
+    """Check Brewster's angle, at which the p polarisation has no reflection: coefficients, specular paths, a plate."""
     rows = []
     for eps in (1.5, 3.18, 6.31, 30.0):
         cosine = 1.0 / np.sqrt(1.0 + eps)
@@ -48,7 +48,7 @@ def brewster(quick: bool) -> Outcome:
 
 
 def total_reflection(quick: bool) -> Outcome:
-    """Try a medium thinner than what the wave comes from: all is reflected beyond the critical angle."""
+    """Check total reflection by a medium of lower permittivity, 0.25, beyond its critical angle."""
     rows = []
     eps = 0.25 + 0j
     critical = np.arcsin(0.5)
@@ -65,7 +65,7 @@ def total_reflection(quick: bool) -> Outcome:
         rows.append(Row(f"tunnelling through {thickness:g} m of eps 0.25: R + T", 1.0, power, 1e-9, "", "energy"))
     cosine = np.sqrt(0.5)
     r = coefficients(HALF_SPACE, eps, 0.0, 0.0, float(cosine), K)
-    # The wave inside fades away from the face; the other root would turn the phase round.
+    # The evanescent wave decays away from the face; the other root would change the sign of the phase.
     exact = 2.0 * float(np.arctan(0.5 / cosine))
     rows.append(Row("eps 0.25 at 45 deg: phase of R_s", exact, float(np.angle(r[0])), 1e-12, "rad", _FRESNEL))
     wall = Body(name="road", shape="ground", params={"size": 4000.0}, material=Material(5.0))
@@ -80,7 +80,7 @@ def total_reflection(quick: bool) -> Outcome:
 
 
 def layers(quick: bool) -> Outcome:
-    """Try layers from 1e-15 m to 1 km: nothing, a first-order film, and a half space."""
+    """Check layers from 1e-15 m to 1 km: thin ones against the first-order film, thick ones against the half space."""
     rows = []
     angle = np.radians(40.0)
     c = float(np.cos(angle))
@@ -111,7 +111,7 @@ def layers(quick: bool) -> Outcome:
 
 
 def _film(eps: complex, d: float, c: float) -> Complexes:
-    """Return R_s, R_p of a film to first order in its thickness (Born and Wolf 1999, sec. 1.6, expanded)."""
+    """Return R_s, R_p of a film to first order in its thickness (Born and Wolf 1999, sec. 1.6, as a series)."""
     s2 = 1.0 - c * c
     r_s = -1j * K * d * (eps - 1.0) / (2.0 * c)
     r_p = 1j * K * d * (eps * c * c - (eps - s2) / eps) / (2.0 * c)
@@ -119,7 +119,7 @@ def _film(eps: complex, d: float, c: float) -> Complexes:
 
 
 def _passive(quick: bool) -> list[Row]:
-    """Return the greatest sums of reflected and passed power over random materials and angles."""
+    """Return checks of reflected plus transmitted power over random materials and angles."""
     rng = np.random.default_rng(5)
     n = 100_000
     eps = 1.0 + 10.0 ** rng.uniform(-6, 2, n) + 0j
@@ -141,7 +141,7 @@ def _passive(quick: bool) -> list[Row]:
 
 
 def _plates() -> list[Row]:
-    """Return plates of ever thinner layers by the tubes, over the film's first order."""
+    """Return checks of the RCS of plates of thin layers against the first-order film."""
     rows = []
     plate = build("plate", {"width": 0.1, "height": 0.1})
     metal = 4 * np.pi * (0.01 / LAMBDA) ** 2
@@ -153,7 +153,7 @@ def _plates() -> list[Row]:
 
 
 def toward_vacuum(quick: bool) -> Outcome:
-    """Let the permittivity go to 1: the reflection fades as (eps - 1), and at 1 is nothing."""
+    """Check permittivities toward 1: the reflection falls in proportion to eps - 1 and is 0 at 1."""
     rows = []
     steps = 10.0 ** -np.arange(1.0, 14.0)
     seen = []

@@ -54,7 +54,7 @@ def far_from_home(quick: bool) -> Outcome:
         there = _power(Geometry(moved(facets, np.eye(3), shift)), end + shift, np.linalg.norm(end + shift))
         turned = _power(Geometry(moved(facets, turn, np.zeros(3))), turn @ end, np.linalg.norm(end))
         both = _power(Geometry(moved(facets, turn, shift)), turn @ end + shift, np.linalg.norm(turn @ end + shift))
-        # The bar for a turn is the tolerance of the run; flat bodies cut by the same rule do far better.
+        # A turn moves the cuts, so that levels agree within the tolerance of the launch.
         rows.append(same_db(f"{name} moved by 14 km", there, here, 0.01, "symmetry: translation"))
         rows.append(same_db(f"{name} turned", turned, here, 0.25, "symmetry: rotation"))
         rows.append(same_db(f"{name} turned and moved", both, here, 0.25, "symmetry: motion"))
@@ -62,7 +62,7 @@ def far_from_home(quick: bool) -> Outcome:
 
 
 def _power(geometry: Geometry, end: Floats, reach: Any) -> float:
-    """Return the power over all polarisations from a near radar, which no choice of axes changes.
+    """Return the power over all polarisations from a near radar, which is the same for all choices of axes.
 
     `amplitudes` scales by the distance of the radar from the origin, once each way; that is taken out.
     """
@@ -71,10 +71,10 @@ def _power(geometry: Geometry, end: Floats, reach: Any) -> float:
 
 
 def facet_sizes(quick: bool) -> Outcome:
-    """Try facets of 1e-6 to 1e2 m: as whole targets, as strips in a plate, and huge ones seen from nearby."""
+    """Check facets of 1e-6 to 1e2 m: as whole targets, as strips in a plate, and a huge one seen from nearby."""
     rows: list[Row] = []
     plates, corners = [], []
-    # Tubes of the default launch are at most 0.3 m: those of a huge target are let be a quarter of it.
+    # Tubes of the default launch are at most 0.3 m; here they may be a quarter of the target.
     for size in _SIZES:
         edge = 0.25 * size
         s = amplitudes(
@@ -95,7 +95,7 @@ def facet_sizes(quick: bool) -> Outcome:
         rows.append(row if row.passed else same_db(row.name, level, exact, 0.1, truth, why))
         corners.append(rows[-1].seen)
     r = rcs(build("dihedral", {"size": 3.0, "height": 3.0}), FREQUENCY, 0.0, max_rays=10_000)
-    why = "the first two launches are never capped, and cut to 0.3 m"
+    why = "max_rays does not limit the first two launches, whose tubes are at most 0.3 m"
     rows.append(
         at_most("dihedral of 3 m: rays, max_rays 10000", float(r.rays), 30_000, "rays", "the caller's bound", why)
     )
@@ -108,7 +108,7 @@ def facet_sizes(quick: bool) -> Outcome:
     near = Leg(end=np.array([15.0, 0.0, 0.0]))
     huge = geometry_of(build("plate", {"width": 30.0, "height": 30.0}))
     level = 4 * np.pi * abs(amplitudes(huge, near, near, 0, 1)[0, 0]) ** 2
-    # Edge waves are about 1 / sqrt(k D) of the image, spread over four edges that are not in phase.
+    # Edge waves are about 1 / sqrt(k D) of the image, shared by four edges that are not in phase.
     rows.append(same_db("plate of 30 m from 15 m", level, np.pi * 15.0**2, 0.05, "limit: image (pi D2)"))
     return Outcome(rows, {"size": np.array(_SIZES), "plate": np.array(plates), "dihedral": np.array(corners)})
 
@@ -156,14 +156,14 @@ def bad_faces(quick: bool) -> Outcome:
 
 
 def _coplanar() -> list[Row]:
-    """Return what coincident and overlapping plates give; together they are one plate."""
+    """Return checks of coincident and overlapping plates, which together are one plate."""
     corner, u, v = np.array([0, -0.05, -0.05]), np.array([0, 0.1, 0]), np.array([0, 0, 0.1])
     one = rectangle(corner, u, v)
     other = (one[0], np.array([[0, 1, 3], [1, 2, 3]]))
     small = rectangle(corner + 0.3 * (u + v), 0.4 * u, 0.4 * v)
     exact = plate_far(0.1, 0.1, 0.0)
     rows = []
-    cause = "seen facets of one plane are each counted whole"
+    cause = "facets that overlap in one plane are each counted whole"
     for name, second in (("coincident plates, other diagonal", other), ("small plate upon a great one", small)):
         r = rcs(sheet(one, second, mend=False), FREQUENCY, 0.0, max_bounces=1)
         row = same_db(f"one body: {name}", float(r.sigma), exact, 0.01, "energy: what is behind is not lit")
@@ -215,7 +215,7 @@ def _quartered(mesh: Mesh) -> Mesh:
 
 
 def lattice(quick: bool) -> Outcome:
-    """Cut the same tubes off their middles: what two launches agree on may not hang on where the cuts lie."""
+    """Cut tubes off the middle of their edges: the converged RCS must not depend on where the cuts are."""
     rows = []
     cases: tuple[tuple[str, dict[str, Any], float, float, int], ...] = (
         ("sphere", {"radius": 0.2}, 20.0, 10.0, 3),
@@ -229,7 +229,7 @@ def lattice(quick: bool) -> Outcome:
         level, stated = _settled(geometry, far(az, el), bounces, 0.0)
         for jitter in (0.13,) if name == "pedestrian" else (0.13, 0.3):
             other, its = _settled(geometry, far(az, el), bounces, jitter)
-            # Where rays ran out before the tolerance, each lattice answers for the error that it states.
+            # Where the ray budget ends before the tolerance is met, the stated errors of both lattices are allowed.
             allowed = _TOLERANCE_DB if max(stated, its) <= _TOLERANCE_DB else stated + its
             note = f"stated error {stated:.3f} and {its:.3f} dB; {geometry.rays} rays in all launches"
             rows.append(

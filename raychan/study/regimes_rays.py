@@ -31,7 +31,7 @@ from raychan.world.shapes import build
 
 
 def parallel_mirrors(quick: bool) -> Outcome:
-    """Try two facing mirrors: every image there, no term stronger than free space, the series ending."""
+    """Check two parallel mirrors: all images are found, no term exceeds free space, the last order has its share."""
     rows: list[Row] = []
     curves: dict[str, Any] = {}
     most = 6 if quick else 12
@@ -83,7 +83,7 @@ def _images(gap: float, tx: Floats, rx: Floats, most: int, material: Material) -
 
 
 def _trough() -> list[Row]:
-    """Return how the cross-section of two facing plates settles once all rays have left."""
+    """Return the check that the RCS of two facing plates no longer changes once all rays have left."""
     pair = sheet(
         rectangle((0.0, 0.05, -0.05), (0.2, 0, 0), (0, 0, 0.1)),
         rectangle((0.0, -0.05, -0.05), (0, 0, 0.1), (0.2, 0, 0)),
@@ -112,10 +112,10 @@ def dish(radius: float, half_angle: float, rings: int, sides: int) -> Mesh:
 
 
 def concave(quick: bool) -> Outcome:
-    """Try bowls seen from their focus and centre, where all rays meet, and a deep one over several bounces."""
+    """Check bowls seen from their focus and centre, where all rays meet, and a deep one over several bounces."""
     rows: list[Row] = []
     radius, half = 0.5, 0.2
-    # Many sides: a rim of chords is a rim of its own, which the phase tells from a circle.
+    # Many sides: the phase resolves the difference between a rim of chords and a circle.
     bowl = dish(radius, half, 8, 96 if quick else 384)
     views = (("centre", 0.5), ("twice the radius", 1.0), ("half its focal length", 0.125), ("focus", 0.25))
     for name, d in views[: 2 if quick else 4]:
@@ -141,13 +141,13 @@ def concave(quick: bool) -> Outcome:
     rows.append(same_db("deep bowl, 4 bounces, in stated error", two, one, sum(stated), truth))
     note = f"{max(int(r.rays) for r in deep)} rays"
     if max(stated) > 0.25:
-        note += ": they ran out; caustics lie between its bounces"
+        note += ": the ray budget ended; there are caustics between the bounces"
     rows.append(at_most("deep bowl: stated error, 0.25 asked", max(stated), 0.25, "dB", "tolerance asked", note))
     return Outcome(rows)
 
 
 def near_field(quick: bool) -> Outcome:
-    """Try plates seen from within their own near field, down to a few wavelengths."""
+    """Check plates seen from within their own near field, down to a few wavelengths."""
     rows = []
     cases = [(1.5, 25.0), (1.5, 12.0), (1.5, 3.0), (0.5, 1.0), (0.5, 0.3), (0.2, 0.1), (0.1, 0.02), (0.05, 0.005)]
     for width, d in cases[1:6] if quick else cases:

@@ -46,7 +46,7 @@ def _peak(rdmap: RangeDoppler) -> tuple[float, float, float]:
 
 
 def path_counts(quick: bool) -> Outcome:
-    """Try 0 to 1e7 paths: none is silence, many are the sum of their copies, in bounded time and memory."""
+    """Check 0 to 1e7 paths: none gives zero samples, copies add linearly, time and memory stay bounded."""
     rng = np.random.default_rng(2)
     rows: list[Row] = []
     radar = _sensor()
@@ -68,7 +68,7 @@ def path_counts(quick: bool) -> Outcome:
         off = float(np.sqrt(np.mean(np.abs(cube.samples - exact) ** 2)))
         truth = "silence" if n == 0 else "term by term" if not copies else "linearity: copies of 1000 echoes"
         rows.append(Row(f"{n} paths: rms error", 0.0, off / size if size else off, 1e-5, "of rms", truth))
-        why = "" if held[-1] <= 2.0 else "phases and projections of all paths are made before chunks are cut"
+        why = "" if held[-1] <= 2.0 else "phases and projections of all paths are held at once"
         rows.append(at_most(f"{n} paths: memory", held[-1], 2.0, "GB", "bound asked", why))
     growth = (seconds[-1] / max(seconds[-2], 1e-9)) / 10.0
     rows.append(at_most("ten times the paths: time over tenfold", growth, 2.0, "", "linear cost"))
@@ -89,7 +89,7 @@ def _first(paths: Paths, n: int) -> Paths:
 
 
 def dynamic_range(quick: bool) -> Outcome:
-    """Put echoes 60 to 120 dB apart into one map, by the direct sum and by the fast one."""
+    """Put echoes 60 to 120 dB apart into one map, by the direct sum and by the non-uniform FFT."""
     rows: list[Row] = []
     curves: dict[str, Any] = {}
     cell = _WAVE.range_resolution
@@ -117,7 +117,7 @@ def dynamic_range(quick: bool) -> Outcome:
             away &= (np.abs(made.rate[:, None] - rate) > 6 * made.rate_resolution) | (
                 np.abs(made.range - r) > 12 * cell
             )
-        # The padded cells of a folded axis wrap round; all of them count.
+        # Both axes of the map are periodic: all cells count, those of the padding too.
         floor = 10 * np.log10(made.power[away].max())
         rows.append(
             at_most(f"{label}: strongest cell elsewhere", float(floor), -120.0, "dB", "bound asked: 120 dB clear")
@@ -126,7 +126,7 @@ def dynamic_range(quick: bool) -> Outcome:
 
 
 def folding(quick: bool) -> Outcome:
-    """Try echoes beyond the unambiguous range and speed: they fold as sampling says."""
+    """Check echoes beyond the unambiguous range and speed: they fold by the sampling theorem."""
     rows = []
     top = _WAVE.unambiguous_range
     # By the frequency at the middle of the sweep, at which a map measures Doppler.
@@ -161,7 +161,7 @@ def folding(quick: bool) -> Outcome:
 
 
 def near_array(quick: bool) -> Outcome:
-    """Try targets in the near field of a receiving array, whose elements are served by one plane wave."""
+    """Check targets in the near field of a receiving array, for which a path is one plane wave."""
     rows = []
     count = 16
     y = (np.arange(count) - 0.5 * (count - 1)) * LAMBDA / 2
@@ -177,11 +177,10 @@ def near_array(quick: bool) -> Outcome:
         detour = np.hypot(distance, y) - np.hypot(distance, y[count // 2])
         off = np.angle(np.exp(1j * (seen + mid * detour)))
         worst.append(float(np.abs(off).max()))
-        note = "" if worst[-1] <= np.pi / 8 else "paths end at the phase centre; elements see a plane wave"
+        note = "" if worst[-1] <= np.pi / 8 else "paths end at the phase centre; the elements see a plane wave"
+        truth = "closed form: spherical wave; pi/8 is the usual far-field limit"
         name = f"array of {count}, target at {distance / edge:g} of 2 D2/lambda ({distance:.2f} m)"
-        rows.append(
-            Row(name, 0.0, worst[-1], np.pi / 8, "rad", "closed form: spherical wave; pi/8 is the custom", note)
-        )
+        rows.append(Row(name, 0.0, worst[-1], np.pi / 8, "rad", truth, note))
     return Outcome(rows, {"distance": distances / edge, "phase": np.array(worst)})
 
 

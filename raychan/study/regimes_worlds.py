@@ -1,5 +1,5 @@
-"""Regimes of worlds: scenes turned and shifted, bodies turned to exact angles, tessellations, open sheets, a radar on
-the plane of a facet."""
+"""Regimes of whole scenes and meshes: scenes turned and shifted, bodies turned with the view, tessellations, open
+sheets, a radar on the plane of a facet."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def worlds(quick: bool) -> Outcome:
 
 
 def _detections(yaw_deg: float, at: tuple[float, float]) -> Floats:
-    """Return range [m], power [dBW] and stated error [dB] of the bodies' detections, by range, in a turned world."""
+    """Return range [m], power [dBW] and stated error [dB] of the bodies' detections, by range, in a turned scene."""
     turn, shift = rotation(np.radians(yaw_deg)), np.array([*at, 0.0])
     bodies = [
         Body(
@@ -74,7 +74,7 @@ def _detections(yaw_deg: float, at: tuple[float, float]) -> Floats:
 
 
 def exact_angles(quick: bool) -> Outcome:
-    """Turn a body and the view together: edge-on faces and float32 rays may change nothing, whatever the angle."""
+    """Turn a body and the view together: the RCS stays the same at all angles, though faces are edge-on."""
     rows: list[Row] = []
     box = trimesh.creation.box((0.2, 0.1, 0.15))
     corner = build("dihedral", {"size": 0.1, "height": 0.1})
@@ -98,7 +98,7 @@ def _sigma(found: Rcs) -> float:
 
 
 def tessellation(quick: bool) -> Outcome:
-    """Mesh curved bodies coarsely and finely, and flat ones with shallow folds: what the mesh leaves open is stated."""
+    """Mesh curved bodies coarsely and finely, and flat ones with shallow folds: the stated error covers this."""
     rows: list[Row] = []
     for half, view in (((0.25, 0.25, 0.25), (20.0, 10.0)), ((0.3, 0.2, 0.15), (30.0, 15.0))):
         exact = _ellipsoid(half, *view)
@@ -120,7 +120,7 @@ def tessellation(quick: bool) -> Outcome:
 
 
 def _covered(name: str, off: float, found: Rcs, truth: str) -> Row:
-    """Return a row on an error that the stated one must cover; what says 'unknown' covers all."""
+    """Return the check that the stated error covers a deviation; an unknown error covers any."""
     stated = float(found.error_db)
     if not np.isfinite(stated):
         return at_most(name, 0.0, 0.0, "dB", truth, f"{off:.2f} dB off, stated: not converged")
@@ -135,7 +135,7 @@ def _ellipsoid(half: Sequence[float], azimuth_deg: float, elevation_deg: float) 
 
 
 def open_sheets(quick: bool) -> Outcome:
-    """Look at sheets from both sides: a sheet has no inside, and both its faces return alike."""
+    """View open sheets from both sides: both faces scatter alike."""
     rows: list[Row] = []
     plate = sheet(rectangle((0, -0.05, -0.05), (0, 0.1, 0), (0, 0, 0.1)), mend=False)
     turned = make_mesh(plate.vertices, plate.faces[:, ::-1])
@@ -154,7 +154,7 @@ def open_sheets(quick: bool) -> Outcome:
 
 
 def on_a_plane(quick: bool) -> Outcome:
-    """Put the radar on the plane of a facet and into a body: right, or told, never a number from nothing."""
+    """Put the radar on the plane of a facet and inside a body: the RCS is right, or refused."""
     rows: list[Row] = []
     box = trimesh.creation.box((2.0, 1.0, 1.0))
     for name, at, inside in (

@@ -14,7 +14,7 @@ Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Glints:
+class SpecularPoints:
     """Visible specular points: `point` (n, 3) [m], `facet` (n,), scattered `field` (n,) [1/m] for unit field at 1 m."""
 
     point: Floats
@@ -22,12 +22,12 @@ class Glints:
     field: Complexes
 
 
-def glints(tracer: RayCaster, end: Floats, wavenumber: float) -> Glints:
+def specular_points(tracer: RayCaster, end: Floats, wavenumber: float) -> SpecularPoints:
     """Return the specular points of conducting bodies that a radar at `end` (3,) [m] sees.
 
     The stationary-phase value of physical optics: 1 / (2 r^2 sqrt|det H|), H the curvature of the path's length over
     the surface, found from how normals and lines of sight turn from corner to corner of a facet.
-    Source: Born and Wolf, Principles of Optics, app. III.3.
+    Source: stationary phase, Born and Wolf, Principles of Optics, 1999, app. III.3.
     """
     f = tracer.facets
     v = f.vertices
@@ -43,7 +43,7 @@ def glints(tracer: RayCaster, end: Floats, wavenumber: float) -> Glints:
     facing = np.einsum("ij,ij->i", tracer.normal, sight.mean(axis=1)) > 0.5
     rows = np.flatnonzero((np.abs(det) > 1e-30) & facing)
     if not len(rows):
-        return Glints(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, complex))
+        return SpecularPoints(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, complex))
     st = np.linalg.solve(turn[rows], -c[rows, 0][..., None])[..., 0]
     # Half-open intervals, so that a point on the edge of two facets counts once.
     inside = (st[:, 0] >= 0.0) & (st[:, 1] >= 0.0) & (st.sum(axis=1) < 1.0)
@@ -63,4 +63,4 @@ def glints(tracer: RayCaster, end: Floats, wavenumber: float) -> Glints:
     valley = np.trace(bend, axis1=1, axis2=2) < 0.0
     sign = np.where(bends < 0.0, -1j, np.where(valley, 1.0, -1.0))
     field = sign * np.exp(-2j * wavenumber * r) / (2.0 * r**2 * np.sqrt(np.abs(bends)))
-    return Glints(point, rows, field)
+    return SpecularPoints(point, rows, field)

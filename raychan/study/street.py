@@ -1,4 +1,4 @@
-"""The scene of the trade-off study: the paths of each method through the same noise-free receiver to a map."""
+"""The scene of the trade-off study: each method's paths give a map by the same noise-free receiver."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from raychan.signal.baseband import synthesize
 from raychan.study.cases import Street
 from raychan.study.methods import ADAPTIVE, MIRRORS, POINT, POINTS, UNIFORM, Run, mean_rcs
 from raychan.study.ray_lattice import Echo, Window, echoes
-from raychan.study.specular_points import glints
+from raychan.study.specular_points import specular_points
 from raychan.tracing.legs import Leg, Mirror
 from raychan.tracing.settings import refinement
 from raychan.units import C0
@@ -30,8 +30,8 @@ from raychan.world.scene import Scene
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-_FINE_SAG = 1e-4  # m: largest distance of flat facets from the surface, for the lattice methods
-_NEAR = 3.0  # m: nearer (and, as ranges wrap, at the far end) the map holds ground clutter only
+_FINE_SAG = 1e-4  # m: largest distance of flat facets from the surface, for the lattice methods (not measured)
+_NEAR = 3.0  # m: below it, and as much from the far end, to which ranges fold, the map holds ground clutter only
 _OWN = "ego"  # prefix of bodies that carry the radar
 
 
@@ -66,7 +66,7 @@ class Road:
         return np.asarray(found.power[:, (found.range > _NEAR) & (found.range < found.range[-1] - _NEAR)])
 
     def paths_of(self, parts: list[Echo]) -> Paths:
-        """Return echoes as paths without a record of what they met."""
+        """Return echoes as paths without the bodies that they met."""
         wave = C0 / self.frequency / (4.0 * np.pi)
         columns = {f.name: np.concatenate([getattr(e, f.name) for e in parts]) for f in dataclasses.fields(Echo)}
         keep = columns["amplitude"] != 0.0
@@ -94,7 +94,7 @@ class Road:
 
 
 def tubes(road: Road, tolerance_db: float, checked: bool = True) -> Run:
-    """Return the map by adaptive tubes as `raychan run` does: refined for a tolerance, and launched again for the
+    """Return the map by adaptive tubes as `raychan run` does: refined for a tolerance, with a check launch for the
     error."""
     since = perf_counter()
     f, s, points, geometry = road.frequency, road.radar, road.scene.points(0.0), Geometry(road.facets)
@@ -141,7 +141,7 @@ def specular(road: Road, fine: int) -> Run:
     facets = road.fine if fine else road.facets
     tracer = RayCaster(facets)
     k = 2.0 * np.pi * road.frequency / C0
-    found = glints(tracer, road.end, k)
+    found = specular_points(tracer, road.end, k)
     mine = road.targets(facets)[found.facet]
     parts = [_direct(road, found.point[mine], found.field[mine], facets.velocity[facets.body[found.facet[mine]]])]
     return Run(road.map_of(road.paths_of(parts)), max(tracer.rays, 1), perf_counter() - since)

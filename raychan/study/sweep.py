@@ -22,7 +22,7 @@ from raychan.world.scene import Scene
 Progress = Callable[[str, float], None]
 
 MOST = 100_000
-"""Most steps of a sweep, against typing errors."""
+"""Most steps of a sweep: more are a typing error."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"(?<![\w.:])({_NUMBER}):({_NUMBER}):(\d+)(?![\w.:])")
@@ -67,7 +67,7 @@ class Axis:
         for step in zip(*ranges, strict=True):
             rest = iter(step)
             changes.append(f"{key}={_RANGE.sub(lambda _, rest=rest: f'{next(rest):.15g}', value)}")
-        # A range within a vector is a component, and is called so; the first, where several go along together.
+        # A range within a vector is named by its component; of several that go along together, by the first.
         place = value[: found[0].start()].count(",")
         inner = value.startswith("[") and value.count(",") == 2
         return Axis(f"{key}.{'xyz'[place]}" if inner else key, tuple(ranges[0]), tuple(changes))
@@ -84,7 +84,7 @@ class Axis:
 def _values(text: str, start: str, stop: str, steps: str) -> list[float]:
     if not 1 <= int(steps) <= MOST:
         raise ValueError(f"'{text}': {steps} steps; 1 to {MOST} are allowed")
-    # Rounded so that 0.1 steps print as such; far below what any key can mean.
+    # Rounded so that steps of 0.1 print as such; no key needs more digits.
     return [float(f"{v:.12g}") for v in np.linspace(float(start), float(stop), int(steps))]
 
 
@@ -109,8 +109,8 @@ class Step:
     values: tuple[float, ...]
     seen: Seen | None
     found: Visibility
-    noise_db: float
-    """SNR [dB] of a margin of 0 dB: the least that is reported."""
+    min_snr_db: float
+    """The least SNR [dB] that the receiver reports: a margin of 0 dB."""
 
 
 @dataclass(frozen=True)
@@ -139,13 +139,13 @@ def sweep(
     Raises: SceneError for a change that makes no scene, ValueError for a body that is no target or too many axes.
     """
     if len(axes) > 2:
-        raise ValueError(f"{len(axes)} keys are varied; at most two can be")
+        raise ValueError(f"{len(axes)} keys are varied; at most two are allowed")
     if len({a.key for a in axes}) < len(axes):
         raise ValueError(f"{axes[0].key} is varied twice")
     places = list(product(*(range(len(a.values)) for a in axes)))
     if len(places) > MOST:
         raise ValueError(f"{len(places)} steps; at most {MOST} are allowed")
-    # The first and the last scene are checked before hours go into those between.
+    # The first and the last scene are checked before any time goes into those between.
     for place in (places[0], places[-1]):
         check_target(_scene(scene, axes, place), target)
     tell = progress or (lambda stage, share: None)

@@ -64,9 +64,8 @@ def tradeoff(names: Sequence[str] = (), quick: bool = False, progress: Progress 
 
 
 def overall(rows: Sequence[Row]) -> list[Row]:
-    """Return each setting that ran on every target, with its worst error and total cost, since it is not known
-    beforehand which setting a target needs. The scene, with settings of its own, is left out; empty for fewer than two
-    targets."""
+    """Return each setting that ran on every target, with its worst error and its total cost: which setting a target
+    needs is not known beforehand. The scene has other settings and is left out; empty for fewer than two targets."""
     mine = [r for r in rows if r.case != "urban"]
     count = len({r.case for r in mine})
     groups: dict[tuple[str, str], list[Row]] = {}
@@ -98,7 +97,7 @@ def _target(case: Target, quick: bool, tell: Progress) -> list[Row]:
     for i, e in enumerate(settings):
         runs.append(_timed(e, case))
         tell(case.name, (i + 1) / len(settings))
-    # Settings with the same work have the same cost: their seconds differ by chance only.
+    # Settings that do the same work have the same cost; their seconds differ by chance only.
     work = [(e.method, run.rays, run.value.tobytes()) for e, run in zip(settings, runs, strict=True)]
     rows = []
     for e, run, key in zip(settings, runs, work, strict=True):

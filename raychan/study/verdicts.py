@@ -1,4 +1,4 @@
-"""Conclusions of the trade-off study: whether default settings are on the Pareto front, and the gain over point
+"""Conclusions of the trade-off study: whether default settings are on the Pareto front, and their saving over point
 samples."""
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from raychan.study.tradeoff import Row, beaten_by
 
 EQUAL_DB = {"sphere": 0.5, "car": 1.0}
 """Errors at which the default and point samples are compared [dB]."""
-_NAMED = 3  # most settings named that are better than the default
+_NAMED = 3  # most settings that are named as better than the default
 
 
 def verdicts(rows: Sequence[Row]) -> list[str]:

@@ -26,8 +26,7 @@ from raychan.world.scene import Scene
 DIFFRACTED = "diffracted"
 WAYS = (DIRECT, MULTIPATH, DIFFRACTED)
 
-_FINE = 4  # zero padding with which the strongest cell is within 0.2 dB of the peak
-_SLOTS = 8  # most interactions of a diffracted path
+_FINE = 4  # zero padding with which the strongest cell is within 0.2 dB of the peak (command not recorded)
 
 
 @dataclass(frozen=True)
@@ -82,8 +81,8 @@ def check_target(scene: Scene | None, target: str) -> Scene:
 
 
 def is_background(body: Body) -> bool:
-    """Tell whether a body is never a target (see run.chain.background)."""
-    return bool(body.kind == MIRROR or body.name.startswith("ego"))
+    """Return whether a body is never a target (see run.simulate.background)."""
+    return bool(body.resolved_role == MIRROR or body.name.startswith("ego"))
 
 
 def led_by(result: Result, target: str) -> tuple[int, ...]:

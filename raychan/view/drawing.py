@@ -23,12 +23,12 @@ _NAMED = {
     "black": "#3a3a3a", "grey": "#8a8a8a", "gray": "#8a8a8a", "silver": "#b8bcc0", "orange": "#e07b39",
     "brown": "#7b5a3c",
 }  # fmt: skip
-"""A body whose name says its colour is drawn in it."""
+"""A body with a colour in its name is drawn in that colour."""
 
 GLASS, GROUND = "#9fc5d8", "#b9b6ae"
-_RAYS = 30
+_RAYS = 30  # most rays that are drawn
 _LINES = 8  # chains that a caption lists
-_ASIDE = 0.25  # opacity of bodies that have no part in a cell
+_FAINT = 0.25  # opacity of bodies that no path of a cell meets
 _WEAKEST_DB = 45.0  # rays weaker than the strongest by more than this are not drawn
 
 
@@ -55,7 +55,7 @@ class Ray:
 
     @property
     def text(self) -> str:
-        """The way, its power and its label in words."""
+        """The ray's bodies, power and label as a line."""
         return f"{self.name}: {self.power:.1f} dBm {self.label}{'' if self.converged else ', not converged'}"
 
     def strokes(self, dash: float) -> list[Floats]:
@@ -85,7 +85,7 @@ class Drawing:
     targets: tuple[tuple[str, tuple[float, float, float]], ...]
     """Names and places to write them."""
     caption: str = ""
-    """What is shown, where only some of the rays are."""
+    """The chains of bodies of a cell, where only its rays are shown."""
 
     @property
     def note(self) -> str:
@@ -151,7 +151,7 @@ def draw(
         )
         if not mine.any():
             continue
-        thin = 1.0 if met is None or name in met else _ASIDE
+        thin = 1.0 if met is None or name in met else _FAINT
         for rows, tint, opacity in ((mine & ~glass, colour, thin), (mine & glass, GLASS, 0.4 * thin)):
             if rows.any():
                 shapes.append(Shape(name, facets.vertices[rows], tint, opacity))
@@ -174,7 +174,7 @@ def draw(
 
 
 def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
-    """Return the strongest path of each chain of a detection, weakest first; without detections, of each chain."""
+    """Return the strongest path of each chain behind a detection, weakest first; without detections, of every chain."""
     paths, known = result.paths, chains(result.paths, result.receiver.background)
     size = np.abs(paths.amplitude)
     index = {chain: i for i, chain in enumerate(known.names)}

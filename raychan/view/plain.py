@@ -1,4 +1,4 @@
-"""The drawing by matplotlib, where there is no OpenGL: places are right, but surfaces may overlap wrongly."""
+"""The drawing by matplotlib, where there is no OpenGL: positions are right, but surfaces may overlap wrongly."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from raychan.report.canvas import collections, figure, save, style
 from raychan.view.drawing import Drawing
 
-_DASH = 0.015  # of the scene's diagonal
-_MOST = 6000  # triangles drawn of a shape; matplotlib sorts and paints them one by one
+_DASH = 0.015  # length of a dash over the scene's diagonal
+_MOST = 6000  # triangles drawn of a shape: matplotlib sorts and paints them one by one (not measured)
 
 
 def _largest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:

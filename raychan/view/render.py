@@ -12,11 +12,11 @@ import numpy as np
 
 from raychan.view.drawing import Drawing
 
-_SIZE = (2000, 1125)
+_SIZE = (2000, 1125)  # pixels
 _MAP = "plasma"
 _POWER = "received power [dBm]"
-_DASH = 8.0  # radii of a ray: a dash, and the gap after it
-_LEAST_SPAN_DB = 4.0  # of the scale, so that no two of its labels read alike
+_DASH = 8.0  # length of a dash, and of the gap after it, in radii of a ray
+_LEAST_SPAN_DB = 4.0  # of the colour scale, so that its labels in whole dB differ
 
 
 def screenshot(drawing: Drawing, path: str | Path) -> None:

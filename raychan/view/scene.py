@@ -14,8 +14,8 @@ from raychan.run.result import Explanation, Result
 from raychan.view import plain
 from raychan.view.drawing import Drawing, draw
 
-_PATIENCE_S = 180.0
-_PNG_END = b"IEND\xaeB`\x82"  # without it the disk was full
+_PATIENCE_S = 180.0  # for one picture; a driver that hangs is given up then (not measured)
+_PNG_END = b"IEND\xaeB`\x82"  # missing where the disk was full
 
 
 def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | None = None) -> Drawing:
@@ -30,7 +30,7 @@ def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | Non
 
 
 def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:
-    """Draw into a PNG and return warnings: empty, or why matplotlib drew it.
+    """Draw into a PNG and return warnings: none, or the reason why matplotlib drew it.
 
     pyvista runs in a process of its own, so that a driver that crashes or hangs is only a warning.
     """
@@ -38,14 +38,14 @@ def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:
     if trouble is None:
         return []
     plain.picture(drawing, path)
-    return [f"scene picture drawn by matplotlib, for OpenGL is not to be had here ({trouble})"]
+    return [f"scene picture drawn by matplotlib, as OpenGL is not available ({trouble})"]
 
 
 def _rendered(drawing: Drawing, path: Path) -> str | None:
     if os.environ.get("RAYCHAN_NO_OPENGL"):
         return "RAYCHAN_NO_OPENGL is set"
     try:
-        picture, trouble = _in_a_process_of_its_own(drawing)
+        picture, trouble = _in_own_process(drawing)
     except OSError as error:
         return f"no room for the drawing in {tempfile.gettempdir()}: {error.strerror or error}"
     if trouble is None:
@@ -53,7 +53,7 @@ def _rendered(drawing: Drawing, path: Path) -> str | None:
     return trouble
 
 
-def _in_a_process_of_its_own(drawing: Drawing) -> tuple[bytes, str | None]:
+def _in_own_process(drawing: Drawing) -> tuple[bytes, str | None]:
     """Return the rendered PNG, or why there is none."""
     with tempfile.TemporaryDirectory() as room:
         held, made = Path(room) / "drawing.npz", Path(room) / "scene.png"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from raychan.run.output_files import write_whole
 from raychan.view.drawing import Drawing, Ray
 
-_DASH = 0.008  # of the scene's diagonal
+_DASH = 0.008  # length of a dash over the scene's diagonal
 
 
 def page(drawing: Drawing, path: str | Path) -> Path:

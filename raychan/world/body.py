@@ -92,7 +92,7 @@ class Body:
         return Motion((x, y, z), yaw, pitch, roll, (u, v, w), turn, (spin[0], spin[1], spin[2]))
 
     def _numbers(self, name: str, limit: Limit, count: int = 1) -> list[float]:
-        """Return a field as so many numbers; SceneError where they are not, or cannot be meant."""
+        """Return a field as `count` numbers. Raises: SceneError where they are no numbers or beyond their limit."""
         value = getattr(self, name)
         try:
             found = [float(x) for x in np.atleast_1d(np.asarray(value, float)).ravel()]
@@ -119,8 +119,8 @@ class Body:
         return moved
 
     @property
-    def kind(self) -> Role:
-        """What it does besides blocking: as `role` says; else the ground mirrors, a body of given RCS blocks."""
+    def resolved_role(self) -> Role:
+        """What it does besides blocking: as `role` says; else the ground mirrors, a body of given RCS only blocks."""
         if self.role is not None:
             if self.role not in ROLES:
                 raise SceneError(

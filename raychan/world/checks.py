@@ -23,7 +23,7 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
     at = np.array(radar.position)
     for body in bodies:
         local, mesh = body.motion.to_body(at), body.geometry
-        if body.kind == MIRROR:
+        if body.resolved_role == MIRROR:
             c = mesh.corners[0]
             n = np.cross(c[1] - c[0], c[2] - c[0])
             if n @ (local - c[0]) <= 0.0:
@@ -65,7 +65,7 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
     at, own = np.array(radar.position), np.array(radar.velocity_mps)
     limit, top = waveform.unambiguous_range, waveform.unambiguous_rate * waveform.carrier / waveform.middle
     for body in bodies:
-        if body.kind == MIRROR or _near_and_slow(body, at, own, limit, top):
+        if body.resolved_role == MIRROR or _near_and_slow(body, at, own, limit, top):
             continue
         place = nearest_point(body, at) if body.rcs_dbsm is None else body.motion.to_world(body.target_point())
         way = place - at

@@ -256,20 +256,20 @@ class HasBodies(Protocol):
     @property
     def inner_spheres(self) -> Spheres: ...
     @property
-    def still(self) -> StaticGeometry | None: ...
+    def static_geometry(self) -> StaticGeometry | None: ...
     @property
-    def kept(self) -> dict[Any, Any]: ...
+    def _derived(self) -> dict[Any, Any]: ...
     def facets(self) -> Facets: ...
 
 
 def surface_at(scene: HasBodies) -> Geometry:
     """Return the geometry of a scene's bodies at time 0."""
-    return Geometry(scene.facets(), scene.topology, scene.inner_spheres, scene.still)
+    return Geometry(scene.facets(), scene.topology, scene.inner_spheres, scene.static_geometry)
 
 
 def geometry_of(scene: HasBodies) -> Geometry:
     """Return the geometry of a scene's bodies at time 0, built once and kept with the scene."""
-    if Geometry not in scene.kept:
-        scene.kept[Geometry] = surface_at(scene)
-    kept: Geometry = scene.kept[Geometry]
-    return kept
+    if Geometry not in scene._derived:
+        scene._derived[Geometry] = surface_at(scene)
+    geometry: Geometry = scene._derived[Geometry]
+    return geometry

@@ -27,8 +27,8 @@ class Limit:
     def allowed(self) -> str:
         """What is allowed, and why, as messages say it."""
         unit = f" {self.unit}" if self.unit else ""
-        ends = f"above {self.low:g} and at most" if self.above else f"between {self.low:g} and"
-        return f"{ends} {self.high:g}{unit}: {self.why}"
+        ends = f"above {_exact(self.low)} and at most" if self.above else f"between {_exact(self.low)} and"
+        return f"{ends} {_exact(self.high)}{unit}: {self.why}"
 
     @property
     def text(self) -> str:
@@ -52,6 +52,11 @@ class Limit:
         return Limit(self.low * factor, self.high * factor, unit, self.why, self.above)
 
 
+def _exact(value: float) -> str:
+    """Return a number in short form; a whole one with all digits where the short form is another number."""
+    return f"{value:,}" if isinstance(value, int) and float(f"{value:g}") != value else f"{value:g}"
+
+
 LENGTH = Limit(0.0, 1e6, "m", "a scene is no wider than a radar's horizon", above=True)
 PLACE = Limit(-1e6, 1e6, "m", "a scene is no wider than a radar's horizon; count from an origin near it")
 WIDTH = Limit(0.0, 1e4, "m", "float32 rays do not tell the facets of a wider body apart; is it the unit, as mm?")
@@ -68,23 +73,23 @@ FREQUENCY = Limit(1e8, 1e12, "Hz", "below, bodies are no longer large in wavelen
 CARRIER_GHZ = FREQUENCY.times(1e-9, "GHz")
 BANDWIDTH_MHZ = Limit(1e-3, 1e6, "MHz", "a range cell from 0.15 mm to 150 km; it must also be below the carrier")
 RAMP_US = Limit(1e-3, 1e6, "us", "a ramp lasts between a nanosecond and a second")
-CHIRPS = Limit(1, 1 << 20, "", "a frame of more ramps is no frame of any radar")
-SAMPLES = Limit(1, 1 << 20, "", "a ramp of more samples is no ramp of any radar")
+CHIRPS = Limit(1, 1 << 20, "", "no radar's frame has more ramps")
+SAMPLES = Limit(1, 1 << 20, "", "no radar samples a ramp more often")
 PAD = Limit(1, 64, "", "1 pads nothing; more than 64 only draws the same map finer")
-CELLS = Limit(0, 1000, "cells", "cells about the one under test")
+CELLS = Limit(0, 1000, "cells", "cells on each side of the one under test")
 
 POWER_DBM = Limit(-100.0, 100.0, "dBm", "from less than a receiver's noise to ten megawatts")
 NOISE_DB = Limit(0.0, 60.0, "dB", "no receiver is quieter than 290 K noise in, nor useful above 60 dB")
 RCS_DBSM = Limit(-100.0, 100.0, "dBsm", "from a grain of dust to more than any ship seen broadside")
-GAIN_DBI = Limit(-60.0, 80.0, "dBi", "from a leak to the largest dishes")
-LOSS_DB = Limit(-60.0, 100.0, "dB", "an antenna that loses more sends nothing; below 0 it mends a published gain")
-LEVEL_DB = Limit(-400.0, 400.0, "dB", "a level beyond is no level")
-WAVELENGTHS = Limit(0.01, 100.0, "wavelengths", "elements closer couple, farther ones are no array")
+GAIN_DBI = Limit(-60.0, 80.0, "dBi", "from leakage to the largest dishes")
+LOSS_DB = Limit(-60.0, 100.0, "dB", "above, an antenna radiates nothing; below 0, it corrects a published gain")
+LEVEL_DB = Limit(-400.0, 400.0, "dB", "levels beyond are not physical")
+WAVELENGTHS = Limit(0.01, 100.0, "wavelengths", "closer elements couple; farther ones make no array")
 ELEMENTS = Limit(1, 256, "", "a row of at most 256 elements")
 ROW_WAVELENGTHS = 128.0
 """Most that a row of elements may span: its pattern is integrated over the sphere, to the square of this."""
 
-PFA = Limit(1e-15, 0.5, "", "a probability of false alarm that training cells can tell")
+PFA = Limit(1e-15, 0.5, "", "a false alarm probability that training cells can resolve")
 SNR_DB = Limit(-100.0, 300.0, "dB", "a level over noise")
 TOLERANCE_DB = Limit(1e-3, 40.0, "dB", "below, rounding shows; above, an error says nothing")
 BOUNCES = Limit(1, 12, "", "each bounce costs more and brings less; paths hold 12")
@@ -96,6 +101,6 @@ SEED = Limit(0, (1 << 63) - 1, "", "seeds are whole numbers of 63 bits")
 
 EPS_R = Limit(1.0, 1e4, "", "of passive materials: 1 is vacuum, 80 water")
 SIGMA = Limit(0.0, 1e9, "S/m", "of passive materials: silver has 6e7")
-THICKNESS_MM = Limit(1e-3, 1e4, "mm", "a thinner layer is none, a thicker one opaque: leave the key out", above=True)
+THICKNESS_MM = Limit(1e-3, 1e4, "mm", "thinner has no effect, thicker is opaque: leave the key out", above=True)
 ROUGHNESS_MM = Limit(0.0, 1e3, "mm", "rms height of a surface, not of a landscape")
 SCALE = Limit(1e-9, 1e9, "", "a factor on a mesh's size", above=True)

@@ -39,7 +39,7 @@ def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
     Args: opaque: which bodies let no wave through. A body wholly inside one that lets waves in is intended.
     """
     said = []
-    solid = [i for i, body in enumerate(bodies) if body.kind != MIRROR]
+    solid = [i for i, body in enumerate(bodies) if body.resolved_role != MIRROR]
     boxes = {i: _box(bodies[i]) for i in solid}
     for i, k in combinations(solid, 2):
         low, high = np.maximum(boxes[i][0], boxes[k][0]), np.minimum(boxes[i][1], boxes[k][1])
@@ -84,7 +84,7 @@ def _inside(body: Body, other: Body) -> float:
 
 def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
     """Return a line where no body is in view of the radar, in its beam, or within its unambiguous range."""
-    things = [b for b in bodies if b.kind != MIRROR and not b.name.startswith("ego")]
+    things = [b for b in bodies if b.resolved_role != MIRROR and not b.name.startswith("ego")]
     if not things:
         return ["no body is in view: the scene has none but ground and the radar's own car (bodies)"]
     spread = [surface_sample(b) for b in things]

@@ -62,7 +62,7 @@ def _posed(bodies: Sequence[Body], which: Sequence[int], index: Index, frequency
         body=stack([np.full(len(m.faces), b, np.int32) for b, m in zip(which, meshes, strict=True)], (), np.int32),
         part=stack([numbers[b][1][m.part] for b, m in zip(which, meshes, strict=True)], (), np.int32),
         material=stack([numbers[b][0][m.part] for b, m in zip(which, meshes, strict=True)], (), np.int32),
-        role=np.array([b.kind for b in bodies], np.int8),
+        role=np.array([b.resolved_role for b in bodies], np.int8),
         origin=origins,
         velocity=np.array([b.motion.velocity for b in bodies], float).reshape(-1, 3),
         spin=np.array([b.motion.spin(time) for b in bodies]).reshape(-1, 3),

@@ -2,24 +2,61 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationError, ValidatorFunctionWrapHandler, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from raychan.world import limits
 from raychan.world.limits import Limit
 
+WRONG_TYPE = "wrong_type"
+"""Type of the error of a value that is no number or no list, as pydantic's own end in _type."""
 
-def _within(limit: Limit) -> AfterValidator:
-    """Return the check that a number lies within a limit."""
 
-    def check(value: float) -> float:
-        if not limit.allows(value):
-            raise PydanticCustomError("limit", "{allowed}", {"allowed": limit.allowed})
-        return value
+class Within(WrapValidator):
+    """The check that a value is a number within a limit."""
 
-    return AfterValidator(check)
+
+def _within(limit: Limit, number: str = "a number") -> Within:
+    """Return the check that a value is a number within a limit; its error says what is allowed."""
+    allowed = f"{number} {limit.allowed}"
+
+    def check(value: Any, parsed: ValidatorFunctionWrapHandler) -> Any:
+        try:
+            found = parsed(value)
+        except ValidationError as e:
+            raise _refused(str(e.errors()[0]["type"]), allowed) from None
+        if not limit.allows(found):
+            raise _refused("limit", allowed)
+        return found
+
+    return Within(check)
+
+
+def _whole(limit: Limit) -> Within:
+    """Return the check that a value is a whole number within a limit."""
+    return _within(limit, "a whole number")
+
+
+def _listed(allowed: str) -> WrapValidator:
+    """Return the check that a value is a list of the right length; its error says what is allowed."""
+
+    def check(value: Any, parsed: ValidatorFunctionWrapHandler) -> Any:
+        try:
+            return parsed(value)
+        except ValidationError as e:
+            # Errors of single items keep their own key and text.
+            own = [str(x["type"]) for x in e.errors() if not x["loc"] or x["type"] == "missing"]
+            if own:
+                raise _refused(own[0], allowed) from None
+            raise
+
+    return WrapValidator(check)
+
+
+def _refused(kind: str, allowed: str) -> PydanticCustomError:
+    return PydanticCustomError(WRONG_TYPE if kind.endswith("_type") else "limit", "{allowed}", {"allowed": allowed})
 
 
 def _window(name: str) -> str:
@@ -34,14 +71,19 @@ def _window(name: str) -> str:
     return name
 
 
+def _three(limit: Limit) -> WrapValidator:
+    """Return the check that a value is a list of three numbers."""
+    return _listed(f"3 numbers, each {limit.allowed}")
+
+
 _REAL = Field(strict=True, allow_inf_nan=False)
 _WHOLE = Field(strict=True)
 _THREE = Field(min_length=3, max_length=3)
 
-Place = Annotated[list[Annotated[float, _REAL, _within(limits.PLACE)]], _THREE]
-Speed = Annotated[list[Annotated[float, _REAL, _within(limits.SPEED)]], _THREE]
-Spin = Annotated[list[Annotated[float, _REAL, _within(limits.TURN)]], _THREE]
-Offset = Annotated[list[Annotated[float, _REAL, _within(limits.OFFSET_MM)]], _THREE]
+Place = Annotated[list[Annotated[float, _REAL, _within(limits.PLACE)]], _THREE, _three(limits.PLACE)]
+Speed = Annotated[list[Annotated[float, _REAL, _within(limits.SPEED)]], _THREE, _three(limits.SPEED)]
+Spin = Annotated[list[Annotated[float, _REAL, _within(limits.TURN)]], _THREE, _three(limits.TURN)]
+Offset = Annotated[list[Annotated[float, _REAL, _within(limits.OFFSET_MM)]], _THREE, _three(limits.OFFSET_MM)]
 Angle = Annotated[float, _REAL, _within(limits.ANGLE)]
 Turn = Annotated[float, _REAL, _within(limits.TURN)]
 Beam = Annotated[float, _REAL, _within(limits.BEAM)]
@@ -64,14 +106,19 @@ Permittivity = Annotated[float, _REAL, _within(limits.EPS_R)]
 Conductivity = Annotated[float, _REAL, _within(limits.SIGMA)]
 Thickness = Annotated[float, _REAL, _within(limits.THICKNESS_MM)]
 Roughness = Annotated[float, _REAL, _within(limits.ROUGHNESS_MM)]
-Chirps = Annotated[int, _WHOLE, _within(limits.CHIRPS)]
-Samples = Annotated[int, _WHOLE, _within(limits.SAMPLES)]
-Row = Annotated[int, _WHOLE, _within(limits.ELEMENTS)]
-Pad = Annotated[int, _WHOLE, _within(limits.PAD)]
-Cells = Annotated[int, _WHOLE, _within(limits.CELLS)]
-Bounces = Annotated[int, _WHOLE, _within(limits.BOUNCES)]
-Layers = Annotated[int, _WHOLE, _within(limits.LAYERS)]
-Tracings = Annotated[int, _WHOLE, _within(limits.TRACINGS)]
+Chirps = Annotated[int, _WHOLE, _whole(limits.CHIRPS)]
+Samples = Annotated[int, _WHOLE, _whole(limits.SAMPLES)]
+Row = Annotated[int, _WHOLE, _whole(limits.ELEMENTS)]
+Pad = Annotated[int, _WHOLE, _whole(limits.PAD)]
+Cells = Annotated[int, _WHOLE, _whole(limits.CELLS)]
+Bounces = Annotated[int, _WHOLE, _whole(limits.BOUNCES)]
+Layers = Annotated[int, _WHOLE, _whole(limits.LAYERS)]
+Tracings = Annotated[int, _WHOLE, _whole(limits.TRACINGS)]
 Window = Annotated[str, AfterValidator(_window)]
-Bearing = Annotated[tuple[Angle, Rcs], Field(strict=False)]
-CellPair = tuple[Cells, Cells]
+Bearing = Annotated[tuple[Angle, Rcs], Field(strict=False), _listed("[azimuth_deg, dBsm], a pair of numbers")]
+Bearings = Annotated[list[Bearing], Field(min_length=2), _listed("2 or more pairs [azimuth_deg, dBsm]")]
+Offsets = Annotated[
+    list[Offset], Field(min_length=1, max_length=4096), _listed("1 to 4096 receivers, each [x, y, z] in mm")
+]
+CellPair = Annotated[tuple[Cells, Cells], _listed(f"2 whole numbers, each {limits.CELLS.allowed}")]
+PadPair = Annotated[tuple[Pad, Pad], _listed(f"2 whole numbers, each {limits.PAD.allowed}")]

@@ -43,7 +43,7 @@ class Scene(Described):
     Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar an object, a table as
     in a scene file, or None; processing of the receiver, an object or a table (default the radar's own); model a table
     of what is modelled; materials by name, which bodies may use; folder to which file names refer.
-    Raises: SceneError for a scene that cannot be.
+    Raises: SceneError for a scene that cannot be simulated.
 
     >>> Scene(bodies=[Body(name="wall", shape="plate", position=(10, 0, 0))]).frequency
     77000000000.0
@@ -80,10 +80,10 @@ class Scene(Described):
         self.materials = dict(materials or {})
         self._data: dict[str, Any] | None = None
         self._tables: Sequence[BodyTable] = ()
-        # Cache of what other modules derive from the bodies at time 0, by class; shared by scenes with the same bodies.
-        self.kept: dict[Any, Any] = {}
+        # What `geometry_of` derives from the bodies at time 0, by class; shared by scenes with the same bodies.
+        self._derived: dict[Any, Any] = {}
         # Cache of the static bodies' geometry, shared by this scene at all times.
-        self._still: dict[type, StaticGeometry | None] = {}
+        self._static: dict[type, StaticGeometry | None] = {}
         try:
             self._prepare()
         except SceneError as e:
@@ -130,7 +130,7 @@ class Scene(Described):
         )
         scene._data, scene._tables = dict(data), tables.bodies
         if like is not None and scene._stands_as(like):
-            scene.kept = like.kept
+            scene._derived = like._derived
         return scene
 
     def to_toml(self) -> str:
@@ -155,11 +155,11 @@ class Scene(Described):
         return self._of(overrides.changed(self._data, changes, self.path), self.path, text, self)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Caches stay behind: a copy, perhaps in another process, makes its own.
-        return self.__dict__ | {"kept": {}, "_still": {}}
+        # Without caches: a copy, perhaps in another process, makes its own.
+        return self.__dict__ | {"_derived": {}, "_static": {}}
 
     def _stands_as(self, other: Scene) -> bool:
-        """Tell whether both scenes have the same bodies at the same places, of the same materials."""
+        """Return whether both scenes have the same bodies at the same places, of the same materials."""
         alike = len(self.bodies) == len(other.bodies) and all(map(is_, self.bodies, other.bodies))
         return alike and (self.materials, self.frequency) == (other.materials, other.frequency)
 
@@ -169,12 +169,12 @@ class Scene(Described):
         for body in self.bodies:
             if body.name in seen:
                 raise SceneError(
-                    "two bodies of one name", key=f"bodies.{body.name}", allowed="a name of its own for each"
+                    "two bodies have this name", key=f"bodies.{body.name}", allowed="a different name for each"
                 )
             seen.add(body.name)
             try:
                 self._chosen(body)
-                _ = body.motion, body.kind
+                _ = body.motion, body.resolved_role
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.bodies = over_seams(self.bodies)
@@ -198,8 +198,8 @@ class Scene(Described):
             return self
         moved = copy(self)
         moved.bodies = tuple(b.at(time) for b in self.bodies)
-        moved.kept = self.kept if moved._stands_as(self) else {}
-        moved._still = self._still
+        moved._derived = self._derived if moved._stands_as(self) else {}
+        moved._static = self._static
         if self.radar_table is not None:
             there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
             moved.radar_table = self.radar_table.model_copy(update={"position": there.tolist()})
@@ -213,7 +213,7 @@ class Scene(Described):
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
         return moved
 
-    def bare(self) -> Scene:
+    def without_caches(self) -> Scene:
         """Return a copy without caches, for results that outlive the run."""
         return copy(self)
 
@@ -223,7 +223,7 @@ class Scene(Described):
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What a user should know: odd meshes, materials out of range, overlaps, nothing in view, aliased targets."""
+        """Warnings: odd meshes, materials out of range, overlaps, bodies out of view, aliased targets."""
         said = [note for body in self.bodies for note in body.notes()]
         used = {
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
@@ -263,16 +263,16 @@ class Scene(Described):
         return list(materials), list(parts), rows
 
     @property
-    def still(self) -> StaticGeometry | None:
+    def static_geometry(self) -> StaticGeometry | None:
         """Geometry of the static bodies, shared by all instants; None where it does not pay."""
-        if StaticGeometry not in self._still:
-            self._still[StaticGeometry] = StaticGeometry.of(self.bodies)
-        still = self._still[StaticGeometry]
-        return still and still.at(self.bodies)
+        if StaticGeometry not in self._static:
+            self._static[StaticGeometry] = StaticGeometry.of(self.bodies)
+        static = self._static[StaticGeometry]
+        return static and static.at(self.bodies)
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        return posed(self.bodies, self._index, self.frequency, time, self.still)
+        return posed(self.bodies, self._index, self.frequency, time, self.static_geometry)
 
     @property
     def topology(self) -> list[MeshTopology]:
@@ -281,10 +281,10 @@ class Scene(Described):
 
     @property
     def inner_spheres(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
-        """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of balls inside bodies at time 0."""
+        """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of spheres inside bodies at time 0."""
         found = []
         for i, b in enumerate(self.bodies):
-            if b.kind != MIRROR:
+            if b.resolved_role != MIRROR:
                 centre, radius = b.geometry.inner_spheres(tuple(m.kind != LAYER for m in self._chosen(b)))
                 found.append((b.motion.to_world(centre), radius, np.full(len(radius), i, np.int32)))
         centres, radii, owners = zip(*found, strict=True) if found else ((), (), ())

@@ -1,4 +1,4 @@
-"""The scene file's tables and keys: what may stand in them, in the units people use."""
+"""The tables and keys of a scene file, with types and limits in the units of the file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from raychan.world.quantities import (
     Angle,
     Bandwidth,
     Beam,
-    Bearing,
+    Bearings,
     Bounces,
     Carrier,
     CellPair,
@@ -23,8 +23,8 @@ from raychan.world.quantities import (
     Level,
     Loss,
     Noise,
-    Offset,
-    Pad,
+    Offsets,
+    PadPair,
     Permittivity,
     Pfa,
     Place,
@@ -161,7 +161,7 @@ class RadarTable(Table):
     tx_antenna: str | AntennaTable | None = None
     rx_antenna: str | AntennaTable | None = None
     polarization: Literal["V", "H"] = "V"
-    elements_mm: Annotated[list[Offset], Field(min_length=1, max_length=4096)] = [[0.0, 0.0, 0.0]]
+    elements_mm: Offsets = [[0.0, 0.0, 0.0]]
     """Receiver phase centres in the antenna's frame."""
     waveform: WaveformTable
 
@@ -171,7 +171,7 @@ class ProcessingTable(Table):
 
     range_window: Window = "hann"
     rate_window: Window = "hann"
-    pad: tuple[Pad, Pad] = (2, 2)
+    pad: PadPair = (2, 2)
     """Zero padding along range and range rate, as a multiple of the samples."""
     cfar: Literal["ca", "os"] = "os"
     pfa: Pfa = 1e-7
@@ -182,7 +182,7 @@ class ProcessingTable(Table):
 
 
 class Model(Table):
-    """[model]: what the channel takes into account, and how well."""
+    """[model]: the mechanisms that are modelled, and the tolerance."""
 
     mode: Literal["physical", "auto"] = "physical"
     """physical: all that max_bounces and max_transmissions allow; auto: of these only what tolerance_db needs."""
@@ -190,8 +190,8 @@ class Model(Table):
     tolerance_db: Tolerance = 0.5
     max_transmissions: Layers = 4
     retrace: Literal["auto"] | Tracings = "auto"
-    """How often a frame is traced; auto: if bodies turn, as often as tolerance_db needs; 1: once, and paths keep the
-    rates of the frame's start; more: so often, and all that moves is carried on in between."""
+    """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, and paths keep the
+    range rates of the frame's start; more: all moving bodies are extrapolated between the tracings."""
     diffraction: bool = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
 
@@ -231,11 +231,11 @@ class BodyTable(Table):
     velocity_mps: Speed = [0.0, 0.0, 0.0]
     turn_rate_dps: Turn = 0.0
     spin_dps: Spin = [0.0, 0.0, 0.0]
-    """About the body's own axes, as of a wheel: about its origin."""
-    rcs_dbsm: Rcs | Annotated[list[Bearing], Field(min_length=2)] | None = None
-    """Makes the body a point target: a figure, or [azimuth_deg, dBsm] pairs seen from its heading."""
+    """About the body's own axes through its origin, as a wheel spins."""
+    rcs_dbsm: Rcs | Bearings | None = None
+    """Makes the body a point target: a number, or [azimuth_deg, dBsm] pairs relative to its heading."""
     rcs_point: Place | None = None
-    """Where it stands, body frame; default the middle of the body."""
+    """Place of the point target, body frame [m]; default the middle of the body."""
     role: Literal["scatterer", "mirror", "blocker"] | None = None
 
     @model_validator(mode="after")

@@ -17,9 +17,25 @@ def checked(kind: type[Any], data: Any, file: Any = None) -> Any:
         raise _explained(kind, data, e, file) from None
 
 
+_TYPES = {
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "string_pattern_mismatch": "a text without dots, spaces and control characters",
+    "string_too_short": "a text of at least {min_length} character",
+    "string_too_long": "a text of at most {max_length} characters",
+}
+"""What is allowed, by the type of pydantic's error; errors of other types say it themselves."""
+
+
 def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: Any) -> SceneError:
     # Unknown keys first: a misspelt key also makes its right spelling missing.
-    found = sorted(error.errors(), key=_weight)[0]
+    ranked = sorted(error.errors(), key=_weight)
+    found = ranked[0]
     loc, value = found["loc"], found.get("input")
     key = _dotted(loc, data, found["type"] in ("missing", "extra_forbidden"))
     if found["type"] == "extra_forbidden":
@@ -27,12 +43,22 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
         return SceneError(
             f"unknown key '{loc[-1]}'", file=file, key=key, value=value, allowed=nearest(str(loc[-1]), known)
         )
-    message = found["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     if found["type"] == "missing":
         return SceneError("key is missing", file=file, key=key, allowed="a value")
     if found["type"] == "value_error":
-        return SceneError("keys do not fit together", file=file, key=key, value=value, allowed=message)
-    return SceneError(f"{shown(value)} is not possible", file=file, key=key, value=value, allowed=message)
+        return SceneError("keys do not fit together", file=file, key=key, value=value, allowed=_allowed(found))
+    # A key that takes several types has an error for each.
+    alike = [e for e in ranked if len(e["loc"]) == len(loc) and _dotted(e["loc"], data, False) == key]
+    allowed = " or ".join(dict.fromkeys(map(_allowed, alike)))
+    return SceneError(f"{shown(value)} is not possible", file=file, key=key, value=value, allowed=allowed)
+
+
+def _allowed(found: Any) -> str:
+    """Return what is allowed where pydantic found an error."""
+    text = _TYPES.get(found["type"])
+    if text is not None:
+        return text.format(**found.get("ctx", {}))
+    return str(found["msg"]).removeprefix("Input should be ").removeprefix("Value error, ")
 
 
 def _weight(found: Any) -> tuple[bool, bool, int]:

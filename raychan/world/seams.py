@@ -23,7 +23,7 @@ def over_seams(bodies: Sequence[Body]) -> tuple[Body, ...]:
     groups: dict[Any, list[int]] = {}
     for i, body in enumerate(bodies):
         mesh = body.geometry
-        if mesh.crease_deg and mesh.report.open_edges and body.kind != MIRROR:
+        if mesh.crease_deg and mesh.report.open_edges and body.resolved_role != MIRROR:
             groups.setdefault((_moves(body), mesh.crease_deg), []).append(i)
     out = list(bodies)
     for (_, crease), members in groups.items():

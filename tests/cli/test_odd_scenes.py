@@ -138,6 +138,6 @@ def test_info_takes_unit_and_up_of_meshes_and_of_nothing_else(tmp_path, capsys):
     said = capsys.readouterr()
     assert "4.500 x 1.800 x 1.400 m" in said.out and said.err == ""
     assert invoke(["info", str(SCENES / "urban.toml"), "--up", "z"]) == 2
-    assert "no mesh file" in capsys.readouterr().err
+    assert "is not a mesh file" in capsys.readouterr().err
     assert invoke(["info", str(file), "--unit", "parsec"]) == 2
     assert "parsec" in capsys.readouterr().err

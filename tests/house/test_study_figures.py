@@ -30,7 +30,7 @@ def printed() -> set[float]:
             found.append(abs(float(at)))
 
     for table in tomllib.loads((ROOT / "validation" / "tables.toml").read_text(encoding="utf-8"))["table"]:
-        walk([table.get("rows"), [f["theirs"] for f in table.get("figure", ())]])
+        walk([table.get("rows"), [f["printed"] for f in table.get("figure", ())]])
     for file in (ROOT / "scenes" / "antennas").glob("*.toml"):
         walk(tomllib.loads(file.read_text(encoding="utf-8")))
     return {x for x in found if digits(x) >= 3}

@@ -87,7 +87,7 @@ def test_what_stands_in_the_way_is_told_and_stays(tmp_path):
     put(out, data="new")
     assert tree(out) == {"data": "new", "beach.jpg": "mine"}
     (out / "a.png").mkdir()
-    with pytest.raises(StoreError, match="is a directory where a file"):
+    with pytest.raises(StoreError, match="is a directory in the place of a file"):
         put(out, data="newer")
     assert (out / "data").read_text() == "new"
 

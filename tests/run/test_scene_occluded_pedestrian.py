@@ -33,7 +33,7 @@ PARTS = {
 }
 TABLE_10 = table(10)
 SPEED = 0.15  # m/s
-GHOST, WITHIN = TABLE_10["ghost"]["range"]["theirs"], TABLE_10["ghost"]["range"]["within"]
+GHOST, WITHIN = TABLE_10["ghost"]["range"]["printed"], TABLE_10["ghost"]["range"]["within"]
 STANDS = table(4)["pedestrian"]["range"]
 BIN = 0.0375  # m: c / 2B at 4 GHz
 
@@ -60,8 +60,8 @@ def with_pedestrian(result):
 @pytest.mark.parametrize("thing", PARTS)
 def test_parts_of_car_and_truck_are_detected_where_table_10_has_them(base, thing):
     row = TABLE_10[thing]
-    at = row["range"] if isinstance(row["range"], dict) else {"theirs": row["range"], "within": 0.1}
-    here = near(base, at["theirs"], at["within"])
+    at = row["range"] if isinstance(row["range"], dict) else {"printed": row["range"], "within": 0.1}
+    here = near(base, at["printed"], at["within"])
     rows = [i for i in here if any(p in base.provenance[i].bodies for p in PARTS[thing])]
     assert rows
     best = rows[int(np.argmax(base.detections.power[rows]))]

@@ -13,7 +13,7 @@ from support.scene_texts import PLATE
 
 import raychan as rc
 from raychan.cli import invoke
-from raychan.run.sequence import Store, carried, frames
+from raychan.run.sequence import Store, frames, moves_as_one
 from raychan.run.storage import load_result
 
 SCENE = f"""{PLATE}
@@ -60,7 +60,7 @@ def test_what_moves_with_the_radar_is_traced_once_and_only_its_noise_differs(fil
     together = [f"bodies.{k}" for k in ("box.turn_rate_dps=0", "box.spin_dps=[0,0,0]")]
     together += [f"bodies.{b}.velocity_mps=[5, 0, 0]" for b in ("sign", "box")]
     scene = rc.Scene.load(file).override(together)
-    assert carried(scene) and not carried(rc.Scene.load(file))
+    assert moves_as_one(scene) and not moves_as_one(rc.Scene.load(file))
     first, second = (f.result for f in frames(scene, 2, 0.5, seed=3))
     assert first.stats["rays"] > 0 and second.stats["rays"] == 0
     traced = rc.simulate(scene.at(0.5), seed=4)

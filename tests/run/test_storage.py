@@ -12,6 +12,7 @@ import xarray as xr
 from support.results import paths, result
 
 from raychan.records import REFLECT, SCATTER
+from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.output_files import StoreError
 from raychan.run.storage import COLUMNS, load_result, save_result
 from raychan.units import C0
@@ -147,7 +148,21 @@ def test_csv_and_summary_say_what_the_record_holds(made, tmp_path):
     assert first.endswith(",multipath,truck.tail > walker > truck.tail")
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["labels"] == {"direct": 1, "multipath": 1, "clutter": 0}
-    assert summary["left_out"] == {"diffraction": "unknown"}
+    assert summary["left_out"] == {"diffraction": {"level_db": "unknown", "kind": "none", "how": ""}}
+
+
+def test_every_entry_of_a_ledger_is_the_same_record_before_and_after_the_disk(made, tmp_path):
+    choice = ModelChoice("none", "estimate", "chosen", bounces=2, transmissions=1, diffraction=False, why=("2 needed",))
+    ledger = {
+        "diffraction": Entry(-12.5, "bound", "wedge"),
+        "transmission": Entry("none", "exact", ""),
+        "model": choice,
+    }
+    save_result(dataclasses.replace(made, ledger=ledger), tmp_path)
+    back = load_result(tmp_path).ledger
+    assert back == ledger and all(isinstance(e, Entry) for e in back.values())
+    told = json.loads((tmp_path / "summary.json").read_text())["left_out"]["model"]
+    assert (told["bounces"], told["transmissions"], told["diffraction"], told["why"]) == (2, 1, False, ["2 needed"])
 
 
 def test_a_file_that_is_not_ours_is_refused(tmp_path):

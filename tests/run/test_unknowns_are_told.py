@@ -20,9 +20,9 @@ from raychan.records import SCATTER as SCATTERS
 from raychan.report.canvas import figure as drawing
 from raychan.report.figures import rdmap_picture
 from raychan.run.convergence import figure
+from raychan.run.ledger import UNKNOWN, Entry
 from raychan.run.messages import counts, marks, noted, warned
 from raychan.run.storage import load_result, save_result, summary
-from raychan.run.unmodelled import UNKNOWN, Entry
 from raychan.study.sweep import Seen, Step, cells
 from raychan.study.validation.sections import Echo
 from raychan.study.visibility import Visibility
@@ -136,10 +136,10 @@ def test_the_map_marks_them_hollow_and_the_legend_says_so(half, tmp_path):
     far = half.detections.replace(folded=[True, False])
     rdmap_picture(dataclasses.replace(half, detections=far), axes=axes)
     lines = {str(line.get_label()): line for line in axes.lines if not str(line.get_label()).startswith("_")}
-    assert set(lines) == {"direct (1)", "multipath, not converged (1)", "folded, truly elsewhere (1)"}
+    assert set(lines) == {"direct (1)", "multipath, not converged (1)", "folded, true place elsewhere (1)"}
     assert lines["multipath, not converged (1)"].get_markerfacecolor() == "none"
     assert lines["direct (1)"].get_markerfacecolor() != "none"
-    assert lines["folded, truly elsewhere (1)"].get_xdata() == [9.0]
+    assert lines["folded, true place elsewhere (1)"].get_xdata() == [9.0]
     with Image.open(rdmap_picture(half, tmp_path / "map.png")) as picture:
         assert picture.width > 1000
 

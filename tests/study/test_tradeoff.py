@@ -1,4 +1,4 @@
-"""The trade-off study: its lattice and glints against closed forms, its fronts and files."""
+"""The trade-off study: its lattice and specular points against closed forms, its fronts and files."""
 
 import csv
 
@@ -10,7 +10,7 @@ from raychan.cli import invoke
 from raychan.run.single_body import facets_of
 from raychan.study import cases, methods
 from raychan.study.ray_lattice import Window, echoes
-from raychan.study.specular_points import glints
+from raychan.study.specular_points import specular_points
 from raychan.study.tradeoff import Row, beaten_by, marked, read_csv, write_csv
 from raychan.study.verdicts import verdicts
 from raychan.tracing.legs import Leg
@@ -48,7 +48,7 @@ def test_uniform_tubes_meet_the_trihedral_closed_form():
 def test_glint_of_a_sphere_is_its_high_frequency_limit():
     end = np.array([12.0, 1.0, 2.0])
     tracer = RayCaster(facets_of(build("sphere", {"radius": 0.5}), "pec", cases.FREQUENCY))
-    found = glints(tracer, end, cases.WAVENUMBER)
+    found = specular_points(tracer, end, cases.WAVENUMBER)
     reach = np.linalg.norm(end)
     sigma = 4 * np.pi * abs(found.field.sum() * reach**2) ** 2
     assert sigma == pytest.approx(np.pi * 0.25 * (reach / (reach - 0.5)) ** 2, rel=2e-3)

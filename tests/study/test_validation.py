@@ -1,4 +1,4 @@
-"""Validation judges honestly: each table and claim once, closed forms met, unknown and healed differences told."""
+"""Validation judges honestly: each table and claim once, closed forms met, unlisted and gone differences told."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def study():
 
 
 def figure(**given):
-    return Figure(**({"name": "f", "theirs": 10.0, "measure": ["x"], "key": "T1/f"} | given))
+    return Figure(**({"name": "f", "printed": 10.0, "measure": ["x"], "key": "T1/f"} | given))
 
 
 def known(*checks, id="why"):
@@ -69,7 +69,7 @@ def test_numbers_are_held_to_a_tolerance_or_a_bound_unless_they_cannot_be_tested
         f.key
         for i in study.items
         for f in i.figure
-        if type(f.theirs) in (int, float) and f.within is None and not (f.at_most or f.at_least or f.untestable)
+        if type(f.printed) in (int, float) and f.within is None and not (f.at_most or f.at_least or f.untestable)
     ]
     assert not loose
 
@@ -88,7 +88,7 @@ def test_tables_14_and_16_print_differences_of_their_own_columns(study):
         item = next(i for i in study.items if i.id == f"T{number}")
         rows: dict[str, dict[str, float]] = {}
         for f in item.figure:
-            rows.setdefault(f.key.split("/")[1], {})[f.key.split("/")[2]] = f.theirs
+            rows.setdefault(f.key.split("/")[1], {})[f.key.split("/")[2]] = f.printed
         full = [r for r in rows.values() if {first, later, change} <= set(r)]
         assert len(full) >= 15
         assert all(r[later] - r[first] == pytest.approx(r[change], abs=1e-9) for r in full)
@@ -98,7 +98,7 @@ def test_tables_14_and_16_print_differences_of_their_own_columns(study):
 
 
 @pytest.mark.parametrize(
-    ("given", "ours", "agrees"),
+    ("given", "simulated", "agrees"),
     [
         ({"within": 0.5}, 10.5, True),
         ({"within": 0.5}, 10.51, False),
@@ -109,14 +109,14 @@ def test_tables_14_and_16_print_differences_of_their_own_columns(study):
         ({"at_least": True}, 9.9, False),
         ({"within": 0.5}, None, False),
         ({"within": 0.5}, math.nan, False),
-        ({"theirs": True}, False, False),
-        ({"theirs": "multipath"}, "direct", False),
-        ({"theirs": 3, "within": 0}, 4, False),
-        ({"theirs": 0.3, "within": 0.0}, 0.1 + 0.2, True),
+        ({"printed": True}, False, False),
+        ({"printed": "multipath"}, "direct", False),
+        ({"printed": 3, "within": 0}, 4, False),
+        ({"printed": 0.3, "within": 0.0}, 0.1 + 0.2, True),
     ],
 )
-def test_a_figure_agrees_within_its_tolerance_and_not_beyond(given, ours, agrees):
-    assert judge(figure(**given), ours).verdict == (AGREES if agrees else DIFFERS)
+def test_a_figure_agrees_within_its_tolerance_and_not_beyond(given, simulated, agrees):
+    assert judge(figure(**given), simulated).verdict == (AGREES if agrees else DIFFERS)
 
 
 def test_what_cannot_be_tested_as_printed_is_said_so_with_its_reason():
@@ -130,7 +130,7 @@ def test_what_cannot_be_tested_as_printed_is_said_so_with_its_reason():
 def test_a_difference_that_is_not_known_is_a_problem_that_names_it():
     checks, said = cover([judge(figure(within=0.5), 12.0)], [])
     assert checks[0].known == ""
-    assert said == ["unknown difference: T1/f: theirs 10, ours 12"]
+    assert said == ["difference not listed: T1/f: printed 10, simulated 12"]
 
 
 def test_a_known_difference_covers_its_figure():
@@ -139,12 +139,12 @@ def test_a_known_difference_covers_its_figure():
 
 
 @pytest.mark.parametrize("reason", ["", "no shape is printed"])
-def test_a_known_difference_that_healed_or_can_no_longer_be_tested_is_a_problem(reason):
+def test_a_known_difference_that_is_gone_or_can_no_longer_be_tested_is_a_problem(reason):
     _, said = cover([judge(figure(within=0.5), 10.1, reason=reason)], [known("T1/f")])
-    assert len(said) == 1 and "'why' has healed: T1/f" in said[0]
+    assert len(said) == 1 and "'why' is gone: T1/f" in said[0]
 
 
-def test_a_known_difference_that_heals_in_part_is_a_problem():
+def test_a_known_difference_that_is_gone_in_part_is_a_problem():
     both = [judge(figure(within=0.5), 12.0), judge(figure(within=0.5, key="T1/g"), 10.0)]
     _, said = cover(both, [known("T1/*")])
     assert len(said) == 1 and "T1/g" in said[0]
@@ -179,18 +179,18 @@ def test_claims_of_closed_form_agree(formulas, claim):
 
 def test_formulas_are_those_of_the_books(formulas):
     c0 = 299_792_458.0
-    ours = {key: c.ours for key, c in formulas.items()}
-    assert ours["C003/range_resolution"] == pytest.approx(c0 / (2e6 * figures(2)["bandwidth"]))
-    assert ours["C004/speed_resolution"] == pytest.approx(LAMBDA / (2 * 128 * 40e-6))
-    assert ours["C007/unambiguous_range_i_q"] == pytest.approx(1024 * c0 / (2 * 4e9))
-    assert ours["C008/unambiguous_speed"] == pytest.approx(LAMBDA / (4 * 40e-6))
+    simulated = {key: c.simulated for key, c in formulas.items()}
+    assert simulated["C003/range_resolution"] == pytest.approx(c0 / (2e6 * figures(2)["bandwidth"]))
+    assert simulated["C004/speed_resolution"] == pytest.approx(LAMBDA / (2 * 128 * 40e-6))
+    assert simulated["C007/unambiguous_range_i_q"] == pytest.approx(1024 * c0 / (2 * 4e9))
+    assert simulated["C008/unambiguous_speed"] == pytest.approx(LAMBDA / (4 * 40e-6))
     away = of_study(4)["pedestrian"]["range"]
     loss = 10 * math.log10((4 * math.pi) ** 3 * away**4 / LAMBDA**2) - 0.85
-    assert ours["C052/path_loss_at_13_5_m"] == pytest.approx(loss)
-    assert ours["C052/reach"] == pytest.approx(away * 10 ** ((10 + PATCH + 120 - loss) / 40), rel=1e-4)
+    assert simulated["C052/path_loss_at_13_5_m"] == pytest.approx(loss)
+    assert simulated["C052/reach"] == pytest.approx(away * 10 ** ((10 + PATCH + 120 - loss) / 40), rel=1e-4)
     # CA-CFAR: N (pfa^(-1/N) - 1), and -ln pfa without end of training cells.
-    assert ours["C051/threshold_32_cells"] == pytest.approx(10 * math.log10(32 * (1e7 ** (1 / 32) - 1)), abs=1e-6)
-    assert ours["C051/threshold_noise_known"] == pytest.approx(10 * math.log10(7 * math.log(10)), abs=1e-3)
+    assert simulated["C051/threshold_32_cells"] == pytest.approx(10 * math.log10(32 * (1e7 ** (1 / 32) - 1)), abs=1e-6)
+    assert simulated["C051/threshold_noise_known"] == pytest.approx(10 * math.log10(7 * math.log(10)), abs=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -301,24 +301,24 @@ def test_report_and_page_are_written(tmp_path, capsys):
 
 
 def test_an_unknown_difference_ends_with_1_and_its_name(tmp_path, data, capsys):
-    spoil(data / "claims.toml", "theirs = 0.2636", "theirs = 0.2836")
+    spoil(data / "claims.toml", "printed = 0.2636", "printed = 0.2836")
     assert run(tmp_path, "--data", str(data)) == 1
-    assert "unknown difference: C003/range_resolution" in capsys.readouterr().err
-    assert "What is wrong" in (tmp_path / "out" / "report.md").read_text()
+    assert "difference not listed: C003/range_resolution" in capsys.readouterr().err
+    assert "## Problems" in (tmp_path / "out" / "report.md").read_text()
 
 
-def test_a_healed_difference_ends_with_1_and_its_name(tmp_path, data, capsys):
+def test_a_difference_that_is_gone_ends_with_1_and_its_name(tmp_path, data, capsys):
     with open(data / "known_differences.toml", "a") as file:
         file.write('\n[[difference]]\nid = "old"\nkind = "paper"\nchecks = ["C003/*"]\nreason = "none"\n')
     assert run(tmp_path, "--data", str(data)) == 1
-    assert "known difference 'old' has healed: C003/range_resolution" in capsys.readouterr().err
+    assert "known difference 'old' is gone: C003/range_resolution" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
         ("claims.toml", 'measure = ["gap", "street"', 'measure = ["gab", "street"', "no measure 'gab'"),
-        ("claims.toml", "theirs = 0.2636", "thiers = 0.2636", "thiers"),
+        ("claims.toml", "printed = 0.2636", "thiers = 0.2636", "thiers"),
         ("claims.toml", '"urban", "range_resolution"', '"urban", "rang_resolution"', "did you mean 'range_resolution'"),
         ("claims.toml", '"urban", "range_resolution"', '"urbane", "range_resolution"', "no run 'urbane'"),
         ("claims.toml", '"urban", "range_resolution"', '"urban"', "arguments for 'waveform'"),
@@ -388,7 +388,7 @@ def test_the_report_in_the_repository_is_of_these_data(study):
         assert len(re.findall(rf"^\| (?:\[{key}\]\(#{key.lower()}\)|{key}) \|", text, re.M)) >= 1, key
     names = {k["id"] for k in tomllib.loads((HERE / "known_differences.toml").read_text())["difference"]}
     assert all(f"| {n} |" in text for n in names)
-    assert "What is wrong" not in text
+    assert "## Problems" not in text
     for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert (HERE / picture).is_file()
     assert "inf dB" not in text and "nan" not in text

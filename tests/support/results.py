@@ -10,6 +10,7 @@ import numpy as np
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube, Detections, MapError, Paths, Profile, RangeDoppler
 from raychan.run.labels import provenance
+from raychan.run.ledger import Entry
 from raychan.run.result import ExplainedDetections, Receiver, Result
 
 WAVE = Waveform(
@@ -81,7 +82,8 @@ def result(p: Paths, where, text: str = "", differ=0.01) -> Result:
     why = provenance(p, rdmap, found, receiver(), error)
     return Result(
         p, profile, cube, rdmap, ExplainedDetections.of(found, why), why, receiver(), seed=3, timings={"trace": 0.5},
-        error=MapError(power=error), ledger={"diffraction": "unknown"}, warnings=("a warning",), text=text,
+        error=MapError(power=error), ledger={"diffraction": Entry("unknown", "none", "")}, warnings=("a warning",),
+        text=text,
         path="street.toml" if text else "",
     )  # fmt: skip
 

@@ -10,13 +10,13 @@ _TABLES = ROOT / "validation" / "tables.toml"
 
 
 def table(number):
-    """Rows of a table of the study, by target; a cell with a tolerance of its own is a dict with `theirs`, `within`."""
+    """Rows of a table of the study, by target; a cell with its own tolerance is a dict with `printed`, `within`."""
     return {row["target"]: row for row in _part(number, "rows")}
 
 
 def figures(number):
     """Figures of a table of the study that is a list of them, by name."""
-    return {row["name"]: row["theirs"] for row in _part(number, "figure")}
+    return {row["name"]: row["printed"] for row in _part(number, "figure")}
 
 
 def _part(number, name):

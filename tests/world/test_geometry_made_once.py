@@ -74,7 +74,7 @@ def test_a_scene_is_built_once_for_all_seeds_and_radars(scene, builds):
 def test_a_scene_that_has_run_can_be_sent_to_another_process(scene):
     first = rc.simulate(scene, seed=1)
     for sent in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
-        assert not sent.kept
+        assert not sent._derived
         assert_same(first, rc.simulate(sent, seed=1))
 
 

@@ -16,6 +16,7 @@ from raychan.run import rules
 from raychan.world import limits, schema
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit
+from raychan.world.quantities import Within
 
 LIMITS = {name: value for name, value in vars(limits).items() if isinstance(value, Limit)}
 
@@ -30,7 +31,7 @@ def scene(tmp_path):
 def figures(annotation, metadata=()):
     """Return the metadata of each number within an annotation."""
     metadata = (*metadata, *getattr(annotation, "__metadata__", ()))
-    annotation = getattr(annotation, "__origin__", annotation) if metadata else annotation
+    annotation = annotation.__origin__ if hasattr(annotation, "__metadata__") else annotation
     if annotation in (int, float):
         yield metadata
     for inner in getattr(annotation, "__args__", ()):
@@ -42,7 +43,7 @@ def test_every_number_of_the_schema_has_limits():
     fields = [(t, name, f) for t in tables for name, f in t.model_fields.items()]
     numbers = [(f"{t.__name__}.{n}", m) for t, n, f in fields for m in figures(f.annotation, tuple(f.metadata))]
     assert len(numbers) > 50
-    assert [name for name, m in numbers if not any(type(x).__name__ == "AfterValidator" for x in m)] == []
+    assert [name for name, m in numbers if not any(isinstance(x, Within) for x in m)] == []
 
 
 @pytest.mark.parametrize("name", LIMITS)
@@ -72,7 +73,14 @@ def test_a_limit_keeps_its_ends_and_says_why(name):
         ("bodies.sign.rcs_dbsm=4000", "bodies.sign.rcs_dbsm", "100 dBsm"),
         ("bodies.sign.rcs_dbsm=[[0,4000],[9,1]]", "bodies.sign.rcs_dbsm.0.1", "100 dBsm"),
         ("radar.power_dbm=4000", "radar.power_dbm", "100 dBm"),
-        ("radar.waveform.samples=1e30", "radar.waveform.samples", "integer"),
+        ("radar.waveform.samples=1e30", "radar.waveform.samples", "a whole number between"),
+        ("radar.waveform.chirps=1.5", "radar.waveform.chirps", "a whole number between 1 and 1,048,576"),
+        ("radar.position=[0,0]", "radar.position", "3 numbers, each between"),
+        ("radar.elements_mm=[]", "radar.elements_mm", "1 to 4096 receivers"),
+        ("processing.pad=2", "processing.pad", "2 whole numbers, each between 1 and 64"),
+        ("processing.guard=[1]", "processing.guard", "2 whole numbers, each between 0 and 1000"),
+        ("model.retrace=0", "model.retrace", "'auto' or a whole number between 1 and 4096"),
+        ("bodies.sign.rcs_dbsm=[[0,1]]", "bodies.sign.rcs_dbsm", "2 or more pairs"),
         ("radar.waveform.samples=1000000000000000000000000000000", "radar.waveform.samples", "between 1 and"),
         ("radar.waveform.carrier_ghz=77e9", "radar.waveform.carrier_ghz", "1000 GHz"),
         ("radar.waveform.bandwidth_mhz=1e9", "radar.waveform.bandwidth_mhz", "MHz"),

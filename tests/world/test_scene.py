@@ -243,7 +243,7 @@ def test_bad_overrides_are_named(change, key, says):
         ),
         (RADAR.replace("[radar]", '[radar]\nantenna = { kind = "cosine" }'), "radar.antenna", "hpbw"),
         (RADAR.replace("[radar]", '[radar]\nantenna = { kind = "array", nx = 2 }'), "radar.antenna.nx", "ny"),
-        (RADAR.replace("[radar]", "[radar]\nnoise_figure_db = inf"), "radar.noise_figure_db", "finite"),
+        (RADAR.replace("[radar]", "[radar]\nnoise_figure_db = inf"), "radar.noise_figure_db", "number between 0 and"),
         (RADAR.replace("60.5", "-60.5"), "radar.waveform.chirp_us", "between 0.001"),
         (RADAR.replace("60.5", '"60.5 us"'), "radar.waveform.chirp_us", "number"),
         (RADAR + "samples = 0\n", "radar.waveform.samples", "between 1 and"),

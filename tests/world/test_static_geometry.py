@@ -48,8 +48,8 @@ def scene(request, monkeypatch):
     all_ = bodies()
     picked = {"still": [0, 1, 3, 4], "rigid": [0, 2, 3, 4], "both": [0, 1, 2, 3, 4]}[request.param]
     scene = rc.Scene(bodies=[all_[i] for i in picked], radar=RADAR, model={"max_bounces": 2, "tolerance_db": 3.0})
-    assert scene.still is not None
-    assert bool(scene.still.instances) == (request.param != "still")
+    assert scene.static_geometry is not None
+    assert bool(scene.static_geometry.instances) == (request.param != "still")
     return scene
 
 
@@ -111,7 +111,7 @@ def test_what_is_kept_is_what_is_made_anew(scene):
 
 def rebuilt(scene):
     """Return the same scene without anything that is kept."""
-    return scene.bare()
+    return scene.without_caches()
 
 
 def test_frames_do_not_depend_on_those_before_them(scene):
@@ -122,19 +122,22 @@ def test_frames_do_not_depend_on_those_before_them(scene):
 
 
 def test_a_result_does_not_hold_on_to_what_is_kept(scene):
-    family = scene.bare()
+    family = scene.without_caches()
     result = rc.simulate(family.at(0.1))
-    gone = weakref.ref(family._still[static_geometry.StaticGeometry])
+    gone = weakref.ref(family._static[static_geometry.StaticGeometry])
     del family
     gc.collect()
     assert gone() is None
-    assert result.scene.still is not None
+    assert result.scene.static_geometry is not None
 
 
 def test_small_scenes_and_those_in_which_nothing_moves_keep_nothing():
-    assert rc.Scene(bodies=bodies(), radar=RADAR).still is None
+    assert rc.Scene(bodies=bodies(), radar=RADAR).static_geometry is None
     many = trimesh.creation.icosphere(subdivisions=6, radius=1.0)
-    assert rc.Scene(bodies=[rc.Body(name="ball", mesh=many, position=(9.0, 0.0, 1.0))], radar=RADAR).still is None
+    assert (
+        rc.Scene(bodies=[rc.Body(name="ball", mesh=many, position=(9.0, 0.0, 1.0))], radar=RADAR).static_geometry
+        is None
+    )
 
 
 @pytest.mark.parametrize("plain", [False, True])

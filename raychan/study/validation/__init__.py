@@ -1,1 +1,1 @@
-"""Validation: the papers' tables and claims, judged figure by figure."""
+"""Validation: the figures that a published study prints, compared one by one with the simulation."""

@@ -1,4 +1,4 @@
-"""The bench: scenes and runs of the study, simulated when first asked for, and the things found in them."""
+"""The study's runs, each simulated when first needed, and the detections of its targets in them."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from raychan.world.errors import SceneError, nearest
 from raychan.world.scene import Scene
 
 Mask = NDArray[np.bool_]
-_ROOM = 0.5  # m: how far from its place a thing's level is looked for
-_NEAR = 1.0  # m: how far from its expected range a ghost is still that ghost
+_ROOM = 0.5  # m about a target's range in which its level without noise is read (not measured)
+_NEAR = 1.0  # m: a detection within this of a ghost's expected range counts as that ghost (not measured)
 
 
 class Bench:
     """Runs of a study, each simulated once.
 
-    Args: study; tolerance_db [dB] over the scenes' own, or None; tell is told the share of the runs `expected` that is
-    done.
+    Args: study; tolerance_db [dB] in place of the scenes' own, or None; expected, number of runs; tell is called with
+    the stage and the share done of these.
     """
 
     def __init__(
@@ -53,14 +53,14 @@ class Bench:
         """Return the scene of a run, with its changes."""
         if run not in self._scenes:
             given = _of(self.study.runs, run, "run")
-            self._scenes[run] = self.drawn(given.scene).override(given.changes)
+            self._scenes[run] = self.scene_file(given.scene).override(given.changes)
         return self._scenes[run]
 
-    def drawn(self, scene: str) -> Scene:
-        """Return a scene file as it stands."""
-        if scene not in self._files:
-            self._files[scene] = Scene.load(self.study.scenes / f"{scene}.toml")
-        return self._files[scene]
+    def scene_file(self, name: str) -> Scene:
+        """Return the scene of a file by its name, without changes."""
+        if name not in self._files:
+            self._files[name] = Scene.load(self.study.scenes / f"{name}.toml")
+        return self._files[name]
 
     def run(self, name: str) -> Result:
         """Return the result of a run, seed 0."""
@@ -83,9 +83,9 @@ class Bench:
         return self.results[name]
 
     def place(self, target: str) -> tuple[Any, float]:
-        """Return the point (3,) by which a target's place in its scene is told, and its distance [m] from the radar."""
+        """Return the reference point (3,) [m] of a target in its scene, and its distance [m] from the radar."""
         given = self.target(target)
-        scene = self.drawn(given.scene)
+        scene = self.scene_file(given.scene)
         place = np.asarray(scene.radar.position)
         facets = scene.facets(0.0)
         if given.reference == POINT:
@@ -106,12 +106,12 @@ class Bench:
         return at, float(np.linalg.norm(at - place))
 
     def expected_range(self, target: str) -> float:
-        """Return where [m] a target's echo is expected: a ghost's stated range, or its place in the scene."""
+        """Return the range [m] at which an echo is expected: a ghost's stated one, or that of the target's place."""
         given = self.target(target)
         return self.place(target)[1] if given.near is None else given.near
 
     def found(self, run: str, target: str) -> int | None:
-        """Return the detection that a target leads, the nearest to where it is expected; None if there is none."""
+        """Return the detection whose leading chain holds a target, the nearest to its expected range, or None."""
         given, result = self.target(target), self.run(run)
         at = self.expected_range(target)
         rows = []
@@ -126,10 +126,10 @@ class Bench:
         return min(rows, key=lambda i: abs(result.detections.range[i] - at), default=None)
 
     def level(self, run: str, target: str) -> float | None:
-        """Return the SNR [dB] at a target's place of the noise-free paths over it alone; None without a path."""
+        """Return the SNR [dB] without noise, at a target's range, of the paths over it alone; None without a path."""
         given, result = self.target(target), self.run(run)
         at = self.expected_range(target)
-        # Paths of another length, folded ones among them, would show there by the side lobes of the window only.
+        # Paths of other lengths, folded ones too, reach this range by side lobes of the window only.
         ways = over(result, given.parts, given.over) & (np.abs(result.paths.range - at) <= _ROOM)
         if not ways.any():
             return None
@@ -143,7 +143,7 @@ class Bench:
 
 
 def over(result: Result, parts: tuple[str, ...], via: tuple[str, ...] = ()) -> Mask:
-    """Return which paths (n,) go over one of `parts` and all of `via`; without `via`, over no other target."""
+    """Return which paths (n,) meet one of `parts` and all of `via`; without `via`, those that meet no other target."""
     paths, trajectories = result.paths, result.paths.trajectories
     met = trajectories.kind > 0
     touched = [(_is(p, trajectories.body, trajectories.part, paths) & met).any(axis=1) for p in (*parts, *via)]

@@ -18,22 +18,22 @@ from raychan.world.schema import Table
 from raychan.world.schema_errors import checked
 
 HERE = Path(raychan.__file__).parents[1] / "validation"
-"""Where the data stand in a checkout."""
+"""The study's data in a checkout."""
 
 Value = bool | int | float | str
 POINT = "point"
 
 
 class Figure(Table):
-    """A printed figure and what of ours stands beside it."""
+    """A printed figure, and the measure of the simulation that is compared with it."""
 
     name: str
-    theirs: Value
+    printed: Value
     measure: list[Any] = Field(min_length=1)
     unit: str = ""
     within: float | None = Field(None, ge=0.0)
     below: float | None = Field(None, ge=0.0)
-    """Tolerance downwards where it is not `within`."""
+    """Tolerance downwards where it differs from `within`."""
     at_most: bool = False
     at_least: bool = False
     untestable: str = ""
@@ -51,7 +51,7 @@ class Column(Table):
     untestable: str = ""
     rcs_only: bool = False
     as_: str = Field("", alias="as")
-    theirs: Value | None = None
+    printed: Value | None = None
 
 
 class Item(Table):
@@ -87,7 +87,7 @@ class Run(Table):
 
 
 class Target(Table):
-    """What counts as a thing that the tables name."""
+    """The bodies, parts and range by which a target of the tables is recognised."""
 
     title: str
     scene: str
@@ -97,7 +97,7 @@ class Target(Table):
     reference: Literal["nearest", "middle", "point"] = "nearest"
     reference_parts: tuple[str, ...] = ()
     reference_above: float = -math.inf
-    """Only what reaches above this height [m] counts for the place."""
+    """Only facets that reach above this height [m] count for the reference point."""
 
 
 class Known(Table):
@@ -129,7 +129,7 @@ class _Known(Table):
 
 @dataclass(frozen=True)
 class Study:
-    """All that stands in `validation/`, and where the scenes are."""
+    """The contents of `validation/`, and the folder of the scenes."""
 
     scenes: Path
     runs: Mapping[str, Run]
@@ -141,7 +141,7 @@ class Study:
 
 
 def load(folder: Path | None = None) -> Study:
-    """Return what stands in a `validation/` folder, by default that of the checkout raychan is installed from.
+    """Return the study's data in a `validation/` folder, by default that of the checkout raychan is installed from.
 
     Raises: SceneError where there is none, or where a file, key or value in it is wrong.
     """
@@ -186,7 +186,7 @@ def _item(sheet: PrintedTable, study: _Study, file: Path) -> Item:
 
 
 def _cell(name: str, sheet: PrintedTable, column: Column, row: dict[str, Any], study: _Study, file: Path) -> Figure:
-    """Return the figure of a cell: the column's, with what the row's cell says over it."""
+    """Return the figure of a table cell: the column's settings, overridden by those of the cell."""
     target = str(row.get("target", ""))
     given = row[column.key]
     known = study.target.get(target)
@@ -198,9 +198,9 @@ def _cell(name: str, sheet: PrintedTable, column: Column, row: dict[str, Any], s
         "within": column.within,
         "untestable": column.untestable,
     }
-    data |= given if isinstance(given, dict) else {"theirs": given}
-    if column.theirs is not None:
-        data["theirs"] = column.theirs
+    data |= given if isinstance(given, dict) else {"printed": given}
+    if column.printed is not None:
+        data["printed"] = column.printed
     if column.rcs_only and not (known and known.reference == POINT):
         data["untestable"] = "shape"
     made: Figure = checked(Figure, data, file)

@@ -25,12 +25,12 @@ PATCH, ARRAY = "street", "street_array"
 """Runs of one scene with either antenna."""
 
 _FINE = 16  # map cells per resolution cell where a gap is measured
-_FAR = 30  # resolution cells to the lone point: clear of the map's edge
-_ALONE = 10.0 ** (0.5 / 20.0) - 1.0  # one point's response that moves the other by 0.5 dB at most, whatever the phase
+_FAR = 30  # resolution cells to the single point: clear of the map's edge
+_HALF_DB = 10.0 ** (0.5 / 20.0) - 1.0  # relative amplitude that changes another by at most 0.5 dB, at any phase
 
 
 def _echo(bench: Bench, run: str, at: float, rate: float, window: str, pad: tuple[int, int], iq: bool = True) -> Any:
-    """Return the map of a lone point at a range [m] and range rate [m/s], without noise."""
+    """Return the map of a single point at a range [m] and range rate [m/s], without noise."""
     given = bench.scene(run).radar
     wave = dataclasses.replace(given.waveform, complex_sampling=iq)
     look, none = np.array([[1.0, 0.0, 0.0]]), np.full((1, 1), -1)
@@ -65,16 +65,17 @@ def gap(bench: Bench, run: str, window: str) -> Seen:
     cell = bench.scene(run).radar.waveform.range_resolution
     made = _echo(bench, run, _FAR * cell, 0.0, window, (_FINE, 1))
     row, column = _top(made)
-    return float(np.argmax(np.abs(made.spectrum[0, row, column:]) < _ALONE * np.sqrt(made.power.max())) * cell / _FINE)
+    below = np.abs(made.spectrum[0, row, column:]) < _HALF_DB * np.sqrt(made.power.max())
+    return float(np.argmax(below) * cell / _FINE)
 
 
 @measure
 def rate_gap(bench: Bench, run: str, window: str) -> Seen:
-    """Return the same gap [m/s] of two movers at one range."""
+    """Return the least gap [m/s], as for `gap`, of two points at one range."""
     wave = bench.scene(run).radar.waveform
     made = _echo(bench, run, _FAR * wave.range_resolution, 0.0, window, (1, _FINE))
     row, column = _top(made)
-    below = np.abs(made.spectrum[0, row:, column]) < _ALONE * np.sqrt(made.power.max())
+    below = np.abs(made.spectrum[0, row:, column]) < _HALF_DB * np.sqrt(made.power.max())
     return float(np.argmax(below) * wave.rate_resolution / _FINE)
 
 
@@ -86,47 +87,50 @@ def unambiguous_range(bench: Bench, run: str, iq: bool) -> Seen:
 
 @measure
 def read_range(bench: Bench, run: str, at: float, iq: bool) -> Seen:
-    """Return the range [m] that a point at `at` [m] reads, with I/Q or real samples."""
+    """Return the range [m] at which the map shows a point at `at` [m], with I/Q or real samples."""
     made = _echo(bench, run, at, 0.0, "hann", (2, 1), iq)
     return float(made.range[_top(made)[1]])
 
 
 @measure
 def read_rate(bench: Bench, run: str, rate: float) -> Seen:
-    """Return the range rate [m/s] that a point of range rate `rate` [m/s] reads."""
+    """Return the range rate [m/s] at which the map shows a point of range rate `rate` [m/s]."""
     made = _echo(bench, run, 50.0, rate, "hann", (1, 2))
     return float(made.rate[_top(made)[0]])
 
 
 @measure
 def threshold(bench: Bench, run: str, cells: float) -> Seen:
-    """Return the threshold [dB] over the mean of so many training cells for the run's false alarm probability."""
+    """Return the CA-CFAR threshold [dB] over the mean of `cells` training cells (see processing.cfar.factor)."""
     return float(db(factor(bench.scene(run).processing.pfa, cells)))
 
 
 @measure
 def point_loss(bench: Bench, run: str, at: float, rcs_dbsm: float) -> Seen:
-    """Return the loss [dB] to a target of given RCS [dBsm] at a range [m] and back, between isotropic antennas."""
+    """Return the two-way loss [dB] to a target of given RCS [dBsm] at a range [m], between isotropic antennas.
+
+    The radar equation (Skolnik, Introduction to Radar Systems, 2001, ch. 1): (4 pi)^3 R^4 / (lambda^2 sigma).
+    """
     wavelength = bench.scene(run).radar.waveform.wavelength
     return float(db((4.0 * np.pi) ** 3 * at**4 / wavelength**2) - rcs_dbsm)
 
 
 @measure
 def reach(bench: Bench, run: str, sensitivity_dbm: float, rcs_dbsm: float) -> Seen:
-    """Return the range [m] at which that loss is the greatest that the link budget allows, without receive gain."""
+    """Return the range [m] at which `point_loss` is the largest loss of the link budget, receive gain left out."""
     most = bench.scene(run).radar.link_budget(sensitivity_dbm)["max_path_loss_db"]
     return float(10.0 ** ((most - float(point_loss(bench, run, 1.0, rcs_dbsm) or 0.0)) / 40.0))
 
 
 @measure
 def spreading(bench: Bench, near: str, far: str) -> Seen:
-    """Return R^-4 [dB] between the places of two targets."""
+    """Return the loss [dB] by R^-4 from the place of one target to that of another."""
     return float(40.0 * np.log10(bench.place(far)[1] / bench.place(near)[1]))
 
 
 @measure
 def gain_change(bench: Bench, azimuth_deg: float, first: str = PATCH, later: str = ARRAY) -> Seen:
-    """Return how much more [dB] the antenna of one run gains than that of another, both ways, at an azimuth."""
+    """Return the gain [dB] of one run's antenna over that of another, both ways, at an azimuth [deg]."""
     return float(both_ways(bench, np.array([azimuth_deg]), first, later)[0])
 
 
@@ -138,10 +142,10 @@ def both_ways(bench: Bench, azimuth_deg: Floats, first: str = PATCH, later: str 
 
 
 def link_snr(bench: Bench, run: str, target: str) -> dict[str, float]:
-    """Return the link budget of a target of given RCS over free space: azimuth, RCS and gain there, power, SNR.
+    """Return the link budget of a target of given RCS in free space: range, azimuth, RCS, gain and SNR.
 
-    SNR = P G^2 lambda^2 sigma / ((4 pi)^3 R^4) over the noise k T0 F f_s of a cell, windows counted; gain by azimuth
-    and elevation, RCS by the aspect; the run's noise figure and nothing else enters.
+    SNR = P G^2 lambda^2 sigma / ((4 pi)^3 R^4) over the noise of a map cell: k T0 F f_s of a sample, less the gain of
+    the windowed transforms. Gain at the target's azimuth and elevation, RCS at its aspect, noise figure of the run.
     """
     scene = bench.scene(run)
     radar, points = scene.radar, scene.points(0.0)
@@ -166,5 +170,5 @@ def link_snr(bench: Bench, run: str, target: str) -> dict[str, float]:
 
 @measure
 def budget_fall(bench: Bench, run: str, near: str, far: str) -> Seen:
-    """Return by how much [dB] the link budget over free space falls from one target of given RCS to another."""
+    """Return the fall [dB] of the free-space link budget from one target of given RCS to another."""
     return link_snr(bench, run, near)["snr_db"] - link_snr(bench, run, far)["snr_db"]

@@ -1,4 +1,4 @@
-"""Judging: a printed figure agrees with ours, differs, or cannot be tested; what differs must be known."""
+"""Verdicts: a printed figure agrees with the simulation, differs, or cannot be tested; differences must be listed."""
 
 from __future__ import annotations
 
@@ -16,58 +16,59 @@ _ROUNDING = 1e-9  # relative: a sum of printed decimals is not exact in binary
 
 @dataclass(frozen=True)
 class Check:
-    """A printed figure, ours, and the verdict."""
+    """A printed figure, the simulated value, and the verdict."""
 
     figure: Figure
-    ours: Seen
+    simulated: Seen
     verdict: str
     note: str = ""
-    """What was seen of a thing that was not detected; why a figure cannot be tested."""
+    """The level of a target that is not detected, or why the figure cannot be tested."""
     known: str = ""
     """The known difference that covers it."""
 
     @property
     def key(self) -> str:
-        """Where it stands: item, target, figure."""
+        """Key of the figure: item, target, figure."""
         return self.figure.key
 
     @property
     def difference(self) -> float | None:
-        """Ours less theirs, of numbers."""
-        return self.ours - self.figure.theirs if _number(self.ours) and _number(self.figure.theirs) else None  # type: ignore[operator]
+        """Simulated less printed; None where one of them is no number."""
+        both = self.simulated, self.figure.printed
+        return both[0] - both[1] if all(map(_number, both)) else None  # type: ignore[operator]
 
 
-def judge(figure: Figure, ours: Seen, note: str = "", reason: str = "") -> Check:
-    """Return the verdict on a figure of which we see `ours`; None is not detected.
+def judge(figure: Figure, simulated: Seen, note: str = "", reason: str = "") -> Check:
+    """Return the check of a figure against its simulated value, None where the target is not detected.
 
-    Args: note what is to be said of it; reason why it cannot be tested as printed, if it cannot.
+    Args: note, a remark on the simulated value; reason why the figure cannot be tested as printed, '' if it can.
     """
     if reason:
-        return Check(figure, ours, UNTESTABLE, "; ".join(x for x in (note, reason) if x))
-    return Check(figure, ours, AGREES if agrees(figure, ours) else DIFFERS, note)
+        return Check(figure, simulated, UNTESTABLE, "; ".join(x for x in (note, reason) if x))
+    return Check(figure, simulated, AGREES if agrees(figure, simulated) else DIFFERS, note)
 
 
-def agrees(figure: Figure, ours: Seen) -> bool:
-    """Say whether ours lies within the tolerance of a figure, bounds included; texts and truths must be equal."""
-    theirs = figure.theirs
-    if ours is None:
+def agrees(figure: Figure, simulated: Seen) -> bool:
+    """Return whether a simulated value lies within a figure's tolerance, bounds included; texts must be equal."""
+    printed = figure.printed
+    if simulated is None:
         return False
-    if not (_number(ours) and _number(theirs)):
-        return ours == theirs
-    slack = (figure.within or 0.0) + _ROUNDING * abs(float(theirs))
+    if not (_number(simulated) and _number(printed)):
+        return simulated == printed
+    slack = (figure.within or 0.0) + _ROUNDING * abs(float(printed))
     down = slack if figure.below is None else figure.below
-    off = float(ours) - float(theirs)
+    off = float(simulated) - float(printed)
     if not math.isfinite(off):
         return False
     return (figure.at_most or off >= -down) and (figure.at_least or off <= slack)
 
 
 def cover(checks: Sequence[Check], known: Iterable[Known], whole: bool = True) -> tuple[list[Check], list[str]]:
-    """Return the checks with the known differences that cover them, and what is wrong, a sentence each.
+    """Return the checks with the known differences that cover them, and the problems, a sentence each.
 
-    Wrong are: a difference that no known one covers; a known one that heals (a check that it covers agrees or can no
-    longer be tested); one that covers no check, or a check that another covers too. Args: whole, whether all checks of
-    the study are there; if not, what known differences say of others is left alone.
+    Problems are: a difference that is not listed; a listed one that is gone (its check agrees or can no longer be
+    tested); a listed one without a check, or with one that another covers too. Args: whole, whether all checks of the
+    study are there; if not, listed differences without a check are no problem.
     """
     found = {c.key: c for c in checks}
     said: list[str] = []
@@ -80,17 +81,17 @@ def cover(checks: Sequence[Check], known: Iterable[Known], whole: bool = True) -
                 c = found[key]
                 if c.verdict != DIFFERS:
                     said.append(
-                        f"known difference '{k.id}' has healed: {key} {c.verdict} (theirs {shown(c.figure.theirs)}, "
-                        f"ours {shown(c.ours)}); take it out of known_differences.toml"
+                        f"known difference '{k.id}' is gone: {key} {c.verdict} (printed {shown(c.figure.printed)}, "
+                        f"simulated {shown(c.simulated)}); remove it from known_differences.toml"
                     )
                 elif c.known:
                     said.append(f"{key}: covered by '{c.known}' and by '{k.id}'")
                 else:
-                    found[key] = Check(c.figure, c.ours, c.verdict, c.note, k.id)
+                    found[key] = Check(c.figure, c.simulated, c.verdict, c.note, k.id)
     for c in found.values():
         if c.verdict == DIFFERS and not c.known:
             said.append(
-                f"unknown difference: {c.key}: theirs {shown(c.figure.theirs)}, ours {shown(c.ours)} "
+                f"difference not listed: {c.key}: printed {shown(c.figure.printed)}, simulated {shown(c.simulated)} "
                 f"{c.figure.unit}".rstrip()
             )
     return list(found.values()), said

@@ -1,4 +1,4 @@
-"""The registry of measures: what of ours stands beside a printed figure, by the name that the data files use."""
+"""The registry of measures: functions that simulate or compute a printed figure, by the names in the data files."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from raychan.study.validation.bench import Bench
 from raychan.world.errors import SceneError, nearest
 
 Seen = bool | int | float | str | None
-"""What a measure returns; None where the thing was not detected."""
+"""What a measure returns; None where the target is not detected."""
 
 MEASURES: dict[str, Callable[..., Seen]] = {}
 
 
 def measure(function: Callable[..., Seen]) -> Callable[..., Seen]:
-    """Put a function into the registry under its own name; its first argument is the bench."""
+    """Register a function as a measure under its own name; its first argument is the bench."""
     MEASURES[function.__name__] = function
     return function
 
 
 def measured(bench: Bench, wanted: list[Any], key: str) -> Seen:
-    """Return what the measure [name, arguments...] of the figure `key` gives.
+    """Return the value of a measure [name, arguments...], for the figure `key`.
 
-    Raises: SceneError where the data name no measure, or give it arguments that it does not take.
+    Raises: SceneError where the data name no measure, or give it the wrong number of arguments.
     """
     name, *arguments = wanted
     if name not in MEASURES:

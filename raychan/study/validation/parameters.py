@@ -1,4 +1,4 @@
-"""Measures of what was put in: antennas, link budget, waveform, materials, places of bodies."""
+"""Measures of a scene's inputs: antennas, link budget, waveform, materials, places of bodies."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _figure(record: Any, name: str) -> float:
 def antenna(bench: Bench, name: str, figure: str) -> Seen:
     """Return a figure of merit of an antenna [dBi, deg, dB]; None for a side lobe that its pattern does not have."""
     value = _figure(_figures_of(name, bench.study.scenes), figure)
-    return None if np.isnan(value) else round(value, 6) + 0.0  # a grating lobe is as high as the beam but for rounding
+    return None if np.isnan(value) else round(value, 6) + 0.0  # rounding: a grating lobe is as high as the main beam
 
 
 @measure
@@ -83,15 +83,15 @@ def height(bench: Bench, run: str) -> Seen:
 
 @measure
 def placed(bench: Bench, target: str) -> Seen:
-    """Return how far [m] from the radar a target was put."""
+    """Return the distance [m] of a target's place from the radar."""
     return bench.place(target)[1]
 
 
 @measure
 def ground_speed(bench: Bench, target: str) -> Seen:
-    """Return the speed [m/s] over ground that a target was given, away from the radar positive."""
+    """Return the speed [m/s] over ground that the scene gives a target, positive away from the radar."""
     given = bench.target(target)
-    scene = bench.drawn(given.scene)
+    scene = bench.scene_file(given.scene)
     at, distance = bench.place(target)
     facets = scene.facets(0.0)
     velocity = facets.velocity[facets.body_names.index(given.parts[0].split(".")[0])]

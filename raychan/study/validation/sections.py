@@ -1,4 +1,4 @@
-"""What the report works out beyond tables and claims: ablations, ghosts, link budget, gain by azimuth."""
+"""The report's sections beyond tables and claims: ablations, ghosts, link budget, array gain by azimuth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from raychan.study.validation.formulas import ARRAY, PATCH, both_ways, link_snr
 from raychan.units import db
 
 ECHOES = ("ghost", "pedestrian", "one_sided")
-"""What an ablation may do something to: the ghost, the direct return, the ghost over the truck one way only."""
+"""The echoes that ablations follow: the ghost over the truck both ways, the direct return, the ghost one way only."""
 _BASE = "occluded"
 
 
@@ -26,7 +26,7 @@ class Echo:
     range: float | None
     """Detected [m]; None if not."""
     snr: float | None
-    """Of the detection, or without noise of the paths alone [dB]; None without a path."""
+    """Of the detection, or of the paths alone without noise where it is not detected [dB]; None without a path."""
     error: float | None
     """Stated error of the detection [dB]; NaN where not converged."""
 
@@ -42,7 +42,7 @@ class Echo:
 
 @dataclass(frozen=True)
 class Ablation:
-    """What a change of the scene does to the pedestrian's echoes."""
+    """The pedestrian's echoes after one change of the scene."""
 
     run: str
     title: str
@@ -51,7 +51,7 @@ class Ablation:
 
 
 def ablations(bench: Bench) -> list[Ablation]:
-    """Return the scene as it stands and each of its ablations."""
+    """Return the unchanged scene and each of its ablations."""
     names = [_BASE, *(n for n, r in bench.study.runs.items() if r.ablation)]
     made = []
     for name in names:
@@ -84,7 +84,7 @@ class Ghost:
 
     @property
     def explained(self) -> bool:
-        """Whether the path is as long as the detection is far, to one range bin."""
+        """Whether path and detection have the same range, to one range bin."""
         return abs(self.range - self.path) <= self.cell
 
 
@@ -143,22 +143,22 @@ def budgets(bench: Bench, run: str) -> list[Budget]:
 
 
 @dataclass(frozen=True)
-class Turn:
-    """A target's gain from patch to array: by the patterns at its azimuth, simulated, printed; dB and deg."""
+class ArrayGain:
+    """A target's change of SNR [dB] from patch to array: by the patterns at its azimuth [deg], simulated, printed."""
 
     target: str
     title: str
     azimuth: float
     pattern: float
-    ours: float | None
+    simulated: float | None
     detected: bool
     printed: float
     needs: float | None
-    """Azimuth within the main beam at which the patterns give what is printed; None if they give it nowhere there."""
+    """Least azimuth [deg] at which the patterns give the printed change; None if they give it nowhere."""
 
 
-def turns(bench: Bench, first: str = PATCH, later: str = ARRAY) -> list[Turn]:
-    """Return the targets of table 16 by azimuth, off boresight first."""
+def array_gains(bench: Bench, first: str = PATCH, later: str = ARRAY) -> list[ArrayGain]:
+    """Return the targets of table 16 by azimuth, the farthest off boresight first."""
     made = []
     for target, row in _printed(bench.study.items, "T16").items():
         at, _ = bench.place(target)
@@ -166,7 +166,7 @@ def turns(bench: Bench, first: str = PATCH, later: str = ARRAY) -> list[Turn]:
         before, after = bench.strength(first, target), bench.strength(later, target)
         change = None if before is None or after is None else after - before
         made.append(
-            Turn(
+            ArrayGain(
                 target,
                 bench.study.targets[target].title,
                 azimuth,
@@ -192,6 +192,6 @@ def _printed(items: tuple[Item, ...], table: str) -> dict[str, dict[str, float]]
     rows: dict[str, dict[str, float]] = {}
     for figure in next(i for i in items if i.id == table).figure:
         _, target, column = figure.key.split("/")
-        if isinstance(figure.theirs, int | float) and not isinstance(figure.theirs, bool):
-            rows.setdefault(target, {})[column] = float(figure.theirs)
+        if isinstance(figure.printed, int | float) and not isinstance(figure.printed, bool):
+            rows.setdefault(target, {})[column] = float(figure.printed)
     return rows

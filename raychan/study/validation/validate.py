@@ -1,4 +1,4 @@
-"""Validate: every table and claim of the study, theirs beside ours, with what is known to differ."""
+"""Compare every table and claim of the study with the simulation; differences are checked against the known ones."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-# Imported so that their measures register themselves.
+# Imported because they register their measures.
+import raychan.study.validation.detections
 import raychan.study.validation.formulas
-import raychan.study.validation.parameters
-import raychan.study.validation.things  # noqa: F401
+import raychan.study.validation.parameters  # noqa: F401
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.data import Figure, Item, Study, load
 from raychan.study.validation.judge import Check, cover, judge
@@ -23,13 +23,13 @@ _OF_RUN = ("range", "rate", "speed", "snr", "shift", "speed_shift", "seen")  # m
 
 @dataclass(frozen=True)
 class Validation:
-    """All checks, what is wrong with them, and the bench with its runs."""
+    """All checks, the problems among them, and the simulated runs."""
 
     study: Study
     items: tuple[Item, ...]
     checks: tuple[Check, ...]
     problems: tuple[str, ...]
-    """Unknown and healed differences: the run fails if there are any."""
+    """Differences that are not listed, and listed ones that are gone: the command fails if there are any."""
     bench: Bench
     whole: bool
     """Whether all of the study was tested."""
@@ -42,7 +42,7 @@ def validate(
     tolerance_db: float | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Validation:
-    """Hold ourselves against the study's tables and claims.
+    """Compare the simulation with the study's tables and claims.
 
     Args: folder with the data, by default that of the checkout; only these items (T10, C023), by default all and every
     run; tolerance_db [dB] of the launches, by default the scenes' own; progress is told the share done.
@@ -72,10 +72,10 @@ def validate(
 
 
 def _check(bench: Bench, figure: Figure) -> Check:
-    ours = measured(bench, figure.measure, figure.key)
+    simulated = measured(bench, figure.measure, figure.key)
     note = ""
     name, *arguments = figure.measure
-    if ours in (None, False) and name in _OF_RUN:
+    if simulated in (None, False) and name in _OF_RUN:
         level = bench.level(*arguments)
         note = "no path" if level is None else f"{level:.1f} dB without noise"
-    return judge(figure, ours, note, bench.study.reasons.get(figure.untestable, ""))
+    return judge(figure, simulated, note, bench.study.reasons.get(figure.untestable, ""))

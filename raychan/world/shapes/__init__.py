@@ -25,8 +25,8 @@ SHAPES: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
 def build(name: str, params: dict[str, Any] | None = None) -> Mesh:
     """Return a built-in shape by name with its parameters.
 
-    Raises: SceneError for an unknown shape or parameter (nearest name told), a size that is not positive, or sizes for
-    which the shape cannot be built.
+    Raises: SceneError for an unknown shape or parameter (with the nearest name), a size that is not positive, or sizes
+    for which the shape cannot be built.
     """
     if name not in SHAPES:
         raise SceneError(f"unknown shape '{name}'", key="shape", value=name, allowed=nearest(name, SHAPES))

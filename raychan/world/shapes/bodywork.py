@@ -1,4 +1,4 @@
-"""The metal of a vehicle: a tub up to the belt line and a glazed cabin on it, both curved in plan and in section."""
+"""Bodywork of a vehicle: the lower body up to the belt line and the glazed cabin on it, curved in plan and section."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Form:
     height: float
     clearance: float
     belt: float
-    """Height of the tub at its highest."""
+    """Largest height of the lower body."""
     nose_drop: float
-    """Share of the tub's height lost at the nose (bonnet) and at the tail (boot)."""
+    """Share of the lower body's height lost at the nose (bonnet); `tail_drop` at the tail (boot)."""
     tail_drop: float
     bonnet: float
     """x where the bonnet begins to fall."""
@@ -33,7 +33,7 @@ class Form:
     bulge: float
     """Turn [rad] of the flanks from the belt to the widest point and from there to the sill."""
     cabin: tuple[float, float]
-    """x of the cabin's foot at the rear window and the windscreen."""
+    """x of the lower edges of rear window and windscreen."""
     lean: tuple[float, float, float]
     """How far rear window, windscreen and sides lean in from belt to roof."""
     wheelbase: float
@@ -48,7 +48,7 @@ class Form:
     """Width and depth of the door seams."""
 
     def _section(self, sag: float) -> Curve:
-        """Return the tub's section (x <= 0: how far in, z), before it falls towards nose and tail."""
+        """Return the lower body's section (x <= 0: inset from the plan outline; z), of full height."""
         b, foot, shoulder = self.bulge, 0.10, 0.06
         tall = self.belt - self.clearance - (foot + shoulder) * (1.0 - np.sin(b))
         flank = tall / (2.0 * np.sin(b))
@@ -61,7 +61,7 @@ class Form:
         plan = half_outline(self.length, self.width, self.rear, self.front, sag)
         flank = plan.points[np.abs(plan.normals[:, 1]) > 0.95, 0]
         for drop, start, stop in ((self.nose_drop, self.bonnet, flank[-1]), (self.tail_drop, self.boot, flank[0])):
-            # The bend curves the flank's upper edge: it needs more columns than the plan does.
+            # The fall towards nose and tail curves the flank's upper edge, which needs more columns than the plan.
             run = self.length - self.bonnet if stop > start else self.boot
             radius = run**2 / (2.0 * max(drop, 1e-6) * (self.belt - self.clearance))
             count = int(abs(stop - start) / np.sqrt(8.0 * radius * sag)) + 1
@@ -72,7 +72,7 @@ class Form:
         return offset_solid(plan, self._section(sag), grooves).bent(self.fall)
 
     def fall(self, p: Floats) -> tuple[Floats, Floats]:
-        """Bend that lets the tub fall towards nose and tail."""
+        """Map that lowers the body towards nose and tail."""
         g, slope = self.falling(p[:, 0])
         q, jacobian = p.copy(), np.tile(np.eye(3), (len(p), 1, 1))
         q[:, 2] = self.clearance + (p[:, 2] - self.clearance) * g
@@ -81,28 +81,28 @@ class Form:
         return q, jacobian
 
     def falling(self, x: Floats) -> tuple[Floats, Floats]:
-        """Return the tub's height at x over its greatest, and the slope of that [1/m]."""
+        """Return the lower body's height at x over its largest height, and the slope of this ratio [1/m]."""
         ahead, behind = self.length - self.bonnet, self.boot
-        # Parabolas: smooth where they start, and curved to one side only.
+        # Parabolas: no kink where they start, convex all along.
         nose = np.maximum((x - self.bonnet) / ahead, 0.0)
         tail = np.maximum((self.boot - x) / behind, 0.0)
         g = 1.0 - self.nose_drop * nose**2 - self.tail_drop * tail**2
         return g, -2.0 * self.nose_drop * nose / ahead + 2.0 * self.tail_drop * tail / behind
 
-    def drawn_in(self, x: float, z: float) -> float:
-        """Return how far [m] the tub's skin at (x, z) lies inside its plan outline."""
+    def inset(self, x: float, z: float) -> float:
+        """Return the distance [m] of the lower body's skin at (x, z) from the plan outline, inwards."""
         g = float(self.falling(np.array([x]))[0][0])
         section = self._section(0.1e-3)
         return -float(np.interp(self.clearance + (z - self.clearance) / g, section.points[:, 1], section.points[:, 0]))
 
     def side(self, x: float, z: float) -> float:
-        """Return the distance [m] of the tub's flank at (x, z) from the middle plane."""
+        """Return the distance [m] of the lower body's flank at (x, z) from the middle plane."""
         plan = half_outline(self.length, self.width, self.rear, self.front, 0.1e-3)
         flank = np.abs(plan.normals[:, 1]) > 0.7
-        return float(np.interp(x, plan.points[flank, 0], -plan.points[flank, 1])) - self.drawn_in(x, z)
+        return float(np.interp(x, plan.points[flank, 0], -plan.points[flank, 1])) - self.inset(x, z)
 
     def cabin_shell(self, sag: float) -> tuple[Piece, Floats]:
-        """Return the closed cabin and, for each face, its place (x, z, plan normal x) before the sides lean in."""
+        """Return the closed cabin and for each face x, whether it is in the row of panes, and x of its plan normal."""
         low, high = self.cabin
         foot, long, tall = self.belt - 0.08, high - low, self.height - self.belt + 0.08
         wide = self.width - 0.12

@@ -1,4 +1,4 @@
-"""Plane curves of arcs and lines, known by the way their normal turns: positions and normals are exact."""
+"""Plane curves of arcs and lines, given by radii and turns of the normal: positions and normals are exact."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
 
-_MOST = 1000  # chords of an arc: a ball of so many has a million facets
+_MOST = 1000  # chords of an arc: a sphere with as many has a million facets
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Curve:
 
 
 def steps(radius: float, angle: float, sag: float) -> int:
-    """Return how many chords an arc needs so that none is more than `sag` off it."""
+    """Return the number of chords of an arc that stay within `sag` [m] of it."""
     if radius <= 0.0 or angle == 0.0:
         return 1
     half = np.arccos(max(1.0 - sag / radius, np.cos(np.pi / 12)))
@@ -76,14 +76,14 @@ def _tangent(angle: float) -> Floats:
 
 @dataclass(frozen=True)
 class End:
-    """One end of an outline: radius of its face and its corners, turn [rad] of the side up to its widest point."""
+    """One end of an outline: radii [m] of its face and its corners, turn [rad] of the side up to its widest point."""
 
     face: float
     corner: float
     turn: float = np.radians(2.0)
 
     def reach(self, half: float, side: float) -> tuple[float, float]:
-        """Return the turn [rad] of half the face, and how far it and the corner go along the axis [m]."""
+        """Return the turn [rad] of half the face, and the length [m] of face and corner along the axis."""
         room = half - self.corner * np.cos(self.turn) - side * (1.0 - np.cos(self.turn))
         alpha = np.arcsin(np.clip(room / (self.face - self.corner), 0.0, np.cos(self.turn)))
         along = self.face * (1.0 - np.cos(alpha)) + self.corner * (np.cos(alpha) - np.sin(self.turn))
@@ -124,7 +124,7 @@ def half_outline(length: float, width: float, rear: End, front: End, sag: float)
 
 
 def split_at(half: Curve, x: float) -> tuple[Curve, int]:
-    """Return the half outline with a point of its flank at x [m] put in, on the true arc, and the point's index."""
+    """Return the half outline with an added point of its flank at x [m], on the true arc, and the point's index."""
     p, n = half.points, half.normals
     flank = np.flatnonzero(np.abs(n[:, 1]) > 0.7)
     i = int(flank[np.searchsorted(p[flank, 0], x)])

@@ -1,4 +1,4 @@
-"""Solids swept from plane curves: revolved, and offset (a plan outline drawn in along a section)."""
+"""Solids from plane curves: surfaces of revolution, and plan outlines with an inset that follows a section."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def capsule(start: Floats, stop: Floats, r0: float, r1: float, sag: float = SAG)
 
 
 def offset_solid(half: Curve, section: Curve, groove: dict[float, tuple[float, float]] | None = None) -> Piece:
-    """Return the closed solid whose outline at height z is the plan drawn in by d, after the section's points (-d, z).
+    """Return the closed solid whose outline at height z is the plan with an inset d, by the section's points (-d, z).
 
     Args: half right half of the plan outline; section from bottom (normal down) to top (normal up); groove maps
     x [m] of an upright groove in each side to its (width, depth) [m]. Caps are strips across the axis.
@@ -73,7 +73,7 @@ def offset_solid(half: Curve, section: Curve, groove: dict[float, tuple[float, f
     normals[..., :2] = n[:, None] * out[:, None]
     normals[..., 2] = up
     steep = np.flatnonzero(np.any(wall != 0.0, axis=1))
-    # The wall runs along a plan line of normal w and is drawn in along n as the rest.
+    # The groove's wall runs along a plan line of normal w; its inset is along n as everywhere.
     w = wall[steep]
     opening = np.einsum("ij,ij->i", w, n[steep])
     raw = np.concatenate([w[:, None] * out[:, None], (opening[:, None] * up)[:, :, None]], axis=2)
@@ -90,7 +90,7 @@ def offset_solid(half: Curve, section: Curve, groove: dict[float, tuple[float, f
 def _columns(half: Curve, groove: dict[float, tuple[float, float]]) -> tuple[Curve, Floats]:
     """Return the closed plan with its grooves, and for groove walls their normal (n, 2), else 0.
 
-    Offsets always go along the plan's normal, so that a groove keeps its width at every height.
+    Insets are along the plan's normal, so that a groove has the same width at every height.
     """
     half = trimmed(half)
     wall = np.zeros_like(half.points)
@@ -99,7 +99,7 @@ def _columns(half: Curve, groove: dict[float, tuple[float, float]]) -> tuple[Cur
         at, normal = cut.points[j], cut.normals[j]
         along, none = np.array([-normal[1], normal[0]]), np.zeros(2)
         first, last = at - 0.5 * width * along, at + 0.5 * width * along
-        # A trapezoid, so that x grows along the outline and the caps' strips never fold.
+        # A trapezoid: x grows along the outline, so that the caps' strips do not overlap.
         lean = 0.25 * width * along
         deep = (first + lean - depth * normal, last - lean - depth * normal)
         points = [first, first, deep[0], deep[0], deep[1], deep[1], last, last]

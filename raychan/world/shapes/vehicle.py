@@ -10,9 +10,9 @@ from raychan.world.shapes.curve import End
 from raychan.world.shapes.piece import BODY_SAG, Assembly, Piece
 from raychan.world.shapes.solid import capsule, ellipsoid, pillar, rounded_block
 
-_ABOUT_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-_PLATE = (0.52, 0.11, 0.004)
-_FINE = np.radians(8.0)
+_UPRIGHT_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_PLATE = (0.52, 0.11, 0.004)  # m: width, height and half thickness of the number plate
+_FLANK = np.radians(8.0)  # turn of a passenger car's flanks above and below their widest point
 
 
 def car(
@@ -27,7 +27,7 @@ def car(
     x, z = length / 4.4, height / 1.45
     form = Form(
         length, width, height, clearance=0.18 * z, belt=0.95 * z, nose_drop=0.24, tail_drop=0.04, bonnet=3.05 * x,
-        boot=0.9 * x, rear=End(3.2, 0.24), front=End(2.4, 0.32), bulge=_FINE, cabin=(0.45 * x, 3.3 * x),
+        boot=0.9 * x, rear=End(3.2, 0.24), front=End(2.4, 0.32), bulge=_FLANK, cabin=(0.45 * x, 3.3 * x),
         lean=(0.6 * x, 0.85 * x, 0.15), wheelbase=2.62 * x, rear_overhang=0.92 * x, wheel_radius=0.32 * z,
         doors=(1.05 * x, 1.95 * x, 3.05 * x), panes=((0.62 * x, 0.9 * x), (1.0 * x, 1.9 * x), (2.0 * x, 2.95 * x)),
     )  # fmt: skip
@@ -44,7 +44,7 @@ def suv(
     x, z = length / 4.7, height / 1.75
     form = Form(
         length, width, height, clearance=0.20 * z, belt=1.12 * z, nose_drop=0.14, tail_drop=0.0, bonnet=3.5 * x,
-        boot=0.5 * x, rear=End(3.5, 0.22), front=End(2.8, 0.3), bulge=_FINE, cabin=(0.07 * x, 3.55 * x),
+        boot=0.5 * x, rear=End(3.5, 0.22), front=End(2.8, 0.3), bulge=_FLANK, cabin=(0.07 * x, 3.55 * x),
         lean=(0.4 * x, 0.75 * x, 0.16), wheelbase=2.75 * x, rear_overhang=0.97 * x, wheel_radius=0.36 * z,
         doors=(1.2 * x, 2.2 * x, 3.3 * x), panes=((0.35 * x, 1.0 * x), (1.1 * x, 2.1 * x), (2.25 * x, 3.2 * x)),
     )  # fmt: skip
@@ -150,8 +150,8 @@ def _wheels(made: Assembly, form: Form, metal: str, sag: float) -> None:
 def wheel(radius: float, width: float, outside: float, sag: float) -> tuple[Piece, Piece]:
     """Return tyre and rim of a left wheel on the ground at x = 0 whose outer face lies at y = outside [m]."""
     proud = 6e-3
-    tyre = pillar(radius, width, 0.035, sag).moved(_ABOUT_Y, (0.0, outside - proud, radius))
-    disc = pillar(0.64 * radius, width, 0.02, sag).moved(_ABOUT_Y, (0.0, outside, radius))
+    tyre = pillar(radius, width, 0.035, sag).moved(_UPRIGHT_TO_Y, (0.0, outside - proud, radius))
+    disc = pillar(0.64 * radius, width, 0.02, sag).moved(_UPRIGHT_TO_Y, (0.0, outside, radius))
     return tyre, disc
 
 
@@ -172,8 +172,8 @@ def _doors(made: Assembly, form: Form, metal: str, sag: float) -> None:
 def _plate(made: Assembly, form: Form, sag: float) -> None:
     wide, tall, thick = _PLATE
     z = form.clearance + 0.72 * (form.belt - form.clearance)
-    x = form.drawn_in(0.0, z) - thick
-    lean = np.arctan2(form.drawn_in(0.0, z + 0.05) - form.drawn_in(0.0, z - 0.05), 0.1)
+    x = form.inset(0.0, z) - thick
+    lean = np.arctan2(form.inset(0.0, z + 0.05) - form.inset(0.0, z - 0.05), 0.1)
     turn = np.array([[np.cos(lean), 0.0, np.sin(lean)], [0.0, 1.0, 0.0], [-np.sin(lean), 0.0, np.cos(lean)]])
     sheet = rounded_block(2.0 * thick, wide, tall, 0.3 * thick, sag).moved(offset=(thick, 0.0, -0.5 * tall))
     sheet = sheet.moved(turn)

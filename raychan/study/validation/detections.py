@@ -1,4 +1,4 @@
-"""Measures of what was detected: where things show, how fast, how strong, over which path, and where nothing shows."""
+"""Measures of detections: range, speed, SNR and path of targets, and ranges where nothing is detected."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _of(bench: Bench, run: str, target: str, column: str) -> float | None:
     return None if row is None else float(getattr(bench.run(run).detections, column)[row])
 
 
-def _less(later: float | None, first: float | None) -> float | None:
+def _minus(later: float | None, first: float | None) -> float | None:
     return None if later is None or first is None else later - first
 
 
@@ -38,37 +38,37 @@ for _column in ("range", "rate", "speed", "snr"):
 
 @measure
 def shift(bench: Bench, run: str, target: str) -> Seen:
-    """Return how far [m] from its place it is detected."""
-    off = _less(_of(bench, run, target, "range"), bench.place(target)[1])
+    """Return the distance [m] in range from a target's place to its detection."""
+    off = _minus(_of(bench, run, target, "range"), bench.place(target)[1])
     return None if off is None else abs(off)
 
 
 @measure
 def speed_shift(bench: Bench, run: str, target: str) -> Seen:
-    """Return by how much [m/s] its speed is off what it was given along the line of sight."""
+    """Return the difference [m/s] of a target's detected speed from its given one along the line of sight."""
     from raychan.study.validation.parameters import ground_speed
 
-    off = _less(_of(bench, run, target, "speed"), float(ground_speed(bench, target) or 0.0))
+    off = _minus(_of(bench, run, target, "speed"), float(ground_speed(bench, target) or 0.0))
     return None if off is None else abs(off)
 
 
 @measure
 def label(bench: Bench, run: str, target: str) -> Seen:
-    """Return the label of its detection."""
+    """Return the label of a target's detection."""
     row = bench.found(run, target)
     return None if row is None else bench.run(run).provenance[row].label
 
 
 @measure
 def chain(bench: Bench, run: str, target: str) -> Seen:
-    """Return the chain of bodies that leads its detection."""
+    """Return the leading chain of bodies of a target's detection."""
     row = bench.found(run, target)
     return None if row is None else bench.run(run).provenance[row].bodies
 
 
 @measure
 def path_off(bench: Bench, run: str, target: str) -> Seen:
-    """Return how far [m] the length of the leading path is from the range detected."""
+    """Return the difference [m] between the leading path's range and the detected one."""
     row = bench.found(run, target)
     if row is None:
         return None
@@ -78,47 +78,47 @@ def path_off(bench: Bench, run: str, target: str) -> Seen:
 
 @measure
 def seen(bench: Bench, run: str, target: str) -> Seen:
-    """Say whether a target is detected."""
+    """Return whether a target is detected."""
     return bench.found(run, target) is not None
 
 
 @measure
 def unseen(bench: Bench, run: str, target: str) -> Seen:
-    """Say whether no detection's leading chain goes over a target, directly or not."""
+    """Return whether no detection's leading chain meets a target."""
     parts = bench.target(target).parts
     return not any(_goes_over(why, parts) for why in bench.run(run).provenance)
 
 
 @measure
 def empty(bench: Bench, run: str, low: float, high: float, speed: float) -> Seen:
-    """Say whether nothing is detected between two ranges [m] at a speed [m/s] below `speed`."""
+    """Return whether nothing is detected between two ranges [m] at a speed [m/s] below `speed`."""
     d = bench.run(run).detections
     return not ((d.range >= low) & (d.range <= high) & (np.abs(d.speed) < speed)).any()
 
 
 @measure
 def empty_over(bench: Bench, run: str, target: str, high: float) -> Seen:
-    """Say whether no detection below a range [m] goes over a target."""
+    """Return whether no detection below a range [m] has a target in its leading chain."""
     parts = bench.target(target).parts
     return not any(_goes_over(why, parts) for why in bench.run(run).provenance if why.range < high)
 
 
 @measure
 def count_seen(bench: Bench, run: str, targets: list[str]) -> Seen:
-    """Return how many of the targets are detected."""
+    """Return the number of targets that are detected."""
     return sum(bench.found(run, t) is not None for t in targets)
 
 
 @measure
 def greatest_off(bench: Bench, run: str, at: dict[str, float]) -> Seen:
-    """Return the greatest distance [m] of a detected target from the range that stands beside it."""
-    offs = [abs(x) for t, r in at.items() if (x := _less(_of(bench, run, t, "range"), r)) is not None]
+    """Return the largest difference [m] of detected targets from the ranges [m] given for them."""
+    offs = [abs(x) for t, r in at.items() if (x := _minus(_of(bench, run, t, "range"), r)) is not None]
     return max(offs, default=None)
 
 
 @measure
 def farthest_clutter(bench: Bench, run: str) -> Seen:
-    """Return the range [m] of the farthest detection led by the ground and the own car alone."""
+    """Return the range [m] of the farthest detection whose leading chain holds only the ground and the own car."""
     result = bench.run(run)
     own = result.receiver.background
     far = [
@@ -138,7 +138,7 @@ def strongest(bench: Bench, run: str, targets: list[str]) -> Seen:
 
 @measure
 def peaks(bench: Bench, run: str, low: float, high: float) -> Seen:
-    """Return how many peaks the power-delay profile has between two ranges [m]."""
+    """Return the number of peaks of the power-delay profile between two ranges [m]."""
     made = bench.run(run).profile
     at = made.range[made.peaks]
     return int(((at >= low) & (at <= high)).sum())
@@ -146,49 +146,49 @@ def peaks(bench: Bench, run: str, low: float, high: float) -> Seen:
 
 @measure
 def split(bench: Bench, run: str, at: list[float]) -> Seen:
-    """Say whether the profile has a peak within a third of the least gap, and within a cell, of each range [m]."""
+    """Return whether the profile has a peak within a third of the least gap, and within a cell, of each range [m]."""
     made = bench.run(run).profile
     tops = made.range[made.peaks]
-    # What lies further off than a cell is the peak of something else.
+    # A peak farther off than a range cell belongs to another target.
     near = min(float(np.diff(sorted(at)).min()) / 3.0, bench.scene(run).radar.waveform.range_resolution)
     return all(np.abs(tops - x).min(initial=np.inf) < near for x in at)
 
 
 @measure
 def range_apart(bench: Bench, run: str, one: str, other: str) -> Seen:
-    """Return how far [m] apart in range two targets are detected."""
-    apart = _less(_of(bench, run, one, "range"), _of(bench, run, other, "range"))
+    """Return the distance [m] in range between the detections of two targets."""
+    apart = _minus(_of(bench, run, one, "range"), _of(bench, run, other, "range"))
     return None if apart is None else abs(apart)
 
 
 @measure
 def speed_apart(bench: Bench, run: str, one: str, other: str) -> Seen:
-    """Return how far [m/s] apart in speed two targets are detected."""
-    apart = _less(_of(bench, run, one, "speed"), _of(bench, run, other, "speed"))
+    """Return the difference [m/s] between the detected speeds of two targets."""
+    apart = _minus(_of(bench, run, one, "speed"), _of(bench, run, other, "speed"))
     return None if apart is None else abs(apart)
 
 
 @measure
 def snr_change(bench: Bench, first: str, later: str, target: str) -> Seen:
-    """Return by how much [dB] a target's SNR rises from one run to another."""
-    return _less(_of(bench, later, target, "snr"), _of(bench, first, target, "snr"))
+    """Return the rise [dB] of a target's SNR from one run to another."""
+    return _minus(_of(bench, later, target, "snr"), _of(bench, first, target, "snr"))
 
 
 @measure
 def level_change(bench: Bench, first: str, later: str, target: str) -> Seen:
-    """Return the same of its level without noise where it is not detected."""
-    return _less(bench.strength(later, target), bench.strength(first, target))
+    """Return the same rise, with the level without noise in a run that does not detect the target."""
+    return _minus(bench.strength(later, target), bench.strength(first, target))
 
 
 @measure
 def range_change(bench: Bench, first: str, later: str, target: str) -> Seen:
-    """Return by how much [m] its range changes."""
-    return _less(_of(bench, later, target, "range"), _of(bench, first, target, "range"))
+    """Return the change [m] of a target's range from one run to another."""
+    return _minus(_of(bench, later, target, "range"), _of(bench, first, target, "range"))
 
 
 @measure
 def near_change(bench: Bench, first: str, later: str, limit: float) -> Seen:
-    """Return by how much [dB] the strongest return of the profile below a range [m] changes; noise counts as least."""
+    """Return the change [dB] of the profile's strongest return below a range [m], taken as no weaker than the noise."""
     tops = []
     for run in (first, later):
         made = bench.run(run).profile
@@ -210,37 +210,37 @@ def mean_change(bench: Bench, first: str, later: str, targets: list[str]) -> See
 
 @measure
 def greatest_change(bench: Bench, first: str, later: str, targets: list[str]) -> Seen:
-    """Return the greatest change of SNR [dB] among them."""
+    """Return the largest change of SNR [dB] of the targets detected in both runs."""
     return max(_changes(bench, first, later, targets, snr_change).values(), default=None)
 
 
 @measure
 def order_of_gain(bench: Bench, first: str, later: str, targets: list[str]) -> Seen:
-    """Return the targets by how much their levels gain, the most first: 'car 3 > car 2'."""
+    """Return the targets in the order of their rise in level, the largest first: 'car 3 > car 2'."""
     got = _changes(bench, first, later, targets, level_change)
     return " > ".join(bench.target(t).title for t in sorted(got, key=lambda t: -got[t]))
 
 
 @measure
-def rank(bench: Bench, run: str, theirs: dict[str, float]) -> Seen:
+def rank(bench: Bench, run: str, printed: dict[str, float]) -> Seen:
     """Return Spearman's rank correlation of levels with printed ones."""
-    return _spearman({t: bench.strength(run, t) for t in theirs}, theirs)
+    return _spearman({t: bench.strength(run, t) for t in printed}, printed)
 
 
 @measure
-def rank_change(bench: Bench, first: str, later: str, theirs: dict[str, float]) -> Seen:
+def rank_change(bench: Bench, first: str, later: str, printed: dict[str, float]) -> Seen:
     """Return Spearman's rank correlation of changes of level with printed ones."""
-    return _spearman(dict(_changes(bench, first, later, theirs, level_change)), theirs)
+    return _spearman(dict(_changes(bench, first, later, printed, level_change)), printed)
 
 
 @measure
 def greatest_sum(bench: Bench, one: list[float], other: list[float]) -> Seen:
-    """Return the greatest size of the sums of two printed columns."""
+    """Return the largest magnitude of the sums of two printed columns."""
     return float(np.abs(np.add(one, other)).max())
 
 
-def _spearman(ours: Any, theirs: dict[str, float]) -> float | None:
-    both = [(ours[t], theirs[t]) for t in theirs if ours.get(t) is not None]
+def _spearman(simulated: Any, printed: dict[str, float]) -> float | None:
+    both = [(simulated[t], printed[t]) for t in printed if simulated.get(t) is not None]
     return float(spearmanr(*zip(*both, strict=True)).statistic) if len(both) > 2 else None
 
 
