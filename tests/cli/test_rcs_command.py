@@ -233,3 +233,17 @@ def test_further_db_is_what_one_more_bounce_like_the_last_would_change():
     assert three.further_db == pytest.approx(20.0 * np.log10(1.0 + third), abs=0.3)
     assert rcs(build("box"), 77e9, 35.0).further_db == 0.0
     assert np.isnan(rcs(mesh, 77e9, 35.0, max_bounces=1).further_db)
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (10.0, 5.0)])
+def test_a_corner_of_three_faces_that_may_return_by_two_bounces_tells_of_the_third(angles, capsys):
+    """Along its axis the second bounce returns nothing, which tells nothing of the third."""
+    mesh = build("trihedral")
+    two, three = (rcs(mesh, 77e9, *angles, max_bounces=n) for n in (2, 3))
+    brought = 10.0 * np.log10(float(three.sigma / two.sigma))
+    told = ["--azimuth", f"{angles[0]}", "--elevation", f"{angles[1]}"]
+    assert invoke(["rcs", "--shape", "trihedral", *told, "--max-bounces", "2"]) == 0
+    assert "further bounces" in capsys.readouterr().err and float(two.further_db) > 3.0
+    if angles == (0.0, 0.0):
+        assert float(two.further_db) == pytest.approx(brought, abs=0.5)
+    assert float(rcs(build("dihedral"), 77e9, *angles).further_db) == 0.0
