@@ -89,11 +89,9 @@ def mesh_error(geometry: Geometry, found: Alternatives, wavenumber: float) -> Me
         if normals is not None:
             certain &= (normals == facets.normals).all(axis=(1, 2))
     sure = _halved(geometry, certain, wavenumber)
-    unsure = (
-        None
-        if sure is not None or (certain == geometry.curved).all()
-        else _halved(geometry, geometry.curved, wavenumber)
-    )
+    # Uncertain facets that are no regular tessellation have no smooth surface to come nearer to.
+    rest = geometry.curved & ~certain & (False if found.regular is None else found.regular)
+    unsure = _halved(geometry, rest, wavenumber) if sure is None and rest.any() else None
     finer = None if rounded is None else _halved(rounded, rounded.curved, wavenumber)
     return MeshError(fitted, creased, rounded, sure, unsure, finer)
 

@@ -79,12 +79,13 @@ def allowed_memory() -> float:
     return min(_SHARE * min(found), _MOST)
 
 
-def check_demand(scene: Scene) -> list[str]:
+def check_demand(scene: Scene, memory: float | None = None) -> list[str]:
     """Return warnings on a map that is small for the detector.
 
-    Raises: SceneError where the run needs more memory than it may take, or where its map is too small for the detector.
+    Args: memory [bytes] that the run may take; None: what this machine allows. Raises: SceneError where the run needs
+    more, or where its map is too small for the detector.
     """
-    need, may = demand(scene), allowed_memory()
+    need, may = demand(scene), allowed_memory() if memory is None else memory
     if need.memory > may:
         raise _refused(scene, need.memory, may)
     return _detector(scene)

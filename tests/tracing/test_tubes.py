@@ -10,7 +10,6 @@ import trimesh
 from support.facets import facets, quad
 from truth import corner, po
 
-import raychan
 from raychan.em.gauss_quadrature import mean_parts, points_for
 from raychan.em.phase_integral import triangle_terms
 from raychan.run.rcs_refinement import refinements
@@ -313,13 +312,3 @@ def test_patches_of_a_coarse_sphere_lie_on_the_sphere(subdivisions, share):
 def test_flat_facets_stay_flat():
     geometry = Geometry(facets_of(trimesh.creation.box((1, 2, 3)), "pec", F))
     assert not geometry.curved.any()
-
-
-def test_tubes_launched_in_batches_carry_what_those_launched_at_once_do(monkeypatch):
-    found = []
-    for batch in (1 << 17, 50):
-        monkeypatch.setattr("raychan.tracing.launch._BATCH", batch)
-        plate = raychan.rcs(build("plate", {"width": 0.5, "height": 0.4}), F, 20.0, distance=3.0)
-        ball = raychan.rcs(trimesh.creation.icosphere(subdivisions=4, radius=0.2), F, 20.0, max_bounces=1)
-        found.append((*plate.sigma.ravel(), *ball.sigma.ravel()))
-    assert found[1] == pytest.approx(found[0], rel=1e-9)
