@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 # Factors trade coverage of the true error against statements too large. They were chosen on the shapes of
-# tests/truth/shapes.py of seed 1; tests/test_truth.py judges on another seed.
+# tests/truth/shapes.py of seed 1; tests/channel/test_mesh_error.py judges on another seed.
 _FITS = 2.0  # of the change by the alternative fit of normals: both fits share part of their error
 _FACETS = 0.005  # of the value: error of quadratic patches although their normals are right
 _HALVED = 4.0 / 3.0  # of the change by halving the facets: the limit of a series that converges with second order

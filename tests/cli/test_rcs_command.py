@@ -76,6 +76,7 @@ def drawn(monkeypatch, dbsm, error, polar=False, azimuth=None, elevation=(0.0,))
     from raychan.report import rcs_figure
 
     made = []
+    # The picture is looked at before it is bytes.
     monkeypatch.setattr(rcs_figure, "drawn_as", lambda figure, suffix: made.append(figure) or memoryview(b""))
     azimuth = np.arange(float(np.shape(dbsm)[1])) if azimuth is None else np.array(azimuth)
     rcs_figure.rcs_picture(azimuth, np.array(elevation), np.array(dbsm), np.array(error), "title", polar=polar)
@@ -160,6 +161,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(plate, tmp_path, monkeypatch, c
     def stop(*_, **__):
         raise KeyboardInterrupt
 
+    # Ctrl-C comes while it computes.
     monkeypatch.setattr("raychan.run.rcs.rcs", stop)
     out = tmp_path / "x.csv"
     assert invoke(["rcs", str(plate), "--out", str(out)]) == 130
@@ -173,6 +175,7 @@ def made(*errors):
 
 
 def test_missed_tolerance_is_told(capsys, monkeypatch):
+    # The command's words are tested here, of an error that is known.
     monkeypatch.setattr("raychan.run.rcs.rcs", lambda *_, **__: made(0.7))
     assert invoke(["rcs", "--shape", "plate"]) == 0
     assert "1 of 1 angles miss the tolerance of 0.25 dB; largest stated error: 0.70 dB" in capsys.readouterr().err

@@ -38,7 +38,7 @@ def tree(folder):
 
 @pytest.fixture(params=["exchanged at once", "by renames", "file by file"])
 def way(request, monkeypatch):
-    """Each way in which a folder may come to its place."""
+    """Each way in which a folder may come to its place; the file system decides, so that other ways are cut off."""
     if request.param != "exchanged at once":
         monkeypatch.setattr(atomic_swap, "_exchange_at_once", lambda new, old: False)
     if request.param == "file by file":
@@ -93,6 +93,7 @@ def test_what_stands_in_the_way_is_told_and_stays(tmp_path):
     assert (out / "data").read_text() == "new"
 
 
+# A kill at a moment between two steps cannot be asked for: the steps themselves end the process.
 _KILLED = """
 import os, signal, sys
 sys.path[:0] = {folders!r}
