@@ -15,9 +15,10 @@ from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 # Factors trade coverage of the true error against statements too large. They were chosen on the shapes of
-# tests/truth/shapes.py of seed 1; tests/test_truth.py judges on another seed.
+# tests/truth/shapes.py of seed 1; tests/channel/test_mesh_error.py judges on another seed.
 _FITS = 2.0  # of the change by the alternative fit of normals: both fits share part of their error
 _FACETS = 0.005  # of the value: error of quadratic patches although their normals are right
 _HALVED = 4.0 / 3.0  # of the change by halving the facets: the limit of a series that converges with second order
@@ -31,17 +32,20 @@ _RESONANCE = 6.0  # k a: below it the creeping wave falls again, but the error o
 @dataclass(frozen=True)
 class MeshError:
     """The other surfaces that a mesh may stand for: with normals by another fit, with uncertain folds as edges, with
-    uncertain edges as smooth folds, and with facets halved along cubic edges."""
+    uncertain edges as smooth folds, and with facets halved along cubic edges: where all folds are certain, where some
+    are not, and with uncertain edges as smooth folds."""
 
     fitted: Geometry | None
     creased: Geometry | None
     rounded: Geometry | None
     halved: Geometry | None
+    uncertain_halved: Geometry | None = None
+    rounded_halved: Geometry | None = None
 
     @property
     def rays(self) -> int:
         """Rays cast on them so far."""
-        return sum(s.rays for s in (self.fitted, self.creased, self.rounded, self.halved) if s is not None)
+        return sum(s.rays for s in vars(self).values() if s is not None)
 
     def facets(self, first: complex, value: complex, of: Callable[[Geometry], complex]) -> float:
         """Return the error of an amplitude, relative to it, due to estimated normals and coarse facets.
@@ -60,10 +64,15 @@ class MeshError:
         if not (first and value):
             return 0.0
         said = [0.0]
-        for geometry in (self.creased, self.rounded):
-            if geometry is None:
-                continue
-            other = of(geometry)
+        others = [] if self.creased is None else [of(self.creased)]
+        # Facets as coarse as uncertain folds make them are far from a smooth surface.
+        if self.uncertain_halved is not None:
+            others.append(value + _HALVED * (of(self.uncertain_halved) - value))
+        if self.rounded is not None:
+            others.append(of(self.rounded))
+            if self.rounded_halved is not None:
+                others.append(others[-1] + _HALVED * (of(self.rounded_halved) - others[-1]))
+        for other in others:
             partly = 20.0 * np.log10(1.0 + _PARTLY * abs(other - first) / abs(first))
             apart = max(abs(20.0 * np.log10(max(abs(other), 1e-300) / abs(a))) for a in (first, value))
             said += [partly, _EDGES_DB * apart]
@@ -75,17 +84,22 @@ def mesh_error(geometry: Geometry, found: Alternatives, wavenumber: float) -> Me
     facets = geometry.facets
     other = (found.fitted, found.creased, found.rounded)
     fitted, creased, rounded = (None if n is None else Geometry(facets.replace(normals=n)) for n in other)
-    return MeshError(fitted, creased, rounded, _halved(geometry, found, wavenumber))
-
-
-def _halved(geometry: Geometry, found: Alternatives, wavenumber: float) -> Geometry | None:
-    """Return the surface with facets halved, None where it is the same; uncertain folds do not count for that."""
-    facets = geometry.facets
     certain = geometry.curved.copy()
     for normals in (found.creased, found.rounded):
         if normals is not None:
             certain &= (normals == facets.normals).all(axis=(1, 2))
-    off = cubic_off(facets.vertices[certain], facets.normals[certain], geometry.edge_curvature[certain])
+    sure = _halved(geometry, certain, wavenumber)
+    # Uncertain facets that are no regular tessellation have no smooth surface to come nearer to.
+    rest = geometry.curved & ~certain & (False if found.regular is None else found.regular)
+    unsure = _halved(geometry, rest, wavenumber) if sure is None and rest.any() else None
+    finer = None if rounded is None else _halved(rounded, rounded.curved, wavenumber)
+    return MeshError(fitted, creased, rounded, sure, unsure, finer)
+
+
+def _halved(geometry: Geometry, rows: Bools, wavenumber: float) -> Geometry | None:
+    """Return a surface with all facets halved; None where that changes nothing on those of `rows` (f,)."""
+    facets = geometry.facets
+    off = cubic_off(facets.vertices[rows], facets.normals[rows], geometry.edge_curvature[rows])
     if 2.0 * wavenumber * off.max(initial=0.0) < _CUBIC:
         return None
     v, n = halved(facets.vertices, facets.normals)

@@ -59,7 +59,7 @@ def further_bounces(found: Rcs, most: int, tolerance: float) -> list[str]:
     if not last:
         return []
     change = float(np.nanmax(found.further_db))
-    estimate = f"a bounce as strong as the last allowed one changes the RCS by up to {change:.2g} dB"
+    estimate = f"one more changes up to {change:.2g} dB, by estimate"
     return [f"at {last} of {found.bounces.size} angles {beyond}: {estimate}"]
 
 

@@ -8,6 +8,7 @@ the same everywhere.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.stats import beta, f, gamma
 
 from raychan.radar.side_lobes import correlation
 from raychan.records import RangeDoppler
+from raychan.units import db
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -87,6 +89,12 @@ def fitting_guard(
     return None
 
 
+def full_count(guard: tuple[int, int], train: tuple[int, int]) -> int:
+    """Return the number of training cells on a map with room for all; args as for `training`."""
+    inner = [guard[axis] // _STRIDE for axis in (0, 1)]
+    return math.prod(2 * (inner[axis] + train[axis]) + 1 for axis in (0, 1)) - math.prod(2 * n + 1 for n in inner)
+
+
 def training(
     grid: Grid, guard: tuple[int, int], train: tuple[int, int], windows: tuple[str, str] = ("hann", "hann")
 ) -> Training:
@@ -134,6 +142,12 @@ def bias(count: float, method: str, looks: int = 1) -> float:
     """Return the expected value of the statistic relative to the mean noise power: 1 for ca."""
     quantiles, weights = _ordered(count, looks)
     return 1.0 if method == "ca" else float(weights @ quantiles) / looks
+
+
+def least_snr_db(pfa: float, count: float, method: str, looks: int = 1) -> float:
+    """Return the least SNR [dB] of an echo that exceeds the threshold, in the mean over the noise of `count`
+    independent training cells; args and errors as for `factor`."""
+    return float(db(factor(pfa, count, method, looks) * bias(count, method, looks)))
 
 
 def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Floats:

@@ -7,6 +7,7 @@ lock are left over from a killed process, and the next writer of the same place 
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import os
 import shutil
@@ -95,11 +96,15 @@ def write_whole(path: str | Path, content: bytes | memoryview) -> Path:
 def write_together(files: Mapping[Path, bytes | memoryview]) -> None:
     """Write several files completely, or none where the disk has no room for all. Raises: StoreError."""
     with ExitStack() as ready:
-        parts = [(ready.enter_context(_part(path.resolve(), content)), path) for path, content in files.items()]
-        for part, path in parts:
+        parts = []
+        for path, content in files.items():
+            with _disk_errors(path):
+                there = path.resolve()
+            parts.append((ready.enter_context(_part(there, content)), there, path))
+        for part, there, path in parts:
             with _disk_errors(path):
                 if part is not None:
-                    os.replace(part, path.resolve())
+                    os.replace(part, there)
 
 
 @contextmanager
@@ -145,6 +150,19 @@ def _disk_errors(path: Path, stage: Path | None = None) -> Iterator[None]:
         raise StoreError(str(error).replace(str(stage), str(path))) from error
     except OSError as error:
         raise StoreError(f"{path}: cannot write: {error.strerror or error}") from error
+    except RuntimeError as error:
+        if not _in_a_circle(path):
+            raise
+        raise StoreError(f"{path}: cannot write: its links lead in a circle") from error
+
+
+def _in_a_circle(path: Path) -> bool:
+    """Tell whether links of a path lead in a circle; Path.resolve then raises RuntimeError before Python 3.13."""
+    try:
+        os.stat(path)
+    except OSError as error:
+        return error.errno == errno.ELOOP
+    return False
 
 
 def _check(out: Path, what: Contents) -> None:

@@ -16,8 +16,8 @@ from raychan.records import Cube, Paths
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import response
 
-_MOST = 1 << 19  # routes held at once, some 300 bytes each: less memory against more sums
-_KEPT = 1 << 18  # strongest routes that stay where there are more than that
+MOST = 1 << 19  # routes held at once, some 300 bytes each: less memory against more sums
+KEPT = 1 << 18  # strongest routes that stay where there are more than that
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,13 @@ class Launched:
 
 
 class PathStream:
-    """Paths of a launch for a radar, whose profile has a window along range: `add` each batch, then `done`."""
+    """Paths of a launch for a radar, whose profile has a window along range: `add` each batch, then `done`.
 
-    def __init__(self, radar: Radar, window: str) -> None:
+    Where there are more than `most` routes, the `kept` strongest stay.
+    """
+
+    def __init__(self, radar: Radar, window: str, most: int = MOST, kept: int = KEPT) -> None:
+        self._most, self._most_kept = most, kept
         self._sensor, self._window = replace(radar, noise=False), window
         self._held: list[Paths] = []
         self._kept: list[Paths] = []
@@ -79,7 +83,7 @@ class PathStream:
         self._held.append(paths)
         self._count += len(paths.delay)
         self._trajectories += len(paths.trajectories.kind)
-        if self._trajectories > _MOST:
+        if self._trajectories > self._most:
             self._flush()
 
     def _flush(self) -> None:
@@ -88,7 +92,7 @@ class PathStream:
         brought = synthesize(every, self._sensor).samples, _response(every, self._sensor, self._window)
         before = self._sums or (np.zeros(brought[0].shape, np.complex128), 0.0)
         self._sums = before[0] + brought[0], before[1] + brought[1]
-        self._kept = [strongest(join([*self._kept, every]), _KEPT)]
+        self._kept = [strongest(join([*self._kept, every]), self._most_kept)]
         self._held, self._trajectories = [], 0
 
     def done(self) -> Launched:

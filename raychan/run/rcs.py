@@ -42,8 +42,9 @@ class Rcs:
     amplitude: Complexes
     """Scattering matrix (..., 2, 2) [m], rows receive V, H, columns transmit: sigma = 4 pi |amplitude|^2."""
     further_db: Floats
-    """Change [dB] if a bounce beyond max_bounces brought as much as the last allowed one: an estimate that is not in
-    error_db; 0 for a convex body, NaN where max_bounces is 1 and the body is not convex."""
+    """Change [dB] if a bounce beyond max_bounces brought as much as the last allowed one, or, where that brings
+    nothing, as much as a coarse launch finds: an estimate that is not in error_db; 0 for a convex body, NaN where
+    max_bounces is 1 and the body is not convex."""
 
     @property
     def converged(self) -> NDArray[np.bool_]:

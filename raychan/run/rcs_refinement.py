@@ -17,6 +17,7 @@ from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
 from raychan.world.geometry import Geometry
+from raychan.world.limits import BOUNCES
 
 Complexes = NDArray[np.complex128]
 
@@ -29,6 +30,7 @@ _CURVED = 0.01  # of the value, a radian of a rule's `phase`: error that launche
 _TERMINATOR = 0.25  # of 1 / k: PO's abrupt terminator on a sphere of any radius, against Mie's series
 _TUBES = 30_000  # tubes that a launch may always subdivide, if max_rays allow
 _NULL = 1e-4  # of the strongest polarisation, -80 dB: a change below it does not count
+_COUNTS = 1e-3  # of the strongest bounce, -60 dB: one below it does not count
 _GROWTH = 2.6  # rays of the next rule over those of all before it, about
 
 
@@ -107,10 +109,10 @@ def refined(case: Case) -> Value:
     # The difference between two surfaces is a figure, however large.
     folds_db = case.mesh_error.edges_db(first, value, other) if sure else 0.0
     by_bounce = found.by_bounce
-    counted = np.flatnonzero(np.abs(by_bounce) > 1e-3 * np.abs(by_bounce).max(initial=0.0))
+    counted = np.flatnonzero(np.abs(by_bounce) > _COUNTS * np.abs(by_bounce).max(initial=0.0))
     # A level of zero has no error in dB.
     known = min(math.hypot(error_db, folds_db), MAX_ERROR_DB) if sure and error_db <= LARGEST_DB else np.nan
-    most, further = int(counted.max(initial=-1)) + 1, _further(geometry, by_bounce)
+    most, further = int(counted.max(initial=-1)) + 1, _further(case, rules[0], by_bounce)
     return Value(4.0 * np.pi * abs(value) ** 2, known, case.rays - rays, most, further, found.matrix)
 
 
@@ -203,12 +205,19 @@ def _typical_edge(geometry: Geometry) -> float:
     return float(longest[order][np.searchsorted(covered, 0.5 * covered[-1])])
 
 
-def _further(geometry: Geometry, by_bounce: Complexes) -> float:
-    """Return the change [dB] of the level if one more bounce brought as much as the last of those given."""
-    if geometry.convex_alone:
+def _further(case: Case, rule: Refinement, by_bounce: Complexes) -> float:
+    """Return the change [dB] of the level if one more bounce brought as much as the last of those given.
+
+    Where the last one brings nothing it tells nothing of the next: seen along its axis, a corner of three faces returns
+    by three bounces and not by two. There a launch by the given rule, with one more bounce, tells it."""
+    if case.geometry.convex_alone:
         return 0.0
-    whole = abs(by_bounce.sum())
-    return np.nan if len(by_bounce) == 1 or not whole else float(20.0 * np.log10(1.0 + abs(by_bounce[-1]) / whole))
+    whole, last = abs(by_bounce.sum()), abs(by_bounce[-1])
+    if len(by_bounce) == 1 or not whole:
+        return np.nan
+    if last <= _COUNTS * np.abs(by_bounce).max() and case.bounces < BOUNCES.high:
+        last = abs(replace(case, bounces=case.bounces + 1).launch(case.geometry, rule)[-1, case.row, case.col])
+    return float(20.0 * np.log10(1.0 + last / whole))
 
 
 def _most_tubes(step: int, max_rays: int) -> int:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from raychan.processing.cfar import GUARD, fitting_guard
+from raychan.processing.cfar import GUARD, TRAIN, Grid, fitting_guard, full_count, least_snr_db, training
 from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.run.receiver import noise_equivalent_amplitude
@@ -124,12 +124,13 @@ def allowed_memory() -> float:
     return min(_SHARE * min(found), _MOST)
 
 
-def check_demand(scene: Scene) -> list[str]:
+def check_demand(scene: Scene, memory: float | None = None) -> list[str]:
     """Return warnings on a map that is small for the detector.
 
-    Raises: SceneError where the run needs more memory than it may take, or where its map is too small for the detector.
+    Args: memory [bytes] that the run may take; None: what this machine allows. Raises: SceneError where the run needs
+    more, or where its map is too small for the detector.
     """
-    need, may = demand(scene), allowed_memory()
+    need, may = demand(scene), allowed_memory() if memory is None else memory
     if need.memory > may:
         raise _refused(scene, need.memory, may)
     return _detector(scene)
@@ -166,7 +167,8 @@ def _refused(scene: Scene, need: float, may: float) -> SceneError:
 
 
 def _detector(scene: Scene) -> list[str]:
-    """Return a line where the map is so small that the CFAR's guard must be smaller than set."""
+    """Return a line where the map is so small that the CFAR's guard must be smaller than set, and one where it has so
+    few training cells that the detector misses echoes above the least SNR."""
     wave, asked = scene.radar.waveform, scene.processing
     count = wave.n_chirps, wave.n_samples if wave.complex_sampling else wave.n_samples // 2
     guard, train = (sizes and sizes[::-1] for sizes in (asked.guard, asked.train))
@@ -176,9 +178,19 @@ def _detector(scene: Scene) -> list[str]:
         key = "processing.train" if train == (0, 0) else "radar.waveform.samples"
         allowed = "a cell or more" if train == (0, 0) else "6 chirps or 12 samples (24 if real) at least"
         raise SceneError(f"{size} has no room for the detector's training cells", key=key, allowed=allowed)
-    if fitted == (guard or GUARD):
-        return []
-    return [f"{size} is small for the detector: processing.guard = {list(fitted[::-1])} taken"]
+    said = []
+    if fitted != (guard or GUARD):
+        said.append(f"{size} is small for the detector: processing.guard = {list(fitted[::-1])} taken")
+    windows = asked.rate_window, asked.range_window
+    found, full = training(Grid((1, 1), count), fitted, train or TRAIN, windows), full_count(fitted, train or TRAIN)
+    least = least_snr_db(asked.pfa, found.worth, asked.cfar, len(scene.radar.elements))
+    if scene.radar.noise and len(found.offsets) < full and least > asked.min_snr_db:
+        said.append(
+            f"{size} has {len(found.offsets)} of the detector's {full} training cells: only echoes "
+            f"{least:.0f} dB above the noise are detected, not all above processing.min_snr_db = {asked.min_snr_db:g} "
+            "(radar.waveform.chirps, processing.train)"
+        )
+    return said
 
 
 def _size(count: float) -> str:

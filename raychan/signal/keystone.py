@@ -49,8 +49,8 @@ Each = Callable[..., Iterable[Any]]
 _SINGLE = 1e-6  # tolerance down to which single precision and a kernel of 8 cells suffice
 _STRIPES = 4  # parts of the echoes that are spread in parallel
 _BLOCK = 64  # samples of a chirp whose transforms over Doppler shift are made at a time
-_ROOM = 1 << 28  # bytes of a grid: beyond, the echoes are split over several grids
-_CHUNK = 1 << 18  # echoes spread at a time
+ROOM = 1 << 28  # bytes of a grid: beyond, the echoes are split over several grids
+CHUNK = 1 << 18  # echoes spread at a time
 _BOX = 8, 8  # rows and columns of a box by which echoes are sorted, so that neighbours share cells in the cache
 _READ, _READY = 4.0, 4  # cost of reading a sample off a plane, in cells transformed; planes that setting it up costs
 _CROWD = 64  # echoes in a box up to which they are summed in single precision: it errs by 3e-7 of their sum
@@ -169,10 +169,10 @@ class Keystone:
         self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
         return echoes[order]
 
-    def add(self, out: Complexes, echoes: Echoes, element: Floats, each: Each) -> None:
+    def add(self, out: Complexes, echoes: Echoes, element: Floats, each: Each, chunk: int = CHUNK) -> None:
         """Add to out (chirps, samples) the beat signal of the `prepared` echoes at a receiver at `element` (3,) [m].
 
-        Args: each, `map` or that of a thread pool.
+        Args: each, `map` or that of a thread pool; chunk, most echoes spread at a time.
         """
         count, samples, half = len(echoes.delay), self.wave.n_samples, self.width // 2
         ramp = np.array([self.wave.carrier, self.wave.slope, self.then, self.t, self.step])
@@ -195,7 +195,7 @@ class Keystone:
             wrap_margins(cells, half)
             return first, scipy.fft.fft(cells[:, :, half:-half], axis=2, overwrite_x=True)
 
-        stripes = min(count, max(_STRIPES, -(-count // _CHUNK)))
+        stripes = min(count, max(_STRIPES, -(-count // chunk)))
         bounds = np.linspace(0, count, stripes + 1).astype(int)
         spectra_rows = list(each(gridded, [slice(a, b) for a, b in pairwise(bounds)]))
 
@@ -215,11 +215,13 @@ class Keystone:
             pass
 
 
-def keystones(echoes: Echoes, wave: Waveform, tolerance: float, reach: float) -> list[tuple[Keystone, Echoes]]:
+def keystones(
+    echoes: Echoes, wave: Waveform, tolerance: float, reach: float, room: int = ROOM
+) -> list[tuple[Keystone, Echoes]]:
     """Return grids, each with its own echoes: one for all, or several where these cost less, as for echoes whose delays
-    or rates differ much."""
+    or rates differ much, or where one takes more than `room` [bytes]."""
     grid = Keystone(echoes, wave, tolerance, reach)
-    large = 16 * grid.planes * grid.rows * grid.columns > _ROOM
+    large = 16 * grid.planes * grid.rows * grid.columns > room
     if not large and grid.turns <= 1.0:
         return [(grid, echoes)]
     spans = grid.delay_rates[1] - grid.delay_rates[0], grid.delays[1] - grid.delays[0]
@@ -232,7 +234,7 @@ def keystones(echoes: Echoes, wave: Waveform, tolerance: float, reach: float) ->
     below = values <= 0.5 * sum(limits)
     if below.all() or not below.any():
         return [(grid, echoes)]
-    parts = [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach)]
+    parts = [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach, room)]
     # More terms of the series may cost less than reading every sample off one more grid.
     return parts if large or sum(part.work for part, _ in parts) < grid.work else [(grid, echoes)]
 

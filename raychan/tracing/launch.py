@@ -28,7 +28,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_BATCH = 1 << 17  # tubes launched at once: bounds the memory; few scenes have more on one leg
 OBLIQUE_SHARE = 0.1  # of their sum in phase that tubes facing away from an end are taken to add up to; not measured
 GAP_LEVELS = 1  # subdivisions of a hidden tube in search of a part that is seen; not measured
 
@@ -88,14 +87,14 @@ def _bisect_for_phase(
     held = 0
     while left:
         facet, bary, level = left.pop()
-        if len(facet) > _BATCH:
+        if len(facet) > rule.batch:
             half = len(facet) // 2
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
         edge = edge_to_cut(facet, bary, *(*shape, *images, *limits))
         more = found.budget.affords_phase(geometry, facet, edge >= 0)
         ready = ~more
-        if held + np.count_nonzero(ready) > _BATCH:
+        if held + np.count_nonzero(ready) > rule.batch:
             yield _joined(done)
             done, held = [], 0
         done.append((facet[ready], bary[ready]))

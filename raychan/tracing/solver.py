@@ -59,7 +59,9 @@ def launch_routes(
     if found is not None:
         yield found
     cuts = _CUTS + _CUTS_A_FACET * len(geometry.facets.vertices)
-    limited = replace(refined.for_depth(bounces), max_tubes=min(refined.max_tubes, _TUBES), max_cuts=cuts)
+    limited = replace(
+        refined.for_depth(bounces), max_tubes=min(refined.max_tubes, _TUBES), max_cuts=min(refined.max_cuts, cuts)
+    )
     # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not matter.
     direct = Contributions(limited)
     for i, leg in enumerate(legs):

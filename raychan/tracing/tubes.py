@@ -37,7 +37,8 @@ class Refinement:
     stationary; `turn` [rad] by which its normal may; `floor` [1/m] scattered amplitude (unit field at 1 m) under which
     a tube is not subdivided; `relative` the same for a hundred tubes, as a fraction of what was found within the same
     `cell` [m] of two-way length; `max_edge` [m] of first tubes; `levels` of subdivision for visibility and bounces;
-    `slots` of history; `layers` that a stretch may pass; budgets of a launch: `max_tubes` that subdivision for phase
+    `slots` of history; `layers` that a stretch may pass; `batch` of tubes launched at once, which bounds the memory
+    (few scenes have more on one leg; not measured); budgets of a launch: `max_tubes` that subdivision for phase
     may make, `max_cuts` for visibility, `max_rays` (see `Contributions.affords`); `jitter` (0 to 0.5) moves cuts off
     the middle, for a second lattice.
     """
@@ -52,6 +53,7 @@ class Refinement:
     levels: int = 12
     slots: int = 8
     layers: int = 2
+    batch: int = 1 << 17
     max_tubes: int = 100_000_000
     max_cuts: float = np.inf
     max_rays: float = np.inf

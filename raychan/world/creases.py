@@ -42,6 +42,9 @@ class Alternatives:
     """With the uncertain smooth folds as edges."""
     rounded: Floats | None = None
     """With those folds above the crease angle as smooth that look like a tessellation."""
+    regular: Bools | None = None
+    """Facets (f,) of smooth patches that are a regular tessellation: finer ones come nearer to a smooth surface, which
+    those of a convex hull of points do not. None where no fold is smooth."""
 
 
 def alternatives(mesh: Mesh) -> Alternatives:
@@ -71,7 +74,12 @@ def _alternatives(mesh: Mesh) -> Alternatives:
     # At uncertain folds `creased` is the alternative.
     fitted[pair[uncertain] // 3] = mesh.normals[pair[uncertain] // 3]
     creased = smoothed(mesh.vertices, mesh.faces, pair[~uncertain]) if uncertain.any() else None
-    return Alternatives(fitted if np.abs(fitted - mesh.normals).max() > _BEND else None, creased, round_)
+    return Alternatives(
+        fitted=fitted if np.abs(fitted - mesh.normals).max() > _BEND else None,
+        creased=creased,
+        rounded=round_,
+        regular=_regular(mesh),
+    )
 
 
 def uncertain_folds(mesh: Mesh, key: str) -> str:
@@ -134,14 +142,26 @@ def _outward(mesh: Mesh, pair: Ints) -> Floats:
     return np.where(np.einsum("ij,ij->i", normal, tip) > 0.0, -1.0, 1.0)
 
 
+def _regular(mesh: Mesh) -> Bools:
+    """Return which facets (f,) are of smooth patches whose facets are even, as those of a regular tessellation are."""
+    pair, fold = _smooth_folds(mesh)
+    patch = components(pair // 3, len(mesh.faces))
+    weight = np.where(fold > _BEND, fold, 0.0) * np.linalg.norm(_spans(mesh, pair), axis=1)
+    whole, uneven = (np.bincount(patch[pair[:, 0] // 3], w, len(patch)) for w in (weight, weight * _uneven(mesh, pair)))
+    return np.asarray((whole > 0.0) & (uneven <= _UNEVEN * whole))[patch]
+
+
+def _uneven(mesh: Mesh, pair: Ints) -> Floats:
+    """Return difference over sum (e,) of the heights of both facets over their shared edge, which are as the areas."""
+    a, b = mesh.areas[pair.T // 3]
+    return np.asarray(np.abs(a - b) / (a + b))
+
+
 def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
     """Return which smooth folds (e,) may be edges: those of patches that fold strongly or whose facets are uneven, in
     the mean over the patch weighted by fold times length."""
-    one, other = pair.T
-    span = _spans(mesh, pair)
-    weight = fold * np.linalg.norm(span, axis=1)
-    # Heights over a shared edge are as the areas.
-    a, b = mesh.areas[one // 3], mesh.areas[other // 3]
+    one = pair[:, 0]
+    weight = fold * np.linalg.norm(_spans(mesh, pair), axis=1)
     of_facet = components(pair // 3, len(mesh.faces))
     patch, crease = of_facet[one // 3], crease_angle(mesh.crease_deg or 0.0)
 
@@ -149,9 +169,7 @@ def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
         return np.asarray(np.bincount(patch, weight * x) / np.maximum(np.bincount(patch, weight), 1e-300))
 
     wide = crease * np.where(_one_way(mesh, pair, fold, of_facet)[: patch.max() + 1], _STRIPS, _WIDE)
-    uncertain = (
-        (mean(np.abs(a - b) / (a + b)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
-    )
+    uncertain = (mean(_uneven(mesh, pair)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
     return np.asarray(uncertain[patch])
 
 

@@ -17,6 +17,7 @@ _TESTS = 48  # most of these that are tested against another body
 _WORK = 1_000_000  # most facets times points: bounds the time (not measured)
 _DEPTH = 1e-3  # m: bodies that only touch, within rounding, do not overlap
 _INSIDE = 0.75  # winding number: 1 inside a closed body, 1/2 on its surface, 0 outside
+_SAME = 0.75  # share of each surface inside the other: two equal boxes have it up to a tenth of their length apart
 _BEAM = 1e-6  # of the two-way peak gain, -60 dB: below, a body is outside the beam
 
 
@@ -36,7 +37,8 @@ def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Flo
 def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
     """Return a line for each pair of bodies that overlap, and for each body hidden inside another.
 
-    Args: opaque: which bodies let no wave through. A body wholly inside one that lets waves in is intended.
+    Args: opaque: which bodies let no wave through. A body wholly inside one that lets waves in is intended; two that
+    fill nearly the same space are not.
     """
     said = []
     solid = [i for i, body in enumerate(bodies) if body.resolved_role != MIRROR]
@@ -54,6 +56,8 @@ def _told(one: Body, other: Body, one_opaque: bool, other_opaque: bool) -> list[
         return []
     inner, outer, share = (one, other, shares[0]) if shares[0] >= shares[1] else (other, one, shares[1])
     key = f"(bodies.{inner.name}.position)"
+    if min(shares) > _SAME:
+        return [f"bodies '{inner.name}' and '{outer.name}' fill nearly the same space: is one a copy? {key}"]
     if share == 1.0:
         hidden = other_opaque if outer is other else one_opaque
         text = f"body '{inner.name}' is wholly inside '{outer.name}', which lets nothing through {key}"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.world.topology import MeshTopology
+from raychan.world.topology import MeshTopology, point_numbers
 from raychan.world.vertex_normals import components
 
 Floats = NDArray[np.float64]
@@ -36,8 +36,9 @@ def rounded(topology: MeshTopology, corners: Floats, pair: Ints, fold: Floats, c
     """Return which edges (e,) above the crease angle [rad] may be smooth.
 
     Such folds continue from panel to panel in the same sense and by similar angles, four or more of them, and the
-    panels are of similar width, as sections of a cylinder or rings of a globe; not two sheets that meet at a ridge, a
-    chamfer, or the facets of a convex hull of points. Args: corners (f, 3, 3) [m] of the facets."""
+    panels are of similar width, as sections of a cylinder or rings of a globe, or each like the next along a ring, as
+    at the tip of a long ellipsoid; not two sheets that meet at a ridge, a chamfer, or the facets of a convex hull of
+    points. Args: corners (f, 3, 3) [m] of the facets."""
     low, high = band(crease)
     among = (np.abs(fold) >= low) & (np.abs(fold) < high)
     found = np.zeros(len(pair), bool)
@@ -46,7 +47,11 @@ def rounded(topology: MeshTopology, corners: Floats, pair: Ints, fold: Floats, c
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     panel = _panels(topology, pair, fold, low)
     length, across = _across(corners, pair)
-    uneven = np.minimum(_apart(area, pair // 3), _apart(np.asarray(np.bincount(panel, area), float), panel[pair // 3]))
+    whole_panel = np.asarray(np.bincount(panel, area), float)
+    uneven = np.minimum(_apart(area, pair // 3), _apart(whole_panel, panel[pair // 3]))
+    near = np.abs(fold) < high
+    ring = _along(point_numbers(corners.reshape(-1, 3)), pair, panel[pair // 3], whole_panel, fold, among, near)
+    uneven = np.minimum(uneven, ring)
     for sense in (1.0, -1.0):
         bend = np.where(np.abs(fold) < high, np.maximum(sense * fold, 0.0), 0.0) * length
         these = among & (sense * fold > 0.0)
@@ -112,6 +117,36 @@ def _alone(panel: Ints, bend: Floats, across: Floats) -> Floats:
         mine, all_ = (np.einsum("ei,eij,ej->e", way, t, way) for t in (own[key], whole[panel[:, side]]))
         share = np.minimum(share, mine / np.maximum(all_, 1e-300))
     return share
+
+
+def _along(point: Ints, pair: Ints, panel: Ints, size: Floats, fold: Floats, among: Bools, near: Bools) -> Floats:
+    """Return how much each fold (e,) of `among` and its panels (e, 2) differ from the next along a ring: the largest
+    difference over sum of both folds and of both panels' sizes, for the more alike of its two neighbours; 1 where
+    there is none.
+
+    The next fold begins where this one ends, between two other panels, each of them beside one of this fold's across
+    a fold of `near` (e,). Args: point (h,) the number of each half edge's first point.
+    """
+    rows = np.flatnonzero(among)
+    half = pair[rows, 0]
+    ends = np.stack([point[half], point[half - half % 3 + (half + 1) % 3]], axis=1).ravel()
+    owner = np.repeat(np.arange(len(rows)), 2)
+    order = np.argsort(ends, kind="stable")
+    least = np.ones(len(fold))
+    beside = np.unique(np.sort(panel[near], axis=1) @ np.array([len(size), 1]))
+    for step in range(1, int(np.unique(ends, return_counts=True)[1].max())):
+        same = np.flatnonzero(ends[order[:-step]] == ends[order[step:]])
+        one, other = rows[owner[order[same]]], rows[owner[order[same + step]]]
+        for turn in (1, -1):
+            a, b = panel[one], panel[other][:, ::turn]
+            sides = np.sort(np.stack([a, b], axis=2), axis=2)
+            next_ = (a != b).all(axis=1) & np.isin(sides @ np.array([len(size), 1]), beside).all(axis=1)
+            off = np.abs(fold[one] - fold[other]) / (np.abs(fold[one]) + np.abs(fold[other]))
+            for k in (0, 1):
+                off = np.maximum(off, _apart(size, np.stack([a[:, k], b[:, k]], axis=1)))
+            for these in (one, other):
+                np.minimum.at(least, these[next_], off[next_])
+    return least
 
 
 def _apart(size: Floats, both: Ints) -> Floats:

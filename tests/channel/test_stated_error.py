@@ -1,4 +1,4 @@
-"""The error that a map states against a far finer launch: in scenes, cell by cell, as `test_rcs.py` does for bodies."""
+"""The error that a map states, against a far finer launch, cell by cell; of bodies: `test_rcs_stated_error.py`."""
 
 from dataclasses import replace
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import trimesh
 from support.places import SCENES
@@ -103,6 +105,40 @@ def test_a_body_inside_glass_is_meant_so_and_one_inside_metal_is_told():
     assert rc.Scene([solid("case", 0.0, material=pane), inner]).warnings == []
     (line,) = rc.Scene([solid("case", 0.0, material="pec"), inner]).warnings
     assert "'inner' is wholly inside 'case'" in line and "bodies.inner.position" in line
+
+
+@pytest.mark.parametrize("material", ["pec", rc.Material(eps_r=6.0, thickness=4e-3)], ids=["metal", "glass"])
+@pytest.mark.parametrize(("x", "size"), [(5.0, 1.0), (5.0 + 1e-5, 1.0), (5.002, 1.0), (5.0, 1.0005), (5.05, 1.0)])
+def test_bodies_that_overlap_nearly_wholly_are_told_whatever_they_are_made_of(x, size, material):
+    (line,) = rc.Scene([solid("one", 5.0, material=material), solid("two", x, size, material=material)]).warnings
+    assert "'one'" in line and "'two'" in line and "fill nearly the same space: is one a copy?" in line
+
+
+def test_info_lists_each_of_several_bodies_with_its_own_place_and_nearest_corner(tmp_path, capsys, monkeypatch):
+    """Distances are from the radar, at (0, 0, 1), whatever body comes before."""
+    monkeypatch.setenv("COLUMNS", "200")
+    box = '[[bodies]]\nname = "{}"\nshape = "box"\nmaterial = "pec"\nparams = {{length = 2, width = 2, height = 1}}\n'
+    places = (("a", 9.0, 0.0), ("b", 20.0, 5.0), ("c", 9.0, -6.0))
+    texts = [f"{box.format(name)}position = [{x}, {y}, 0]\n" for name, x, y in places]
+    (tmp_path / "s.toml").write_text(PLATE + "".join(texts))
+    assert invoke(["info", str(tmp_path / "s.toml")]) == 0
+    told = {row[0]: row for line in capsys.readouterr().out.splitlines() if len(row := line.split()) > 10}
+    for name, x, y in places:
+        corner = min(math.hypot(x + i, y + k) for i in (-1, 1) for k in (-1, 1))
+        assert told[name][3:8] == ["2.00", "x", "2.00", "x", "1.00"]
+        assert told[name][8:10] == [f"{x:.2f},", f"{y:.2f},"] and told[name][-1] == f"{corner:.2f}"
+
+
+def test_where_few_chirps_leave_too_few_training_cells_for_the_least_snr_the_run_says_so():
+    """An echo of 23 dB SNR is missed by one chirp's detector, whose 6 training cells ask for 29 dB."""
+    scene = rc.Scene.from_text(PLATE).override(["radar.power_dbm=0", "radar.waveform.chirps=1"])
+    missed = rc.simulate(scene)
+    assert len(missed.detections.range) == 0
+    assert 20.0 < 10.0 * math.log10(missed.rdmap.power.max() / missed.rdmap.noise) < 29.0
+    (line,) = [w for w in missed.warnings if "training cells" in w]
+    assert "6 of the detector's 72" in line and "29 dB above the noise" in line and "radar.waveform.chirps" in line
+    for change in ("processing.cfar='ca'", "processing.min_snr_db=30", "radar.noise=false", "radar.waveform.chirps=32"):
+        assert not [w for w in rc.simulate(scene.override([change])).warnings if "training cells" in w], change
 
 
 @pytest.mark.parametrize(

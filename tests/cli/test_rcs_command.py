@@ -76,6 +76,7 @@ def drawn(monkeypatch, dbsm, error, polar=False, azimuth=None, elevation=(0.0,))
     from raychan.report import rcs_figure
 
     made = []
+    # The picture is looked at before it is bytes.
     monkeypatch.setattr(rcs_figure, "drawn_as", lambda figure, suffix: made.append(figure) or memoryview(b""))
     azimuth = np.arange(float(np.shape(dbsm)[1])) if azimuth is None else np.array(azimuth)
     rcs_figure.rcs_picture(azimuth, np.array(elevation), np.array(dbsm), np.array(error), "title", polar=polar)
@@ -160,6 +161,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(plate, tmp_path, monkeypatch, c
     def stop(*_, **__):
         raise KeyboardInterrupt
 
+    # Ctrl-C comes while it computes.
     monkeypatch.setattr("raychan.run.rcs.rcs", stop)
     out = tmp_path / "x.csv"
     assert invoke(["rcs", str(plate), "--out", str(out)]) == 130
@@ -173,6 +175,7 @@ def made(*errors):
 
 
 def test_missed_tolerance_is_told(capsys, monkeypatch):
+    # The command's words are tested here, of an error that is known.
     monkeypatch.setattr("raychan.run.rcs.rcs", lambda *_, **__: made(0.7))
     assert invoke(["rcs", "--shape", "plate"]) == 0
     assert "1 of 1 angles miss the tolerance of 0.25 dB; largest stated error: 0.70 dB" in capsys.readouterr().err
@@ -233,3 +236,17 @@ def test_further_db_is_what_one_more_bounce_like_the_last_would_change():
     assert three.further_db == pytest.approx(20.0 * np.log10(1.0 + third), abs=0.3)
     assert rcs(build("box"), 77e9, 35.0).further_db == 0.0
     assert np.isnan(rcs(mesh, 77e9, 35.0, max_bounces=1).further_db)
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0), (10.0, 5.0)])
+def test_a_corner_of_three_faces_that_may_return_by_two_bounces_tells_of_the_third(angles, capsys):
+    """Along its axis the second bounce returns nothing, which tells nothing of the third."""
+    mesh = build("trihedral")
+    two, three = (rcs(mesh, 77e9, *angles, max_bounces=n) for n in (2, 3))
+    brought = 10.0 * np.log10(float(three.sigma / two.sigma))
+    told = ["--azimuth", f"{angles[0]}", "--elevation", f"{angles[1]}"]
+    assert invoke(["rcs", "--shape", "trihedral", *told, "--max-bounces", "2"]) == 0
+    assert "further bounces" in capsys.readouterr().err and float(two.further_db) > 3.0
+    if angles == (0.0, 0.0):
+        assert float(two.further_db) == pytest.approx(brought, abs=0.5)
+    assert float(rcs(build("dihedral"), 77e9, *angles).further_db) == 0.0

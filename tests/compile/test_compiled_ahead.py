@@ -55,6 +55,7 @@ print(lost, misses > 0, misses + hits)
 def test_the_second_process_ends_with_the_command_that_started_it(monkeypatch: pytest.MonkeyPatch):
     started: list[subprocess.Popen[bytes]] = []
     real = subprocess.Popen
+    # Which process is started is seen at the system's own call only.
     monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: started.append(real(*a, **k)) or started[-1])
     with ahead.helped("none of this name", ahead.MANY):
         assert len(started) == 1
@@ -67,6 +68,7 @@ def test_where_no_second_process_can_start_the_command_goes_on(monkeypatch: pyte
     def none(*args: object, **kwargs: object) -> None:
         raise BlockingIOError("no more processes")
 
+    # A system that is out of processes.
     monkeypatch.setattr(subprocess, "Popen", none)
     with ahead.helped("run", ahead.MANY):
         pass

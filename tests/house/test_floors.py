@@ -5,6 +5,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
+from support.places import TESTS
 
 ROOT = Path(__file__).parents[2] / "raychan"
 STOREYS = (
@@ -121,6 +122,11 @@ def test_files_are_short_and_functions_short_and_shallow(file: Path):
             length = (node.end_lineno or node.lineno) - node.lineno + 1
             assert length <= LONGEST_FUNCTION, f"{where}:{node.name} has {length} lines"
             assert _depth(node) <= DEEPEST, f"{where}:{node.name} is nested {_depth(node)} deep"
+
+
+@pytest.mark.parametrize("file", sorted(TESTS.rglob("*.py")), ids=lambda p: str(p.relative_to(TESTS)))
+def test_files_of_tests_are_short_too(file: Path):
+    assert file.read_text(encoding="utf-8").count("\n") <= LONGEST_FILE
 
 
 def test_each_heavy_library_is_imported_in_one_place_and_drawing_lazily():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.echoes import SMALL, WIDE, echoes, make_radar
 
-from raychan.processing.cfar import Grid, bias, factor, level, training
+from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, full_count, least_snr_db, level, training
 from raychan.processing.detection import detect
 from raychan.processing.doa import azimuth
 from raychan.processing.range_doppler import range_doppler
@@ -225,3 +225,23 @@ def test_receivers_that_are_no_line_give_no_azimuth():
 def test_bad_arguments_are_refused(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
         detect(rdmap(echoes([])), **bad)
+
+
+@pytest.mark.parametrize("method", ["ca", "os"])
+@pytest.mark.parametrize("chirps", [1, 64])
+def test_the_least_snr_is_what_a_lone_echo_needs_over_the_mean_threshold_of_noise(method, chirps):
+    """The mean of the threshold over 30 maps of noise alone; the training cells of one chirp are few."""
+    wave = Waveform(77e9, 1e9, 20e-6, 40e-6, chirps, 1024)
+    ring = training(Grid.of(rdmap(echoes([]), wave)), GUARD, TRAIN)
+    thresholds = []
+    for seed in range(30):
+        m = range_doppler(synthesize(echoes([]), make_radar(wave, noise=True), np.random.default_rng(seed)), wave)
+        cells = np.argwhere(np.ones_like(m.power, bool))[::41]
+        thresholds.append(factor(1e-7, ring.worth, method) * level(m.power, cells, ring, method).mean() / m.noise)
+    assert db(np.mean(thresholds)) == pytest.approx(least_snr_db(1e-7, ring.worth, method), abs=0.3)
+
+
+@pytest.mark.parametrize("count", [(64, 256), (256, 64)])
+@pytest.mark.parametrize(("guard", "train"), [((2, 2), (3, 3)), ((3, 5), (2, 1)), ((0, 0), (1, 4))])
+def test_a_map_with_room_has_all_training_cells(count, guard, train):
+    assert len(training(Grid((1, 1), count), guard, train).offsets) == full_count(guard, train)

@@ -131,3 +131,17 @@ def test_bad_settings_are_refused(bad):
 def test_a_cube_of_another_waveform_is_refused():
     with pytest.raises(ValueError, match="128 by 1024"):
         range_doppler(synthesize(echoes([]), make_radar(SMALL)), WIDE)
+
+
+@pytest.mark.parametrize("pad", [(1, 1), (2, 2), (4, 4)])
+def test_a_frame_of_one_chirp_has_one_rate_and_reads_range_and_power(pad):
+    """A target at rest reads as in a frame of many; no padding makes rates of one chirp."""
+    wave = Waveform(77e9, 1e9, 20e-6, 40e-6, 1, 256)
+    m = rdmap(echoes([9.0], 0.0, 3e-4), wave, "hann", (pad[0], pad[1]), power=0.5)
+    assert m.power.shape == (1, 256 * pad[0]) and m.rate.tolist() == [0.0]
+    _, far, power = peak(m)
+    assert far == pytest.approx(9.0, abs=0.5 * wave.range_resolution / pad[0] + 1e-9)
+    found = detect(m, waveform=wave)
+    assert found.rate.tolist() == [0.0] and found.range[0] == pytest.approx(9.0, abs=0.1 * wave.range_resolution)
+    if pad[0] == 4:
+        assert db(power / (0.5 * 9e-8)) == pytest.approx(0.0, abs=0.15)

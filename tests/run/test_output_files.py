@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 from support.places import TESTS
 from support.results import paths, result
-from support.scene_texts import PLATE
+from support.scene_texts import PLATE, but_compiling
 
+from raychan.cli import invoke
 from raychan.run import atomic_swap, output_files
 from raychan.run.output_files import Contents, StoreError, staging, write_together, write_whole
 from raychan.run.storage import CONTENTS, save_result
@@ -37,7 +38,7 @@ def tree(folder):
 
 @pytest.fixture(params=["exchanged at once", "by renames", "file by file"])
 def way(request, monkeypatch):
-    """Each way in which a folder may come to its place."""
+    """Each way in which a folder may come to its place; the file system decides, so that other ways are cut off."""
     if request.param != "exchanged at once":
         monkeypatch.setattr(atomic_swap, "_exchange_at_once", lambda new, old: False)
     if request.param == "file by file":
@@ -92,6 +93,7 @@ def test_what_stands_in_the_way_is_told_and_stays(tmp_path):
     assert (out / "data").read_text() == "new"
 
 
+# A kill at a moment between two steps cannot be asked for: the steps themselves end the process.
 _KILLED = """
 import os, signal, sys
 sys.path[:0] = {folders!r}
@@ -229,6 +231,22 @@ def test_a_full_disk_ends_with_2_and_one_sentence_and_the_old_result(more, tmp_p
     assert done.stderr.startswith(f"raychan: {out}") and done.stderr.count("\n") == 1
     assert {p.name: p.read_bytes() for p in out.iterdir()} == old
     assert {p.name for p in tmp_path.iterdir()} == {"out", "plate.toml"}
+
+
+@NOT_WINDOWS
+def test_an_out_of_links_in_a_circle_ends_with_2_and_one_sentence(tmp_path, capsys):
+    scene, one, two = tmp_path / "plate.toml", tmp_path / "one", tmp_path / "two"
+    scene.write_text(PLATE)
+    one.symlink_to(two)
+    two.symlink_to(one)
+    before = sorted(tmp_path.iterdir())
+    for out in (one, one / "deeper"):
+        assert invoke(["run", str(scene), "--out", str(out), "--no-pictures"]) == 2
+        said = capsys.readouterr()
+        assert said.out == "" and str(out) in said.err and "Traceback" not in said.err
+        assert but_compiling(said.err).startswith("raychan: ") and but_compiling(said.err).count("\n") == 1
+    assert invoke(["rcs", "--shape", "plate", "--out", str(one)]) == 2
+    assert sorted(tmp_path.iterdir()) == before
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")

@@ -1,10 +1,17 @@
 """Launches too large to keep: samples, profile and stated error are those of all paths; the strongest explain them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import raychan as rc
 from raychan.run import path_stream
+from raychan.run.clock import Clock
+from raychan.run.path_stream import PathStream
+from raychan.run.rules import check_rule, fine_rule
+from raychan.run.simulate import channel_of, result_of
+from raychan.run.solver import solve_into
 
 RADAR = {"waveform": {"bandwidth_mhz": 500.0, "chirp_us": 30.0, "chirps": 32, "samples": 64}}
 
@@ -17,12 +24,21 @@ def scene():
     return rc.Scene(bodies=bodies, radar=RADAR, model={"max_bounces": 2})
 
 
+def streamed(of, channel, rule):
+    """Return what a launch brings where at most 100 routes are held and 40 are kept."""
+    stream = PathStream(of.radar, of.processing.range_window, most=100, kept=40)
+    solve_into(stream.add, channel.geometry, channel.points, of.radar, of.radar.waveform.carrier, rule)
+    return stream.done()
+
+
 @pytest.fixture
-def both(monkeypatch):
-    every = rc.simulate(scene())
-    monkeypatch.setattr(path_stream, "_MOST", 100)
-    monkeypatch.setattr(path_stream, "_KEPT", 40)
-    return every, rc.simulate(scene())
+def both():
+    of = scene()
+    channel = channel_of(of, None, None, Clock(None))
+    rules = [rule(of.radar, of.processing, of.model) for rule in (fine_rule, check_rule)]
+    launched, others = (streamed(of, channel, rule) for rule in rules)
+    few = dataclasses.replace(channel, launched=launched, others=others)
+    return rc.simulate(of), result_of(of, few, 0, Clock(None))
 
 
 def test_samples_profile_and_error_are_those_of_all_paths(both):

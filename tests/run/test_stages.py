@@ -109,6 +109,7 @@ def test_what_a_leg_keeps_does_not_depend_on_the_order_of_the_others(scene, monk
             direct, *others = legs_over(*args)
             return [direct, *others[::order]]
 
+        # Legs are traced in the order in which they are found; none can be chosen.
         with monkeypatch.context() as patch:
             patch.setattr(solver, "legs_over", turned)
             found = rc.trace(scene)

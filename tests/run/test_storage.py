@@ -111,6 +111,20 @@ def test_detections_say_in_the_file_what_made_them_and_how_sure_they_are(made, t
                 np.testing.assert_array_equal(data[name], getattr(made.detections, name))
 
 
+def test_cells_of_detections_are_indices_into_the_map_of_the_file(made, tmp_path):
+    save_result(made, tmp_path)
+    with (
+        xr.open_dataset(tmp_path / "result.nc", group="detections") as found,
+        xr.open_dataset(tmp_path / "result.nc", group="rdmap") as rdmap,
+    ):
+        assert "cell" not in found and found.rate_cell.dims == found.range_cell.dims == ("detection",)
+        assert {found[name].attrs["units"] for name in ("rate_cell", "range_cell")} == {"1"}
+        at = rdmap.isel(range_rate=found.rate_cell, range=found.range_cell)
+        np.testing.assert_array_equal(at.power, made.detections.power)
+        np.testing.assert_allclose(at.range, found.range, atol=0.5 * made.rdmap.range_resolution)
+        np.testing.assert_allclose(at.range_rate, found.range_rate, atol=0.5 * made.rdmap.rate_resolution)
+
+
 UDUNITS = {"1", "m", "m s-1", "s", "W", "V", "rad", "dB", "dBm"}  # and decibels, which it has not
 """Each was parsed by UDUNITS-2."""
 

@@ -50,6 +50,7 @@ def test_a_regime_that_raises_is_a_failure_and_the_next_one_runs(monkeypatch):
         raise ZeroDivisionError("by zero")
 
     good = Regime("good", "Good", lambda quick: Outcome([Row("case", 1.0, 1.0, 0.0, "", "")]))
+    # No regime of the study raises.
     monkeypatch.setattr(study, "REGIMES", (Regime("bad", "Bad", breaks), good))
     bad, after = study.stability()
     assert [r.note for r in bad.failed] == ["ZeroDivisionError: by zero"]

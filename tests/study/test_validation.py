@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
-import shutil
 import tomllib
 from collections import Counter
 
 import numpy as np
 import pytest
-from PIL import Image
 from support.study_tables import figures
 from support.study_tables import table as of_study
 
-from raychan.cli import invoke
-from raychan.report.validation_page import page
-from raychan.report.validation_report import _difference, table
 from raychan.run.result import MULTIPATH
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.data import HERE, Figure, Known, load
@@ -266,130 +260,3 @@ def test_every_ghost_is_explained_by_a_path_as_long_to_a_range_bin(bench, run):
     assert all(g.explained for g in found)
     if run == "occluded_array":
         assert any("truck.tail > pedestrian > truck.tail" in g.text for g in found)
-
-
-# The command
-
-
-@pytest.fixture
-def data(tmp_path):
-    """Return a copy of the data that a test may spoil; the scenes beside it are the checkout's."""
-    copy = tmp_path / "checkout" / "validation"
-    copy.mkdir(parents=True)
-    for file in HERE.glob("*.toml"):
-        shutil.copy(file, copy)
-    (copy.parent / "scenes").symlink_to(HERE.parent / "scenes")
-    return copy
-
-
-def spoil(file, old, new):
-    text = file.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new))
-
-
-def run(tmp_path, *more):
-    return invoke(["validate", "--out", str(tmp_path / "out"), "--only", "C003", "--only", "T7", *more])
-
-
-def test_report_and_page_are_written(tmp_path, capsys):
-    assert run(tmp_path) == 0
-    text = (tmp_path / "out" / "report.md").read_text()
-    assert "C003" in text and "0.264" in text and "cannot be tested as printed" in text
-    assert "agrees" in capsys.readouterr().out
-    assert '<td class="agrees">' in (tmp_path / "out" / "report.html").read_text()
-
-
-def test_an_unknown_difference_ends_with_1_and_its_name(tmp_path, data, capsys):
-    spoil(data / "claims.toml", "printed = 0.2636", "printed = 0.2836")
-    assert run(tmp_path, "--data", str(data)) == 1
-    assert "difference not listed: C003/range_resolution" in capsys.readouterr().err
-    assert "## Problems" in (tmp_path / "out" / "report.md").read_text()
-
-
-def test_a_difference_that_is_gone_ends_with_1_and_its_name(tmp_path, data, capsys):
-    with open(data / "known_differences.toml", "a") as file:
-        file.write('\n[[difference]]\nid = "old"\nkind = "paper"\nchecks = ["C003/*"]\nreason = "none"\n')
-    assert run(tmp_path, "--data", str(data)) == 1
-    assert "known difference 'old' is gone: C003/range_resolution" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("file", "old", "new", "said"),
-    [
-        ("claims.toml", 'measure = ["gap", "street"', 'measure = ["gab", "street"', "no measure 'gab'"),
-        ("claims.toml", "printed = 0.2636", "thiers = 0.2636", "thiers"),
-        ("claims.toml", '"urban", "range_resolution"', '"urban", "rang_resolution"', "did you mean 'range_resolution'"),
-        ("claims.toml", '"urban", "range_resolution"', '"urbane", "range_resolution"', "no run 'urbane'"),
-        ("claims.toml", '"urban", "range_resolution"', '"urban"', "arguments for 'waveform'"),
-        ("study.toml", 'changes = ["radar.waveform.bandwidth_mhz=4000"]', 'changes = ["radar.waveform.x=4"]', "'x'"),
-        ("study.toml", "[run.urban]", "[run.urban", "not valid TOML"),
-        ("tables.toml", 'untestable = "lobes"', 'untestable = "globes"', "no reason 'globes'"),
-        ("study.toml", 'scene = "urban"', 'scene = "suburb"', "suburb.toml"),
-    ],
-)
-def test_broken_data_are_told_with_their_place_and_nothing_is_written(tmp_path, data, capsys, file, old, new, said):
-    spoil(data / file, old, new)
-    wanted = ["validate", "--out", str(tmp_path / "out"), "--only", "C001", "--only", "C003", "--data", str(data)]
-    assert invoke(wanted) == 2
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_without_a_checkout_it_says_so(tmp_path, capsys):
-    assert run(tmp_path, "--data", str(tmp_path)) == 2
-    assert "checkout" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-def test_an_item_that_does_not_exist_is_refused(tmp_path, capsys):
-    assert invoke(["validate", "--out", str(tmp_path / "out"), "--only", "T17"]) == 2
-    assert "no table or claim 'T17'" in capsys.readouterr().err
-
-
-def test_ctrl_c_leaves_nothing(tmp_path, monkeypatch):
-    def stopped(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("raychan.study.validation.bench.simulate", stopped)
-    assert invoke(["validate", "--out", str(tmp_path / "out"), "--only", "C010"]) == 130
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_page_shows_the_pictures_beside_it_and_its_links_lead_somewhere(tmp_path):
-    Image.new("RGB", (1000, 10)).save(tmp_path / "dot.png")
-    text = "# Title\n\n[a](#the-array-by-azimuth)\n\n## The array, by azimuth\n\n### T1\n\n![dot](dot.png)\n\n"
-    made = page(text + "| a |\n| --- |\n| differs (why) |\n", tmp_path, "t")
-    assert '<img src="dot.png" width="600"' in made
-    assert '<td class="differs">differs (why)' in made and '<h3 id="t1">' in made
-    assert set(re.findall(r'href="#([^"]+)"', made)) <= set(re.findall(r'id="([^"]+)"', made))
-
-
-def test_columns_of_numbers_are_set_flush_right():
-    lines = table(("", "n", "said"), [("a", "1,024", "+1 dB"), ("b", "", "-2.5"), ("c", "-0.3", "")])
-    assert lines[1] == "| --- | ---: | --- |"
-
-
-@pytest.mark.parametrize(
-    ("off", "text"),
-    [(0.0, "0"), (4e-5, "0"), (0.000651, "+0.0007"), (-0.0123, "-0.012"), (-12.04, "-12"), (759164.0, "+759,164")],
-)
-def test_differences_are_told_with_two_digits_that_count(off, text):
-    assert _difference(off) == text
-
-
-# The copy in the repository
-
-
-def test_the_report_in_the_repository_is_of_these_data(study):
-    text = (HERE / "report.md").read_text(encoding="utf-8")
-    keys = [i.id for i in study.items]
-    for key in keys:
-        assert len(re.findall(rf"^\| (?:\[{key}\]\(#{key.lower()}\)|{key}) \|", text, re.M)) >= 1, key
-    names = {k["id"] for k in tomllib.loads((HERE / "known_differences.toml").read_text())["difference"]}
-    assert all(f"| {n} |" in text for n in names)
-    assert "## Problems" not in text
-    for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
-        assert (HERE / picture).is_file()
-    assert "inf dB" not in text and "nan" not in text
-    assert sum(f.stat().st_size for f in HERE.iterdir()) < 1_500_000

@@ -38,6 +38,15 @@ max_bounces = 3
 tolerance_db = 3.0
 """
 
+BARE_RADAR = """
+[radar]
+[radar.waveform]
+bandwidth_mhz = 570.0
+chirp_us = 60.5
+"""
+
+BALL = '[[bodies]]\nname = "ball"\nshape = "sphere"\nposition = [10.0, 0.0, 0.5]\n'
+
 
 def but_compiling(said: str) -> str:
     """Return what a command printed, without the line that it compiles: only the first of all tests does."""

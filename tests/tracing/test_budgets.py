@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,10 +14,13 @@ from typer.testing import CliRunner
 
 import raychan as rc
 from raychan.cli import app
-from raychan.run.rules import demand
+from raychan.run.clock import Clock
+from raychan.run.messages import uncut
+from raychan.run.rules import demand, fine_rule
+from raychan.run.simulate import channel_of, result_of
 from raychan.run.single_body import facets_of
-from raychan.tracing import solver
 from raychan.tracing.contributions import Contributions
+from raychan.tracing.solver import Stats, launch_routes
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 
@@ -61,16 +65,23 @@ position = [4, 0, 0]
 """
 
 
-def test_a_scene_whose_tubes_were_too_many_to_cut_names_the_body(tmp_path, monkeypatch):
+def test_a_scene_whose_tubes_were_too_many_to_cut_names_the_body(tmp_path):
     tangle(60, 2).export(tmp_path / "knot.ply")
     file = tmp_path / "scene.toml"
     file.write_text(_SCENE)
     scene = rc.Scene.load(file)
-    assert not [w for w in rc.simulate(scene).warnings if "are coarser than" in w]
-    monkeypatch.setattr(solver, "_CUTS", 20)
-    monkeypatch.setattr(solver, "_CUTS_A_FACET", 0)
-    told = [w for w in rc.simulate(scene).warnings if "are coarser than" in w]
-    assert len(told) == 1 and "'knot'" in told[0]
+    whole = channel_of(scene, None, None, Clock(None))
+    told = []
+    for cuts in (np.inf, 20.0):
+        rule = fine_rule(scene.radar, scene.processing, scene.model)
+        stats = Stats()
+        limited = replace(rule, refinement=replace(rule.refinement, max_cuts=cuts))
+        for _ in launch_routes(whole.geometry, whole.points, limited, stats):
+            pass
+        result = result_of(scene, replace(whole, warnings=uncut(whole.geometry, stats)), 0, Clock(None))
+        told.append([w for w in result.warnings if "are coarser than" in w])
+    assert whole.warnings == () and told[0] == []
+    assert len(told[1]) == 1 and "'knot'" in told[1][0]
 
 
 @pytest.mark.parametrize("size", [40, 400])

@@ -89,6 +89,7 @@ def test_what_a_solid_body_hides_is_what_no_ray_finds(leg, aside):
     geometry = Geometry(facets([front, ball((12.0, aside, 0.3)), ground(height=-2.0)], smooth=True))
     way, bodies = LEGS[leg](geometry), np.array([True, True, False])
     found = seed_facets(geometry, way, bodies)
+    # The occluders are left out: they only save time, so that no setting does without them.
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Occluders, "spheres_over", lambda self, leg: NOTHING)
         left = np.setdiff1d(seed_facets(geometry, way, bodies), found)
@@ -130,7 +131,8 @@ def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_
         calls.append(len(within(self, leg)[1]))
         return within(self, leg)
 
-    # The weakest tubes are let go up to a sum, to which hidden ones would add.
+    # The weakest tubes are let go up to a sum, to which hidden ones would add. Neither that nor the occluders can be
+    # left out by a setting: both only save time.
     monkeypatch.setattr(Contributions, "that_count", lambda self, bound, length, many=0: np.arange(len(bound)))
     monkeypatch.setattr(Occluders, "spheres_over", counted)
     ours = paths()

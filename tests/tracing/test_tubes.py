@@ -8,30 +8,19 @@ import numpy as np
 import pytest
 import trimesh
 from support.facets import facets, quad
+from support.triangles import nodes
 from truth import corner, po
 
-import raychan
 from raychan.em.phase_integral import triangle_terms
 from raychan.em.phasor import mean_parts, points_for
 from raychan.run.rcs_refinement import refinements
 from raychan.run.single_body import facets_of
-from raychan.tracing.footprints import element_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
 from raychan.world.geometry import Geometry
 from raychan.world.shapes import build
 
 F = 77e9
-
-
-def nodes(panels=40, order=8):
-    """Points (n, 3) barycentric and weights (n,) of a product rule on the triangle; weights sum to one."""
-    x, w = np.polynomial.legendre.leggauss(order)
-    start = np.arange(panels)[:, None]
-    t, wt = ((start + 0.5 + 0.5 * x) / panels).ravel(), np.tile(0.5 * w / panels, panels)
-    s, v = (a.ravel() for a in np.meshgrid(t, t, indexing="ij"))
-    # Duffy: a square onto the triangle, with the width of its rows as weight.
-    return np.column_stack([1 - s, s * (1 - v), s * v]), 2 * s * np.outer(wt, wt).ravel()
 
 
 BARY, WEIGHTS = nodes()
@@ -157,25 +146,6 @@ def test_corner_terms_keep_the_change_of_the_mean_with_frequency(slope, bend):
     assert max(off) < 0.05
 
 
-def on_patch(geometry, bary):
-    """Points (n, m, 3) of the true surface at barycentric coordinates (m, 3) of every facet."""
-    flat = np.einsum("mi,nij->nmj", bary, geometry.facets.vertices)
-    return flat - np.einsum("me,nej->nmj", bary * np.roll(bary, -1, axis=1), geometry.edge_curvature)
-
-
-def test_elements_of_the_true_surface_add_up_to_its_area_and_point_along_its_normals():
-    geometry = Geometry(facets_of(trimesh.creation.icosphere(3, 0.5), "pec", F))
-    bary, weights = nodes(2, 4)
-    normal = np.empty((len(geometry.area), len(bary), 3))
-    for of_facet, v, b in zip(normal, geometry.facets.vertices, geometry.edge_curvature, strict=True):
-        for out, w in zip(of_facet, bary, strict=True):
-            element_of(v, b, w, out)
-    assert (0.5 * np.linalg.norm(normal, axis=2) @ weights).sum() == pytest.approx(np.pi, rel=1e-4)
-    points = on_patch(geometry, bary)
-    along = normal / np.linalg.norm(normal, axis=2, keepdims=True)
-    assert np.einsum("nij,nij->ni", along, points / 0.5).min() > np.cos(0.02)
-
-
 # --- no ray is lost at an edge ------------------------------------------------------------------------------------
 
 
@@ -280,46 +250,4 @@ def test_first_tubes_of_an_open_corner_cover_it_once():
     assert sorted(areas.values()) == pytest.approx([0.005] * 3, rel=1e-9)
 
 
-def test_lit_half_of_a_sphere_projects_to_its_disc():
-    mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
-    geometry = Geometry(facets_of(mesh, "pec", F))
-    leg = Leg(end=po.direction(0.3, 0.2), far=True)
-    rule = next(itertools.islice(refinements(geometry, F), 2, None))
-    shadow = 0.0
-    for routes in tube_routes(geometry, leg, [leg], np.ones(len(geometry.piece_role), bool), rule, 1):
-        shadow += float(routes.area @ np.einsum("nj,j->n", routes.normals[:, 0], leg.end))
-    assert shadow == pytest.approx(np.pi * 0.1**2, rel=2e-3)
-
-
 # --- the true surface behind the facets ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("subdivisions", "share"), [(2, 0.02), (3, 0.02), (4, 0.02)])
-def test_patches_of_a_coarse_sphere_lie_on_the_sphere(subdivisions, share):
-    """The distance from the true sphere is a small share of the facets' own sag."""
-    radius = 0.5
-    mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    geometry = Geometry(facets_of(mesh, "pec", F))
-    bary = np.random.default_rng(6).dirichlet(np.ones(3), 50)
-    flat = np.einsum("mi,nij->nmj", bary, geometry.facets.vertices)
-    sag = radius - np.linalg.norm(flat, axis=2).min()
-    curved = on_patch(geometry, bary)
-    assert np.abs(np.linalg.norm(curved, axis=2) - radius).max() < share * sag
-    normal = np.einsum("mi,nij->nmj", bary, geometry.facets.normals)
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    assert np.einsum("nmj,nmj->nm", normal, curved / radius).min() > 1 - 1e-4
-
-
-def test_flat_facets_stay_flat():
-    geometry = Geometry(facets_of(trimesh.creation.box((1, 2, 3)), "pec", F))
-    assert not geometry.curved.any()
-
-
-def test_tubes_launched_in_batches_carry_what_those_launched_at_once_do(monkeypatch):
-    found = []
-    for batch in (1 << 17, 50):
-        monkeypatch.setattr("raychan.tracing.launch._BATCH", batch)
-        plate = raychan.rcs(build("plate", {"width": 0.5, "height": 0.4}), F, 20.0, distance=3.0)
-        ball = raychan.rcs(trimesh.creation.icosphere(subdivisions=4, radius=0.2), F, 20.0, max_bounces=1)
-        found.append((*plate.sigma.ravel(), *ball.sigma.ravel()))
-    assert found[1] == pytest.approx(found[0], rel=1e-9)

@@ -1,5 +1,5 @@
 """Random meshes whose true RCS is known, smooth and flat: `python -m truth.shapes SEED COUNT` (from tests/) prints how
-the stated error of `raychan.rcs` covers the true one. The factors of `channel/mesh_doubt.py` were chosen on seed 1."""
+the stated error of `raychan.rcs` covers the true one. The factors of `channel/mesh_error.py` were chosen on seed 1."""
 
 from __future__ import annotations
 

@@ -4,21 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.far_field import HEAD_ON, LAM, K, far, sigma
 
 from truth import corner, po, slab
-
-C0 = 299_792_458.0
-K = 2 * np.pi * 77e9 / C0
-LAM = C0 / 77e9
-HEAD_ON = po.direction(0.0)
-
-
-def sigma(s):
-    return 4 * np.pi * np.abs(s) ** 2
-
-
-def far(azimuth, elevation=0.0):
-    return po.direction(azimuth, elevation), np.inf
 
 
 @pytest.mark.parametrize("end", [(0.0, 0.0), (0.3, 0.2), (-0.9, 0.4)])

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import runpy
+import shutil
+import subprocess
 import sys
 import tomllib
 import types
@@ -68,15 +71,24 @@ def test_run_without_a_scene_lists_those_that_come_along(elsewhere, capsys):
     assert "--out" in capsys.readouterr().err
 
 
-def test_the_wheel_holds_the_scenes_beside_the_code_and_the_code_finds_them_there(tmp_path, monkeypatch):
+def python(code, folder):
+    """Return what code prints that imports raychan from a folder."""
+    env = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, env=env, cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_wheel_holds_the_scenes_beside_the_code_and_the_code_finds_them_there(tmp_path):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     assert project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {"scenes": "raychan/scenes"}
-    (tmp_path / "raychan" / "scenes").mkdir(parents=True)
-    (tmp_path / "raychan" / "scenes" / "only.toml").write_text(PLATE)
-    monkeypatch.setattr(bundled, "_CODE", tmp_path / "raychan")
-    assert bundled.names() == ["only"] and rc.Scene.load("only").title == "A plate ahead"
-    monkeypatch.setattr(bundled, "_CODE", tmp_path / "elsewhere" / "raychan")
-    assert bundled.folder() is None and bundled.names() == []
+    for place in ("wheel", "bare"):
+        shutil.copytree(ROOT / "raychan", tmp_path / place / "raychan", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "wheel" / "raychan" / "scenes").mkdir()
+    (tmp_path / "wheel" / "raychan" / "scenes" / "only.toml").write_text(PLATE)
+    names = "from raychan.world import bundled; print(bundled.names(), bundled.folder())"
+    loads = f"{names}; import raychan; print(raychan.Scene.load('only').title)"
+    assert python(loads, tmp_path / "wheel") == f"['only'] {tmp_path}/wheel/raychan/scenes\nA plate ahead\n"
+    assert python(names, tmp_path / "bare") == "[] None\n"
 
 
 def test_the_readme_of_a_package_index_has_no_address_that_leads_nowhere(monkeypatch):

@@ -54,7 +54,7 @@ def scene():
 
 @pytest.fixture
 def builds(monkeypatch):
-    """Count how many tracers are made."""
+    """Count how many tracers are made: their making costs, and no result shows it."""
     made = []
     init = RayCaster.__init__
     monkeypatch.setattr(RayCaster, "__init__", lambda self, f, *a: (made.append(len(f.body)), init(self, f, *a))[1])

@@ -15,6 +15,7 @@ from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
 from raychan.world.mesh import make_mesh
+from raychan.world.mesh_io import from_trimesh
 from raychan.world.topology import point_numbers
 
 
@@ -45,6 +46,18 @@ def test_halved_facets_share_every_edge_even_where_normals_part():
     corner = point_numbers(v.reshape(-1, 3)).reshape(-1, 3)
     edge = np.sort(np.stack([corner, np.roll(corner, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     assert (np.unique(edge, axis=0, return_counts=True)[1] == 2).all()
+
+
+@pytest.mark.parametrize("sections", [9, 16, 24])
+def test_a_halved_lid_follows_the_round_side_and_stays_flat(sections):
+    """Its rim lies on both: area goes to pi r^2 with the square of the section, three quarters of the lack a step."""
+    mesh = from_trimesh(trimesh.creation.cylinder(0.1, 0.3, sections=sections), crease_deg=60.0)
+    v, _ = halved(mesh.corners, mesh.normals)
+    lid = (np.abs(np.abs(v[:, :, 2]) - 0.15) < 1e-12).all(axis=1)
+    area = 0.5 * np.linalg.norm(np.cross(v[lid, 1] - v[lid, 0], v[lid, 2] - v[lid, 0]), axis=1).sum() / 2.0
+    before = 0.5 * sections * 0.1**2 * np.sin(2.0 * np.pi / sections)
+    twice = sections * 0.1**2 * np.sin(np.pi / sections)
+    assert area == pytest.approx(twice, abs=0.05 * (twice - before))
 
 
 def parabola(a):

@@ -185,10 +185,9 @@ def test_the_memory_foreseen_holds_what_a_run_takes_and_not_three_times_it(scene
         (["radar.waveform.samples=4096", "radar.waveform.chirps=16", "processing.pad=[1,1]"], "radar.waveform.samples"),
     ],
 )
-def test_what_needs_too_much_memory_is_refused_by_the_key_that_mends_it(scene, monkeypatch, changes, key):
-    monkeypatch.setattr(rules, "allowed_memory", lambda: 2.7e6)
+def test_what_needs_too_much_memory_is_refused_by_the_key_that_mends_it(scene, changes, key):
     with pytest.raises(SceneError) as caught:
-        rules.check_demand(rc.Scene.load(scene).override(changes))
+        rules.check_demand(rc.Scene.load(scene).override(changes), memory=2.7e6)
     assert caught.value.key == key and "at most" in caught.value.allowed
 
 

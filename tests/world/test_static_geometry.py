@@ -44,6 +44,7 @@ def bodies():
 @pytest.fixture(params=["still", "rigid", "both"])
 def scene(request, monkeypatch):
     """Return a scene of which the truck is kept, or the drum in its own frame, or both."""
+    # Real bodies of 200,000 facets take minutes to trace; that sharing begins there is no one's choice.
     monkeypatch.setattr(static_geometry, "MANY", 2000)
     all_ = bodies()
     picked = {"still": [0, 1, 3, 4], "rigid": [0, 2, 3, 4], "both": [0, 1, 2, 3, 4]}[request.param]

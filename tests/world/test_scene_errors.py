@@ -1,0 +1,154 @@
+"""Scene files and overrides that are wrong: file, key, value and what is allowed."""
+
+from __future__ import annotations
+
+import pytest
+from support.places import SCENES
+from support.scene_texts import BALL, BARE_RADAR
+
+from raychan.world.scene import Scene, SceneError
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("own/patsch.toml", "", "did you mean 'own/patch.toml'"),
+        ("patch", "", "no antenna file"),
+        ("own", "", "no antenna file"),
+        ("own/patch.toml", "kind = ", "patch.toml:1: not valid TOML"),
+        ("own/patch.toml", 'kind = "cosine"\nhpbw_h = 3.0', "patch.toml: hpbw_h: unknown key 'hpbw_h'"),
+        ("own/patch.toml", 'kind = "cosine"\nhpbw_h_deg = 80.0', "patch.toml: keys do not fit"),
+        ("own/patch.toml", 'kind = "cosine"\nhpbw_h_deg = 80.0\nhpbw_v_deg = 180.0', "patch.toml: a half-power"),
+        ("own/patch.toml", 'kind = "measured"\nfile = "none.csv"', "none.csv"),
+        ("own/patch.toml", 'kind = "array"\nny = 2\ntaper_y = "hamm"', "patch.toml"),
+        ("own/patch.toml", "ny = 2", "patch.toml: kind: key is missing"),
+        (
+            "own/patch.toml",
+            'kind = "array"\nny = 2\nspacing_y = 0.5\ngain_dbi = 5.0\n[element]\nkind = "measured"\nfile = "no.csv"',
+            "patch.toml: element",
+        ),
+    ],
+)
+def test_a_bad_antenna_file_is_named_with_its_key(tmp_path, name, content, says):
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "patch.toml").write_text(content)
+    with pytest.raises(SceneError) as caught:
+        Scene.from_text(BARE_RADAR.replace("[radar]", f'[radar]\nantenna = "{name}"'), tmp_path / "street.toml")
+    assert says in str(caught.value)
+
+
+def test_override_changes_keys_and_keeps_the_file():
+    scene = Scene.load(SCENES / "urban.toml")
+    new = scene.override(
+        ["radar.power_dbm=10", "bodies.suv.position=[20, 0, 0]", "radar.antenna=antennas/patch.toml", "scene.title=x"]
+    )
+    assert new.radar.power == pytest.approx(0.01) and new.title == "x"
+    suv = next(b for b in new.bodies if b.name == "suv")
+    assert list(suv.position) == [20, 0, 0]
+    assert "# changed: radar.power_dbm=10" in new.text
+    assert Scene.load(SCENES / "urban.toml").text == scene.text
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "says"),
+    [
+        ("radar.powr_dbm=1", "radar.powr_dbm", "power_dbm"),
+        ("bodies.suw.yaw_deg=1", "bodies.suw", "suv"),
+        ("radar.power_dbm", "radar.power_dbm", "key=value"),
+        ("radar.power_dbm=loud", "radar.power_dbm", "number"),
+        ("scene.title.x=1", "scene.title", "table"),
+        ("bodies=3", "bodies", "list"),
+    ],
+)
+def test_bad_overrides_are_named(change, key, says):
+    with pytest.raises(SceneError) as caught:
+        Scene.load(SCENES / "urban.toml").override([change])
+    assert caught.value.key == key and says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "says"),
+    [
+        ("[radar\n", "", "TOML"),
+        ("a = 1\na = 2\n", "", "TOML"),
+        ("[sceen]\n", "sceen", "did you mean 'scene'"),
+        (BARE_RADAR + "chirp = 3\n", "radar.waveform.chirp", "chirps"),
+        (
+            BARE_RADAR.replace("[radar]", "[radar]\nvelocity_kmh = [7.0, 0.0, 0.0]"),
+            "radar.velocity_kmh",
+            "velocity_mps",
+        ),
+        (BARE_RADAR.replace("[radar]", "[radar]\npositon = [0, 0, 1]"), "radar.positon", "position"),
+        (BARE_RADAR.replace("[radar]", "[radar]\nposition = [0.0, 1.0]"), "radar.position", "3"),
+        (BARE_RADAR.replace("[radar]", '[radar]\nantenna = "patch.tml"'), "radar.antenna", "no antenna file"),
+        (BARE_RADAR.replace("[radar]", '[radar]\nrx_antenna = "patch.tml"'), "radar.rx_antenna", "no antenna file"),
+        (BARE_RADAR.replace("[radar]", '[radar]\nantenna = { kind = "cosin" }'), "radar.antenna.kind", "'cosine'"),
+        (BARE_RADAR.replace("[radar]", '[radar]\nantenna = { kind = "isotropic", ny = 2 }'), "radar.antenna", "front"),
+        (
+            BARE_RADAR.replace("[radar]", '[radar]\nantenna = { kind = "isotropic", gain_dbi = 3.0, loss_db = 1.0 }'),
+            "radar.antenna",
+            "either gain_dbi or loss_db",
+        ),
+        (BARE_RADAR.replace("[radar]", '[radar]\nantenna = { kind = "cosine" }'), "radar.antenna", "hpbw"),
+        (BARE_RADAR.replace("[radar]", '[radar]\nantenna = { kind = "array", nx = 2 }'), "radar.antenna.nx", "ny"),
+        (BARE_RADAR.replace("[radar]", "[radar]\nnoise_figure_db = inf"), "radar.noise_figure_db", "finite"),
+        (BARE_RADAR.replace("60.5", "-60.5"), "radar.waveform.chirp_us", "between 0.001"),
+        (BARE_RADAR.replace("60.5", '"60.5 us"'), "radar.waveform.chirp_us", "number"),
+        (BARE_RADAR + "samples = 0\n", "radar.waveform.samples", "between 1 and"),
+        (BARE_RADAR + "repetition_us = 30.0\n", "radar.waveform", "repetition_us"),
+        ("[radar]\npower_dbm = 3.0\n", "radar.waveform", "missing"),
+        ("[model]\nmax_bounces = 0\n", "model.max_bounces", "1"),
+        ("[processing]\npfa = 2.0\n", "processing.pfa", "and 0.5"),
+        ("[materials.tin]\neps = 3.0\n", "materials.tin.eps", "eps_r"),
+        ("[materials.tin]\neps_r = 0.2\n", "materials.tin.eps_r", "1"),
+        (BALL + 'material = "concret"\n', "bodies.ball.material", "concrete"),
+        (BALL + 'materials = { boddy = "pec" }\n', "bodies.ball.materials.boddy", "body"),
+        (BALL + "params = { radius = -1.0 }\n", "bodies.ball.params.radius", "positive"),
+        (BALL + "params = { radious = 1.0 }\n", "bodies.ball.params.radious", "radius"),
+        (BALL + "velocity = [1, 0, 0]\n", "bodies.ball.velocity", "velocity_mps"),
+        (BALL + "position = 3\n", "", "TOML"),
+        (BALL + 'mesh = "a.ply"\n', "bodies.ball", "either"),
+        (BALL + BALL, "bodies.ball", "two bodies"),
+        (BALL.replace("sphere", "spere"), "bodies.ball.shape", "sphere"),
+        (BALL + "role = 'wall'\n", "bodies.ball.role", "mirror"),
+        ('[[bodies]]\nname = "m"\nmesh = "none.ply"\n', "bodies.m", "not found"),
+        ("[[bodies]]\nshape = 'car'\n", "bodies.0.name", "missing"),
+        (BARE_RADAR + BALL.replace("10.0, 0.0, 0.5", "0.1, 0.0, 0.5"), "radar.position", "inside 'ball'"),
+        (
+            BARE_RADAR + '[[bodies]]\nname = "road"\nshape = "ground"\nposition = [0.0, 0.0, 1.0]\n',
+            "radar.position",
+            "behind 'road'",
+        ),
+    ],
+)
+def test_bad_scene_files_say_what_where_and_what_is_allowed(tmp_path, text, key, says):
+    file = tmp_path / "bad.toml"
+    file.write_text(text)
+    with pytest.raises(SceneError) as caught:
+        Scene.load(file)
+    assert caught.value.key == key
+    assert says in str(caught.value)
+    assert any(name in str(caught.value) for name in ("bad.toml", "none.ply"))
+
+
+def test_broken_toml_names_its_line(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text("[scene]\ntitle = 'x'\nthis is no toml\n")
+    with pytest.raises(SceneError) as caught:
+        Scene.load(file)
+    assert caught.value.line == 3 and "bad.toml:3" in str(caught.value)
+
+
+def test_missing_scene_file(tmp_path):
+    with pytest.raises(SceneError, match="not found"):
+        Scene.load(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("bad", ["nan", "empty"])
+def test_nan_and_empty_meshes_name_file_and_body(tmp_path, bad):
+    rows = {"nan": "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n", "empty": "v 0 0 0\nv 1 0 0\nv 0 1 0\n"}
+    (tmp_path / "m.obj").write_text(rows[bad])
+    (tmp_path / "s.toml").write_text('[[bodies]]\nname = "b"\nmesh = "m.obj"\n')
+    with pytest.raises(SceneError) as caught:
+        Scene.load(tmp_path / "s.toml")
+    assert caught.value.key == "bodies.b" and "m.obj" in str(caught.value)
