@@ -68,20 +68,22 @@ def contains(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def near_sphere(origin, direction, most, centre, radius):  # type: ignore[no-untyped-def]
-    """Return which rays (k,) may meet a sphere, centre (3,) and radius [m], before `most` (n,) [m]."""
+def near_spheres(origin, direction, most, centre, radius):  # type: ignore[no-untyped-def]
+    """Return which rays (k,) may meet a sphere before `most` (n,) [m]; spheres: centre (s, 3), radius (s,) [m]."""
     rows = np.empty(len(origin), np.int64)
     count = 0
     for i in range(len(origin)):
-        along, apart = 0.0, 0.0
-        for c in range(3):
-            d = centre[c] - origin[i, c]
-            along += d * direction[i, c]
-            apart += d * d
-        aside = apart - along * along
-        if along > -radius and along - radius < most[i] and aside < radius * radius * (1.0 + 1e-9) + 1e-9 * apart:
-            rows[count] = i
-            count += 1
+        for s in range(len(radius)):
+            along, apart, size = 0.0, 0.0, radius[s]
+            for c in range(3):
+                d = centre[s, c] - origin[i, c]
+                along += d * direction[i, c]
+                apart += d * d
+            aside = apart - along * along
+            if along > -size and along - size < most[i] and aside < size * size * (1.0 + 1e-9) + 1e-9 * apart:
+                rows[count] = i
+                count += 1
+                break
     return rows[:count].copy()
 
 

@@ -1,4 +1,4 @@
-"""Ray casting: triangle ids from Embree, everything else in float64 (the only import of embreex).
+"""Ray casting: triangle ids from Embree, everything else in float64 (see `world.triangle_groups`).
 
 Embree answers in float32, whose spacing at 200 m is 15 um: 0.05 rad two-way at 77 GHz. So only the triangle's id is
 taken; the hit point is the float64 intersection with that triangle's plane. The world is shifted to the centre of the
@@ -8,8 +8,6 @@ facets before it is cast to float32, so a scene far from the origin gives the an
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from copy import copy
 from functools import partial
 from typing import Any
 
@@ -20,17 +18,18 @@ from raychan.geometry.intersect import (
     CastRays,
     FacetShapes,
     companions,
-    near_sphere,
+    near_spheres,
     offset_origins,
     plane_distances,
     resolve_hits,
 )
 from raychan.geometry.shadow_rays import ShadowSurfaces, ShadowTargets, resolve_shadow_rays
-from raychan.geometry.triangles import extents, planes_of, transform
-from raychan.parallel import cached, parallel_for
+from raychan.geometry.triangles import extents, planes_of
+from raychan.parallel import parallel_for
 from raychan.records import LAYER, Facets
 from raychan.world.backed_layers import backed
 from raychan.world.static_geometry import StaticGeometry, columns, computed_once
+from raychan.world.triangle_groups import Group
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -44,62 +43,6 @@ _TRIES = 8  # casts of a ray whose hit is its own facet or one that it runs alon
 # Of the size of a small scene, or of 1 m in a larger one:
 _TOUCH = 2e-5  # surfaces nearer than this lie on each other
 _NEAREST = 1e-6  # a hit closer than this is the surface the ray leaves
-
-
-class Triangles:
-    """Embree's scene of triangles, built for the first ray.
-
-    Args: corners returns them, (n, 3, 3) [m]; centre (3,) [m], from which float32 coordinates count.
-    """
-
-    def __init__(self, corners: Callable[[], Floats], centre: Floats) -> None:
-        self._corners: Callable[[], Floats] | None = corners
-        self.centre, self.making = centre, threading.RLock()
-
-    @cached
-    def scene(self) -> Any:
-        """Embree's scene; origins of rays count from the centre."""
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
-        assert self._corners is not None
-        scene = EmbreeScene(robust=True)
-        self._mesh = TriangleMesh(scene, np.ascontiguousarray(self._corners() - self.centre, np.float32))
-        scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-        self._corners = None
-        return scene
-
-
-class Group:
-    """Facets that rays are cast at together, in the world's frame or in one of their own.
-
-    Args: corners returns them, (n, 3, 3) [m]; extents (b, 2, 3) [m] that hold them; rows (n,) their numbers among all,
-    None if they are all; behind [m] by which a hit must lie before those of earlier groups.
-    """
-
-    def __init__(self, corners: Callable[[], Floats], extents: Floats, rows: Ints | None, behind: float = 0.0) -> None:
-        self.behind = behind
-        low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
-        self.centre, self.radius = 0.5 * (low + high), 0.5001 * float(np.linalg.norm(high - low))
-        self.mesh, self._rows = Triangles(corners, self.centre), rows
-        self._frame: tuple[Floats, Floats] | None = None
-
-    def posed(self, turn: Floats, origin: Floats) -> Group:
-        """Return the same facets with their frame at turn (3, 3) to world axes, origin (3,) [m]."""
-        now = copy(self)
-        now.centre, now._frame = turn @ self.mesh.centre + origin, (np.ascontiguousarray(turn.T), -turn.T @ origin)
-        return now
-
-    def to_frame(self, origin: Floats, direction: Floats) -> tuple[Floats, Floats]:
-        """Return origins and directions (n, 3) of rays in the group's frame."""
-        if self._frame is None:
-            return origin, direction
-        return transform(origin, *self._frame), transform(direction, self._frame[0], np.zeros(3))
-
-    def run(self, origin: NDArray[np.float32], direction: NDArray[np.float32]) -> Ints:
-        """Return the facet (n,) that each ray meets first, -1 for none; origins from the mesh's centre in its frame."""
-        hit: Ints = self.mesh.scene.run(origin, direction)
-        return hit if self._rows is None else np.where(hit >= 0, self._rows[hit], _MISS)
 
 
 class RayCaster:
@@ -147,7 +90,7 @@ class RayCaster:
         rest, thin = (np.flatnonzero(x).astype(np.int32) for x in (~upon, upon))
         return [
             Group(lambda: v[rest], self.extents, rest),
-            Group(lambda: v[thin], self.extents, thin, behind=self.touch),
+            Group(lambda: v[thin], self.extents, thin, behind=self.touch).facet_by_facet(v[thin]),
         ]
 
     def _groups_of(self, static: StaticGeometry) -> list[Group]:
@@ -219,7 +162,7 @@ class RayCaster:
 
     def _cast_nearer(self, group: Group, rays: CastRays, facet: Ints, distance: Floats) -> None:
         """Write what rays meet of another group, where that is nearer."""
-        rows = near_sphere(rays.origin, rays.direction, distance, group.centre, group.radius)
+        rows = near_spheres(rays.origin, rays.direction, distance, *group.spheres)
         found, t = np.full(len(rows), _MISS, np.int32), np.full(len(rows), np.inf)
         self._cast(group, CastRays(*(x[rows] for x in rays)), found, t)
         # Of two in the same place the first counts, whichever group it is of.
