@@ -148,11 +148,11 @@ def edge_folds(pair, v, n, normal, area):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def cluster_bounds(order, first, v, n, normal, edge_curvature):  # type: ignore[no-untyped-def]
-    """Return for clusters of facets, order[first[i] : first[i + 1]], bounding spheres of their curved surfaces, centre
-    (k, 3) and radius (k,) [m], and normal cones, axis (k, 3) and half angle (k,) [rad]."""
+def cluster_bounds(order, first, v, edge_curvature):  # type: ignore[no-untyped-def]
+    """Return for clusters of facets, order[first[i] : first[i + 1]], bounding spheres of their curved surfaces: centre
+    (k, 3) and radius (k,) [m]."""
     k = len(first) - 1
-    centre, radius, axis, spread = np.zeros((k, 3)), np.zeros(k), np.zeros((k, 3)), np.full(k, math.pi)
+    centre, radius = np.zeros((k, 3)), np.zeros(k)
     low, high = np.empty(3), np.empty(3)
     for i in range(k):
         low[:], high[:] = np.inf, -np.inf
@@ -161,27 +161,17 @@ def cluster_bounds(order, first, v, n, normal, edge_curvature):  # type: ignore[
             for q in range(3):
                 for c in range(3):
                     low[c], high[c] = min(low[c], v[f, q, c]), max(high[c], v[f, q, c])
-            for c in range(3):
-                axis[i, c] += normal[f, c]
         for c in range(3):
             centre[i, c] = 0.5 * (low[c] + high[c])
-        size = math.sqrt(axis[i, 0] ** 2 + axis[i, 1] ** 2 + axis[i, 2] ** 2)
-        least, most = 1.0 if size > 1e-6 else -1.0, 0.0
-        for c in range(3):
-            axis[i, c] /= max(size, 1e-6)
+        most = 0.0
         for at in range(first[i], first[i + 1]):
             f = order[at]
-            swell = 0.0
             for q in range(3):
-                off, turn, out = 0.0, 0.0, 0.0
+                off, out = 0.0, 0.0
                 for c in range(3):
                     off += (v[f, q, c] - centre[i, c]) ** 2
-                    turn += n[f, q, c] * axis[i, c]
                     out += edge_curvature[f, q, c] ** 2
-                radius[i], least, swell = max(radius[i], off), min(least, turn), max(swell, out)
-            turn = normal[f, 0] * axis[i, 0] + normal[f, 1] * axis[i, 1] + normal[f, 2] * axis[i, 2]
-            most, least = max(most, swell), min(least, turn)
+                radius[i], most = max(radius[i], off), max(most, out)
         # Of a patch's three products l_i l_j the sum is at most 1/3.
         radius[i] = math.sqrt(radius[i]) + math.sqrt(most) / 3.0
-        spread[i] = math.acos(min(max(least, -1.0), 1.0)) + 1e-6
-    return centre, radius, axis, spread
+    return centre, radius

@@ -1,8 +1,8 @@
 """Culling: which facets a leg may light at all.
 
-Facets are dropped by clusters of neighbours, each with a bounding sphere and a normal cone: clusters that turn away,
-that no ray over the leg's mirror reaches, that an occluder (a wall or a solid body) hides, or that lie outside the
-antenna's beam.
+Facets are dropped by clusters of neighbours, each with a bounding sphere: clusters that no ray over the leg's mirror
+reaches, that an occluder (a wall or a solid body) hides, or that lie outside the antenna's beam. Of the others each
+facet is dropped that turns away.
 """
 
 from __future__ import annotations
@@ -31,17 +31,13 @@ _ROUNDING = 1e-6  # rad: what grazes within it is kept
 
 
 class _Clusters(NamedTuple):
-    """Clusters of facets: which are wanted (k,), their bodies (k,), which hold facets that are lit from both sides
-    (k,), bounding spheres, centre (k, 3) and radius (k,) [m], and normal cones, axis (k, 3) and half angle (k,)
-    [rad]."""
+    """Clusters of facets: which are wanted (k,), their bodies (k,), and bounding spheres, centre (k, 3) and radius (k,)
+    [m]."""
 
     wanted: Bools
     body: Ints
-    both_sides: Bools
     centre: Floats
     radius: Floats
-    axis: Floats
-    half_angle: Floats
 
 
 class _Source(NamedTuple):
@@ -72,14 +68,13 @@ def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     image = np.asarray(leg.image, float)
     source = _Source(image, leg.far, bool(leg.mirrors) and not leg.far, *mirror)
     lead = c.order[c.first[:-1]]
-    of, sides, piece = f.body[lead], geometry.scene_topology.cluster_sides, geometry.scene_topology.cluster_piece
+    of, piece = f.body[lead], geometry.scene_topology.cluster_piece
     # Of clusters of several pieces each facet is tested below.
     wanted = pieces[piece] | (piece < 0)
     alive = np.zeros(len(lead), np.bool_)
 
     def some(rows: slice) -> None:
-        bounds = c.centre[rows], c.radius[rows], c.axis[rows], c.half_angle[rows]
-        clusters = _Clusters(wanted[rows], of[rows], sides[rows], *bounds)
+        clusters = _Clusters(wanted[rows], of[rows], c.centre[rows], c.radius[rows])
         _may_be_lit(clusters, source, walls, spheres, alive[rows])
 
     parallel_for(len(lead), some, _PARALLEL_FROM)
@@ -186,10 +181,6 @@ def _may_be_lit(clusters, source, walls, spheres, out):  # type: ignore[no-untyp
         centre, radius = clusters.centre[i], clusters.radius[i]
         for c in range(3):
             d[c] = -image[c] if far else centre[c] - image[c]
-        if not clusters.both_sides[i]:
-            around = 0.0 if far else _half_width(radius, math.sqrt(dot(d, d)))
-            if _angle(d, clusters.axis[i]) + clusters.half_angle[i] + around < 0.5 * math.pi - _ROUNDING:
-                continue
         if source.mirrored and not _reached_over_mirror(centre, radius, d, source, work):
             continue
         swell = 1.001 * radius + walls.touch

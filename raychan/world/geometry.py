@@ -117,10 +117,7 @@ class Geometry(RayCaster):
         half, faces = self.scene_topology.silhouettes
         if not len(half):
             return half, faces
-        c = self.clusters
-        clusters = c.centre, c.radius, c.axis, c.half_angle
-        edges, planes = self.scene_topology.edges_by_cluster, (self.first, self.normal)
-        found = np.sort(silhouette_edges(edges, clusters, *planes, np.asarray(image, float), far))
+        found = silhouette_edges(faces, self.first, self.normal, np.asarray(image, float), far)
         return half[found], faces[found]
 
     @cached
@@ -151,7 +148,7 @@ class Geometry(RayCaster):
         """The facets in clusters of neighbours, each of one body."""
         order, first = self.scene_topology.clusters
         f = self.facets
-        shape = f.vertices, f.normals, self.normal, self.edge_curvature
+        shape = f.vertices, self.edge_curvature
         if self._static is None or not self._static.shares:
             return Clusters(order, first, *cluster_bounds(order, first, *shape))
         kept = self._static.computed_once("cluster bounds", lambda: cluster_bounds(order, first, *shape))
@@ -238,14 +235,12 @@ class Geometry(RayCaster):
 @dataclass(frozen=True, eq=False)
 class Clusters:
     """Clusters of facets, order[first[i] : first[i + 1]], each with a bounding sphere, centre (k, 3) and radius (k,)
-    [m], and a normal cone, axis (k, 3) and half_angle (k,) [rad]."""
+    [m]."""
 
     order: Ints
     first: NDArray[np.int64]
     centre: Floats
     radius: Floats
-    axis: Floats
-    half_angle: Floats
 
 
 class HasBodies(Protocol):

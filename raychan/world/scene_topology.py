@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from raychan.geometry.silhouettes import edges_by_cluster
 from raychan.geometry.triangles import half_edge_ends
 from raychan.parallel import cached
 from raychan.records import LAYER, MIRROR, Facets
@@ -121,18 +119,6 @@ class SceneTopology:
         own = self.piece[order]
         least, most = np.minimum.reduceat(own, first[:-1]), np.maximum.reduceat(own, first[:-1])
         return np.where(least == most, least, -1).astype(np.int32)
-
-    @cached
-    def cluster_sides(self) -> Bools:
-        """Which clusters (k,) hold a facet that is lit from both sides."""
-        order, first = self.clusters
-        return np.logical_or.reduceat(self.both_sides[order], first[:-1])
-
-    @cached
-    def edges_by_cluster(self) -> tuple[NDArray[Any], ...]:
-        """Facets (e, 2) of `silhouettes` with its edges by cluster (see geometry.silhouettes.edges_by_cluster)."""
-        faces = self.silhouettes[1]
-        return faces, *edges_by_cluster(faces, *self.clusters)
 
 
 def _numbers(labels: list[Ints], counts: list[int]) -> Ints:
