@@ -13,12 +13,14 @@ from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.interferers import interference
 from raychan.run.labels import provenance
 from raychan.run.mechanisms import Choice, choose
 from raychan.run.messages import counts, told, uncut
 from raychan.run.micro_doppler import needed, retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
+from raychan.run.received import Stage, notes, received, stream
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.resources import check_demand
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
@@ -26,7 +28,7 @@ from raychan.run.rules import asked, changed, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
 from raychan.run.unmodelled import ledger
-from raychan.signal.baseband import noisy, synthesize
+from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats
@@ -127,14 +129,12 @@ def _launch(
 
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
     """Return what the receiver makes of a channel, and how each detection came about."""
-    # Streams are numbered by stage, so that one more random stage leaves the others as they are.
-    noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
         noise = radar.noise_power if radar.noise else 0.0
         pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
         quiet = channel.turned.cube if channel.turned else channel.launched.quiet
-        cube = noisy(quiet, radar, noise_rng)
+        cube, heard = _received(scene, channel, quiet, seed)
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
@@ -164,12 +164,22 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *check_demand(scene),
             *channel.launched.notes(),
             *channel.warnings,
+            *heard,
             *told(known, tolerance, rdmap, left_out),
         ),
         scene=scene.bare(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
+
+
+def _received(scene: Scene, channel: Channel, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:
+    """Return what the receiver records of noise-free samples, and what a user should know of it."""
+    turned, launched = channel.turned, channel.launched
+    paths = without(launched.paths, turned.turns) if turned else launched.paths
+    others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
+    cube, said = received(quiet, paths, scene.radar, seed, others)
+    return cube, said + notes(scene.radar, launched.whole, turned is not None)
 
 
 def _explained(

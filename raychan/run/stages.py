@@ -9,6 +9,7 @@ import numpy as np
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
+from raychan.run.received import received
 from raychan.run.receiver import detections_in, map_of
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
@@ -75,13 +76,12 @@ def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
 
 
 def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
-    """Return the dechirped samples of a frame, with the radar's noise.
+    """Return the dechirped samples of a frame, with the radar's noise and impairments, without interferers.
 
     Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
     """
     SEED.check("seed", seed, whole=True)
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    return samples_of(paths, radar, rng)
+    return received(samples_of(paths, radar), paths, radar, seed)[0]
 
 
 def range_doppler(cube: Cube, radar: Radar) -> RangeDoppler:

@@ -1,5 +1,7 @@
 """Phase noise and chirp error: their statistics and closed forms, and groups of paths against the sum path by path."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from support.echoes import echoes, make_radar
