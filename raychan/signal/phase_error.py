@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 METHODS = ("auto", "groups", "direct")
-_NOISE_SHARE = 0.03  # of the phase noise at the edge of the band, -30 dB: error of the groups; less at lower offsets
+_NOISE_SHARE = 0.1  # of the phase noise at the edge of the band, -20 dB: error of the groups; an octave below, -44 dB
 _CHIRP_SHARE = 1e-4  # of an echo, -80 dB: error of the groups for the chirp error
 _FEW = 4  # paths up to which the direct sum is taken: it costs about as much a path as a group; not measured
 _OVER = 4  # grid points of the phase noise a sample: between them cubic interpolation errs by 1 % at the band's edge
