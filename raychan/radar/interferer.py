@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ class Interferer:
     start: float = 0.0
     locked: bool = False
     name: str = ""
-    table: Any = None
+    table: object = None
     """The table of a scene file that it comes from, if any."""
 
     def __post_init__(self) -> None:

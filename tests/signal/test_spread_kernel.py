@@ -73,6 +73,13 @@ def test_shortcut_agrees_at_the_delay_of_its_kernel_and_errs_by_range_correlatio
     assert db(shortcut / floors[3.0][0, cells].mean()) > 6.0
 
 
+@pytest.mark.parametrize(("distance", "off_db"), [(1.0, 33.4), (3.0, 23.9), (10.0, 13.5), (30.0, 4.1), (100.0, -4.4)])
+def test_kernel_made_for_50_m_is_off_at_other_ranges_by_what_the_theory_page_says(distance, off_db):
+    made = Processor(Waveform(77e9, 1e9, 25.6e-6, 30e-6, 128, 512), "hann", "hann", (1, 1))
+    true, shortcut = (pedestal(made, MASK, 2.0 * r / C0)[0, 13:17].mean() for r in (distance, 50.0))
+    assert db(shortcut / true) == pytest.approx(off_db, abs=0.1)
+
+
 def test_quantisation_of_the_shortcut_is_that_of_a_full_scale_sine_and_too_low_for_a_weaker_one():
     adc = Converter(10, 0.0)
     kernel = spread_kernel(MADE, None, adc, 0.0)
