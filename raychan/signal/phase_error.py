@@ -30,10 +30,13 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 METHODS = ("auto", "groups", "direct")
-_NOISE_SHARE = 0.1  # of the phase noise at the edge of the band, -20 dB: error of the groups; an octave below, -44 dB
+# Error of the groups against their number: of the phase noise at the edge of the band -20 dB, an octave below -44 dB.
+# 1e5 paths in 9 groups take 5 to 9 times as long as without phase noise (python -m bench --only phase_noise).
+_NOISE_SHARE = 0.1
 _CHIRP_SHARE = 1e-4  # of an echo, -80 dB: error of the groups for the chirp error
 _FEW = 4  # paths up to which the direct sum is taken: it costs about as much a path as a group; not measured
 _OVER = 4  # grid points of the phase noise a sample: between them cubic interpolation errs by 1 % at the band's edge
+_MOST = 1 << 26  # grid points of a draw: 0.5 GB, a frame of 0.4 s at 20 MHz
 _MARGIN = 4  # grid points beyond both ends, for interpolation
 
 
@@ -57,8 +60,16 @@ class PhaseTrack:
         self.phase = None if noise is None else self._drawn(noise, end - self.start, rng)
 
     def _drawn(self, noise: PhaseNoise, duration: float, rng: np.random.Generator) -> Floats:
-        """Return phase noise [rad] on the fine grid. The draw repeats after twice the time asked for."""
+        """Return phase noise [rad] on the fine grid. The draw repeats after twice the time asked for.
+
+        Raises: ValueError for a frame that is too long for its sample rate.
+        """
         needed = math.ceil(duration / self.fine) + 1
+        if 2 * needed > _MOST:
+            raise ValueError(
+                f"phase noise of a frame of {duration:.3g} s at {1e-6 / self.step:.3g} MHz needs {2 * needed:.2g} "
+                f"points, {_MOST:.2g} at most: a shorter frame or fewer samples a ramp"
+            )
         length = int(scipy.fft.next_fast_len(2 * needed, real=True))
         spacing = 1.0 / (length * self.fine)
         lines = np.arange(1, int(0.5 / self.step / spacing))

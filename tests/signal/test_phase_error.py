@@ -121,6 +121,12 @@ def test_equal_seeds_give_equal_bytes_and_no_impairment_changes_nothing():
     assert np.array_equal(faulty(paths, radar(), np.random.default_rng(5)).samples, synthesize(paths, radar()).samples)
 
 
+def test_a_frame_too_long_for_its_sample_rate_is_refused_before_it_fills_the_memory():
+    long = Waveform(77e9, 1e9, 25.6e-6, 1.0, 64, 512)
+    with pytest.raises(ValueError, match="a shorter frame"):
+        faulty(echoes([10.0]), radar(long, phase_noise=MASK), np.random.default_rng(0))
+
+
 @pytest.mark.parametrize(
     ("mask", "said"),
     [
