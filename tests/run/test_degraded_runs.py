@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.cli.info_impairments import impairment_rows
 from raychan.em.atmosphere import Atmosphere
 from raychan.radar.impairments import ChirpError, Converter, Impairments, PhaseNoise
 from raychan.radar.interferer import Interferer
@@ -122,6 +123,15 @@ def test_objects_of_impairments_air_and_interferers_become_tables():
     assert back.radar.noise_temperature_k == 100.0
     assert back.atmosphere == Atmosphere(fog_gm3=0.05)
     assert (back.interferers[0].name, back.interferers[0].start, back.interferers[0].locked) == ("car", 1e-7, True)
+
+
+def test_info_tells_of_receiver_air_and_interferers_and_is_silent_on_an_ideal_radar():
+    assert impairment_rows(rc.Scene.from_text(SCENE)) == []
+    said = dict(impairment_rows(rc.Scene.from_text(SCENE + BAD + AIR + OTHER)))
+    assert said["converter"] == "10 bits, full scale -50 dBm, SNR 62.0 dB"
+    assert said["image rejection"] == "36.8 dB"
+    assert said["air, one way"].startswith("gas 0.348, rain 17.9")
+    assert said["interferer truck"] == "at 40.05 m; a crossing lasts 20 us of a ramp"
 
 
 def test_a_run_with_everything_wrong_still_sees_its_target_says_what_it_clips_and_repeats():
