@@ -34,6 +34,12 @@ _HOME = {
     "MeasuredAntenna": "raychan.radar.pattern",
     "load_antenna": "raychan.world.radar_mount",
     "Processing": "raychan.radar.processing",
+    "Impairments": "raychan.radar.impairments",
+    "PhaseNoise": "raychan.radar.impairments",
+    "ChirpError": "raychan.radar.impairments",
+    "Converter": "raychan.radar.impairments",
+    "Interferer": "raychan.radar.interferer",
+    "Atmosphere": "raychan.em.atmosphere",
     "Paths": "raychan.records",
     "SpecularPaths": "raychan.records",
     "InteractionType": "raychan.kinds",
@@ -55,11 +61,17 @@ _HOME = {
 """Where each public name is at home; the imports below say the same to type checkers."""
 
 if TYPE_CHECKING:
+    from raychan.em.atmosphere import Atmosphere as Atmosphere
     from raychan.kinds import InteractionType as InteractionType
     from raychan.radar.antenna import Antenna as Antenna
     from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
     from raychan.radar.antenna import CosineAntenna as CosineAntenna
     from raychan.radar.antenna import IsotropicAntenna as IsotropicAntenna
+    from raychan.radar.impairments import ChirpError as ChirpError
+    from raychan.radar.impairments import Converter as Converter
+    from raychan.radar.impairments import Impairments as Impairments
+    from raychan.radar.impairments import PhaseNoise as PhaseNoise
+    from raychan.radar.interferer import Interferer as Interferer
     from raychan.radar.pattern import MeasuredAntenna as MeasuredAntenna
     from raychan.radar.processing import Processing as Processing
     from raychan.radar.radar import Radar as Radar

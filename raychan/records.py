@@ -53,6 +53,8 @@ class Facets(Record):
     materials: Materials
     body_names: tuple[str, ...]
     part_names: tuple[str, ...]
+    attenuation: float = 0.0
+    """Of the air between them: a field falls by exp(-attenuation L) over a length L [1/m]."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ def diffracted_paths(routes: DiffractedRoutes, facets: Facets, radar: RadarEnds,
         back = leg_field(_leg(routes, r, 1), facets, radar.rx_field, k)
         amplitude[r] = 0.5 / k * np.sqrt(routes.sigma[r] / (4.0 * np.pi)) * (there @ back)
     length = (routes.near + routes.far).sum(axis=1)
+    amplitude = amplitude * np.exp(-facets.attenuation * length) if facets.attenuation else amplitude
     rate = np.array([_length_rate(routes, r, facets, np.asarray(radar.velocity)) for r in range(n)])
     return Paths.of(
         length=length,

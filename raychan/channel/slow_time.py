@@ -82,7 +82,9 @@ def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> C
     n = len(routes.kind)
     bare: Routes = routes.replace(lengths=np.zeros((n, 6)), length=np.zeros(n), taper=np.ones((n, 3)))
     ends: list[Any] = [lambda d, f=f: np.asarray(f(d))[:, None] for f in (radar.tx_field, radar.rx_field)]
-    return transfer(bare, facets, frequency, *ends)[:, 0, 0]
+    gain = transfer(bare, facets, frequency, *ends)[:, 0, 0]
+    # The air's loss hardly changes within a frame: 1 m of path is 0.001 dB, in the heaviest rain 0.03 dB.
+    return gain * np.exp(-facets.attenuation * routes.length) if facets.attenuation else gain
 
 
 def extrapolated(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:

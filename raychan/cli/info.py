@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
+from raychan.cli.info_impairments import impairment_rows
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -106,6 +107,8 @@ def _scene(scene: Any) -> None:
     screen.print(scene.title, style="bold", markup=False)
     for made in (_bodies(scene), _parts(scene), *_radar(scene.radar), *_antennas(scene)):
         screen.print(made)
+    if rows := impairment_rows(scene):
+        screen.print(show.table("", ("receiver, air, other radars", ""), rows, left=(0,)))
     show.warn(scene.warnings)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from raychan.poses import rotation
 from raychan.radar.antenna import Antenna, IsotropicAntenna
+from raychan.radar.impairments import Impairments
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.processing import Processing
 from raychan.radar.spherical_vectors import turned, vectors
@@ -21,7 +22,8 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _AHEAD, _POWER, _PROCESSING = IsotropicAntenna(front=True), float(watt(12.0)), Processing()
-_NUMBERS = ("yaw_deg", "pitch_deg", "roll_deg", "noise_figure_db")
+_IDEAL = Impairments()
+_NUMBERS = ("yaw_deg", "pitch_deg", "roll_deg", "noise_figure_db", "noise_temperature_k")
 _VECTORS = {"position": "(3,)", "velocity": "(3,)", "elements": "(a, 3)"}
 
 
@@ -30,9 +32,10 @@ class Radar:
     """A monostatic radar: one transmitter, one or several receivers of one pattern. Defaults as in a scene file.
 
     Args: waveform; position (3,) [m] of the phase centre in the world; antenna of transmitter and receiver, or
-    tx_antenna and rx_antenna of their own; power [W] into the antenna; noise_figure_db [dB]; noise: whether samples get
-    noise; yaw_deg, pitch_deg, roll_deg [deg] of the boresight; velocity (3,) [m/s], world axes; elements (a, 3) [m],
-    the receivers' phase centres in the antenna's frame; processing of the receiver.
+    tx_antenna and rx_antenna of their own; power [W] into the antenna; noise_figure_db [dB]; noise_temperature_k [K] of
+    the antenna; noise: whether samples get noise; yaw_deg, pitch_deg, roll_deg [deg] of the boresight; velocity (3,)
+    [m/s], world axes; elements (a, 3) [m], the receivers' phase centres in the antenna's frame; processing and
+    impairments of the receiver.
     Raises: ValueError for values that cannot be.
     """
 
@@ -45,6 +48,7 @@ class Radar:
     """None: `antenna`."""
     power: float
     noise_figure_db: float
+    noise_temperature_k: float
     noise: bool
     yaw_deg: float
     pitch_deg: float
@@ -52,6 +56,7 @@ class Radar:
     velocity: Floats
     elements: Floats
     processing: Processing
+    impairments: Impairments
 
     def __init__(
         self,
@@ -63,6 +68,7 @@ class Radar:
         rx_antenna: Antenna | None = None,
         power: float = _POWER,
         noise_figure_db: float = 15.0,
+        noise_temperature_k: float = T0,
         noise: bool = True,
         yaw_deg: float = 0.0,
         pitch_deg: float = 0.0,
@@ -70,6 +76,7 @@ class Radar:
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         elements: ArrayLike = ((0.0, 0.0, 0.0),),
         processing: Processing = _PROCESSING,
+        impairments: Impairments = _IDEAL,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
         if not (power > 0.0 and np.isfinite(power)):
@@ -77,6 +84,10 @@ class Radar:
         for name in _NUMBERS:
             if not np.isfinite(given[name]):
                 raise ValueError(f"Radar.{name} = {given[name]!r}: must be finite")
+        if noise_temperature_k < 0.0:
+            raise ValueError(f"Radar.noise_temperature_k = {noise_temperature_k!r}: must be 0 or more")
+        if not (impairments.iq_balanced or waveform.complex_sampling):
+            raise ValueError("Radar.impairments: I/Q imbalance needs I/Q sampling, and the waveform has real sampling")
         for name, wanted in _VECTORS.items():
             value = np.array(given[name], np.float64)
             if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
@@ -132,8 +143,11 @@ class Radar:
 
     @property
     def noise_power(self) -> float:
-        """Thermal noise power per complex sample, k T0 F f_s [W], whether or not noise is on."""
-        return float(K_BOLTZMANN * T0 * self.waveform.sample_rate * undb(self.noise_figure_db))
+        """Thermal noise power per complex sample, k (T_a + T0 (F - 1)) f_s [W], whether or not noise is on."""
+        rate = self.waveform.sample_rate
+        own = K_BOLTZMANN * T0 * rate * undb(self.noise_figure_db)
+        # Apart, so that an antenna at T0 gives k T0 F f_s to the last digit.
+        return float(own + K_BOLTZMANN * (self.noise_temperature_k - T0) * rate)
 
     def tx_field(self, direction_world: Floats) -> Complexes:
         """Return sqrt(gain) times polarisation (n, 3), world axes, in unit directions (n, 3) away from the radar."""

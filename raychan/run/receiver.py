@@ -72,9 +72,3 @@ def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     cube = Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0)
     windows = (settings.range_window, settings.rate_window, settings.pad)
     return range_doppler(cube, radar.waveform, *windows).power
-
-
-def noise_stream(seed: int) -> np.random.Generator:
-    """Return the random numbers of the noise of a run. Streams are numbered by stage, so that one more random stage
-    leaves the others as they are."""
-    return np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])

@@ -13,6 +13,7 @@ from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.interferers import interference
 from raychan.run.labels import provenance
 from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.mechanisms import choose
@@ -20,13 +21,15 @@ from raychan.run.messages import counts, told, uncut
 from raychan.run.micro_doppler import needed, retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
-from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, noise_stream, quiet_map
+from raychan.run.received import notes, received
+from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
+from raychan.run.streams import Stage, stream
 from raychan.run.unmodelled import ledger
-from raychan.signal.baseband import noisy, synthesize
+from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats
@@ -137,7 +140,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     with clock.stage("synthesize"):
         noise = radar.noise_power if radar.noise else 0.0
         pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
-        cube = noisy(channel.quiet, radar, noise_stream(seed))
+        cube, heard = _received(scene, channel, channel.quiet, seed)
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
@@ -167,12 +170,22 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *check_demand(scene),
             *channel.launched.notes(),
             *channel.warnings,
+            *heard,
             *told(known, tolerance, rdmap, left_out),
         ),
         scene=scene.without_caches(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
+
+
+def _received(scene: Scene, channel: Channel, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:
+    """Return what the receiver records of noise-free samples, and what a user should know of it."""
+    turned, launched = channel.turned, channel.launched
+    paths = without(launched.paths, turned.turns) if turned else launched.paths
+    others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
+    cube, said = received(quiet, paths, scene.radar, seed, others)
+    return cube, said + notes(scene.radar, launched.whole, turned is not None)
 
 
 def _explained(

@@ -42,7 +42,10 @@ def toml_of(scene: Scene) -> str:
     if scene.radar_table is not None:
         if scene.is_radar_object and not _antennas(scene.radar):
             raise ValueError("antennas of a class of their own, from files, or of two polarisations cannot be written")
-        data["radar"] = _with_files(scene.radar_table.model_dump(exclude_defaults=True), scene.folder)
+        data["radar"] = with_files(scene.radar_table.model_dump(exclude_defaults=True), scene.folder)
+    from raychan.world.surroundings_text import surroundings_tables
+
+    data |= surroundings_tables(scene)
     data["materials"] = {name: _material_table(m) for name, m in materials.items()}
     tables = checked(SceneFile, data, scene.path)
     return "\n".join(_lines(tables.model_dump(exclude_defaults=True))).lstrip() + "\n"
@@ -53,6 +56,8 @@ def radar_table_of(radar: Radar) -> RadarTable:
 
     Raises: SceneError for a value beyond the limits of scene files.
     """
+    from raychan.world.surroundings_text import impairments_table
+
     return checked(  # type: ignore[no-any-return]
         RadarTable,
         {
@@ -61,10 +66,12 @@ def radar_table_of(radar: Radar) -> RadarTable:
             "velocity_mps": radar.velocity.tolist(),
             "power_dbm": figure(float(dbm(radar.power)), radar.power, lambda x: float(watt(x))),
             "noise_figure_db": float(radar.noise_figure_db),
+            "noise_temperature_k": float(radar.noise_temperature_k),
             "noise": radar.noise,
             **_antennas(radar),
             "elements_mm": [[figure(1e3 * x, x, _milli) for x in row] for row in radar.elements.tolist()],
             "waveform": _waveform_table(radar.waveform),
+            "impairments": impairments_table(radar.impairments),
         },
     )
 
@@ -141,7 +148,7 @@ def _loss(loss_db: float) -> dict[str, float]:
     return {"loss_db": loss_db} if loss_db else {}
 
 
-def _with_files(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def with_files(table: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return a radar's table with the files of its antennas by their whole path."""
     for key in ("antenna", "tx_antenna", "rx_antenna"):
         given = table.get(key)
@@ -211,7 +218,7 @@ def _lines(table: Mapping[str, Any], path: str = "") -> Iterator[str]:
 
 
 def _is_table(key: str, value: Any) -> bool:
-    return (isinstance(value, dict) and key not in ("params", "element")) or key == "bodies"
+    return (isinstance(value, dict) and key not in ("params", "element")) or key in ("bodies", "interferers")
 
 
 def _key(key: str) -> str:

@@ -19,6 +19,7 @@ from raychan.world.quantities import (
     Conductivity,
     Crease,
     Gain,
+    Kelvin,
     Layers,
     Level,
     Loss,
@@ -39,12 +40,14 @@ from raychan.world.quantities import (
     Spacing,
     Speed,
     Spin,
+    Start,
     Thickness,
     Tolerance,
     Tracings,
     Turn,
     Window,
 )
+from raychan.world.schema_impairments import AtmosphereTable, ImpairmentsTable
 
 
 class Table(BaseModel):
@@ -155,6 +158,8 @@ class RadarTable(Table):
     velocity_mps: Speed = [0.0, 0.0, 0.0]
     power_dbm: Power = 12.0
     noise_figure_db: Noise = 15.0
+    noise_temperature_k: Kelvin = 290.0
+    """Of the antenna: the noise power is k (T + 290 K (F - 1)) times the sample rate."""
     noise: bool = True
     antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
     """Of transmitter and receiver; a text names an antenna file, relative to the scene's."""
@@ -164,6 +169,27 @@ class RadarTable(Table):
     elements_mm: Offsets = [[0.0, 0.0, 0.0]]
     """Receiver phase centres in the antenna's frame."""
     waveform: WaveformTable
+    impairments: ImpairmentsTable = ImpairmentsTable()
+
+
+class InterfererTable(Table):
+    """Table [[interferers]]: a second radar that transmits into the receiver."""
+
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    position: Place
+    yaw_deg: Angle = 0.0
+    pitch_deg: Angle = 0.0
+    roll_deg: Angle = 0.0
+    velocity_mps: Speed = [0.0, 0.0, 0.0]
+    power_dbm: Power = 12.0
+    antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
+    polarization: Literal["V", "H"] = "V"
+    waveform: WaveformTable
+    """Its samples do not matter."""
+    start_us: Start = 0.0
+    """Start of its first ramp after that of the radar."""
+    locked: bool = False
+    """Ramps keep their phase to the radar's; else each begins at a random phase."""
 
 
 class ProcessingTable(Table):
@@ -250,6 +276,9 @@ class SceneFile(Table):
 
     scene: Header = Header()
     radar: RadarTable | None = None
+    interferers: list[InterfererTable] = []
+    atmosphere: AtmosphereTable | None = None
+    """None: no loss on the way."""
     processing: ProcessingTable = ProcessingTable()
     model: Model = Model()
     materials: dict[str, MaterialTable] = {}

@@ -170,6 +170,21 @@ def test_scene_and_radar() -> None:
     assert rc.PEC.pec
 
 
+def test_impairments_air_and_interferers_of_a_scene() -> None:
+    wave = rc.Waveform(77e9, 300e6, 20e-6, n_chirps=32, n_samples=64)
+    bad = rc.Impairments(
+        rc.ChirpError([[0.0, 0.0], [2e-5, 1e4]]), rc.PhaseNoise([[1e5, -90.0]]), rc.Converter(12, -20.0), iq_gain_db=0.1
+    )
+    other = rc.Interferer(rc.Radar(wave, (30.0, 0.0, 0.6), yaw_deg=180.0), start=1e-6, name="other")
+    scene = rc.Scene(
+        radar=rc.Radar(wave, impairments=bad), atmosphere=rc.Atmosphere(rain_mmh=10.0), interferers=[other]
+    )
+    assert assert_type(scene.radar.impairments, rc.Impairments) == bad
+    assert assert_type(scene.interferers, tuple[rc.Interferer, ...]) == (other,)
+    assert assert_type(scene.atmosphere, rc.Atmosphere | None) == rc.Atmosphere(rain_mmh=10.0)
+    assert assert_type(scene.attenuation, float) > 0.0
+
+
 def measured_antenna() -> rc.MeasuredAntenna:
     flat = np.zeros((3, 3))
     return rc.MeasuredAntenna(np.radians([-90.0, 0.0, 90.0]), np.radians([-90.0, 0.0, 90.0]), flat - 3.0, flat)
