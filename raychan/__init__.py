@@ -44,6 +44,8 @@ _HOME = {
     "range_doppler": "raychan.run.stages",
     "detect": "raychan.run.stages",
     "SceneRoutes": "raychan.run.stages",
+    "Detector": "raychan.processing.detection_theory",
+    "detection_probability": "raychan.processing.detection_theory",
     "frames": "raychan.run.sequence",
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
@@ -56,6 +58,8 @@ _HOME = {
 
 if TYPE_CHECKING:
     from raychan.kinds import InteractionType as InteractionType
+    from raychan.processing.detection_theory import Detector as Detector
+    from raychan.processing.detection_theory import detection_probability as detection_probability
     from raychan.radar.antenna import Antenna as Antenna
     from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
     from raychan.radar.antenna import CosineAntenna as CosineAntenna

@@ -136,6 +136,15 @@ def bias(count: float, method: str, looks: int = 1) -> float:
     return 1.0 if method == "ca" else float(weights @ quantiles) / looks
 
 
+def statistic(count: float, method: str, looks: int = 1) -> tuple[Floats, Floats]:
+    """Return quantiles and weights for averages over the training statistic of `count` sums of `looks` exponentials:
+    their mean (ca) or their ordered statistic (os)."""
+    if method == "os":
+        return _ordered(count, looks)
+    x, weights = _knots()
+    return np.asarray(gamma.ppf(x, looks * count) / count), weights
+
+
 def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Floats:
     """Return the mean or ordered statistic (c,) of the training cells around map cells (c, 2)."""
     rates, ranges = power.shape
@@ -157,8 +166,13 @@ def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Flo
 
 def _ordered(count: float, looks: int) -> tuple[Floats, Floats]:
     """Return quantiles and weights for averages over the ordered statistic of `count` sums of `looks` exponentials."""
+    x, weights = _knots()
+    rank = max(1.0, RANK * count)
+    return np.asarray(gamma.ppf(beta.ppf(x, rank, count - rank + 1.0), looks)), weights
+
+
+def _knots() -> tuple[Floats, Floats]:
+    """Return probabilities and weights of a quadrature, dense where low probabilities arise."""
     knots, weights = np.polynomial.legendre.leggauss(200)
     x = 0.5 * (knots + 1.0)
-    rank = max(1.0, RANK * count)
-    quantiles = gamma.ppf(beta.ppf(x**_FLAT, rank, count - rank + 1.0), looks)
-    return np.asarray(quantiles), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))
+    return np.asarray(x**_FLAT), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))

@@ -53,6 +53,11 @@ def moving(scene: Scene) -> NDArray[np.bool_]:
     return turning(scene) | np.array([not np.array_equal(b.motion.velocity, own) for b in scene.bodies], bool)
 
 
+def carried_on(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
+    """Return which bodies (b,) are carried on from tracing to tracing: those that turn, or all that move."""
+    return turning(scene) if retrace == "auto" else moving(scene)
+
+
 def bend(scene: Scene, edge: float) -> float:
     """Return the phase [rad] over a frame that paths of constant rates leave out: by the turn of a body's outermost
     point, and across a tube of a given edge [m]."""
@@ -101,7 +106,7 @@ class _Frame:
 
     def __init__(self, scene: Scene, rule: PruneRule, model: Any, progress: Callable[[float], None] | None) -> None:
         self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
-        self.turns = turning(scene) if model.retrace == "auto" else moving(scene)
+        self.turns = carried_on(scene, model.retrace)
         self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
         wave = self.radar.waveform
         self.chirps, self.step = wave.n_chirps, wave.repetition

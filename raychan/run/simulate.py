@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,10 +13,11 @@ from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.fluctuation import check, drawn, fluctuated
 from raychan.run.labels import provenance
 from raychan.run.mechanisms import Choice, choose
 from raychan.run.messages import counts, told, uncut
-from raychan.run.micro_doppler import needed, retraced
+from raychan.run.micro_doppler import carried_on, needed, retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
@@ -25,6 +26,7 @@ from raychan.run.result import ExplainedDetections, Explanation, Receiver, Resul
 from raychan.run.rules import asked, changed, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
+from raychan.run.streams import FLUCTUATION, NOISE, stream
 from raychan.run.unmodelled import ledger
 from raychan.signal.baseband import noisy, synthesize
 from raychan.signal.delay_profile import profile_of
@@ -100,6 +102,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
             (launched, stats), (others, more) = run_pair(fine, lambda: launch(checked, heard=not again))
     turned = None
     if again:
+        check(scene, carried_on(scene, model.retrace))
         with clock.stage("retrace"):
             traced = Traced(launched.paths, tuple(routes))
             turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
@@ -128,17 +131,19 @@ def _launch(
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
     """Return what the receiver makes of a channel, and how each detection came about."""
     # Streams are numbered by stage, so that one more random stage leaves the others as they are.
-    noise_rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
+        steady = channel.turned.cube if channel.turned else channel.launched.quiet
+        factors = drawn(scene, radar.waveform.n_chirps, stream(seed, FLUCTUATION))
+        quiet, launched = fluctuated(steady, channel.launched, factors)
         noise = radar.noise_power if radar.noise else 0.0
-        pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
-        quiet = channel.turned.cube if channel.turned else channel.launched.quiet
-        cube = noisy(quiet, radar, noise_rng)
+        pdp = profile_of(launched.response, radar.waveform, noise, settings.range_window)
+        cube = noisy(quiet, radar, stream(seed, NOISE))
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
-        error = _error_of(channel, quiet, radar, settings)
+        error = _error_of(channel, steady, radar, settings)
+    channel = replace(channel, launched=launched)
     windows = settings.range_window, settings.rate_window
     names = background(channel.geometry.facets)
     receiver = Receiver(radar.waveform, *windows, radar.power, radar.ego_speed, names)

@@ -12,6 +12,7 @@ from raychan.records import Cube, Detections, Paths, RangeDoppler
 from raychan.run.receiver import detections_in, map_of
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
+from raychan.run.streams import NOISE, stream
 from raychan.signal.baseband import synthesize as samples_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats, launch_routes
@@ -78,10 +79,10 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     """Return the dechirped samples of a frame, with the radar's noise.
 
     Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
+    Targets are steady here: only `simulate`, which knows their bodies, draws those that fluctuate.
     """
     SEED.check("seed", seed, whole=True)
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    return samples_of(paths, radar, rng)
+    return samples_of(paths, radar, stream(seed, NOISE))
 
 
 def range_doppler(cube: Cube, radar: Radar) -> RangeDoppler:

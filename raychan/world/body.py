@@ -37,7 +37,7 @@ class Body:
     Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; spin_dps (3,) [deg/s] about its own axes;
     `material` for all parts or `materials` by part (patterns), a name or a Material. `rcs_dbsm` [dBsm], a number or
     (azimuth_deg, dBsm) pairs relative to its heading, makes it a point target at `rcs_point` (body frame [m]) whose
-    mesh only blocks.
+    mesh only blocks; that RCS fluctuates by its Swerling case `swerling`, 0 to 4.
     """
 
     name: str
@@ -55,6 +55,7 @@ class Body:
     spin_dps: Sequence[float] = (0.0, 0.0, 0.0)
     rcs_dbsm: float | Sequence[tuple[float, float]] | None = None
     rcs_point: Sequence[float] | None = None
+    swerling: int = 0
     role: str | None = None
     unit: str = "m"
     up: str | None = None
@@ -130,6 +131,14 @@ class Body:
         if self.rcs_dbsm is not None:
             return Role.BLOCKER
         return Role.MIRROR if self.shape == "ground" else Role.SCATTERER
+
+    @property
+    def fluctuates(self) -> bool:
+        """Whether its RCS does; SceneError for an unknown Swerling case, or where no RCS is given."""
+        if self.swerling not in range(5) or (self.swerling and self.rcs_dbsm is None):
+            key, allowed = f"{self.name}.swerling", "0, 1, 2, 3 or 4, above 0 only with rcs_dbsm"
+            raise SceneError(f"{shown(self.swerling)} is not possible", key=key, value=self.swerling, allowed=allowed)
+        return self.swerling > 0
 
     def part_materials(self) -> list[str | Material]:
         """Return the material of each part: by name or pattern, else the body's, else the shape's, else PEC."""

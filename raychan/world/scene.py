@@ -175,7 +175,7 @@ class Scene(Described):
             seen.add(body.name)
             try:
                 self._chosen(body)
-                _ = body.motion, body.kind
+                _ = body.motion, body.kind, body.fluctuates
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.bodies = over_seams(self.bodies)

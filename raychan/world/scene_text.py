@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from raychan.world.body import Body
     from raychan.world.scene import Scene
 
-_BODY = ("shape", "unit", "up", "forward", "role", "rcs_dbsm", "scale", "crease_deg", "turn_rate_dps", "params")
+_BODY = (
+    "shape", "unit", "up", "forward", "role", "rcs_dbsm", "swerling", "scale", "crease_deg",
+    "turn_rate_dps", "params",
+)  # fmt: skip
 _ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
