@@ -50,6 +50,8 @@ _HOME = {
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
     "load_result": "raychan.run.storage",
+    "spectrogram": "raychan.run.spectrogram",
+    "Spectrogram": "raychan.run.spectrogram",
     "rcs": "raychan.run.rcs",
     "specular_paths": "raychan.run.specular_paths",
     "visibility": "raychan.study.visibility",
@@ -75,6 +77,8 @@ if TYPE_CHECKING:
     from raychan.run.result import Result as Result
     from raychan.run.sequence import frames as frames
     from raychan.run.simulate import simulate as simulate
+    from raychan.run.spectrogram import Spectrogram as Spectrogram
+    from raychan.run.spectrogram import spectrogram as spectrogram
     from raychan.run.specular_paths import specular_paths as specular_paths
     from raychan.run.storage import load_result as load_result
     from raychan.study.visibility import visibility as visibility

@@ -16,6 +16,7 @@ from raychan.units import undb
 from raychan.world import limits, shapes
 from raychan.world.creases import uncertain_folds
 from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.limbs import LimbMotion, limbs_of
 from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
@@ -104,10 +105,23 @@ class Body:
             raise SceneError(f"{shown(value)} is not possible", key=f"{self.name}.{name}", value=value, allowed=allowed)
         return found
 
+    @cached_property
+    def limbs(self) -> tuple[Body, ...]:
+        """The rigid bodies 'NAME.LIMB' of which a walker or a cyclist is made; of others the body itself."""
+        try:
+            skeleton = shapes.skeleton(self.shape, dict(self.params))
+            return (
+                (self,)
+                if skeleton is None or isinstance(self.__dict__.get("motion"), LimbMotion)
+                else limbs_of(self, skeleton)
+            )
+        except SceneError as e:
+            raise e.at(key="bodies") from None
+
     @property
     def moves(self) -> bool:
         """Whether it moves or turns."""
-        return any(self.motion.velocity) or bool(self.motion.spin().any())
+        return self.motion.moves
 
     def at(self, time: float) -> Body:
         """Return the body where it is at a time [s], itself if it does not move; the mesh is shared."""

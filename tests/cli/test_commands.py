@@ -73,7 +73,7 @@ def test_info_tells_how_often_a_target_is_detected(tmp_path, capsys):
     file, picture = tmp_path / "two.toml", tmp_path / "pd.png"
     file.write_text(PLATE + walker(12.0, 2.0) + "swerling = 1\n")
     assert invoke(["info", str(file), "--plot", str(picture)]) == 0
-    assert re.search(r"walker +12\.2\d +0\.0 +1 +-?\d+\.\d +[01]\.\d{3}", capsys.readouterr().out)
+    assert re.search(r"walker +12\.17 +0\.0 +1 +-?\d+\.\d +[01]\.\d{3}", capsys.readouterr().out)
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert invoke(["info", "antennas/array_2x2", "--plot", str(picture)]) == 2
     assert "is no scene file" in capsys.readouterr().err

@@ -1,0 +1,84 @@
+"""raychan spectrogram: received power against time and range rate, over seconds in which bodies move in themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from raychan.cli import show
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, within
+from raychan.world import limits
+
+
+def spectrogram(
+    scene: SceneFile,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR")
+    ],
+    seconds: Annotated[
+        float, typer.Option(help="How long the radar listens.", metavar="S", callback=within(limits.SECONDS))
+    ] = 2.0,
+    resolution: Annotated[
+        float,
+        typer.Option(
+            help="Resolution of the range rate in m/s, which sets how long a stretch is transformed.",
+            metavar="M/S",
+            callback=within(limits.RATE_STEP),
+        ),
+    ] = 0.1,
+    tracings: Annotated[
+        float, typer.Option(help="Tracings of the scene a second.", metavar="N", callback=within(limits.TRACED))
+    ] = 50.0,
+    near: Annotated[
+        float | None, typer.Option(help="Nearest range cell in metres; the first if not given.", metavar="M")
+    ] = None,
+    far: Annotated[
+        float | None, typer.Option(help="Farthest range cell in metres; the last if not given.", metavar="M")
+    ] = None,
+    seed: Seed = 0,
+    tolerance: Tolerance = None,
+    max_bounces: MaxBounces = None,
+    set_: Changes = None,
+) -> None:
+    """Compute a spectrogram of a scene: walkers, cyclists, wheels and rotors show how their parts move.
+
+    The radar's chirps follow each other without a pause. Writes spectrogram.nc (netCDF-4) and spectrogram.png.
+    """
+    from raychan.report.spectrogram_figure import spectrogram_picture
+    from raychan.run.output_files import write_together
+    from raychan.run.spectrogram import spectrogram as compute
+    from raychan.run.spectrogram_file import as_netcdf
+    from raychan.world.scene import Scene
+
+    loaded = Scene.load(scene).override(set_ or [])
+    inf = float("inf")
+    ranges = None if near is None and far is None else (near or 0.0, inf if far is None else far)
+    show.warn(loaded.warnings)
+    try:
+        with show.progress() as tell:
+            found = compute(
+                loaded, seconds, ranges=ranges, resolution=resolution, tracings_per_second=tracings, seed=seed,
+                tolerance_db=tolerance, max_bounces=max_bounces, progress=tell,
+            )  # fmt: skip
+    except ValueError as error:
+        from raychan.world.errors import SceneError
+
+        if isinstance(error, SceneError):
+            raise
+        raise typer.BadParameter(str(error)) from error
+    out.mkdir(parents=True, exist_ok=True)
+    title = loaded.title or "Spectrogram"
+    files: dict[Path, bytes | memoryview] = {
+        out / "spectrogram.nc": as_netcdf(found, loaded.text),
+        out / "spectrogram.png": spectrogram_picture(found, title),
+    }
+    write_together(files)
+    screen = show.console()
+    screen.print(
+        f"{len(found.time)} stretches of {found.resolution:.3g} m/s over {seconds:g} s; {found.tracings} tracings, "
+        f"error of carrying on {found.error_db:.1f} dB; seed {found.seed}",
+        soft_wrap=True,
+    )
+    screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
