@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from raychan.cli import show
 from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, within
 from raychan.world import limits
+
+if TYPE_CHECKING:
+    from raychan.run.spectrogram import Spectrogram
+    from raychan.world.scene import Scene
 
 
 def spectrogram(
@@ -46,35 +50,20 @@ def spectrogram(
 
     The radar's chirps follow each other without a pause. Writes spectrogram.nc (netCDF-4) and spectrogram.png.
     """
-    from raychan.report.spectrogram_figure import spectrogram_picture
-    from raychan.run.output_files import write_together
-    from raychan.run.spectrogram import spectrogram as compute
-    from raychan.run.spectrogram_file import as_netcdf
     from raychan.world.scene import Scene
 
     loaded = Scene.load(scene).override(set_ or [])
-    inf = float("inf")
-    ranges = None if near is None and far is None else (near or 0.0, inf if far is None else far)
     show.warn(loaded.warnings)
-    try:
-        with show.progress() as tell:
-            found = compute(
-                loaded, seconds, ranges=ranges, resolution=resolution, tracings_per_second=tracings, seed=seed,
-                tolerance_db=tolerance, max_bounces=max_bounces, progress=tell,
-            )  # fmt: skip
-    except ValueError as error:
-        from raychan.world.errors import SceneError
-
-        if isinstance(error, SceneError):
-            raise
-        raise typer.BadParameter(str(error)) from error
-    out.mkdir(parents=True, exist_ok=True)
-    title = loaded.title or "Spectrogram"
-    files: dict[Path, bytes | memoryview] = {
-        out / "spectrogram.nc": as_netcdf(found, loaded.text),
-        out / "spectrogram.png": spectrogram_picture(found, title),
+    options = {
+        "ranges": None if near is None and far is None else (near or 0.0, float("inf") if far is None else far),
+        "resolution": resolution,
+        "tracings_per_second": tracings,
+        "seed": seed,
+        "tolerance_db": tolerance,
+        "max_bounces": max_bounces,
     }
-    write_together(files)
+    found = _computed(loaded, seconds, options)
+    files = _written(loaded, out, found)
     screen = show.console()
     screen.print(
         f"{len(found.time)} stretches of {found.resolution:.3g} m/s over {seconds:g} s; {found.tracings} tracings, "
@@ -82,3 +71,31 @@ def spectrogram(
         soft_wrap=True,
     )
     screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
+
+
+def _computed(scene: Scene, seconds: float, options: dict[str, Any]) -> Spectrogram:
+    """Return the spectrogram. Raises: typer.BadParameter for options that do not fit the radar."""
+    from raychan.run.spectrogram import spectrogram as compute
+    from raychan.world.errors import SceneError
+
+    try:
+        with show.progress() as tell:
+            return compute(scene, seconds, **options, progress=tell)
+    except SceneError:
+        raise
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def _written(scene: Scene, out: Path, found: Spectrogram) -> list[Path]:
+    from raychan.report.spectrogram_figure import spectrogram_picture
+    from raychan.run.output_files import write_together
+    from raychan.run.spectrogram_file import as_netcdf
+
+    out.mkdir(parents=True, exist_ok=True)
+    files: dict[Path, bytes | memoryview] = {
+        out / "spectrogram.nc": as_netcdf(found, scene.text),
+        out / "spectrogram.png": spectrogram_picture(found, scene.title or "Spectrogram"),
+    }
+    write_together(files)
+    return list(files)

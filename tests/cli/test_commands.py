@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from support.scene_texts import PLATE, but_compiling, walker
 
@@ -77,6 +78,22 @@ def test_info_tells_how_often_a_target_is_detected(tmp_path, capsys):
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert invoke(["info", "antennas/array_2x2", "--plot", str(picture)]) == 2
     assert "is no scene file" in capsys.readouterr().err
+
+
+def test_spectrogram_writes_a_picture_and_netcdf(tmp_path, capsys):
+    import xarray as xr
+
+    file, out = tmp_path / "plate.toml", tmp_path / "out"
+    file.write_text(PLATE)
+    command = ["spectrogram", str(file), "--out", str(out), "--seconds", "0.01", "--resolution", "0.5"]
+    assert invoke([*command, "--near", "5", "--far", "12"]) == 0
+    assert "tracings" in capsys.readouterr().out
+    with xr.open_dataset(out / "spectrogram.nc", engine="h5netcdf") as data:
+        ridge = data.range_rate[data.power_dbm.argmax("range_rate")]
+        assert np.allclose(ridge, -5.0, atol=0.2) and data.power_dbm.attrs["units"] == "dBm"
+    assert (out / "spectrogram.png").read_bytes().startswith(b"\x89PNG")
+    assert invoke([*command, "--near", "500", "--far", "600"]) == 2
+    assert "no range cell" in capsys.readouterr().err
 
 
 def test_info_tells_of_scenes_and_of_meshes(scene, tmp_path, capsys):

@@ -24,8 +24,9 @@ _ALL = (
 )  # fmt: skip
 SKELETONS: dict[str, Callable[..., Skeleton]] = {"walker": Walker, "cyclist": Cyclist}
 """Shapes with limbs that move in themselves."""
-_STILL: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
-SHAPES: dict[str, Callable[..., Mesh | Skeleton]] = {**_STILL, **SKELETONS}
+RIGID: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
+"""Shapes in one piece."""
+SHAPES: dict[str, Callable[..., Mesh | Skeleton]] = {**RIGID, **SKELETONS}
 _LIMITS = {"max_sag": SAG, "hoops": HOOPS, "speed": WALK, "phase": PHASE}
 
 
@@ -76,4 +77,4 @@ def _made(name: str, params: dict[str, Any] | None) -> Mesh | Skeleton:
         raise SceneError(f"'{name}' cannot be built with these sizes ({e})", key="shape", value=given) from e
 
 
-__all__ = ["SHAPES", "SKELETONS", "build", "skeleton"]
+__all__ = ["RIGID", "SHAPES", "SKELETONS", "build", "skeleton"]
