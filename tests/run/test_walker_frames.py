@@ -7,18 +7,20 @@ import pytest
 
 import raychan as rc
 from raychan.radar.beam_table import beam_of
+from raychan.run import micro_doppler
 from raychan.run.micro_doppler import bend, needed, retraced, stretches
+from raychan.run.rules import fine_rule
 from raychan.run.solver import solve
 from raychan.signal.baseband import synthesize
 from raychan.tracing.settings import PruneRule, refinement
 
 WAVE = {"bandwidth_mhz": 150.0, "chirp_us": 30.0, "repetition_us": 500.0, "chirps": 24, "samples": 16}
+RADAR = {"position": [0, 0, 1.0], "noise": False, "antenna": {"kind": "isotropic"}, "waveform": WAVE}
 
 
-def scene(shape: str, **params: float) -> rc.Scene:
+def scene(shape: str, wave: dict[str, float] = WAVE, **params: float) -> rc.Scene:
     who = rc.Body(name="who", shape=shape, position=(8.0, 0.5, 0.0), yaw_deg=165.0, params={"max_sag": 3e-3, **params})
-    radar = {"position": [0, 0, 1.0], "noise": False, "antenna": {"kind": "isotropic"}, "waveform": WAVE}
-    return rc.Scene(bodies=[who], radar=radar, model={"max_bounces": 1, "tolerance_db": 1.0})
+    return rc.Scene(bodies=[who], radar={**RADAR, "waveform": wave}, model={"max_bounces": 1, "tolerance_db": 1.0})
 
 
 def every_chirp(given: rc.Scene) -> tuple[np.ndarray, PruneRule]:
@@ -50,6 +52,19 @@ def test_few_tracings_give_the_samples_of_tracing_every_chirp(shape):
     joined, error = (np.concatenate(x, axis=1) for x in zip(*parts, strict=True))
     assert joined.shape == truth.shape
     assert energy_db(joined - truth, truth) < max(energy_db(error, truth) + 3.0, -20.0)
+
+
+def test_between_poses_of_six_tenths_of_a_millisecond_lengths_and_amplitudes_are_cubics(monkeypatch):
+    given = scene("walker", wave={**WAVE, "repetition_us": 100.0, "chirps": 80})
+    rule = fine_rule(given.radar, given.processing, given.model)
+
+    def samples(between: float) -> np.ndarray:
+        monkeypatch.setattr(micro_doppler, "_BETWEEN", between)
+        return np.concatenate([part for part, _ in stretches(given, rule, given.model, 2)], axis=1)
+
+    exact = samples(0.0)
+    assert energy_db(samples(0.3e-3) - exact, exact) < -43.0
+    assert energy_db(samples(0.6e-3) - exact, exact) < -40.0
 
 
 def test_limbs_of_one_walker_are_one_target_in_labels():
