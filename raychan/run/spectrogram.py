@@ -21,10 +21,12 @@ from raychan.records import Cube
 from raychan.reprs import Plotted
 from raychan.run.clock import Progress
 from raychan.run.micro_doppler import stretches
+from raychan.run.resources import allowed_memory
 from raychan.run.rules import asked, fine_rule
 from raychan.run.streams import NOISE, stream
 from raychan.signal.baseband import noisy
 from raychan.units import C0, db
+from raychan.world.errors import SceneError
 from raychan.world.limits import RATE_STEP, SECONDS, SEED, TRACED
 from raychan.world.scene import Scene
 
@@ -32,10 +34,11 @@ Floats = NDArray[np.float64]
 Samples = NDArray[np.complex64]
 
 _TRACINGS = 50.0
-"""A second: fewer are less accurate, as limbs turn other sides to the radar in between. Of a walker neighbours differ by
--19, -21, -23, -21 dB at 12.5, 25, 50, 100 (the error that `raychan spectrogram --tracings N` prints); from 50 on the
+"""A second: fewer are less accurate, as limbs turn other sides to the radar in between. Of a walker neighbours differ
+by -19, -21, -23, -21 dB at 12.5, 25, 50, 100 (the error that `raychan spectrogram --tracings N` prints); from 50 on the
 random part of the launches is what is left."""
 _RESOLUTION = 0.1  # m/s: finer tells slow limbs apart, coarser follows fast ones (not measured)
+_BYTES = 32.0  # of memory, a sample of slow time: the samples, and the transforms of one range cell
 _OVERLAP = 8  # stretches that each instant belongs to: a picture without steps (not measured)
 
 
@@ -78,20 +81,17 @@ def spectrogram(
     the scene's; progress is told how far it is. Rates fold at the unambiguous range rate of the waveform.
     Raises: ValueError on arguments out of range; SceneError for a radar that runs into a body.
     """
-    SECONDS.check("duration", duration)
-    RATE_STEP.check("resolution", resolution)
     TRACED.check("tracings_per_second", tracings_per_second)
     SEED.check("seed", seed, whole=True)
+    chirps, length = _chirps(scene, duration, resolution)
     model = asked(scene, tolerance_db, max_bounces)
     wave = scene.radar.waveform
-    chirps = max(2, round(duration / wave.repetition))
-    length = max(4, round(0.5 * C0 / wave.middle / (resolution * wave.repetition)))
-    if length > chirps:
-        raise ValueError(f"duration = {duration:g} s: a range rate resolution of {resolution:g} m/s takes longer")
     count = max(2, 1 + round(duration * tracings_per_second))
     radar = replace(scene.radar, waveform=replace(wave, n_chirps=chirps))
     long = _with(scene, radar)
     cells = _cells(radar, ranges)
+    if (need := _BYTES * chirps * len(cells) * len(radar.elements)) > allowed_memory():
+        raise ValueError(f"duration = {duration:g} s takes {need / 1e9:.0f} GB of memory: fewer ranges take less")
     tell = progress or (lambda stage, share: None)
     rng, slow, signal, error = stream(seed, NOISE), [], 0.0, 0.0
     rule = fine_rule(scene.radar, scene.processing, model)
@@ -112,6 +112,23 @@ def spectrogram(
         tracings=count,
         seed=seed,
     )
+
+
+def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]:
+    """Return how many chirps there are, and how many of them make a stretch. Raises: ValueError where that cannot be;
+    SceneError for a target that fluctuates, which only `simulate` draws."""
+    SECONDS.check("duration", duration)
+    RATE_STEP.check("resolution", resolution)
+    for body in scene.bodies:
+        if body.fluctuates:
+            key, allowed = f"bodies.{body.name}.swerling", "0: in a spectrogram targets are steady"
+            raise SceneError(f"{body.swerling} is not possible", key=key, value=body.swerling, allowed=allowed)
+    wave = scene.radar.waveform
+    chirps = max(2, round(duration / wave.repetition))
+    length = max(4, round(0.5 * C0 / wave.middle / (resolution * wave.repetition)))
+    if length > chirps:
+        raise ValueError(f"duration = {duration:g} s: a range rate resolution of {resolution:g} m/s takes longer")
+    return chirps, length
 
 
 def _with(scene: Scene, radar: Radar) -> Scene:

@@ -8,6 +8,7 @@ from raychan.run.receiver import noise_of_cell
 from raychan.run.simulate import simulate
 from raychan.run.spectrogram import Spectrogram, spectrogram
 from raychan.units import db
+from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 from raychan.world.shapes.walker import Walker
 
@@ -110,5 +111,9 @@ def test_what_cannot_be_is_told():
         spectrogram(scene, 0.0)
     with pytest.raises(ValueError, match="takes longer"):
         spectrogram(scene, 0.01, resolution=0.05)
+    with pytest.raises(SceneError, match="targets are steady"):
+        spectrogram(Scene.from_text(RADAR + target(12.0, 0.0) + "swerling = 1\n"), 0.2)
+    with pytest.raises(ValueError, match="GB of memory"):
+        spectrogram(scene.override(["radar.waveform.repetition_us=20.0", "radar.waveform.samples=4096"]), 600.0)
     with pytest.raises(ValueError, match="no range cell"):
         spectrogram(scene, 0.2, ranges=(500.0, 600.0))
