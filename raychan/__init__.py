@@ -50,10 +50,14 @@ _HOME = {
     "range_doppler": "raychan.run.stages",
     "detect": "raychan.run.stages",
     "SceneRoutes": "raychan.run.stages",
+    "Detector": "raychan.processing.detection_theory",
+    "detection_probability": "raychan.processing.detection_theory",
     "frames": "raychan.run.sequence",
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
     "load_result": "raychan.run.storage",
+    "spectrogram": "raychan.run.spectrogram",
+    "Spectrogram": "raychan.run.spectrogram",
     "rcs": "raychan.run.rcs",
     "specular_paths": "raychan.run.specular_paths",
     "visibility": "raychan.study.visibility",
@@ -63,6 +67,8 @@ _HOME = {
 if TYPE_CHECKING:
     from raychan.em.atmosphere import Atmosphere as Atmosphere
     from raychan.kinds import InteractionType as InteractionType
+    from raychan.processing.detection_theory import Detector as Detector
+    from raychan.processing.detection_theory import detection_probability as detection_probability
     from raychan.radar.antenna import Antenna as Antenna
     from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
     from raychan.radar.antenna import CosineAntenna as CosineAntenna
@@ -83,6 +89,8 @@ if TYPE_CHECKING:
     from raychan.run.result import Result as Result
     from raychan.run.sequence import frames as frames
     from raychan.run.simulate import simulate as simulate
+    from raychan.run.spectrogram import Spectrogram as Spectrogram
+    from raychan.run.spectrogram import spectrogram as spectrogram
     from raychan.run.specular_paths import specular_paths as specular_paths
     from raychan.run.storage import load_result as load_result
     from raychan.study.visibility import visibility as visibility

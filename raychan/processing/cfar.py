@@ -150,6 +150,15 @@ def least_snr_db(pfa: float, count: float, method: str, looks: int = 1) -> float
     return float(db(factor(pfa, count, method, looks) * bias(count, method, looks)))
 
 
+def statistic(count: float, method: str, looks: int = 1) -> tuple[Floats, Floats]:
+    """Return quantiles and weights for averages over the training statistic of `count` sums of `looks` exponentials:
+    their mean (ca) or their ordered statistic (os)."""
+    if method == "os":
+        return _ordered(count, looks)
+    x, weights = _knots()
+    return np.asarray(gamma.ppf(x, looks * count) / count), weights
+
+
 def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Floats:
     """Return the mean or ordered statistic (c,) of the training cells around map cells (c, 2)."""
     rates, ranges = power.shape
@@ -171,8 +180,13 @@ def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Flo
 
 def _ordered(count: float, looks: int) -> tuple[Floats, Floats]:
     """Return quantiles and weights for averages over the ordered statistic of `count` sums of `looks` exponentials."""
+    x, weights = _knots()
+    rank = max(1.0, RANK * count)
+    return np.asarray(gamma.ppf(beta.ppf(x, rank, count - rank + 1.0), looks)), weights
+
+
+def _knots() -> tuple[Floats, Floats]:
+    """Return probabilities and weights of a quadrature, dense where low probabilities arise."""
     knots, weights = np.polynomial.legendre.leggauss(200)
     x = 0.5 * (knots + 1.0)
-    rank = max(1.0, RANK * count)
-    quantiles = gamma.ppf(beta.ppf(x**_FLAT, rank, count - rank + 1.0), looks)
-    return np.asarray(quantiles), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))
+    return np.asarray(x**_FLAT), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))

@@ -45,6 +45,7 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
     targets: list[int] = []
     known: dict[tuple[str, ...], int] = {}
     trajectories = paths.trajectories
+    backdrop = set(map(whole, background))
     first, index = _alike(paths)
     for row in first:
         met = [
@@ -54,7 +55,7 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
         ]
         names.append(tuple(_name(paths, b, p, k) for b, p, k in met))
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
-        left = [b for b in bodies[-1] if b not in background]
+        left = [b for b in map(whole, bodies[-1]) if b not in backdrop]
         link = tuple(b for i, b in enumerate(left) if i == 0 or b != left[i - 1])
         # A chain and its reverse have equal gains, by reciprocity.
         targets.append(known.setdefault(min(link, link[::-1]), len(known)))
@@ -206,18 +207,24 @@ def _name(paths: Paths, body: int, part: int, kind: int) -> str:
     return f"({name})" if kind == TRANSMIT else name
 
 
+def whole(name: str) -> str:
+    """Return the name of the body that a limb, such as 'walker.foot_left', belongs to: limbs of one are one target."""
+    return name.partition(".")[0]
+
+
 def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver) -> str:
     """Return the label of a cell whose strongest path is `row`, over `bodies`."""
-    targets = set(bodies) - set(receiver.background)
+    met = set(map(whole, bodies))
+    targets = met - set(map(whole, receiver.background))
     if not targets:
         return CLUTTER
-    if len(set(bodies)) == 1:
+    if len(met) == 1:
         return DIRECT
     if len(targets) > 1:
         return MULTIPATH
     # Over the ground and one target: an echo of the target, or a ghost behind it if the detour is long.
     trajectory = paths.trajectory[row]
-    index = [paths.body_names[b] in targets for b in paths.trajectories.body[trajectory]]
+    index = [whole(paths.body_names[b]) in targets for b in paths.trajectories.body[trajectory]]
     straight = np.linalg.norm(
         paths.trajectories.vertices[trajectory][index] - 0.5 * (paths.tx + paths.rx), axis=1
     ).min()

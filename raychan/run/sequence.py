@@ -87,7 +87,7 @@ def _frames(
 def moves_as_one(scene: Scene) -> bool:
     """Return whether all bodies move with the radar, so that its channel does not change."""
     own = np.asarray(scene.radar.velocity, float)
-    return all(np.array_equal(b.motion.velocity, own) and not b.motion.spin().any() for b in scene.bodies)
+    return all(np.array_equal(b.motion.velocity, own) and not b.motion.turns for b in scene.bodies)
 
 
 def _shifted(channel: Channel, scene: Scene, time: float) -> Channel:

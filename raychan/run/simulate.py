@@ -14,13 +14,15 @@ from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
 from raychan.run.interferers import interference
+from raychan.run.fluctuation import check
 from raychan.run.labels import provenance
 from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages import counts, told, uncut
-from raychan.run.micro_doppler import needed, retraced
+from raychan.run.micro_doppler import carried_on, needed, retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
+from raychan.run.realization import realized
 from raychan.run.received import notes, received
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
@@ -109,6 +111,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
             (launched, stats), (others, more) = run_pair(fine, lambda: launch(checked, heard=not again))
     turned = None
     if again:
+        check(scene, carried_on(scene, model.retrace))
         with clock.stage("retrace"):
             traced = Traced(launched.paths, tuple(routes))
             turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
@@ -138,13 +141,15 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     """Return what the receiver makes of a channel, and how each detection came about."""
     radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
+        quiet, launched = realized(scene, channel.geometry, channel.model, channel.quiet, channel.launched, seed)
         noise = radar.noise_power if radar.noise else 0.0
-        pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
-        cube, heard = _received(scene, channel, channel.quiet, seed)
+        pdp = profile_of(launched.response, radar.waveform, noise, settings.range_window)
+        cube, heard = _received(scene, channel, launched, quiet, seed)
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
         error = _error_of(channel, radar, settings)
+    channel = replace(channel, launched=launched)
     windows = settings.range_window, settings.rate_window
     names = background(channel.geometry.facets)
     receiver = Receiver(radar.waveform, *windows, radar.power, radar.ego_speed, names)
@@ -179,9 +184,9 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     )
 
 
-def _received(scene: Scene, channel: Channel, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:
+def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:
     """Return what the receiver records of noise-free samples, and what a user should know of it."""
-    turned, launched = channel.turned, channel.launched
+    turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
     others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
     cube, said = received(quiet, paths, scene.radar, seed, others)

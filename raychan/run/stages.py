@@ -13,6 +13,7 @@ from raychan.run.received import received
 from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
+from raychan.run.streams import NOISE, stream
 from raychan.signal.baseband import synthesize as samples_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats, launch_routes
@@ -80,6 +81,7 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     """Return the dechirped samples of a frame, with the radar's noise and impairments, without interferers.
 
     Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
+    Targets are steady here: only `simulate`, which knows their bodies, draws those that fluctuate.
     """
     SEED.check("seed", seed, whole=True)
     return received(samples_of(paths, radar), paths, radar, seed)[0]

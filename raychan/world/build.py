@@ -62,6 +62,7 @@ def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = No
         spin_dps=t.spin_dps,
         rcs_dbsm=t.rcs_dbsm,
         rcs_point=t.rcs_point,
+        swerling=t.swerling,
         role=t.role,
         unit=t.unit,
         up=t.up,

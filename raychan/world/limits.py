@@ -61,6 +61,8 @@ LENGTH = Limit(0.0, 1e6, "m", "a scene is no wider than a radar's horizon", abov
 PLACE = Limit(-1e6, 1e6, "m", "a scene is no wider than a radar's horizon; count from an origin near it")
 WIDTH = Limit(0.0, 1e4, "m", "float32 rays do not tell the facets of a wider body apart; is it the unit, as mm?")
 SAG = Limit(1e-6, 10.0, "m", "a facet finer than a micrometre is flat at any wavelength allowed")
+WALK = Limit(0.0, 30.0, "m/s", "nobody walks or cycles faster", above=True)
+PHASE = Limit(0.0, 1e6, "cycles", "the share of a cycle that is done, and whole ones before")
 HOOPS = Limit(1, 1000, "", "a rack of so many hoops")
 OFFSET_MM = Limit(-1e5, 1e5, "mm", "receivers of one radar stand within 100 m of each other")
 SPEED = Limit(-1e5, 1e5, "m/s", "range rates are of second order in v/c, and nothing here is faster than a spacecraft")
@@ -109,6 +111,9 @@ BOUNCES = Limit(1, 12, "", "each bounce costs more and brings less; paths hold 1
 LAYERS = Limit(0, 16, "", "paths hold 16 layers")
 TRACINGS = Limit(1, 4096, "", "each is a tracing of its own")
 FRAMES = Limit(1, 100_000, "", "each is a run and a folder of its own")
+SECONDS = Limit(1e-4, 600.0, "s", "a spectrogram of ten minutes is thousands of tracings")
+TRACED = Limit(1.0, 1e5, "1/s", "tracings a second")
+RATE_STEP = Limit(1e-3, 100.0, "m/s", "resolution of a spectrogram in range rate", above=True)
 INTERVAL = Limit(1e-9, 1e6, "s", "from frame to frame")
 SEED = Limit(0, (1 << 63) - 1, "", "seeds are whole numbers of 63 bits")
 

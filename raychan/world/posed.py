@@ -95,7 +95,7 @@ def _posed(bodies: Sequence[Body], which: Sequence[int], index: Index, frequency
         material=stack([numbers[b][0][m.part] for b, m in zip(which, meshes, strict=True)], (), np.int32),
         role=np.array([b.resolved_role for b in bodies], np.int8),
         origin=origins,
-        velocity=np.array([b.motion.velocity for b in bodies], float).reshape(-1, 3),
+        velocity=np.array([b.motion.velocity_of_origin(time) for b in bodies], float).reshape(-1, 3),
         spin=np.array([b.motion.spin(time) for b in bodies]).reshape(-1, 3),
         materials=resolve(materials, frequency),
         body_names=tuple(b.name for b in bodies),

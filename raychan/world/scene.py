@@ -71,7 +71,8 @@ class Scene(Described):
     ) -> None:
         self.title, self.text, self.path = title, text, path
         self.folder = folder or Path.cwd()
-        self.bodies = tuple(bodies)
+        self._given = tuple(bodies)
+        self.bodies = tuple(limb for body in self._given for limb in body.limbs)
         self.radar_table: RadarTable | None = mount(radar, path)
         self.processing: Processing = processing_of(processing, radar, path)
         self.is_radar_object = not isinstance(radar, RadarTable | Mapping | None)
@@ -125,7 +126,7 @@ class Scene(Described):
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
         ghz = tables.scene.frequency_ghz
-        known = {t.name: (t, b) for t, b in zip(like._tables, like.bodies, strict=True)} if like else {}
+        known = {t.name: (t, b) for t, b in zip(like._tables, like._given, strict=True)} if like else {}
         scene = cls(
             bodies=[body_of(b, folder, known.get(b.name)) for b in tables.bodies],
             frequency=None if ghz is None else ghz * 1e9,
@@ -187,7 +188,7 @@ class Scene(Described):
             seen.add(body.name)
             try:
                 self._chosen(body)
-                _ = body.motion, body.resolved_role
+                _ = body.motion, body.resolved_role, body.fluctuates
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.bodies = over_seams(self.bodies)

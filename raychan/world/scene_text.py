@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from raychan.units import dbm, watt
 from raychan.world import bundled
+from raychan.world.limbs import wholes
 from raychan.world.material import Material, material, names
 from raychan.world.schema import RadarTable, SceneFile
 from raychan.world.schema_errors import checked
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
     from raychan.world.body import Body
     from raychan.world.scene import Scene
 
-_BODY = ("shape", "unit", "up", "forward", "role", "rcs_dbsm", "scale", "crease_deg", "turn_rate_dps", "params")
+_BODY = (
+    "shape", "unit", "up", "forward", "role", "rcs_dbsm", "swerling", "scale", "crease_deg",
+    "turn_rate_dps", "params",
+)  # fmt: skip
 _ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -37,7 +41,7 @@ def toml_of(scene: Scene) -> str:
         "scene": {"title": scene.title, "frequency_ghz": figure(scene.frequency / 1e9, scene.frequency, _giga)},
         "processing": {k: v for k, v in vars(scene.processing).items() if v is not None},
         "model": scene.model.model_dump(),
-        "bodies": [_body_table(body, materials, scene.frequency) for body in scene.bodies],
+        "bodies": [_body_table(body, materials, scene.frequency) for body in wholes(scene.bodies)],
     }
     if scene.radar_table is not None:
         if scene.is_radar_object and not _antennas(scene.radar):

@@ -262,12 +262,16 @@ class BodyTable(Table):
     """Makes the body a point target: a number, or [azimuth_deg, dBsm] pairs relative to its heading."""
     rcs_point: Place | None = None
     """Place of the point target, body frame [m]; default the middle of the body."""
+    swerling: Literal[0, 1, 2, 3, 4] = 0
+    """How that RCS fluctuates: 0 steady, 1 and 3 from frame to frame, 2 and 4 from chirp to chirp."""
     role: Literal["scatterer", "mirror", "blocker"] | None = None
 
     @model_validator(mode="after")
     def _one_of(self) -> BodyTable:
         if (self.shape is None) == (self.mesh is None):
             raise ValueError("either shape or mesh")
+        if self.swerling and self.rcs_dbsm is None:
+            raise ValueError("rcs_dbsm with swerling: only a given RCS fluctuates")
         return self
 
 

@@ -264,3 +264,16 @@ def test_rcs_of_a_mesh() -> None:
     found = assert_type(rc.rcs(trimesh.creation.icosphere(3, 0.2), 10e9, [0.0, 30.0]), Rcs)
     assert_type(found.sigma, NDArray[np.float64])
     assert found.sigma == pytest.approx(np.pi * 0.04, rel=0.1)
+
+
+def test_a_stronger_target_is_detected_more_often() -> None:
+    found = assert_type(rc.detection_probability([10.0, 15.0], rc.Detector(pfa=1e-6), 1), NDArray[np.float64])
+    assert found[0] < found[1]
+
+
+def test_a_spectrogram_shows_the_wall_at_its_range_rate() -> None:
+    found = assert_type(rc.spectrogram(street(), 0.004, resolution=1.0), rc.Spectrogram)
+    ridge = found.rate[found.power.argmax(axis=1)]
+    # 7 m/s towards each other, and the ground at less.
+    assert ridge == pytest.approx(np.full(len(ridge), -7.0), abs=0.3)
+    assert_type(found.power, NDArray[np.float64])
