@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import Record, column
+from raychan.em.diffuse import Diffuse
 from raychan.kinds import *  # noqa: F403
 from raychan.reprs import Plotted
 from raychan.units import C0
@@ -35,6 +36,8 @@ class Materials(Record):
     eps: Complexes = column("m", np.complex128, doc="relative permittivity eps_r - j sigma/(omega eps0); 1 for PEC")
     thickness: Floats = column("m", unit="m", doc="layer thickness; 0 unless LAYER")
     roughness: Floats = column("m", unit="m", doc="rms height")
+    diffuse: tuple[Diffuse | None, ...] = ()
+    """How each scatters diffusely; empty: none does."""
 
 
 @dataclass(frozen=True)

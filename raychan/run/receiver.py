@@ -74,7 +74,10 @@ def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     return range_doppler(cube, radar.waveform, *windows).power
 
 
-def noise_stream(seed: int) -> np.random.Generator:
-    """Return the random numbers of the noise of a run. Streams are numbered by stage, so that one more random stage
-    leaves the others as they are."""
-    return np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+NOISE, CLUTTER = range(2)
+"""Streams of random numbers of a run, numbered by stage, so that one more leaves the others as they are."""
+
+
+def stream(seed: int, stage: int) -> np.random.Generator:
+    """Return the random numbers of a stage of a run."""
+    return np.random.default_rng(np.random.SeedSequence(seed).spawn(stage + 1)[stage])

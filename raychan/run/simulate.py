@@ -8,25 +8,36 @@ from typing import Any
 
 import numpy as np
 
+from raychan.channel.paths import join
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
-from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
+from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Paths, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.clutter import clutter_of
 from raychan.run.labels import provenance
 from raychan.run.mechanisms import Choice, choose
 from raychan.run.messages import counts, told, uncut
 from raychan.run.micro_doppler import needed, retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
-from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, noise_stream, quiet_map
+from raychan.run.receiver import (
+    CLUTTER,
+    NOISE,
+    detections_in,
+    map_error,
+    map_of,
+    noise_of_cell,
+    quiet_map,
+    stream,
+)
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
 from raychan.run.unmodelled import ledger
-from raychan.signal.baseband import noisy, synthesize
-from raychan.signal.delay_profile import profile_of
+from raychan.signal.baseband import added, noisy, synthesize
+from raychan.signal.delay_profile import profile_of, response
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats
 from raychan.world.geometry import Geometry, geometry_of
@@ -52,11 +63,23 @@ class Channel:
     warnings: tuple[str, ...] = ()
     turned: Retraced | None = None
     """Samples of a frame that was traced more than once."""
+    clutter: Paths | None = None
+    """Diffuse returns, drawn for a seed."""
 
     @property
     def quiet(self) -> Cube:
-        """The samples of the frame without noise."""
+        """The samples of the frame without noise and clutter."""
         return self.turned.cube if self.turned else self.launched.quiet
+
+    @property
+    def paths(self) -> Paths:
+        """The paths of the frame, clutter among them."""
+        return self.launched.paths if self.clutter is None else join([self.launched.paths, self.clutter])
+
+    def with_clutter(self, radar: Radar, seed: int) -> Channel:
+        """Return the channel with the diffuse returns of a seed, where materials have any."""
+        found = clutter_of(self.geometry, radar, self.model, stream(seed, CLUTTER))
+        return replace(self, clutter=found) if len(found.delay) else self
 
 
 def simulate(
@@ -134,9 +157,15 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     """Return what the receiver makes of a channel, and how each detection came about."""
     radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
+        channel = channel.with_clutter(radar, seed)
+        paths, quiet = channel.paths, channel.quiet
         noise = radar.noise_power if radar.noise else 0.0
-        pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
-        cube = noisy(channel.quiet, radar, noise_stream(seed))
+        heard = channel.launched.response
+        if channel.clutter is not None:
+            quiet = added(quiet, synthesize(channel.clutter, radar))
+            heard = heard + response(channel.clutter, radar.waveform, radar.power, settings.range_window)
+        pdp = profile_of(heard, radar.waveform, noise, settings.range_window)
+        cube = noisy(quiet, radar, stream(seed, NOISE))
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
@@ -149,7 +178,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
-        paths=channel.launched.paths,
+        paths=paths,
         profile=pdp,
         cube=cube,
         rdmap=rdmap,
@@ -179,7 +208,7 @@ def _explained(
 ) -> tuple[tuple[Explanation, ...], dict[str, Any]]:
     """Return where each detection came from, and the ledger of what the run left out."""
     radar, settings, turned = scene.radar, scene.processing, channel.turned
-    paths, model = channel.launched.paths, channel.model
+    paths, model = channel.paths, channel.model
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
     reasons, left_out = run_pair(
         lambda: provenance(paths, rdmap, found, receiver, error.power),

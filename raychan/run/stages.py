@@ -9,7 +9,7 @@ import numpy as np
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
-from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude, noise_stream
+from raychan.run.receiver import NOISE, detections_in, map_of, noise_equivalent_amplitude, stream
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
 from raychan.signal.baseband import synthesize as samples_of
@@ -81,7 +81,7 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
     """
     SEED.check("seed", seed, whole=True)
-    return samples_of(paths, radar, noise_stream(seed))
+    return samples_of(paths, radar, stream(seed, NOISE))
 
 
 def range_doppler(cube: Cube, radar: Radar) -> RangeDoppler:

@@ -66,6 +66,11 @@ def synthesize(
     return quiet if rng is None else noisy(quiet, radar, rng)
 
 
+def added(one: Cube, other: Cube) -> Cube:
+    """Return the sum of two cubes without noise."""
+    return Cube(samples=one.samples + other.samples, noise_power=0.0)
+
+
 def noisy(quiet: Cube, radar: Radar, rng: np.random.Generator) -> Cube:
     """Return the samples with thermal noise added, if the radar has noise."""
     if not radar.noise:

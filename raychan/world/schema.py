@@ -18,7 +18,11 @@ from raychan.world.quantities import (
     Chirps,
     Conductivity,
     Crease,
+    CrossLevel,
+    DiffuseLevel,
+    Exponent,
     Gain,
+    KShape,
     Layers,
     Level,
     Loss,
@@ -39,6 +43,7 @@ from raychan.world.quantities import (
     Spacing,
     Speed,
     Spin,
+    Texture,
     Thickness,
     Tolerance,
     Tracings,
@@ -192,8 +197,34 @@ class Model(Table):
     retrace: Literal["auto"] | Tracings = "auto"
     """How often a frame is traced; auto: if bodies turn, as often as tolerance_db needs; 1: once, and paths keep the
     rates of the frame's start; more: so often, and all that moves is carried on in between."""
+    diffuse: Literal["stated", "rough", "off"] = "stated"
+    """Diffuse scattering, as clutter. stated: of materials with a diffuse table; rough: also of those with a roughness,
+    by Lambert's law; off: none."""
     diffraction: bool = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
+
+
+class DiffuseTable(Table):
+    """Table [materials.NAME.diffuse]: a surface that scatters diffusely, as speckle."""
+
+    law: Literal["constant", "gamma", "lambert", "lobe"]
+    level_db: DiffuseLevel
+    """constant: sigma-nought; gamma: sigma-nought over the sine of the grazing angle; lambert, lobe: the share of the
+    incident power that is scattered."""
+    exponent: Exponent = 4
+    """Of a lobe: larger is narrower."""
+    cross_db: CrossLevel | None = None
+    """Cross-polarised return under the co-polarised one; none: no cross-polarised return."""
+    k_shape: KShape | None = None
+    """Shape of a K distribution; none: Rayleigh."""
+    texture_m: Texture = 1.0
+    """Side of a square of one texture."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> DiffuseTable:
+        if self.law in ("lambert", "lobe") and self.level_db > 0.0:
+            raise ValueError(f"level_db at most 0 for law = '{self.law}': it is a share of the incident power")
+        return self
 
 
 class MaterialTable(Table):
@@ -206,6 +237,7 @@ class MaterialTable(Table):
     roughness_mm: Roughness = 0.0
     pec: bool = False
     source: str = ""
+    diffuse: DiffuseTable | None = None
 
 
 class BodyTable(Table):
