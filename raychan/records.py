@@ -35,6 +35,8 @@ class Materials(Record):
     eps: Complexes = column("m", np.complex128, doc="relative permittivity eps_r - j sigma/(omega eps0); 1 for PEC")
     thickness: Floats = column("m", unit="m", doc="layer thickness; 0 unless LAYER")
     roughness: Floats = column("m", unit="m", doc="rms height")
+    diffuse: tuple[object, ...] = ()
+    """How each scatters diffusely (em.diffuse.Diffuse or None); empty: none does."""
 
 
 @dataclass(frozen=True)

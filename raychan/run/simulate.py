@@ -13,8 +13,8 @@ from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
-from raychan.run.interferers import interference
 from raychan.run.fluctuation import check
+from raychan.run.interferers import interference
 from raychan.run.labels import provenance
 from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.mechanisms import choose
@@ -61,7 +61,7 @@ class Channel:
 
     @property
     def quiet(self) -> Cube:
-        """The samples of the frame without noise."""
+        """The samples of the frame without noise, of steady targets and without clutter."""
         return self.turned.cube if self.turned else self.launched.quiet
 
 
@@ -158,7 +158,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
-        paths=channel.launched.paths,
+        paths=launched.paths,
         profile=pdp,
         cube=cube,
         rdmap=rdmap,

@@ -21,9 +21,8 @@ from raychan.records import Cube
 from raychan.reprs import Plotted
 from raychan.run.clock import Progress
 from raychan.run.micro_doppler import stretches
-from raychan.run.resources import allowed_memory
-from raychan.run.rules import asked, fine_rule
-from raychan.run.streams import NOISE, stream
+from raychan.run.rules import allowed_memory, asked, fine_rule
+from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy
 from raychan.units import C0, db
 from raychan.world.errors import SceneError
@@ -93,7 +92,7 @@ def spectrogram(
     if (need := _BYTES * chirps * len(cells) * len(radar.elements)) > allowed_memory():
         raise ValueError(f"duration = {duration:g} s takes {need / 1e9:.0f} GB of memory: fewer ranges take less")
     tell = progress or (lambda stage, share: None)
-    rng, slow, signal, error = stream(seed, NOISE), [], 0.0, 0.0
+    rng, slow, signal, error = stream(seed, Stage.NOISE), [], 0.0, 0.0
     rule = fine_rule(scene.radar, scene.processing, model)
     for quiet, off in stretches(long, rule, model, count, lambda share: tell("trace", share)):
         signal, error = signal + float((np.abs(quiet) ** 2).sum()), error + float((np.abs(off) ** 2).sum())

@@ -13,7 +13,6 @@ from raychan.run.received import received
 from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
-from raychan.run.streams import NOISE, stream
 from raychan.signal.baseband import synthesize as samples_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats, launch_routes

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.em.fresnel import coefficients_array
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
+from raychan.run.clutter import scatters_diffusely
 from raychan.run.ledger import NOTHING, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, peak
 from raychan.run.solver import paths_over_wedges
@@ -43,7 +44,7 @@ def ledger(
         "transmission": _transmission(paths, radar, settings, weakest),
         "diffraction": _diffraction(geometry, radar, weakest),
         "diffraction to point targets": _around(geometry, points, radar, settings, model, weakest),
-        "diffuse scattering": _diffuse(geometry, radar, weakest),
+        "diffuse scattering": _diffuse(geometry, radar, model, weakest),
         "tessellation": _tessellation(paths, geometry, bodies, radar, settings, weakest),
         "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
         "intra-frame motion": _motion(paths, geometry.facets, radar),
@@ -131,12 +132,15 @@ def _around(geometry: Geometry, points: Points, radar: Radar, settings: Any, mod
     return Entry(float(db(max(level, 1e-40) / weakest)), "estimate", "strongest cell of the diffracted returns (UTD)")
 
 
-def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
+def _diffuse(geometry: Geometry, radar: Radar, model: Any, weakest: float) -> Entry:
     """Return the entry of diffuse scattering, of the strongest range cell: the power that roughness takes from the
     specular reflection (Ament, Proc. IRE 41, 1953), scattered by Lambert's law."""
     f = geometry.facets
     m = f.materials
-    rough = m.roughness[f.material] > 0.0
+    modelled = scatters_diffusely(f, model)
+    rough = ((m.roughness > 0.0) & ~modelled)[f.material]
+    if modelled.any() and not rough.any():
+        return Entry(NOTHING, "exact", "modelled: what the radar sees directly of rough surfaces")
     if not rough.any():
         return Entry(UNKNOWN, "none", "no material states a roughness")
     rng = np.random.default_rng(0)

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,13 +197,14 @@ def _named(given: str | Material, materials: dict[str, Material], frequency: flo
 
 
 def _material_table(m: Material) -> dict[str, Any]:
+    own = {} if m.diffuse is None else {"diffuse": {k: v for k, v in asdict(m.diffuse).items() if v is not None}}
     if m.pec:
-        return {"pec": True, "source": m.source}
+        return {"pec": True, "source": m.source} | own
     table: dict[str, Any] = {"eps_r": float(m.eps_r), "sigma": float(m.sigma), "source": m.source}
     table["roughness_mm"] = figure(1e3 * m.roughness, m.roughness, _milli)
     if m.thickness is not None:
         table["thickness_mm"] = figure(1e3 * m.thickness, m.thickness, _milli)
-    return table
+    return table | own
 
 
 def _lines(table: Mapping[str, Any], path: str = "") -> Iterator[str]:

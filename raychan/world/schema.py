@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from raychan.world.limits import ROW_WAVELENGTHS
 from raychan.world.quantities import (
@@ -16,7 +16,6 @@ from raychan.world.quantities import (
     Carrier,
     CellPair,
     Chirps,
-    Conductivity,
     Crease,
     Gain,
     Kelvin,
@@ -26,13 +25,11 @@ from raychan.world.quantities import (
     Noise,
     Offsets,
     PadPair,
-    Permittivity,
     Pfa,
     Place,
     Power,
     Ramp,
     Rcs,
-    Roughness,
     Row,
     Samples,
     Scale,
@@ -41,19 +38,14 @@ from raychan.world.quantities import (
     Speed,
     Spin,
     Start,
-    Thickness,
     Tolerance,
     Tracings,
     Turn,
     Window,
 )
+from raychan.world.schema_base import Table
 from raychan.world.schema_impairments import AtmosphereTable, ImpairmentsTable
-
-
-class Table(BaseModel):
-    """A table of a scene file: unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+from raychan.world.schema_materials import MaterialTable
 
 
 class Header(Table):
@@ -218,20 +210,11 @@ class Model(Table):
     retrace: Literal["auto"] | Tracings = "auto"
     """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, and paths keep the
     range rates of the frame's start; more: all moving bodies are extrapolated between the tracings."""
+    diffuse: Literal["stated", "rough", "off"] = "stated"
+    """Diffuse scattering, as clutter. stated: of materials with a diffuse table; rough: also of those with a roughness,
+    by Lambert's law; off: none."""
     diffraction: bool = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
-
-
-class MaterialTable(Table):
-    """Table [materials.NAME]."""
-
-    eps_r: Permittivity = 1.0
-    sigma: Conductivity = 0.0
-    """S/m."""
-    thickness_mm: Thickness | None = None
-    roughness_mm: Roughness = 0.0
-    pec: bool = False
-    source: str = ""
 
 
 class BodyTable(Table):

@@ -7,7 +7,7 @@ from support.scene_texts import ISOTROPIC, upright, walker
 from raychan.run.clock import Clock
 from raychan.run.fluctuation import drawn, fluctuated, of_target
 from raychan.run.simulate import Channel, channel_of, result_of, simulate
-from raychan.run.streams import FLUCTUATION, stream
+from raychan.run.streams import Stage, stream
 from raychan.run.target_links import target_links
 from raychan.signal.baseband import synthesize
 from raychan.units import db
@@ -38,7 +38,7 @@ def test_only_the_targets_echo_fluctuates_and_has_the_mean_power_of_its_rcs(chan
     ).samples
     chirps, powers, means = scene.radar.waveform.n_chirps, [], []
     for seed in range(600):
-        factors = drawn(scene, chirps, stream(seed, FLUCTUATION))
+        factors = drawn(scene, chirps, stream(seed, Stage.FLUCTUATION))
         cube, launched = fluctuated(channel.launched.quiet, channel.launched, factors)
         share = (cube.samples - (steady - own))[0, :, 3] / own[0, :, 3]
         assert np.allclose(share, factors[body], rtol=2e-3, atol=2e-3)
