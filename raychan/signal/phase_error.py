@@ -209,5 +209,5 @@ def _nothing(paths: Paths, radar: Radar) -> Complexes:
 
 def _rows(paths: Paths, rows: slice | NDArray[np.int64], share: Floats | float) -> Paths:
     """Return some of the paths, their amplitudes times a share."""
-    columns = {name: getattr(paths, name)[rows] for name in ("length", "length_rate", "way")}
+    columns = {name: getattr(paths, name)[rows] for name in ("length", "length_rate", "trajectory")}
     return replace(paths, amplitude=paths.amplitude[rows] * share, **columns)
