@@ -27,6 +27,8 @@ _HOME = {
     "PEC": "raychan.world.material",
     "Radar": "raychan.radar.radar",
     "Waveform": "raychan.radar.waveform",
+    "uniform_array": "raychan.radar.array",
+    "mimo_array": "raychan.radar.array",
     "Antenna": "raychan.radar.antenna",
     "IsotropicAntenna": "raychan.radar.antenna",
     "CosineAntenna": "raychan.radar.antenna",
@@ -60,6 +62,8 @@ if TYPE_CHECKING:
     from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
     from raychan.radar.antenna import CosineAntenna as CosineAntenna
     from raychan.radar.antenna import IsotropicAntenna as IsotropicAntenna
+    from raychan.radar.array import mimo_array as mimo_array
+    from raychan.radar.array import uniform_array as uniform_array
     from raychan.radar.pattern import MeasuredAntenna as MeasuredAntenna
     from raychan.radar.processing import Processing as Processing
     from raychan.radar.radar import Radar as Radar

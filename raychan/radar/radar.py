@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from raychan.poses import rotation
 from raychan.radar.antenna import Antenna, IsotropicAntenna
+from raychan.radar.array import Transmission, check_multiplexing, numbers, offsets, virtual_elements
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.processing import Processing
 from raychan.radar.spherical_vectors import turned, vectors
@@ -22,17 +23,19 @@ Complexes = NDArray[np.complex128]
 
 _AHEAD, _POWER, _PROCESSING = IsotropicAntenna(front=True), float(watt(12.0)), Processing()
 _NUMBERS = ("yaw_deg", "pitch_deg", "roll_deg", "noise_figure_db")
-_VECTORS = {"position": "(3,)", "velocity": "(3,)", "elements": "(a, 3)"}
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class Radar:
-    """A monostatic radar: one transmitter, one or several receivers of one pattern. Defaults as in a scene file.
+    """A radar: transmitters of one pattern, receivers of one pattern. Defaults as in a scene file.
 
     Args: waveform; position (3,) [m] of the phase centre in the world; antenna of transmitter and receiver, or
-    tx_antenna and rx_antenna of their own; power [W] into the antenna; noise_figure_db [dB]; noise: whether samples get
-    noise; yaw_deg, pitch_deg, roll_deg [deg] of the boresight; velocity (3,) [m/s], world axes; elements (a, 3) [m],
-    the receivers' phase centres in the antenna's frame; processing of the receiver.
+    tx_antenna and rx_antenna of their own; power [W] into the antenna of each transmitter; noise_figure_db [dB]; noise:
+    whether samples get noise; yaw_deg, pitch_deg, roll_deg [deg] of the boresight; velocity (3,) [m/s], world axes;
+    elements (a, 3) and tx_elements (t, 3) [m], phase centres of receivers and transmitters in the antenna's frame;
+    multiplexing of the transmitters: "tdm", chirp m is sent by transmitter m modulo t, or "ddm", transmitter i advances
+    its phase by i / ddm_slots of a turn from chirp to chirp (default t + 1: the empty slot tells folds); processing of
+    the receiver.
     Raises: ValueError for values that cannot be.
     """
 
@@ -51,6 +54,9 @@ class Radar:
     roll_deg: float
     velocity: Floats
     elements: Floats
+    tx_elements: Floats
+    multiplexing: str
+    ddm_slots: int | None
     processing: Processing
 
     def __init__(
@@ -69,6 +75,9 @@ class Radar:
         roll_deg: float = 0.0,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         elements: ArrayLike = ((0.0, 0.0, 0.0),),
+        tx_elements: ArrayLike = ((0.0, 0.0, 0.0),),
+        multiplexing: str = "none",
+        ddm_slots: int | None = None,
         processing: Processing = _PROCESSING,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
@@ -77,14 +86,11 @@ class Radar:
         for name in _NUMBERS:
             if not np.isfinite(given[name]):
                 raise ValueError(f"Radar.{name} = {given[name]!r}: must be finite")
-        for name, wanted in _VECTORS.items():
-            value = np.array(given[name], np.float64)
-            if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
-                raise ValueError(f"Radar.{name}: numbers of shape {wanted} wanted, {value.tolist()} given")
-            if not np.isfinite(value).all():
-                raise ValueError(f"Radar.{name}: finite numbers wanted, {value.tolist()} given")
-            value.flags.writeable = False
-            given[name] = value
+        for name in ("position", "velocity"):
+            given[name] = numbers(f"Radar.{name}", given[name], "(3,)")
+        for name in ("elements", "tx_elements"):
+            given[name] = offsets(f"Radar.{name}", given[name])
+        check_multiplexing(multiplexing, len(given["tx_elements"]), ddm_slots)
         for name, value in given.items():
             object.__setattr__(self, name, value)
 
@@ -123,6 +129,32 @@ class Radar:
     def elements_world(self) -> Floats:
         """Receiver offsets (a, 3) from the position, world axes [m]."""
         return np.array(self.elements @ self.axes.T)
+
+    @property
+    def virtual_elements(self) -> Floats:
+        """Elements (t * a, 3) [m] of the virtual array in the antenna's frame: row i * a + j is transmitter i with
+        receiver j, at the sum of their positions."""
+        return virtual_elements(self.tx_elements, self.elements)
+
+    @property
+    def slots(self) -> int:
+        """By what the multiplexing divides the rates that do not fold: transmitters, or Doppler slots."""
+        count = len(self.tx_elements)
+        return self.ddm_slots or count + 1 if self.multiplexing == "ddm" else count
+
+    @property
+    def transmissions(self) -> tuple[Transmission, ...]:
+        """What each transmitter sends."""
+        places, slots = np.array(self.tx_elements @ self.axes.T), self.slots
+        if self.multiplexing == "tdm":
+            return tuple(Transmission(x, first=i, step=slots) for i, x in enumerate(places))
+        return tuple(Transmission(x, turn=i / slots) for i, x in enumerate(places))
+
+    @property
+    def channel_waveform(self) -> Waveform:
+        """The waveform of one virtual channel: fewer chirps, farther apart, over the same frame; of one transmitter the
+        waveform itself. Raises: ValueError if the chirps are no multiple of the slots."""
+        return self.waveform.every(self.slots)
 
     @property
     def ego_speed(self) -> float:

@@ -10,7 +10,7 @@ where a is the path's amplitude at the start of the frame, which already holds e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from raychan.units import C0
 
@@ -51,6 +51,17 @@ class Waveform:
                 raise ValueError(f"Waveform.{name} = {getattr(self, name)!r}: must be a whole number")
         if self.repetition < self.chirp_duration * (1.0 - 1e-9):
             raise ValueError(f"Waveform.repetition = {self.repetition:g} s: shorter than the chirp")
+
+    def every(self, step: int) -> Waveform:
+        """Return the waveform of every `step`-th ramp. Raises: ValueError if the ramps are no multiple of it."""
+        if step == 1:
+            return self
+        if self.n_chirps % step:
+            raise ValueError(
+                f"{self.n_chirps} chirps cannot be shared among {step} transmitters or Doppler slots: "
+                f"a multiple of {step} is wanted"
+            )
+        return replace(self, n_chirps=self.n_chirps // step, repetition=step * self.repetition)
 
     @property
     def slope(self) -> float:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import take
-from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, TRANSMIT, Paths
+from raychan.run.receiver import quiet_map
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 
@@ -50,8 +50,7 @@ def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> 
     if not rows.any():
         return 0.0
     cube = synthesize(take(paths, rows), dataclasses.replace(radar, noise=False), tolerance=_LEVEL)
-    rdmap = range_doppler(cube, radar.waveform, settings.range_window, settings.rate_window, settings.pad)
-    return float(rdmap.power.max())
+    return float(quiet_map(cube.samples, radar, settings).max())
 
 
 def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db: float) -> Choice:

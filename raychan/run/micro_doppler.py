@@ -19,6 +19,7 @@ from raychan.channel.paths import join
 from raychan.channel.slow_time import Poses, carried, strengths
 from raychan.channel.transfer import departures
 from raychan.columns import take
+from raychan.radar.array import Transmission, Wavefronts, wavefronts
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.segments import Keyframe, Retraced, Segment, Traced, echoes, joined, reach
@@ -94,6 +95,13 @@ def retraced(
     if model.retrace == "auto":
         return work.adaptive(last, first)
     return work.even(last, first, int(model.retrace))
+
+
+def fronts_of_routes(routes: Routes) -> Wavefronts:
+    """Return the spherical waves of routes at both ends."""
+    ends = (np.broadcast_to(x, (len(routes.kind), 1, 3)) for x in (routes.tx, routes.rx))
+    stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
+    return wavefronts(stops, routes.scatter, *departures(routes), routes.length)
 
 
 class _Frame:
@@ -200,45 +208,57 @@ class _Frame:
             amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
-        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame)).samples
+        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples
         for routes, strength in zip(key.routes, key.strengths, strict=True):
-            # A receiver moved towards the arriving wave has a shorter path.
-            nearer = departures(routes)[1] @ self.radar.elements_world.T
+            fronts = fronts_of_routes(routes)
             for start in range(first, last + 1, _AT_ONCE):
                 count = min(_AT_ONCE, last + 1 - start)
                 # One instant more than chirps: the rate is the change from chirp to chirp.
                 poses = self.poses(key, np.arange(start, start + count + 1))
                 lengths, amplitudes = carried(routes, strength, poses, wave.carrier)
-                rows = slice(start - first, start - first + count)
-                for layer, near in zip(out[0], nearer.T, strict=True):
-                    layer[rows] += self.ramps(lengths - near[:, None], amplitudes * self.turn(near)[:, None])
+                rows = out[0, :, start - first : start - first + count]
+                for sent in self.radar.transmissions:
+                    self.add_ramps(rows, start, sent, lengths, amplitudes, fronts)
         return out
 
-    def turn(self, nearer: Floats) -> Complexes:
-        """Return the transmitted amplitude [sqrt(W)] times the carrier phase of paths shorter by some lengths [m]."""
-        wave = self.radar.waveform
-        return np.asarray(np.sqrt(self.radar.power) * np.exp(2j * np.pi / wave.wavelength * nearer))
+    def add_ramps(
+        self, out: Samples, start: int, sent: Transmission, lengths: Floats, amplitudes: Complexes, fronts: Wavefronts
+    ) -> None:
+        """Add to samples (antenna, chirp, sample) from chirp number `start` on what one transmitter brings over parts
+        (chirp + 1, n, 3) of routes of these lengths [m]."""
+        wave, chirps = self.radar.waveform, slice(sent.since(start).first, None, sent.step)
+        code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
+        for layer, element in zip(out, self.radar.elements_world, strict=True):
+            longer = fronts.longer(sent.offset, element)
+            turn = np.sqrt(self.radar.power) * np.exp(-2j * np.pi / wave.wavelength * longer)
+            brought = self.ramps(lengths + longer[:, None], amplitudes * turn[:, None], chirps)
+            layer[chirps] += brought if sent.turn == 0.0 else brought * code
 
-    def ramps(self, lengths: Floats, amplitudes: Complexes) -> Samples:
-        """Return the samples (chirp, sample) of parts (chirp + 1, n, 3) of routes with these lengths [m]."""
+    def ramps(self, lengths: Floats, amplitudes: Complexes, chirps: slice) -> Samples:
+        """Return the samples (chirp, sample) of some chirps, of parts (chirp + 1, n, 3) of routes with these lengths
+        [m]."""
         wave, count = self.radar.waveform, len(lengths) - 1
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
         length = lengths.reshape(count + 1, -1)[:, parts]
         delay = length / C0
-        delay_rate, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
-        strength = amplitudes.reshape(count + 1, -1)[:-1, parts]
+        delay_rate, delay = (np.diff(delay, axis=0) / self.step)[chirps], delay[:-1][chirps]
+        strength = np.ascontiguousarray(amplitudes.reshape(count + 1, -1)[:-1, parts][chirps])
+        length, delay = length[:-1][chirps], np.ascontiguousarray(delay)
+        delay_rate = np.ascontiguousarray(delay_rate)
+        if not len(delay):
+            return np.zeros((0, wave.n_samples), np.complex128)
         if len(parts) * wave.n_samples <= _FEW:
             step = wave.chirp_duration / wave.n_samples
             rows = ramp_sums(strength, delay, delay_rate, wave.carrier, wave.slope, step, wave.n_samples)
             return np.asarray(rows)
         here = np.zeros(3)
-        one = dataclasses.replace(
-            self.radar, elements=here[None], power=1.0, waveform=dataclasses.replace(wave, n_chirps=1)
-        )
+        single: dict[str, Any] = {"elements": here[None], "tx_elements": here[None], "multiplexing": "none"}
+        single |= {"ddm_slots": None, "waveform": dataclasses.replace(wave, n_chirps=1)}
+        one = dataclasses.replace(self.radar, **single, power=1.0)
         return np.stack(
             [
                 synthesize(echoes(*row, here), one).samples[0, 0]
-                for row in zip(length[:-1], strength, delay_rate, strict=True)
+                for row in zip(length, strength, delay_rate, strict=True)
             ]
         )
 

@@ -142,7 +142,8 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
                 _column(group, name, f, getattr(result.rdmap, f.name), {})
     if name == "cube":
         times = (
-            ("chirp", wave.repetition, "start of the ramp"),
+            # The receiver's waveform is that of a virtual channel; samples are those of all chirps as sent.
+            ("chirp", wave.repetition * (wave.n_chirps / len(group.dimensions["chirp"])), "start of the ramp"),
             ("sample", 1.0 / wave.sample_rate, "time in the ramp"),
         )
         for axis, step, title in times:

@@ -9,7 +9,7 @@ import numpy as np
 from raychan.poses import direction
 from raychan.processing.cfar import Grid, fitting_guard
 from raychan.processing.detection import detect
-from raychan.processing.range_doppler import range_doppler
+from raychan.processing.mimo import unfolded, virtual_range_doppler
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
@@ -17,7 +17,7 @@ from raychan.records import Cube, Detections, MapError, RangeDoppler
 
 def map_of(cube: Cube, radar: Radar, settings: Any) -> RangeDoppler:
     """Return the range-Doppler map of samples; settings: windows and padding of a scene file's [processing]."""
-    return range_doppler(cube, radar.waveform, settings.range_window, settings.rate_window, settings.pad)
+    return virtual_range_doppler(cube, radar, settings.range_window, settings.rate_window, settings.pad)
 
 
 def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detections:
@@ -27,7 +27,7 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
     guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
     if guard is not None:
         sizes["guard"] = guard
-    return detect(
+    found = detect(
         rdmap,
         pfa=settings.pfa,
         min_snr_db=settings.min_snr_db,
@@ -35,9 +35,10 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
         ego_speed=radar.ego_speed,
         windows=(settings.rate_window, settings.range_window),
         waveform=radar.waveform,
-        elements=np.asarray(radar.elements),
+        elements=radar.virtual_elements,
         **sizes,
     )
+    return unfolded(rdmap, found)
 
 
 def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
@@ -57,9 +58,10 @@ def noise_of_cell(radar: Radar, settings: Any) -> float:
     """Return the thermal noise [W] of one cell of the map; 0 when noise is off."""
     if not radar.noise:
         return 0.0
-    wave = radar.waveform
-    gain = processing_gain(window(settings.range_window, wave.n_samples))
-    return float(radar.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
+    gain = processing_gain(window(settings.range_window, radar.waveform.n_samples))
+    # By time division a channel has a share of the chirps, by Doppler division all of them.
+    chirps = (radar.channel_waveform if radar.multiplexing == "tdm" else radar.waveform).n_chirps
+    return float(radar.noise_power / gain / processing_gain(window(settings.rate_window, chirps)))
 
 
 def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapError:
@@ -71,4 +73,4 @@ def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     """Return the powers (v, r) [W] of the map of samples (antenna, chirp, sample) without noise."""
     cube = Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0)
     windows = (settings.range_window, settings.rate_window, settings.pad)
-    return range_doppler(cube, radar.waveform, *windows).power
+    return virtual_range_doppler(cube, radar, *windows, resolve=False).power

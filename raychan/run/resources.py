@@ -122,7 +122,7 @@ def _refused(scene: Scene, need: float, may: float) -> SceneError:
 
 def _detector(scene: Scene) -> list[str]:
     """Return a line where the map is so small that the CFAR's guard must be smaller than set."""
-    wave, asked = scene.radar.waveform, scene.processing
+    wave, asked = scene.radar.channel_waveform, scene.processing
     count = wave.n_chirps, wave.n_samples if wave.complex_sampling else wave.n_samples // 2
     guard, train = (sizes and sizes[::-1] for sizes in (asked.guard, asked.train))
     fitted = fitting_guard(count, guard, train)

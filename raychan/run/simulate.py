@@ -141,7 +141,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         error = _error_of(channel, quiet, radar, settings)
     windows = settings.range_window, settings.rate_window
     names = background(channel.geometry.facets)
-    receiver = Receiver(radar.waveform, *windows, radar.power, radar.ego_speed, names)
+    receiver = Receiver(radar.channel_waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
         reasons, left_out = _explained(scene, channel, rdmap, detections, receiver, error)
     known = ExplainedDetections.of(detections, reasons)

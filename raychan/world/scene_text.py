@@ -16,6 +16,9 @@ from raychan.world.schema import RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from raychan.radar.antenna import Antenna
     from raychan.radar.radar import Radar
     from raychan.radar.waveform import Waveform
@@ -63,7 +66,9 @@ def radar_table_of(radar: Radar) -> RadarTable:
             "noise_figure_db": float(radar.noise_figure_db),
             "noise": radar.noise,
             **_antennas(radar),
-            "elements_mm": [[figure(1e3 * x, x, _milli) for x in row] for row in radar.elements.tolist()],
+            **{f"{name}_mm": _millimetres(getattr(radar, name)) for name in ("elements", "tx_elements")},
+            "multiplexing": radar.multiplexing,
+            "ddm_slots": radar.ddm_slots,
             "waveform": _waveform_table(radar.waveform),
         },
     )
@@ -93,6 +98,10 @@ def figure(guess: float, value: float, read: Callable[[float], float]) -> float:
             return short
     near = (guess, math.nextafter(guess, math.inf), math.nextafter(guess, -math.inf))
     return next((x for x in near if read(x) == value), guess)
+
+
+def _millimetres(places: NDArray[np.float64]) -> list[list[float]]:
+    return [[figure(1e3 * x, x, _milli) for x in row] for row in places.tolist()]
 
 
 def _waveform_table(wave: Waveform) -> dict[str, Any]:

@@ -35,6 +35,7 @@ from raychan.world.quantities import (
     Row,
     Samples,
     Scale,
+    Slots,
     Snr,
     Spacing,
     Speed,
@@ -163,7 +164,26 @@ class RadarTable(Table):
     polarization: Literal["V", "H"] = "V"
     elements_mm: Annotated[list[Offset], Field(min_length=1, max_length=4096)] = [[0.0, 0.0, 0.0]]
     """Receiver phase centres in the antenna's frame."""
+    tx_elements_mm: Annotated[list[Offset], Field(min_length=1, max_length=64)] = [[0.0, 0.0, 0.0]]
+    """Transmitter phase centres in the antenna's frame."""
+    multiplexing: Literal["none", "tdm", "ddm"] = "none"
+    """Of transmitters: by time division, chirp m by transmitter m modulo their number, or by Doppler division."""
+    ddm_slots: Slots | None = None
+    """Doppler slots; default one more than transmitters."""
     waveform: WaveformTable
+
+    @model_validator(mode="after")
+    def _transmitters_fit(self) -> RadarTable:
+        many, chirps = len(self.tx_elements_mm), self.waveform.chirps
+        if self.multiplexing == "none" and many > 1:
+            raise ValueError(f"multiplexing = 'tdm' or 'ddm' for {many} transmitters")
+        if self.ddm_slots is not None and (self.multiplexing != "ddm" or self.ddm_slots < many):
+            raise ValueError(f"ddm_slots only with multiplexing = 'ddm', and not below the {many} transmitters")
+        slots = (self.ddm_slots or many + 1) if self.multiplexing == "ddm" else many
+        if chirps % slots:
+            what = "Doppler slots" if self.multiplexing == "ddm" else "transmitters"
+            raise ValueError(f"waveform.chirps a multiple of the {slots} {what}, not {chirps}")
+        return self
 
 
 class ProcessingTable(Table):

@@ -106,6 +106,13 @@ def test_nothing_on_the_public_face_is_of_any_type(name: str) -> None:
     assert (getattr(rc, name).__doc__ or "").strip()
 
 
+def test_arrays_of_a_mimo_radar_are_made_by_name() -> None:
+    wave = rc.Waveform(carrier=77e9, bandwidth=300e6, chirp_duration=20e-6, n_chirps=48, n_samples=64)
+    radar = rc.Radar(wave, **rc.mimo_array(3, 8, 0.5 * wave.wavelength), multiplexing="tdm")
+    line = assert_type(rc.uniform_array(24, 0.5 * wave.wavelength), NDArray[np.float64])
+    np.testing.assert_allclose(radar.virtual_elements, line, atol=1e-15)
+
+
 def test_every_public_name_is_used_here() -> None:
     text = Path(__file__).read_text(encoding="utf-8")
     assert [name for name in rc.__all__ if f"rc.{name}" not in text and name not in ELSEWHERE] == []
