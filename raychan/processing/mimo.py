@@ -13,33 +13,25 @@ Waldschmidt, IEEE Microw. Wirel. Compon. Lett. 27(12), 2017 (the same with folde
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.columns import column
-from raychan.processing.range_doppler import range_doppler
+from raychan.processing.own_waveform import map_by_waveform
+from raychan.processing.staggered import STRONG, doppler, fold_range, resolved, staggered_map
 from raychan.radar.radar import Radar
-from raychan.records import Cube, Detections, RangeDoppler
+from raychan.records import Cube, RangeDoppler
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex64]
 
 # Single values not measured.
-_STRONG = 10.0  # times the noise, or the median without noise: weaker cells keep the hypothesis "not folded"
 _SURE = 1.05  # by which the beam of a folded hypothesis must be stronger than that of the unfolded one
 _PER_BEAM = 4  # beams tested per aperture's beam width: at most 0.2 dB are lost between two
 _BATCH = 1 << 22  # cells times beams at once: bounds the memory
-
-
-@dataclass(frozen=True)
-class ResolvedMap(RangeDoppler):
-    """A map of virtual channels, whose cells know by how many spans of unambiguous rates their echo is folded."""
-
-    fold: NDArray[np.int8] = column("v r", np.int8, doc="true rate = rate + 2 unambiguous_rate fold")
 
 
 def virtual_range_doppler(
@@ -57,8 +49,10 @@ def virtual_range_doppler(
     Returns: RangeDoppler, a ResolvedMap with `resolve`. Raises: ValueError if the cube does not fit the radar.
     """
     given = range_window, rate_window, pad
+    if radar.waveform.stagger:
+        return staggered_map(cube, radar, given, resolve)
     if len(radar.tx_elements) == 1:
-        return range_doppler(cube, radar.waveform, *given)
+        return map_by_waveform(cube, radar.waveform, *given)
     made = _by_time if radar.multiplexing == "tdm" else _by_doppler
     plain, channels = made(cube, radar, given)
     many, receivers = len(radar.tx_elements), channels.shape[1]
@@ -68,18 +62,7 @@ def virtual_range_doppler(
     spectrum = channels[:many].copy()
     for cells, h in _groups(fold):
         spectrum[:, :, *cells] = _under(channels[:, :, *cells], h, radar)
-    flat: NDArray[np.complex64] = np.concatenate(list(spectrum))
-    held = {name: getattr(plain, name) for name in RangeDoppler.__dataclass_fields__}
-    power = (flat.real.astype(np.float64) ** 2 + flat.imag.astype(np.float64) ** 2).mean(axis=0)
-    return ResolvedMap(**(held | {"spectrum": flat, "power": power, "fold": fold}))
-
-
-def unfolded(map: RangeDoppler, found: Detections) -> Detections:
-    """Return detections with the true rates and speeds that the folds of a ResolvedMap give; of other maps the same."""
-    if not isinstance(map, ResolvedMap) or not len(found.rate):
-        return found
-    more = 2.0 * map.unambiguous_rate * map.fold[found.cell[:, 0], found.cell[:, 1]]
-    return found.replace(rate=found.rate + more, speed=found.speed + more)
+    return resolved(plain, np.concatenate(list(spectrum)), fold, plain.noise)
 
 
 def _by_time(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Complexes]:
@@ -89,8 +72,8 @@ def _by_time(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Comple
     # Chirp m is sent by transmitter m modulo t.
     parts = cube.samples.reshape(receivers, wave.n_chirps, many, samples).transpose(2, 0, 1, 3)
     split: NDArray[np.complex64] = parts.reshape(many * receivers, wave.n_chirps, samples)
-    map = range_doppler(Cube(samples=split, noise_power=cube.noise_power), wave, *given)
-    turns = np.outer(np.arange(many) * radar.waveform.repetition, _doppler(map, radar))
+    map = map_by_waveform(Cube(samples=split, noise_power=cube.noise_power), wave, *given)
+    turns = np.outer(np.arange(many) * radar.waveform.repetition, doppler(map, radar))
     undone = np.exp(2j * np.pi * turns).astype(np.complex64)
     channels = map.spectrum.reshape(many, receivers, *map.spectrum.shape[1:]) * undone[:, None, :, None]
     return map, channels
@@ -106,7 +89,7 @@ def _by_doppler(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Com
     for k in range(slots):
         code = np.exp(-2j * np.pi * (k * np.arange(wave.n_chirps) % slots) / slots).astype(np.complex64)
         turned = Cube(samples=cube.samples * code[:, None], noise_power=cube.noise_power)
-        whole = range_doppler(turned, wave, *given)
+        whole = map_by_waveform(turned, wave, *given)
         count = len(whole.rate) // slots
         rows = slice(len(whole.rate) // 2 - count // 2, len(whole.rate) // 2 - count // 2 + count)
         made.append(whole.spectrum[:, rows])
@@ -118,11 +101,6 @@ def _by_doppler(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Com
     return replace(whole, rate=whole.rate[rows], spectrum=flat, power=power, unambiguous_rate=limit), channels
 
 
-def _doppler(map: RangeDoppler, radar: Radar) -> Floats:
-    """Return the Doppler shifts (v,) [Hz] of the rows of a map."""
-    return map.rate * (2.0 * radar.waveform.middle / C0)
-
-
 def _under(channels: Complexes, h: int, radar: Radar) -> Complexes:
     """Return channels (t, a, ...) if the echo is folded h times, from what the cells hold (t or slots, a, ...)."""
     many, slots = len(radar.tx_elements), radar.slots
@@ -132,21 +110,16 @@ def _under(channels: Complexes, h: int, radar: Radar) -> Complexes:
     return np.asarray(channels * turn.reshape(-1, *[1] * (channels.ndim - 1)))
 
 
-def hypotheses(slots: int) -> list[int]:
-    """Return the folds within the rates that the radar tells apart by its chirps, nearest to 0 first."""
-    return sorted(range(-((slots - 1) // 2), slots // 2 + 1), key=lambda h: (abs(h), h))
-
-
 def _folds(channels: Complexes, radar: Radar, map: RangeDoppler) -> NDArray[np.int8]:
     """Return by how many spans the strongest echo of each cell is folded (v, r)."""
     fold = np.zeros(map.power.shape, np.int8)
-    level = _STRONG * (map.noise or float(np.median(map.power)))
+    level = STRONG * (map.noise or float(np.median(map.power)))
     at = np.argwhere((np.abs(channels) ** 2).mean(axis=(0, 1)) > level)
     steering = _steering(radar)
     for some in np.array_split(at, max(1, len(at) * len(steering) // _BATCH)):
         held = channels[:, :, some[:, 0], some[:, 1]]
         best, power = np.zeros(len(some), np.int8), np.zeros(len(some))
-        for h in hypotheses(radar.slots):
+        for h in fold_range(radar.slots):
             beams = steering @ _under(held, h, radar).reshape(steering.shape[1], -1)
             strongest = (np.abs(beams) ** 2).max(axis=0)
             better = strongest > (_SURE if h else 1.0) * power

@@ -91,6 +91,8 @@ class Radar:
         for name in ("elements", "tx_elements"):
             given[name] = offsets(f"Radar.{name}", given[name])
         check_multiplexing(multiplexing, len(given["tx_elements"]), ddm_slots)
+        if waveform.stagger and len(given["tx_elements"]) > 1:
+            raise ValueError("Radar.tx_elements: one transmitter wanted where the repetition is staggered")
         for name, value in given.items():
             object.__setattr__(self, name, value)
 
@@ -138,14 +140,18 @@ class Radar:
 
     @property
     def slots(self) -> int:
-        """By what the multiplexing divides the rates that do not fold: transmitters, or Doppler slots."""
+        """By what multiplexing or stagger divides the rates that do not fold: transmitters, slots, staggered times."""
+        if self.waveform.stagger:
+            return len(self.waveform.stagger)
         count = len(self.tx_elements)
         return self.ddm_slots or count + 1 if self.multiplexing == "ddm" else count
 
     @property
     def transmissions(self) -> tuple[Transmission, ...]:
-        """What each transmitter sends."""
+        """What each transmitter sends, as ramps at equal distances each."""
         places, slots = np.array(self.tx_elements @ self.axes.T), self.slots
+        if self.waveform.stagger:
+            return tuple(Transmission(places[0], first=k, step=slots) for k in range(slots))
         if self.multiplexing == "tdm":
             return tuple(Transmission(x, first=i, step=slots) for i, x in enumerate(places))
         return tuple(Transmission(x, turn=i / slots) for i, x in enumerate(places))

@@ -156,7 +156,10 @@ def provenance(
     sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.range_rate, at)
     found = []
     for i in range(len(at)):
-        shown = Shown(*map(float, (at[i, 0], at[i, 1], detections.range[i], detections.rate[i])))
+        # What the receiver took off the range of a folded rate is put back: cells stand where the beat does.
+        folds = np.rint((detections.rate[i] - at[i, 1]) / response.periods[1])
+        stands = detections.range[i] + folds * response.periods[1] * response.drift
+        shown = Shown(*map(float, (at[i, 0], at[i, 1], stands, detections.rate[i])))
         cell = _Cell(shown, float(powers[i]), float(errors[i]))
         why = _explained(paths, known, response, tuple(x[i] for x in sums), cell, receiver)
         found.append(replace(why, speed=float(detections.speed[i]), power=float(detections.power[i])))

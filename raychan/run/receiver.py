@@ -9,7 +9,8 @@ import numpy as np
 from raychan.poses import direction
 from raychan.processing.cfar import Grid, fitting_guard
 from raychan.processing.detection import detect
-from raychan.processing.mimo import unfolded, virtual_range_doppler
+from raychan.processing.mimo import virtual_range_doppler
+from raychan.processing.staggered import unfolded
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
@@ -38,7 +39,7 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
         elements=radar.virtual_elements,
         **sizes,
     )
-    return unfolded(rdmap, found)
+    return unfolded(rdmap, found, radar.waveform)
 
 
 def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
@@ -59,7 +60,7 @@ def noise_of_cell(radar: Radar, settings: Any) -> float:
     if not radar.noise:
         return 0.0
     gain = processing_gain(window(settings.range_window, radar.waveform.n_samples))
-    # By time division a channel has a share of the chirps, by Doppler division all of them.
+    # By time division a channel has a share of the chirps, by Doppler division or stagger all of them.
     chirps = (radar.channel_waveform if radar.multiplexing == "tdm" else radar.waveform).n_chirps
     return float(radar.noise_power / gain / processing_gain(window(settings.rate_window, chirps)))
 

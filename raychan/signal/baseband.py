@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.radar.array import Transmission, Wavefronts, wavefronts
+from raychan.radar.array import Wavefronts, wavefronts
 from raychan.radar.radar import Radar
-from raychan.radar.waveform import Waveform
+from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.records import POINT, SCATTER, Cube, Paths
 from raychan.signal.dechirp import beat_sum
 from raychan.signal.keystone import Echoes, Keystone, keystones, middle
@@ -61,13 +61,13 @@ def synthesize(
             rows = samples[:, one.first :: one.step]
             if not rows.size:
                 continue
-            if one.turn == 0.0:
-                _fill(rows, echoes, one, elements, wave, tolerance, method)
-                continue
-            part = np.zeros(rows.shape, np.complex64)
-            _fill(part, echoes, one, elements, wave, tolerance, method)
-            turns = one.turn * (first + np.arange(wave.n_chirps))
-            rows += part * np.exp(2j * np.pi * (turns % 1.0)).astype(np.complex64)[:, None]
+            part = replace(wave, n_chirps=rows.shape[1], repetition=one.step * wave.repetition, stagger=())
+            begun = echoes.after(wave.start_of(first + one.first) - wave.start_of(first), wave.carrier)
+            brought = np.zeros(rows.shape, np.complex64) if one.turn else rows
+            _fill(brought, begun, [(one.offset, element) for element in elements], part, tolerance, method)
+            if one.turn:
+                turns = one.turn * (first + np.arange(wave.n_chirps)) % 1.0
+                rows += brought * np.exp(2j * np.pi * turns).astype(np.complex64)[:, None]
     if not wave.complex_sampling:
         samples.imag = 0.0
     quiet = Cube(samples=samples, noise_power=0.0)
@@ -87,28 +87,29 @@ def fronts_of(paths: Paths) -> Wavefronts:
 
 
 def _fill(
-    out: Samples, start: Echoes, sent: Transmission, elements: Floats, wave: Waveform, tolerance: float, method: str
+    out: Samples, echoes: Echoes, pairs: list[tuple[Floats, Floats]], wave: Waveform, tolerance: float, method: str
 ) -> None:
-    """Write the samples (a, chirps, samples) of all receivers that one transmitter brings, but for its own phase.
+    """Write the samples (a, chirps, samples) of ramps at equal distances between pairs of elements of one transmitter.
 
-    Args: start, the echoes at the start of the frame; `out` holds the chirps that it sends.
+    Args: echoes at the start of the first ramp; the rest as for `synthesize`.
     """
-    part, late = replace(wave, n_chirps=out.shape[1], repetition=sent.step * wave.repetition), sent.first
-    rate, delay, amplitude = start.delay_rate, start.delay, start.amplitude
-    if late:
-        grown = rate * (late * wave.repetition)
-        delay, amplitude = delay + grown, amplitude * np.exp(-2j * np.pi * wave.carrier * grown)
-    echoes = Echoes(delay + rate * middle(part)[0], rate, amplitude, start.fronts)
-    # The carrier's phase over the time to the middle is the grid's to add: its amplitudes hold that of the start.
-    reach = float(np.linalg.norm(elements, axis=1).max()) + float(np.linalg.norm(sent.offset))
-    grids = keystones(echoes, part, tolerance, reach / C0)
-    cells = sum(grid.cells for grid, _ in grids) / (part.n_chirps * part.n_samples)
-    pairs = [(sent.offset, element) for element in elements]
+    rate = echoes.delay_rate
+    if isinstance(wave, OwnWaveform):
+        for layer, pair in zip(out, pairs, strict=True):
+            later = echoes.later(*pair)
+            turned = echoes.amplitude * np.exp(-2j * np.pi * wave.carrier * later)
+            layer[...] = wave.received(turned, echoes.delay + later, rate)
+        return
+    # The grid adds the carrier's phase over the time to the middle: its amplitudes are those of the start.
+    centred = replace(echoes, delay=echoes.delay + rate * middle(wave)[0])
+    reach = max(float(np.linalg.norm(rx)) for _, rx in pairs) + float(np.linalg.norm(pairs[0][0]))
+    grids = keystones(centred, wave, tolerance, reach / C0)
+    cells = sum(grid.cells for grid, _ in grids) / (wave.n_chirps * wave.n_samples)
     if method == "direct" or (method == "auto" and len(rate) <= _FEW * cells):
         for layer, pair in zip(out, pairs, strict=True):
             later = echoes.later(*pair)
-            turned = amplitude * np.exp(-2j * np.pi * wave.carrier * later)
-            layer[...] = _direct(turned, delay + later, rate, part)
+            turned = echoes.amplitude * np.exp(-2j * np.pi * wave.carrier * later)
+            layer[...] = _direct(turned, echoes.delay + later, rate, wave)
     else:
         _add_fast(out, grids, pairs)
 

@@ -59,7 +59,7 @@ _CROWD = 64  # echoes in a box up to which they are summed in single precision: 
 
 @dataclass(frozen=True)
 class Echoes:
-    """Echoes at the middle sample of a frame; rows (n,)."""
+    """Echoes at one instant; rows (n,). `Keystone` takes them at the middle sample of a frame."""
 
     delay: Floats
     """[s]"""
@@ -72,6 +72,14 @@ class Echoes:
     def __getitem__(self, rows: Any) -> Echoes:
         fronts = None if self.fronts is None else self.fronts[rows]
         return Echoes(self.delay[rows], self.delay_rate[rows], self.amplitude[rows], fronts)
+
+    def after(self, time: float, carrier: float) -> Echoes:
+        """Return the echoes a time [s] later, their amplitudes with the phase of the carrier [Hz] until then."""
+        if time == 0.0:
+            return self
+        grown = self.delay_rate * time
+        turned = self.amplitude * np.exp(-2j * np.pi * carrier * grown)
+        return Echoes(self.delay + grown, self.delay_rate, turned, self.fronts)
 
     def later(self, tx: Floats, rx: Floats) -> Floats:
         """Return by how much later (n,) [s] they come between elements at tx and rx (3,) [m] off the phase centres."""

@@ -105,7 +105,7 @@ def _millimetres(places: NDArray[np.float64]) -> list[list[float]]:
 
 
 def _waveform_table(wave: Waveform) -> dict[str, Any]:
-    table = {
+    table: dict[str, Any] = {
         "carrier_ghz": figure(wave.carrier / 1e9, wave.carrier, _giga),
         "bandwidth_mhz": figure(wave.bandwidth / 1e6, wave.bandwidth, _mega),
         "chirp_us": figure(wave.chirp_duration * 1e6, wave.chirp_duration, _micro),
@@ -113,7 +113,9 @@ def _waveform_table(wave: Waveform) -> dict[str, Any]:
         "samples": wave.n_samples,
         "iq": wave.complex_sampling,
     }
-    if wave.repetition != wave.chirp_duration:
+    if wave.stagger:
+        table["stagger_us"] = [figure(t * 1e6, t, _micro) for t in wave.stagger]
+    elif wave.repetition != wave.chirp_duration:
         table["repetition_us"] = figure(wave.repetition * 1e6, wave.repetition, _micro)
     return table
 

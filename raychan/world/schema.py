@@ -133,6 +133,8 @@ class WaveformTable(Table):
     """Sampled time of a ramp."""
     repetition_us: Ramp | None = None
     """From ramp to ramp; default chirp_us."""
+    stagger_us: Annotated[list[Ramp], Field(min_length=2, max_length=16)] | None = None
+    """Times from ramp to ramp in turn, in place of repetition_us."""
     chirps: Chirps = 128
     samples: Samples = 256
     iq: bool = True
@@ -141,6 +143,11 @@ class WaveformTable(Table):
     def _fits(self) -> WaveformTable:
         if self.repetition_us is not None and self.repetition_us < self.chirp_us * (1.0 - 1e-9):
             raise ValueError("repetition_us not shorter than chirp_us")
+        if self.stagger_us is not None:
+            if self.repetition_us is not None or min(self.stagger_us) < self.chirp_us * (1.0 - 1e-9):
+                raise ValueError("either repetition_us or stagger_us, none of it shorter than chirp_us")
+            if self.chirps % len(self.stagger_us):
+                raise ValueError(f"chirps a multiple of the {len(self.stagger_us)} times of stagger_us")
         if self.bandwidth_mhz >= 1e3 * self.carrier_ghz:
             raise ValueError(f"bandwidth_mhz below the carrier of {self.carrier_ghz:g} GHz")
         return self
@@ -175,6 +182,8 @@ class RadarTable(Table):
     @model_validator(mode="after")
     def _transmitters_fit(self) -> RadarTable:
         many, chirps = len(self.tx_elements_mm), self.waveform.chirps
+        if self.waveform.stagger_us is not None and many > 1:
+            raise ValueError("one transmitter with waveform.stagger_us")
         if self.multiplexing == "none" and many > 1:
             raise ValueError(f"multiplexing = 'tdm' or 'ddm' for {many} transmitters")
         if self.ddm_slots is not None and (self.multiplexing != "ddm" or self.ddm_slots < many):

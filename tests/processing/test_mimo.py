@@ -7,8 +7,9 @@ import pytest
 from support.echoes import echoes, make_radar
 
 import raychan as rc
-from raychan.processing.mimo import ResolvedMap, hypotheses, virtual_range_doppler
+from raychan.processing.mimo import virtual_range_doppler
 from raychan.processing.range_doppler import range_doppler
+from raychan.processing.staggered import ResolvedMap, fold_range
 from raychan.radar.processing import Processing
 from raychan.radar.waveform import Waveform
 from raychan.run.receiver import detections_in, map_of, noise_of_cell, quiet_map
@@ -103,8 +104,8 @@ def test_one_receiver_leaves_folds_open():
     assert not rdmap.fold.any() and seen.azimuth[0] == pytest.approx(0.2, abs=5e-3)
 
 
-def test_hypotheses_cover_the_rates_of_the_chirps():
-    assert hypotheses(3) == [0, -1, 1] and hypotheses(4) == [0, -1, 1, 2] and hypotheses(1) == [0]
+def test_folds_cover_the_rates_of_the_chirps():
+    assert fold_range(3) == [0, -1, 1] and fold_range(4) == [0, -1, 1, 2] and fold_range(1) == [0]
 
 
 def test_chirps_that_are_no_multiple_of_the_transmitters_are_refused():
