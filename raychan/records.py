@@ -9,8 +9,7 @@ Integer sentinel: -1 means "none". SI units and radians throughout.
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -221,9 +220,16 @@ class Paths(PropagationPaths):
     @classmethod
     def of(cls, **columns: object) -> Paths:
         """Return paths of columns of which each has a row a path, those of `Ways` among them."""
-        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in dataclasses.fields(Ways)}
+        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in fields(Ways)}
         rows: dict[str, Any] = columns
         return cls(way=np.arange(len(rows["length"]), dtype=np.int32), ways=Ways(**held), **rows)
+
+
+@dataclass(frozen=True)
+class DualPaths(Paths):
+    """Paths to receivers of both polarisations."""
+
+    cross: NDArray[np.complex128] = column("n", np.complex128, doc="as amplitude, at the cross-polarised receiver")
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.records import DualPaths, Paths
+
 Floats = NDArray[np.float64]
 
 
@@ -19,3 +21,15 @@ class RadarEnds(Protocol):
     def velocity(self) -> Floats: ...
     def tx_field(self, direction_world: Floats) -> Any: ...
     def rx_field(self, direction_world: Floats) -> Any: ...
+
+
+def rx_fields(radar: RadarEnds) -> tuple[Any, ...]:
+    """Return the receivers' fields: the co-polarised, and the cross-polarised where the radar has such receivers."""
+    if getattr(radar, "rx_polarization", None) == "both":
+        return radar.rx_field, radar.cross_field  # type: ignore[attr-defined]
+    return (radar.rx_field,)
+
+
+def paths_record(radar: RadarEnds) -> type[Paths]:
+    """Return the class of a radar's paths: DualPaths where it has receivers of both polarisations."""
+    return Paths if len(rx_fields(radar)) == 1 else DualPaths

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.edge_diffraction import diffracted_paths
-from raychan.channel.ends import RadarEnds
+from raychan.channel.ends import RadarEnds, paths_record, rx_fields
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
-from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Ways
+from raychan.records import SCATTER, DiffractedRoutes, DualPaths, Facets, Paths, Routes, Ways
 
 Floats = NDArray[np.float64]
 
@@ -22,14 +22,14 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     """Return what routes carry for a radar at a frequency [Hz]; a footprint long in range becomes three paths."""
     if isinstance(routes, DiffractedRoutes):
         return diffracted_paths(routes, facets, radar, frequency)
-    a = transfer(
+    gains = transfer(
         routes,
         facets,
         frequency,
         lambda d: np.asarray(radar.tx_field(d))[:, None],
-        lambda d: np.asarray(radar.rx_field(d))[:, None],
+        lambda d: np.stack([np.asarray(f(d)) for f in rx_fields(radar)], axis=1),
         corners=True,
-    )[:, 0, 0]
+    )[:, :, 0]
     away, look = departures(routes)
     v = np.asarray(radar.velocity, float)
     rate = rates(routes, facets, v, v)
@@ -39,9 +39,13 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
     whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
     part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
-    return Paths(
+    received = {
+        name: np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])
+        for name, a in zip(("amplitude", "cross"), gains.swapaxes(0, 1), strict=False)
+    }
+    return paths_record(radar)(
         length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
-        amplitude=np.concatenate([a[whole].sum(axis=1), a[rows].ravel()]),
+        **received,
         length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, v).ravel()]),
         way=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
         ways=Ways(
@@ -62,9 +66,10 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
 def nothing(facets: Facets, radar: RadarEnds) -> Paths:
     """Return the empty record of a scene of which nothing is in view."""
     end, none = np.asarray(radar.position, float), np.zeros((0, 1), np.int8)
-    return Paths.of(
+    names = ("amplitude", "cross")[: len(rx_fields(radar))]
+    return paths_record(radar).of(
         length=np.zeros(0),
-        amplitude=np.zeros(0, complex),
+        **{name: np.zeros(0, complex) for name in names},
         length_rate=np.zeros(0),
         departure=np.zeros((0, 3)),
         arrival=np.zeros((0, 3)),
@@ -77,6 +82,11 @@ def nothing(facets: Facets, radar: RadarEnds) -> Paths:
         tx=end,
         rx=end,
     )
+
+
+def _columns(paths: Paths) -> tuple[str, ...]:
+    own = ("length", "length_rate", "amplitude")
+    return (*own, "cross") if isinstance(paths, DualPaths) else own
 
 
 def join(parts: list[Paths]) -> Paths:
@@ -97,9 +107,7 @@ def join(parts: list[Paths]) -> Paths:
             ways[f.name] = out
         else:
             ways[f.name] = np.concatenate(held)
-    rows: dict[str, Any] = {
-        name: np.concatenate([getattr(p, name) for p in parts]) for name in ("length", "length_rate", "amplitude")
-    }
+    rows: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _columns(parts[0])}
     way = np.concatenate([p.way + np.int32(first) for p, first in zip(parts, begin, strict=True)])
     return dataclasses.replace(parts[0], **rows, way=way, ways=Ways(**ways))
 
@@ -113,5 +121,5 @@ def strongest(paths: Paths, most: int) -> Paths:
     keep[np.argsort(-power, kind="stable")[:most]] = True
     rows, number = keep[paths.way], np.cumsum(keep, dtype=np.int32) - 1
     ways = Ways(**{f.name: getattr(paths.ways, f.name)[keep] for f in dataclasses.fields(Ways)})
-    columns = {name: getattr(paths, name)[rows] for name in ("length", "length_rate", "amplitude")}
+    columns = {name: getattr(paths, name)[rows] for name in _columns(paths)}
     return dataclasses.replace(paths, **columns, way=number[paths.way[rows]], ways=ways)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from raychan.poses import rotation
-from raychan.radar.antenna import Antenna, IsotropicAntenna
+from raychan.radar.antenna import Antenna, IsotropicAntenna, Repolarized
 from raychan.radar.array import Transmission, check_multiplexing, numbers, offsets, virtual_elements
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.processing import Processing
@@ -34,8 +34,8 @@ class Radar:
     whether samples get noise; yaw_deg, pitch_deg, roll_deg [deg] of the boresight; velocity (3,) [m/s], world axes;
     elements (a, 3) and tx_elements (t, 3) [m], phase centres of receivers and transmitters in the antenna's frame;
     multiplexing of the transmitters: "tdm", chirp m is sent by transmitter m modulo t, or "ddm", transmitter i advances
-    its phase by i / ddm_slots of a turn from chirp to chirp (default t + 1: the empty slot tells folds); processing of
-    the receiver.
+    its phase by i / ddm_slots of a turn from chirp to chirp (default t + 1: the empty slot tells folds);
+    rx_polarization V, H or "both" of the receivers; processing of the receiver.
     Raises: ValueError for values that cannot be.
     """
 
@@ -57,6 +57,8 @@ class Radar:
     tx_elements: Floats
     multiplexing: str
     ddm_slots: int | None
+    rx_polarization: str | None
+    """V, H, or both: co-polarised receivers, then as many cross-polarised ones; None: that of the antenna."""
     processing: Processing
 
     def __init__(
@@ -78,6 +80,7 @@ class Radar:
         tx_elements: ArrayLike = ((0.0, 0.0, 0.0),),
         multiplexing: str = "none",
         ddm_slots: int | None = None,
+        rx_polarization: str | None = None,
         processing: Processing = _PROCESSING,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
@@ -91,6 +94,8 @@ class Radar:
         for name in ("elements", "tx_elements"):
             given[name] = offsets(f"Radar.{name}", given[name])
         check_multiplexing(multiplexing, len(given["tx_elements"]), ddm_slots)
+        if rx_polarization not in (None, "V", "H", "both"):
+            raise ValueError(f"Radar.rx_polarization = {rx_polarization!r}: must be V, H or both")
         if waveform.stagger and len(given["tx_elements"]) > 1:
             raise ValueError("Radar.tx_elements: one transmitter wanted where the repetition is staggered")
         for name, value in given.items():
@@ -139,6 +144,11 @@ class Radar:
         return virtual_elements(self.tx_elements, self.elements)
 
     @property
+    def receivers(self) -> int:
+        """Number of receivers whose samples are recorded: the elements, twice where both polarisations are."""
+        return len(self.elements) * (2 if self.rx_polarization == "both" else 1)
+
+    @property
     def slots(self) -> int:
         """By what multiplexing or stagger divides the rates that do not fold: transmitters, slots, staggered times."""
         if self.waveform.stagger:
@@ -179,7 +189,13 @@ class Radar:
 
     def rx_field(self, direction_world: Floats) -> Complexes:
         """Return sqrt(gain) times polarisation (n, 3), world axes, looking in unit directions (n, 3)."""
-        return self._vector(self.rx, direction_world)
+        if self.rx_polarization in (None, "both"):
+            return self._vector(self.rx, direction_world)
+        return self._vector(Repolarized(self.rx, str(self.rx_polarization)), direction_world)
+
+    def cross_field(self, direction_world: Floats) -> Complexes:
+        """Return the same of the cross-polarised receivers: the same pattern with V and H exchanged."""
+        return self._vector(Repolarized(self.rx, "cross"), direction_world)
 
     def link_budget(self, sensitivity_dbm: float | None = None) -> dict[str, float]:
         """Return the sums of the link at boresight, by name with unit.

@@ -90,10 +90,9 @@ def retraced(
     "auto" or the number of tracings, when bodies that only move are carried on too; first the paths at the frame's
     start, if they are known; progress is told the share done.
     """
-    if scene.radar.waveform.stagger:
-        raise ValueError(
-            "a frame of staggered repetition is traced once: model.retrace = 1 is wanted where bodies turn"
-        )
+    if scene.radar.waveform.stagger or scene.radar.rx_polarization == "both":
+        what = "staggered repetition" if scene.radar.waveform.stagger else "receivers of both polarisations"
+        raise ValueError(f"a frame of {what} is traced once: model.retrace = 1 is wanted where bodies turn")
     work = _Frame(scene, rule, model, progress)
     last = scene.radar.waveform.n_chirps - 1
     if model.retrace == "auto":

@@ -16,9 +16,22 @@ from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
 
 
-def map_of(cube: Cube, radar: Radar, settings: Any) -> RangeDoppler:
-    """Return the range-Doppler map of samples; settings: windows and padding of a scene file's [processing]."""
+def map_of(cube: Cube, radar: Radar, settings: Any, cross: bool = False) -> RangeDoppler:
+    """Return the range-Doppler map of samples; settings: windows and padding of a scene file's [processing]; cross: of
+    the cross-polarised receivers, else of the co-polarised."""
+    cube = channel(cube, radar, cross)
     return virtual_range_doppler(cube, radar, settings.range_window, settings.rate_window, settings.pad)
+
+
+def channel(cube: Cube, radar: Radar, cross: bool = False) -> Cube:
+    """Return the samples of the co-polarised receivers, or of the cross-polarised. Raises: ValueError if there are
+    none."""
+    if radar.rx_polarization != "both":
+        if cross:
+            raise ValueError('a radar without cross-polarised receivers: rx_polarization = "both" is wanted')
+        return cube
+    many = len(radar.elements)
+    return cube.replace(samples=cube.samples[many:] if cross else cube.samples[:many])
 
 
 def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detections:
@@ -72,6 +85,6 @@ def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapErro
 
 def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     """Return the powers (v, r) [W] of the map of samples (antenna, chirp, sample) without noise."""
-    cube = Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0)
+    cube = channel(Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0), radar)
     windows = (settings.range_window, settings.rate_window, settings.pad)
     return virtual_range_doppler(cube, radar, *windows, resolve=False).power

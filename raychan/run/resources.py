@@ -45,7 +45,7 @@ class Demand:
 def demand(scene: Scene) -> Demand:
     """Return the estimated memory and time of a run."""
     wave = scene.radar.waveform
-    samples = float(len(scene.radar.elements)) * wave.n_chirps * wave.n_samples
+    samples = float(scene.radar.receivers) * wave.n_chirps * wave.n_samples
     cells = samples * scene.processing.pad[0] * scene.processing.pad[1]
     facets = sum(len(body.geometry.faces) for body in scene.bodies)
     tracings = 1 if scene.model.retrace == "auto" else scene.model.retrace
@@ -99,7 +99,7 @@ def long_run(scene: Scene, frames: int = 1) -> list[str]:
 
 def _refused(scene: Scene, need: float, may: float) -> SceneError:
     """Return the error that names the key by which a scene needs too much memory, and the value that is possible."""
-    wave, pad, receivers = scene.radar.waveform, scene.processing.pad, len(scene.radar.elements)
+    wave, pad, receivers = scene.radar.waveform, scene.processing.pad, scene.radar.receivers
     plain = float(wave.n_chirps) * wave.n_samples * (_SAMPLE_BYTES + _CELL_BYTES)
     key: str
     value: Any

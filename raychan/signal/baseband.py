@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from raychan.radar.array import Wavefronts, wavefronts
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform, Waveform
-from raychan.records import POINT, SCATTER, Cube, Paths
+from raychan.records import POINT, SCATTER, Cube, DualPaths, Paths
 from raychan.signal.dechirp import beat_sum
 from raychan.signal.keystone import Echoes, Keystone, keystones, middle
 from raychan.units import C0
@@ -70,6 +70,12 @@ def synthesize(
                 rows += brought * np.exp(2j * np.pi * turns).astype(np.complex64)[:, None]
     if not wave.complex_sampling:
         samples.imag = 0.0
+    if radar.rx_polarization == "both":
+        if not isinstance(paths, DualPaths):
+            raise ValueError("paths of a radar with receivers of one polarisation: transfer the routes to this one")
+        co = replace(radar, rx_polarization=None)
+        crossed = synthesize(paths.replace(amplitude=paths.cross), co, None, tolerance, method, first).samples
+        samples = np.concatenate([samples, crossed])
     quiet = Cube(samples=samples, noise_power=0.0)
     return quiet if rng is None else noisy(quiet, radar, rng)
 

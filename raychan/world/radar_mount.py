@@ -72,6 +72,7 @@ def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any 
         tx_elements=1e-3 * np.array(table.tx_elements_mm),
         multiplexing=table.multiplexing,
         ddm_slots=table.ddm_slots,
+        rx_polarization=table.rx_polarization,
         processing=processing,
         power=float(watt(table.power_dbm)),
         noise_figure_db=table.noise_figure_db,

@@ -69,6 +69,7 @@ def radar_table_of(radar: Radar) -> RadarTable:
             **{f"{name}_mm": _millimetres(getattr(radar, name)) for name in ("elements", "tx_elements")},
             "multiplexing": radar.multiplexing,
             "ddm_slots": radar.ddm_slots,
+            "rx_polarization": radar.rx_polarization,
             "waveform": _waveform_table(radar.waveform),
         },
     )

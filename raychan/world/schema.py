@@ -169,6 +169,8 @@ class RadarTable(Table):
     tx_antenna: str | AntennaTable | None = None
     rx_antenna: str | AntennaTable | None = None
     polarization: Literal["V", "H"] = "V"
+    rx_polarization: Literal["V", "H", "both"] | None = None
+    """Of the receivers; default `polarization`; both: co-polarised, then as many cross-polarised ones."""
     elements_mm: Annotated[list[Offset], Field(min_length=1, max_length=4096)] = [[0.0, 0.0, 0.0]]
     """Receiver phase centres in the antenna's frame."""
     tx_elements_mm: Annotated[list[Offset], Field(min_length=1, max_length=64)] = [[0.0, 0.0, 0.0]]
