@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,6 +22,26 @@ class RadarEnds(Protocol):
     def velocity(self) -> Floats: ...
     def tx_field(self, direction_world: Floats) -> Any: ...
     def rx_field(self, direction_world: Floats) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where transmitter and receiver are (3,) [m] and how they move (3,) [m/s]."""
+
+    tx: Floats
+    rx: Floats
+    tx_velocity: Floats
+    rx_velocity: Floats
+
+
+def ends_of(radar: RadarEnds) -> Ends:
+    """Return the ends of a radar; one without `rx_position` is monostatic."""
+    here, moves = np.asarray(radar.position, float), np.asarray(radar.velocity, float)
+    there = getattr(radar, "rx_position", None)
+    if there is None:
+        return Ends(here, here, moves, moves)
+    given: Any = radar
+    return Ends(here, np.asarray(there, float), moves, np.asarray(given.rx_motion, float))
 
 
 def rx_fields(radar: RadarEnds) -> tuple[Any, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.edge_diffraction import diffracted_paths
-from raychan.channel.ends import RadarEnds, paths_record, rx_fields
+from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
 from raychan.records import SCATTER, DiffractedRoutes, DualPaths, Facets, Paths, Routes, Ways
@@ -31,8 +31,8 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
         corners=True,
     )[:, :, 0]
     away, look = departures(routes)
-    v = np.asarray(radar.velocity, float)
-    rate = rates(routes, facets, v, v)
+    speeds = ends_of(radar).tx_velocity, ends_of(radar).rx_velocity
+    rate = rates(routes, facets, *speeds)
     corner = routes.lengths[:, :3]
     spans = np.maximum(np.maximum(corner[:, 0], corner[:, 1]), corner[:, 2])
     spans -= np.minimum(np.minimum(corner[:, 0], corner[:, 1]), corner[:, 2])
@@ -46,7 +46,7 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     return paths_record(radar)(
         length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
         **received,
-        length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, v).ravel()]),
+        length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, *speeds).ravel()]),
         way=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
         ways=Ways(
             departure=away.astype(np.float32),
@@ -65,7 +65,7 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
 
 def nothing(facets: Facets, radar: RadarEnds) -> Paths:
     """Return the empty record of a scene of which nothing is in view."""
-    end, none = np.asarray(radar.position, float), np.zeros((0, 1), np.int8)
+    ends, none = ends_of(radar), np.zeros((0, 1), np.int8)
     names = ("amplitude", "cross")[: len(rx_fields(radar))]
     return paths_record(radar).of(
         length=np.zeros(0),
@@ -79,8 +79,8 @@ def nothing(facets: Facets, radar: RadarEnds) -> Paths:
         vertices=np.zeros((0, 1, 3)),
         body_names=facets.body_names,
         part_names=facets.part_names,
-        tx=end,
-        rx=end,
+        tx=ends.tx,
+        rx=ends.rx,
     )
 
 

@@ -73,6 +73,16 @@ def uniform_array(n: int, spacing: float, axis: str = "y") -> Floats:
     return out
 
 
+def check_receiver_elsewhere(position: object, velocity: object, yaw_deg: float | None, transmitters: int) -> None:
+    """Raise ValueError where what is said of receivers elsewhere does not fit."""
+    if position is None and not (velocity is None and yaw_deg is None):
+        raise ValueError("Radar.rx_velocity and rx_yaw_deg: only with rx_position")
+    if yaw_deg is not None and not np.isfinite(yaw_deg):
+        raise ValueError(f"Radar.rx_yaw_deg = {yaw_deg!r}: must be finite")
+    if position is not None and transmitters > 1:
+        raise ValueError("Radar.tx_elements: one transmitter wanted where the receivers stand elsewhere (rx_position)")
+
+
 class ArrayElements(TypedDict):
     """Elements of a MIMO radar, named as the arguments of `Radar`."""
 

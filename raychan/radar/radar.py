@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from raychan.poses import rotation
 from raychan.radar.antenna import Antenna, IsotropicAntenna, Repolarized
-from raychan.radar.array import Transmission, check_multiplexing, numbers, offsets, virtual_elements
+from raychan.radar.array import (
+    Transmission,
+    check_multiplexing,
+    check_receiver_elsewhere,
+    numbers,
+    offsets,
+    virtual_elements,
+)
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.processing import Processing
 from raychan.radar.spherical_vectors import turned, vectors
@@ -35,7 +42,8 @@ class Radar:
     elements (a, 3) and tx_elements (t, 3) [m], phase centres of receivers and transmitters in the antenna's frame;
     multiplexing of the transmitters: "tdm", chirp m is sent by transmitter m modulo t, or "ddm", transmitter i advances
     its phase by i / ddm_slots of a turn from chirp to chirp (default t + 1: the empty slot tells folds);
-    rx_polarization V, H or "both" of the receivers; processing of the receiver.
+    rx_polarization V, H or "both" of the receivers; rx_position (3,) [m] of receivers elsewhere, with the radar's
+    clock, their rx_velocity [m/s] and rx_yaw_deg [deg] (default the radar's); processing of the receiver.
     Raises: ValueError for values that cannot be.
     """
 
@@ -59,6 +67,10 @@ class Radar:
     ddm_slots: int | None
     rx_polarization: str | None
     """V, H, or both: co-polarised receivers, then as many cross-polarised ones; None: that of the antenna."""
+    rx_position: Floats | None
+    """Receivers elsewhere than the transmitter; None: a monostatic radar."""
+    rx_velocity: Floats | None
+    rx_yaw_deg: float | None
     processing: Processing
 
     def __init__(
@@ -81,6 +93,9 @@ class Radar:
         multiplexing: str = "none",
         ddm_slots: int | None = None,
         rx_polarization: str | None = None,
+        rx_position: ArrayLike | None = None,
+        rx_velocity: ArrayLike | None = None,
+        rx_yaw_deg: float | None = None,
         processing: Processing = _PROCESSING,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
@@ -89,8 +104,10 @@ class Radar:
         for name in _NUMBERS:
             if not np.isfinite(given[name]):
                 raise ValueError(f"Radar.{name} = {given[name]!r}: must be finite")
-        for name in ("position", "velocity"):
-            given[name] = numbers(f"Radar.{name}", given[name], "(3,)")
+        check_receiver_elsewhere(rx_position, rx_velocity, rx_yaw_deg, len(np.atleast_2d(tx_elements)))
+        for name in ("position", "velocity", "rx_position", "rx_velocity"):
+            if given[name] is not None:
+                given[name] = numbers(f"Radar.{name}", given[name], "(3,)")
         for name in ("elements", "tx_elements"):
             given[name] = offsets(f"Radar.{name}", given[name])
         check_multiplexing(multiplexing, len(given["tx_elements"]), ddm_slots)
@@ -123,9 +140,27 @@ class Radar:
 
     def at(self, time: float) -> Radar:
         """Return the radar where its velocity has brought it at a time [s]."""
-        moved = replace(self, position=self.position + time * self.velocity)
+        there = None if self.rx_position is None else self.rx_position + time * self.rx_motion
+        moved = replace(self, position=self.position + time * self.velocity, rx_position=there)
         moved.__dict__["kept"] = self.kept
         return moved
+
+    @property
+    def rx_place(self) -> Floats:
+        """Position (3,) [m] of the receivers' phase centre: the radar's, or that of receivers elsewhere."""
+        return self.position if self.rx_position is None else self.rx_position
+
+    @property
+    def rx_motion(self) -> Floats:
+        """Velocity (3,) [m/s] of the receivers, world axes."""
+        return self.velocity if self.rx_velocity is None else self.rx_velocity
+
+    @cached_property
+    def rx_axes(self) -> Floats:
+        """Matrix (3, 3) from the receiving antenna's frame to the world's."""
+        if self.rx_yaw_deg is None:
+            return self.axes
+        return rotation(*map(float, np.radians([self.rx_yaw_deg, self.pitch_deg, self.roll_deg])))
 
     @property
     def boresight(self) -> Floats:
@@ -135,7 +170,7 @@ class Radar:
     @property
     def elements_world(self) -> Floats:
         """Receiver offsets (a, 3) from the position, world axes [m]."""
-        return np.array(self.elements @ self.axes.T)
+        return np.array(self.elements @ self.rx_axes.T)
 
     @property
     def virtual_elements(self) -> Floats:
@@ -185,17 +220,17 @@ class Radar:
 
     def tx_field(self, direction_world: Floats) -> Complexes:
         """Return sqrt(gain) times polarisation (n, 3), world axes, in unit directions (n, 3) away from the radar."""
-        return self._vector(self.tx, direction_world)
+        return self._vector(self.tx, direction_world, self.axes)
 
     def rx_field(self, direction_world: Floats) -> Complexes:
         """Return sqrt(gain) times polarisation (n, 3), world axes, looking in unit directions (n, 3)."""
         if self.rx_polarization in (None, "both"):
-            return self._vector(self.rx, direction_world)
-        return self._vector(Repolarized(self.rx, str(self.rx_polarization)), direction_world)
+            return self._vector(self.rx, direction_world, self.rx_axes)
+        return self._vector(Repolarized(self.rx, str(self.rx_polarization)), direction_world, self.rx_axes)
 
     def cross_field(self, direction_world: Floats) -> Complexes:
         """Return the same of the cross-polarised receivers: the same pattern with V and H exchanged."""
-        return self._vector(Repolarized(self.rx, "cross"), direction_world)
+        return self._vector(Repolarized(self.rx, "cross"), direction_world, self.rx_axes)
 
     def link_budget(self, sensitivity_dbm: float | None = None) -> dict[str, float]:
         """Return the sums of the link at boresight, by name with unit.
@@ -220,7 +255,7 @@ class Radar:
             "max_path_loss_db": power + tx - sensitivity,
         }
 
-    def _vector(self, antenna: Antenna, direction_world: Floats) -> Complexes:
-        local = turned(np.asarray(direction_world, float), self.axes)
-        found: Complexes = vectors(antenna.field(local), local, self.axes)
+    def _vector(self, antenna: Antenna, direction_world: Floats, axes: Floats) -> Complexes:
+        local = turned(np.asarray(direction_world, float), axes)
+        found: Complexes = vectors(antenna.field(local), local, axes)
         return found

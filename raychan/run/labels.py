@@ -217,6 +217,7 @@ def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver
     # Over the ground and one target: an echo of the target, or a ghost behind it if the way round is long.
     way = paths.way[row]
     index = [paths.body_names[b] in targets for b in paths.ways.body[way]]
-    straight = np.linalg.norm(paths.ways.vertices[way][index] - 0.5 * (paths.tx + paths.rx), axis=1).min()
+    spots = paths.ways.vertices[way][index]
+    straight = sum(0.5 * np.linalg.norm(spots - end, axis=1) for end in (paths.tx, paths.rx)).min()
     detour = 0.5 * paths.length[row] - straight
     return DIRECT if detour < max(receiver.waveform.range_resolution, _DEPTH) else MULTIPATH

@@ -90,8 +90,12 @@ def retraced(
     "auto" or the number of tracings, when bodies that only move are carried on too; first the paths at the frame's
     start, if they are known; progress is told the share done.
     """
-    if scene.radar.waveform.stagger or scene.radar.rx_polarization == "both":
-        what = "staggered repetition" if scene.radar.waveform.stagger else "receivers of both polarisations"
+    refused = {
+        "staggered repetition": bool(scene.radar.waveform.stagger),
+        "receivers of both polarisations": scene.radar.rx_polarization == "both",
+        "receivers elsewhere": scene.radar.rx_position is not None,
+    }
+    for what in (name for name, given in refused.items() if given):
         raise ValueError(f"a frame of {what} is traced once: model.retrace = 1 is wanted where bodies turn")
     work = _Frame(scene, rule, model, progress)
     last = scene.radar.waveform.n_chirps - 1

@@ -55,7 +55,7 @@ def _rule(radar: Radar, settings: Any, model: Any, tolerance_db: float, jitter: 
 def rule_of(radar: Radar, settings: Any, refined: Refinement, bounces: int, diffraction: bool = False) -> PruneRule:
     """Return the prune rule of a radar: where it is, where its antennas look, and its noise."""
     place, noise = np.asarray(radar.position, float), noise_equivalent_amplitude(radar, settings)
-    return PruneRule(place, beam_of(radar), refined, bounces, noise, diffraction)
+    return PruneRule(place, beam_of(radar), refined, bounces, noise, diffraction, radar.rx_position)
 
 
 def changed(rule: PruneRule, **changes: Any) -> PruneRule:

@@ -20,7 +20,17 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
     """Raise SceneError where the radar is inside a body, on its surface, or below a mirror."""
     if radar is None:
         return
-    at = np.array(radar.position)
+    outside(bodies, np.array(radar.position), "radar", "radar.position")
+    if radar.rx_position is not None:
+        outside(bodies, np.array(radar.rx_position), "receiver", "radar.rx_position")
+        if radar.rx_position == radar.position:
+            where = "a place apart from radar.position; without this key the receiver stands beside the transmitter"
+            problem = "the receiver stands where the transmitter does"
+            raise SceneError(problem, key="radar.rx_position", value=radar.rx_position, allowed=where)
+
+
+def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
+    """Raise SceneError where an end at (3,) [m] is inside a body, on its surface, or below a mirror."""
     for body in bodies:
         local, mesh = body.motion.to_body(at), body.geometry
         if body.kind == MIRROR:
@@ -28,17 +38,15 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
             n = np.cross(c[1] - c[0], c[2] - c[0])
             if n @ (local - c[0]) <= 0.0:
                 where = "a place on its lit side"
-                raise SceneError(
-                    f"radar is behind '{body.name}'", key="radar.position", value=at.tolist(), allowed=where
-                )
+                raise SceneError(f"{what} is behind '{body.name}'", key=key, value=at.tolist(), allowed=where)
             continue
         place = place_of(mesh.corners, local)
         if place != Place.OUTSIDE:
             where = "inside" if place == Place.INSIDE else "on the surface of"
             # A mesh in the wrong unit may enclose the radar.
             allowed = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
-            problem = f"radar is {where} '{body.name}'"
-            raise SceneError(problem, key="radar.position", value=at.tolist(), allowed=allowed)
+            problem = f"{what} is {where} '{body.name}'"
+            raise SceneError(problem, key=key, value=at.tolist(), allowed=allowed)
 
 
 def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:

@@ -70,6 +70,7 @@ def radar_table_of(radar: Radar) -> RadarTable:
             "multiplexing": radar.multiplexing,
             "ddm_slots": radar.ddm_slots,
             "rx_polarization": radar.rx_polarization,
+            **_elsewhere(radar),
             "waveform": _waveform_table(radar.waveform),
         },
     )
@@ -99,6 +100,13 @@ def figure(guess: float, value: float, read: Callable[[float], float]) -> float:
             return short
     near = (guess, math.nextafter(guess, math.inf), math.nextafter(guess, -math.inf))
     return next((x for x in near if read(x) == value), guess)
+
+
+def _elsewhere(radar: Radar) -> dict[str, Any]:
+    if radar.rx_position is None:
+        return {}
+    speed = None if radar.rx_velocity is None else radar.rx_velocity.tolist()
+    return {"rx_position": radar.rx_position.tolist(), "rx_velocity_mps": speed, "rx_yaw_deg": radar.rx_yaw_deg}
 
 
 def _millimetres(places: NDArray[np.float64]) -> list[list[float]]:

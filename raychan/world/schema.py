@@ -177,6 +177,11 @@ class RadarTable(Table):
     """Transmitter phase centres in the antenna's frame."""
     multiplexing: Literal["none", "tdm", "ddm"] = "none"
     """Of transmitters: by time division, chirp m by transmitter m modulo their number, or by Doppler division."""
+    rx_position: Place | None = None
+    """Of receivers elsewhere, with the radar's clock; default beside the transmitter."""
+    rx_velocity_mps: Speed | None = None
+    """Default the radar's, as rx_yaw_deg."""
+    rx_yaw_deg: Angle | None = None
     ddm_slots: Slots | None = None
     """Doppler slots; default one more than transmitters."""
     waveform: WaveformTable
@@ -186,6 +191,10 @@ class RadarTable(Table):
         many, chirps = len(self.tx_elements_mm), self.waveform.chirps
         if self.waveform.stagger_us is not None and many > 1:
             raise ValueError("one transmitter with waveform.stagger_us")
+        if self.rx_position is None and (self.rx_velocity_mps is not None or self.rx_yaw_deg is not None):
+            raise ValueError("rx_velocity_mps and rx_yaw_deg only with rx_position")
+        if self.rx_position is not None and many > 1:
+            raise ValueError("one transmitter with rx_position")
         if self.multiplexing == "none" and many > 1:
             raise ValueError(f"multiplexing = 'tdm' or 'ddm' for {many} transmitters")
         if self.ddm_slots is not None and (self.multiplexing != "ddm" or self.ddm_slots < many):
