@@ -49,8 +49,13 @@ def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> 
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
     if not rows.any():
         return 0.0
-    cube = synthesize(take(paths, rows), dataclasses.replace(radar, noise=False), tolerance=_LEVEL)
-    return float(quiet_map(cube.samples, radar, settings).max())
+    # One pair of elements is as loud as the mean over all.
+    one = dataclasses.replace(
+        radar, noise=False, elements=radar.elements[:1], tx_elements=radar.tx_elements[:1], multiplexing="none",
+        ddm_slots=None, rx_polarization=None if radar.rx_polarization == "both" else radar.rx_polarization,
+    )  # fmt: skip
+    cube = synthesize(take(paths, rows), one, tolerance=_LEVEL)
+    return float(quiet_map(cube.samples, one, settings).max())
 
 
 def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db: float) -> Choice:
