@@ -179,6 +179,12 @@ class ProcessingTable(Table):
     guard: CellPair | None = None
     """Cells along range and range rate; none: the detector's own choice."""
     train: CellPair | None = None
+    beams: Literal["coherent", "mean"] = "coherent"
+    """Of several receivers: detect in the strongest of a bank of beams, or in their mean power."""
+    doa: Literal["bartlett", "capon", "music", "esprit"] = "bartlett"
+    """Directions of echoes."""
+    beam_window: Window = "rect"
+    """Taper of the detector's beams over a uniform line or rectangle."""
 
 
 class Model(Table):

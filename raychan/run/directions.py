@@ -1,0 +1,34 @@
+"""What a radar's receivers tell of directions beyond its detections: the range-azimuth map."""
+
+from __future__ import annotations
+
+from raychan.processing.aperture import Aperture
+from raychan.processing.range_azimuth import RangeAzimuth
+from raychan.processing.range_azimuth import range_azimuth as from_map
+from raychan.radar.radar import Radar
+from raychan.records import Cube, RangeDoppler
+from raychan.run.receiver import map_of, receivers
+from raychan.run.result import Result
+
+
+def range_azimuth(data: Cube | RangeDoppler, radar: Radar) -> RangeAzimuth:
+    """Return the range-azimuth map of samples or of a range-Doppler map, of all range rates the strongest.
+
+    Args: data, a Cube or a RangeDoppler with all receivers; radar that recorded it, with its `processing`.
+    Raises: ValueError where the radar's receivers measure no azimuth.
+    """
+    rdmap = map_of(data, radar, radar.processing) if isinstance(data, Cube) else data
+    return from_map(rdmap, receivers(radar), radar.waveform.wavelength, radar.processing.beam_window)
+
+
+def aperture_of(radar: Radar) -> Aperture:
+    """Return the aperture of a radar's receivers."""
+    return Aperture(receivers(radar), radar.waveform.wavelength)
+
+
+def angles_in(result: Result) -> RangeAzimuth | None:
+    """Return the range-azimuth map of a result; None where its receivers measure no azimuth or are not known."""
+    radar = result.scene.radar if result.scene is not None else None
+    if radar is None or not aperture_of(radar).scans[0]:
+        return None
+    return range_azimuth(result.rdmap, radar)
