@@ -9,6 +9,7 @@ the same everywhere.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,8 +169,14 @@ def statistic(values: Floats, method: str) -> Floats:
 
 def _ordered(count: float, looks: int) -> tuple[Floats, Floats]:
     """Return quantiles and weights for averages over the ordered statistic of `count` sums of `looks` exponentials."""
-    knots, weights = np.polynomial.legendre.leggauss(200)
+    knots, weights = _legendre()
     x = 0.5 * (knots + 1.0)
     rank = max(1.0, RANK * count)
     quantiles = gamma.ppf(beta.ppf(x**_FLAT, rank, count - rank + 1.0), looks)
     return np.asarray(quantiles), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))
+
+
+@cache
+def _legendre() -> tuple[Floats, Floats]:
+    """Return knots and weights from -1 to 1; to find them takes longer than a small map's detection."""
+    return np.polynomial.legendre.leggauss(200)

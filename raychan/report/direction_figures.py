@@ -79,9 +79,11 @@ def beams_picture(result: Result, path: str | Path) -> Path:
     radar = result.require_scene().radar
     aperture, d = aperture_of(radar), result.detections
     with style():
-        made = figure(7.2, 4.2)
+        both = all(aperture.scans)
+        made = figure(5.6 if both else 7.2, 4.6 if both else 4.2)
         axes = made.add_subplot()
-        if all(aperture.scans):
+        axes.invert_xaxis()  # left is left
+        if both:
             _beam_map(result, aperture, axes)
             return save(made, path)
         cells = list(dict.fromkeys(map(tuple, d.cell.tolist())))[:_CELLS]
@@ -94,7 +96,7 @@ def beams_picture(result: Result, path: str | Path) -> Path:
             axes.plot(np.degrees(np.arcsin(np.clip(u, -1.0, 1.0))), level, color=colour, lw=1.2, label=place)
             mine = (d.cell == cell).all(axis=1)
             axes.plot(np.degrees(d.azimuth[mine]), dbm(d.power[mine]), "o", color=colour, ms=6, mec="black", mew=0.6)
-        axes.set(xlabel="azimuth [deg]   (left is positive)", ylabel="received power [dBm]", title="Beams over cells")
+        axes.set(xlabel="azimuth [deg]", ylabel="received power [dBm]", title="Beams over cells")
         axes.set_ylim(peak - _BEAM_DB, peak + 6.0)
         axes.grid(alpha=0.25, lw=0.5)
         axes.legend(loc="lower right", title="cell; dots are detections")

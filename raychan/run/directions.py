@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from raychan.processing.aperture import Aperture
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.processing.aperture import Aperture, cosines
 from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.processing.range_azimuth import range_azimuth as from_map
 from raychan.radar.radar import Radar
-from raychan.records import Cube, RangeDoppler
+from raychan.records import Cube, Detections, Paths, RangeDoppler
 from raychan.run.receiver import map_of, receivers
 from raychan.run.result import Result
+
+Complexes = NDArray[np.complexfloating[Any, Any]]
 
 
 def range_azimuth(data: Cube | RangeDoppler, radar: Radar) -> RangeAzimuth:
@@ -32,3 +40,18 @@ def angles_in(result: Result) -> RangeAzimuth | None:
     if radar is None or not aperture_of(radar).scans[0]:
         return None
     return range_azimuth(result.rdmap, radar)
+
+
+def beam_to(radar: Radar, found: Detections, paths: Paths) -> Callable[[int], Complexes] | None:
+    """Return a function of a detection's row: what its beam passes of each path's wave (n,); None without an array."""
+    aperture = aperture_of(radar)
+    if not any(aperture.scans):
+        return None
+
+    def passed(row: int) -> Complexes:
+        look = np.nan_to_num([found.azimuth[row], found.elevation[row]])
+        rows = aperture.steering(cosines(*look)).conj()[0] / len(aperture.elements)
+        arrival = paths.arrival @ radar.axes
+        return np.asarray(np.exp(2j * np.pi / aperture.wavelength * (arrival @ aperture.elements.T)) @ rows)
+
+    return passed
