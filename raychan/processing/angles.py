@@ -34,17 +34,18 @@ class Scan:
     range_resolution: float
     """[m]"""
 
-    def misfit(self, direction: Floats, distance: float) -> float:
-        """Return the share of an echo's power that one plane wave in one range cell cannot fit, as an upper estimate.
+    def misfit(self, directions: Floats, distances: Floats) -> Floats:
+        """Return the share of echoes' power (n,) that one plane wave in one range cell cannot fit, an upper estimate.
 
+        Args: directions, cosines (n, 2); distances (n,) [m].
         Two causes: the element farthest out sees the echo earlier by x range cells, on the slope of the window's
         response (at most 2 x of the amplitude); and the wave is curved, by the phase k D^2 / 8 r at the rim, of
         whose power 4/45 is left by the best plane (integral of the parabola less its mean).
         """
         extent = np.ptp(self.aperture.elements, axis=0)
-        early = 0.25 * float(extent[1:] @ np.abs(direction)) / self.range_resolution
-        bend = 2.0 * np.pi / self.aperture.wavelength * float(extent @ extent) / (8.0 * max(distance, 1e-3))
-        return min(1.0, _FLOOR + _SAFETY * ((2.0 * early) ** 2 / 3.0 + 4.0 / 45.0 * bend**2))
+        early = 0.25 * (np.abs(directions) @ extent[1:]) / self.range_resolution
+        bend = 2.0 * np.pi / self.aperture.wavelength * float(extent @ extent) / (8.0 * np.maximum(distances, 1e-3))
+        return np.asarray(np.minimum(1.0, _FLOOR + _SAFETY * ((2.0 * early) ** 2 / 3.0 + 4.0 / 45.0 * bend**2)))
 
     def conventional(self, direction: Floats) -> Complexes:
         """Return the weights (s, a) of beams towards cosines (2,) and half a beam width to all sides of it."""
@@ -55,8 +56,7 @@ class Scan:
     def through(self, weights: Complexes, directions: Floats, distances: Floats) -> Floats:
         """Return the greatest power that beams of weights (s, a) let through of echoes (n,), over that in their own."""
         share = (np.abs(weights @ self.aperture.steering(directions).T) ** 2).max(axis=0)
-        pairs = zip(directions, distances, strict=True)
-        return np.maximum(share, np.array([self.misfit(d, float(r)) for d, r in pairs]))
+        return np.maximum(share, self.misfit(directions, distances))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float) ->
     data = snapshot[None, :].astype(np.complex128)
     aperture = scan.aperture
     found = _told(data, aperture, estimate(data, aperture, "bartlett", 1))
-    least = max(least, scan.misfit(found.direction[0], distance) * float(found.power[0]))
+    least = max(least, float(scan.misfit(found.direction[:1], np.array([distance]))[0] * found.power[0]))
     count = len(aperture.elements)
     for k in range(1, min(_MOST, count // 2) + 1):
         rest = data - amplitudes(data, aperture, found.direction) @ aperture.steering(found.direction)

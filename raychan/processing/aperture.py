@@ -6,6 +6,7 @@ sin(elevation). A plane wave from there has the phase 2 pi / wavelength times (e
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,6 +20,7 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _SAME = 1e-3  # wavelengths: elements nearer than this along an axis share a coordinate; 6 mrad of phase
 _EDGE = 1e-9
+_KEPT = 1 << 21  # steering values kept between searches, 32 MB; more are made anew each time
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +139,21 @@ class Aperture:
                 axes.append(np.linspace(-1.0, 1.0, int(np.ceil(2.0 * per_beam / width)) + 1))
         inside = axes[0][:, None] ** 2 + axes[1][None, :] ** 2 <= 1.0 + _EDGE
         return Grid(axes[0], axes[1], inside, (wraps[0], wraps[1]))
+
+    def scanned(self, per_beam: int) -> tuple[Grid, Iterable[Complexes]]:
+        """Return a grid of directions and the steering vectors (n, a) of its points, in batches that memory holds."""
+        if per_beam not in self._scanned:
+            grid = self.grid(per_beam)
+            batch = max(1, _KEPT // len(self.elements))
+            if len(grid.points) > batch:
+                parts = range(0, len(grid.points), batch)
+                return grid, (self.steering(grid.points[i : i + batch]) for i in parts)
+            self._scanned[per_beam] = grid, [self.steering(grid.points)]
+        return self._scanned[per_beam]
+
+    @cached_property
+    def _scanned(self) -> dict[int, tuple[Grid, list[Complexes]]]:
+        return {}
 
     def canonical(self, cosines: Floats) -> Floats:
         """Return the aliases of cosines (n, 2) that are nearest to boresight."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
+_LITTLE = 1e-3  # of a peak's power: what an echo may show there without its direction being looked at (not measured)
 _SAME_BEAM = 0.5  # beam widths: nearer directions of neighbouring peaks are one echo (not measured)
 
 
@@ -96,8 +98,8 @@ class Splitter:
         A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain."""
         kept: list[Row] = []
         for i in range(len(peaks.cells)):
-            beams = self.scan.conventional(peaks.direction[i]) if self.coherent else None
-            if not peaks.power[i] > self._shown(kept, peaks, peaks.place[i], beams):
+            beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
+            if not self._clear(float(peaks.power[i]), peaks.place[i], kept, peaks, beams):
                 continue
             v, r = peaks.cells[i]
             snapshot = self.map.spectrum[:, v, r]
@@ -110,19 +112,25 @@ class Splitter:
             return Echoes(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
         return Echoes(*(np.array([getattr(row, name) for row in kept]) for name in names))
 
-    def _shown(self, kept: list[Row], peaks: Peaks, place: Floats, beams: Complexes | None) -> float:
-        """Return what the side lobes of echoes may show at a place in map cells, seen in beams of weights (s, a)."""
+    def _clear(self, power: float, place: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:
+        """Return whether a power at a place in map cells exceeds what the side lobes of echoes may show there.
+
+        Args: beams, None or a function that gives the weights (s, a) of those in which the place is seen."""
         if not kept:
-            return 0.0
+            return True
         pad = np.array(self.grid.pad)
         at = np.array([row.cell + row.shift for row in kept]) / pad
         smear = peaks.smear[[row.peak for row in kept]]
-        shown = self.lobes.at(place / pad, at, np.array([row.power for row in kept]), smear)
-        if beams is not None:
-            directions = np.array([row.direction for row in kept])
-            through = self.scan.through(beams, directions, self.map.range[[row.cell[1] for row in kept]])
-            shown = shown * np.maximum(through, [row.misfit for row in kept])
-        return float(MARGIN * shown.sum())
+        shown = MARGIN * self.lobes.at(place / pad, at, np.array([row.power for row in kept]), smear)
+        if beams is None or power > shown.sum():
+            return bool(power > shown.sum())
+        # Echoes that all beams let through would matter little: they count as if they did.
+        some = [kept[k] for k in np.flatnonzero(shown > _LITTLE * power)]
+        rest = float(shown[shown <= _LITTLE * power].sum())
+        distances = self.map.range[[row.cell[1] for row in some]]
+        through = self.scan.through(beams(), np.array([row.direction for row in some]).reshape(-1, 2), distances)
+        through = np.maximum(through, [row.misfit for row in some])
+        return bool(power > rest + float(shown[shown > _LITTLE * power] @ through))
 
     def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int, kept: list[Row]) -> Row | None:
         """Return echo k in the cell of peak i where its own beam peaks; None for what is none.
@@ -144,8 +152,8 @@ class Splitter:
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, held.rest / float(held.power[k]))
         row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)
-        clear = k == 0 or row.power > self._shown(kept, peaks, cell + shift[0], held.weights[k : k + 1])
-        return row if clear else None
+        beams = partial(held.weights.__getitem__, slice(k, k + 1))
+        return row if k == 0 or self._clear(row.power, cell + shift[0], kept, peaks, beams) else None
 
     def _same(self, one: Row, other: Row) -> bool:
         """Return whether echoes of neighbouring peaks are one."""

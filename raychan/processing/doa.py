@@ -14,7 +14,7 @@ from raychan.processing.covariance import Covariance, covariance
 from raychan.processing.esprit import esprit
 from raychan.processing.monopulse import monopulse
 from raychan.processing.source_number import source_number
-from raychan.processing.spectra import bartlett, capon, climb, music, peaks
+from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, capon, climb, music, peaks
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
@@ -84,7 +84,7 @@ def estimate(data: Complexes, aperture: Aperture, method: str, count: int, made:
     if method == "bartlett":
         return by_turns(data, aperture, count)
     if method == "monopulse":
-        start = peaks(bartlett(data), aperture, 1)
+        start = peaks(bartlett(data), aperture, 1, BEAMS_PER_BEAM)
         axis = 0 if aperture.scans[0] else 1
         found = np.zeros((1, 2))
         found[:, axis] = monopulse(data, aperture, np.full(len(data), start[0, axis])).mean()
@@ -112,7 +112,7 @@ def by_turns(data: Complexes, aperture: Aperture, count: int) -> Floats:
     found = np.zeros((0, 2))
     for _ in range(count):
         rest = data - amplitudes(data, aperture, found) @ aperture.steering(found)
-        found = np.concatenate([found, peaks(bartlett(rest), aperture, 1)])
+        found = np.concatenate([found, peaks(bartlett(rest), aperture, 1, BEAMS_PER_BEAM)])
         for _ in range(_ROUNDS if len(found) > 1 else 0):
             before = found.copy()
             for k in range(len(found)):

@@ -23,11 +23,12 @@ Form = Callable[[Complexes], Floats]
 
 PER_BEAM = 8
 """Grid points per beam width: maxima of MUSIC nearer than two points are one (not measured)."""
+BEAMS_PER_BEAM = 4
+"""The same of Bartlett's, whose maxima lie a beam width apart."""
 _LOADING = 1e-9  # of the mean eigenvalue: keeps the inverse of a covariance without noise
 _FEW_LOADING = 1e-2  # the same for fewer than 2 p snapshots (Reed, Mallett and Brennan 1974), whose least eigenvalues
 # are chance: echoes 20 dB weaker than the strongest are lost (not measured)
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
-_POINTS = 1 << 22  # steering values made at a time: bounds memory
 
 
 def bartlett(snapshots: Complexes) -> Form:
@@ -65,14 +66,13 @@ def music(found: Covariance, sources: int) -> Form:
     return value
 
 
-def peaks(form: Form, aperture: Aperture, count: int) -> Floats:
-    """Return the cosines (k, 2) along y and z of at most `count` greatest maxima of a form, greatest first."""
-    grid = aperture.grid(PER_BEAM)
-    points = grid.points
-    batch = max(1, _POINTS // len(aperture.elements))
-    parts = [form(aperture.steering(points[i : i + batch])) for i in range(0, len(points), batch)]
+def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) -> Floats:
+    """Return the cosines (k, 2) along y and z of at most `count` greatest maxima of a form, greatest first.
+
+    Args: per_beam, grid points to a beam width."""
+    grid, batches = aperture.scanned(per_beam)
     values = np.full(grid.visible.shape, -np.inf)
-    values[grid.visible] = np.concatenate(parts)
+    values[grid.visible] = np.concatenate([form(steering) for steering in batches])
     modes = ["wrap" if wrap else "constant" for wrap in grid.wraps]
     top = (values >= maximum_filter(values, size=3, mode=modes, cval=-np.inf)) & np.isfinite(values)
     m, n = np.nonzero(top)
