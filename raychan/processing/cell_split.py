@@ -19,6 +19,9 @@ Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _LITTLE = 1e-3  # of a peak's power: what an echo may show there without its direction being looked at (not measured)
+_HIDDEN = (
+    10.0  # on what echoes leave in their cell: the fit takes some of an echo that was not told apart (not measured)
+)
 _SAME_BEAM = 0.5  # beam widths: nearer directions of neighbouring peaks are one echo (not measured)
 
 
@@ -150,7 +153,7 @@ class Splitter:
         beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
         shift, power = parabolas(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
-        misfit = min(1.0, held.rest / float(held.power[k]))
+        misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
         row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)
         beams = partial(held.weights.__getitem__, slice(k, k + 1))
         return row if k == 0 or self._clear(row.power, cell + shift[0], kept, peaks, beams) else None

@@ -14,7 +14,7 @@ from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
 from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, training
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
-from raychan.processing.peaks import SideLobes, maxima, refine
+from raychan.processing.peaks import SideLobes, refine
 from raychan.radar.waveform import Waveform
 from raychan.records import Detections, RangeDoppler
 from raychan.units import C0, db, undb
@@ -73,7 +73,7 @@ def detect(
     seen: DetectorMap = StrongestBeam(map, bank) if bank and array.beams == "coherent" else MeanPower(map)
     threshold = factor(seen.single(pfa), ring.worth, method, seen.looks)
 
-    cells = maxima(seen.power, seen.dip * float(undb(min_snr_db)) * seen.noise)
+    cells = seen.maxima(seen.dip * float(undb(min_snr_db)) * seen.noise)
     local = seen.level(cells, ring, method)
     over = seen.power[tuple(cells.T)] > threshold * local
     cells, local = cells[over], local[over]

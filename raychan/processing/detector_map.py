@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Training, batches, level, statistic
+from raychan.processing.peaks import maxima
 from raychan.records import RangeDoppler
 
 Floats = NDArray[np.float64]
@@ -16,6 +17,8 @@ Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 BEAMS = ("coherent", "mean")
+_AROUND = [(v, r) for v in (-1, 0, 1) for r in (-1, 0, 1) if v or r]
+_ROUNDING = 1e-5  # two sums of single precision over the receivers
 
 
 class DetectorMap(Protocol):
@@ -32,6 +35,9 @@ class DetectorMap(Protocol):
     receiver_noise: float
     """What `noise` grows by in a beam of weights w, over |w|^2."""
 
+    def maxima(self, least: float) -> Ints:
+        """Return the local maxima (c, 2) above a power [W]."""
+
     def single(self, pfa: float) -> float:
         """Return the false alarm probability that the threshold must keep for a cell to keep `pfa`."""
 
@@ -47,6 +53,10 @@ class MeanPower:
     def __init__(self, map: RangeDoppler) -> None:
         self.power, self.noise, self.looks = map.power, map.noise, len(map.spectrum)
         self.receiver_noise = float(self.looks)  # SNR is over the noise of one receiver
+
+    def maxima(self, least: float) -> Ints:
+        """Return the local maxima (c, 2) above a power [W]."""
+        return maxima(self.power, least)
 
     def single(self, pfa: float) -> float:
         """Return `pfa`."""
@@ -68,6 +78,23 @@ class StrongestBeam:
         self.power, self.beam = bank.strongest(map.spectrum)
         self.noise = map.noise * bank.noise_gain
         self.receiver_noise = 1.0 / bank.noise_gain
+
+    def maxima(self, least: float) -> Ints:
+        """Return the cells (c, 2) above a power [W] that are local maxima of the beam that is strongest in them.
+
+        A weak echo beside a strong one of another direction is one, though the strong one's beam hides it from the
+        map of the strongest beams.
+        """
+        cells = np.argwhere(self.power > least)
+        for step in _AROUND:
+            near = (cells + step) % self.power.shape
+            beside = np.empty(len(cells))
+            for at in batches(len(cells), self.spectrum.shape[0]):
+                rows = self.bank.rows[self.beam[tuple(cells[at].T)]]
+                wave = np.einsum("ca,ac->c", rows, self.spectrum[:, near[at, 0], near[at, 1]])
+                beside[at] = wave.real**2 + wave.imag**2
+            cells = cells[self.power[tuple(cells.T)] >= beside * (1.0 - _ROUNDING)]
+        return cells
 
     def single(self, pfa: float) -> float:
         """Return the false alarm probability of each beam."""

@@ -190,3 +190,9 @@ def test_bad_settings_are_refused():
     m, _ = seen(line(4), [6.0], 0.0, 1e-4)
     with pytest.raises(ValueError, match="elements: 3 given for a map of 4 receivers"):
         detect(m, waveform=SMALL, elements=line(3))
+
+
+def test_a_weak_echo_on_the_skirt_of_a_strong_one_of_another_direction_is_found():
+    ranges = 6.0 + np.array([0.0, 1.9]) * SMALL.range_resolution
+    _, found = seen(line(16), ranges, [22.0, -3.0], [1e-3, 1e-3 * 10 ** (-13.7 / 20)])
+    assert np.degrees(found.azimuth) == pytest.approx([22.0, -3.0], abs=0.5)
