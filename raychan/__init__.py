@@ -45,6 +45,9 @@ _HOME = {
     "synthesize": "raychan.run.stages",
     "range_doppler": "raychan.run.stages",
     "detect": "raychan.run.stages",
+    "range_azimuth": "raychan.run.directions",
+    "RangeAzimuth": "raychan.processing.range_azimuth",
+    "doa": "raychan.processing.doa",
     "SceneRoutes": "raychan.run.stages",
     "frames": "raychan.run.sequence",
     "Result": "raychan.run.result",
@@ -58,6 +61,8 @@ _HOME = {
 
 if TYPE_CHECKING:
     from raychan.kinds import InteractionType as InteractionType
+    from raychan.processing.doa import doa as doa
+    from raychan.processing.range_azimuth import RangeAzimuth as RangeAzimuth
     from raychan.radar.antenna import Antenna as Antenna
     from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
     from raychan.radar.antenna import CosineAntenna as CosineAntenna
@@ -70,6 +75,7 @@ if TYPE_CHECKING:
     from raychan.radar.waveform import Waveform as Waveform
     from raychan.records import Paths as Paths
     from raychan.records import SpecularPaths as SpecularPaths
+    from raychan.run.directions import range_azimuth as range_azimuth
     from raychan.run.explain import explain as explain
     from raychan.run.rcs import rcs as rcs
     from raychan.run.result import Result as Result

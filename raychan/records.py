@@ -226,13 +226,6 @@ class Paths(PropagationPaths):
 
 
 @dataclass(frozen=True)
-class DualPaths(Paths):
-    """Paths to receivers of both polarisations."""
-
-    cross: NDArray[np.complex128] = column("n", np.complex128, doc="as amplitude, at the cross-polarised receiver")
-
-
-@dataclass(frozen=True)
 class SpecularPaths(PropagationPaths):
     """Exact paths between two points with isotropic ends, shortest first; each has a way of its own."""
 
@@ -295,6 +288,8 @@ class Detections(Record):
     rate: Floats = column("n", unit="m/s")
     speed: Floats = column("n", unit="m/s", doc="range rate with the scalar ego speed added")
     azimuth: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
+    elevation: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
+    ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="whether a grating lobe shows another direction alike")
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
     cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")

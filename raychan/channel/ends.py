@@ -8,7 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import DualPaths, Paths
+from raychan.radar.dual_paths import DualPaths
+from raychan.records import Paths
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
-from raychan.records import SCATTER, DiffractedRoutes, DualPaths, Facets, Paths, Routes, Ways
+from raychan.radar.dual_paths import DualPaths
+from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Ways
 
 Floats = NDArray[np.float64]
 

@@ -5,15 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.poses import direction
+from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Grid, fitting_guard
-from raychan.processing.detection import detect
+from raychan.processing.detection import Array, detect
 from raychan.processing.mimo import virtual_range_doppler
 from raychan.processing.staggered import unfolded
+from raychan.radar.aperture import Aperture
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
 
 
 def map_of(cube: Cube, radar: Radar, settings: Any, cross: bool = False) -> RangeDoppler:
@@ -49,22 +55,44 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
         ego_speed=radar.ego_speed,
         windows=(settings.rate_window, settings.range_window),
         waveform=radar.waveform,
-        elements=radar.virtual_elements,
+        elements=receivers(radar),
+        array=Array(settings.beams, settings.doa, settings.beam_window),
         **sizes,
     )
     return unfolded(rdmap, found, radar.waveform)
 
 
+def receivers(radar: Radar) -> Floats:
+    """Return the phase centres (t * a, 3) [m] of the map's antennas, in the antenna's frame: the virtual elements.
+
+    Cross-polarised receivers stand at the places of the co-polarised; a map is of one or the other (see `map_of`).
+    """
+    return radar.virtual_elements
+
+
+def aperture_of(radar: Radar) -> Aperture:
+    """Return the aperture of the map's antennas, at the middle of the ramp as their phases in a map are."""
+    return Aperture(receivers(radar), C0 / radar.waveform.middle)
+
+
+def beam_gain(radar: Radar, settings: Any) -> float:
+    """Return by how much the detector's beams raise an echo above the noise: 1 for one receiver or their mean."""
+    aperture = aperture_of(radar)
+    if settings.beams != "coherent" or not any(aperture.scans):
+        return 1.0
+    return 1.0 / BeamBank(aperture, settings.beam_window).noise_gain
+
+
 def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
     """Return the scattered amplitude [1/m, unit field at 1 m] of a return as strong as the noise in one cell of the
-    map."""
+    map, or of a beam over it."""
     if not radar.noise:
         return 0.0
     # The strongest direction of both antennas, on a grid finer than any beam of use.
     azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
     look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
     ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
-    amplitude = np.sqrt(noise_of_cell(radar, settings) / radar.power)
+    amplitude = np.sqrt(noise_of_cell(radar, settings) / beam_gain(radar, settings) / radar.power)
     return float(amplitude * 4.0 * np.pi / radar.waveform.wavelength / np.prod(list(ends)))
 
 

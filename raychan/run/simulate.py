@@ -13,6 +13,7 @@ from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.directions import beam_to
 from raychan.run.labels import provenance
 from raychan.run.mechanisms import Choice, choose
 from raychan.run.messages import counts, told, uncut
@@ -180,7 +181,7 @@ def _explained(
     paths, model = channel.launched.paths, channel.model
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
     reasons, left_out = run_pair(
-        lambda: provenance(paths, rdmap, found, receiver, error.power),
+        lambda: provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths)),
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
     )
     if turned:

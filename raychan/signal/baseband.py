@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.array import Wavefronts, wavefronts
+from raychan.radar.dual_paths import DualPaths
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform, Waveform
-from raychan.records import POINT, SCATTER, Cube, DualPaths, Paths
+from raychan.records import POINT, SCATTER, Cube, Paths
 from raychan.signal.dechirp import beat_sum
 from raychan.signal.keystone import Echoes, Keystone, keystones, middle
 from raychan.units import C0

@@ -12,7 +12,8 @@ import numpy as np
 from raychan.units import watt
 from raychan.world import bundled, overrides
 from raychan.world.errors import SceneError, nearest
-from raychan.world.schema import AntennaTable, ProcessingTable, RadarTable
+from raychan.world.schema import ProcessingTable, RadarTable
+from raychan.world.schema_antenna import AntennaTable
 from raychan.world.schema_errors import checked
 
 if TYPE_CHECKING:

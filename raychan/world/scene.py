@@ -181,7 +181,7 @@ class Scene(Described):
         self.bodies = over_seams(self.bodies)
         checks.radar_outside(self.bodies, self.radar_table)
         if self.radar_table is not None:
-            _ = self.radar
+            checks.array_fits(self.radar)
 
     @cached_property
     def radar(self) -> Radar:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import raychan as rc
 from raychan.columns import take
+from raychan.processing.doa import Directions
 from raychan.radar.pattern import gain_dbi
 from raychan.records import Cube, Detections, Profile, RangeDoppler
 from raychan.run.explain import CellExplanation
@@ -250,6 +251,18 @@ def test_explain_and_load_result(result: rc.Result, tmp_path: Path) -> None:
     assert back.paths.length.tobytes() == result.paths.length.tobytes()
     why = assert_type(rc.explain(back, detection=1), CellExplanation)
     assert "wall" in why.bodies
+
+
+def test_directions_of_waves_at_an_array() -> None:
+    line = np.arange(8)[:, None] * np.array([0.0, 2e-3, 0.0])
+    wave = np.exp(2j * np.pi / 4e-3 * line[:, 1] * np.sin(0.3))
+    found = assert_type(rc.doa(wave, line, 4e-3, "esprit", sources=1), Directions)
+    assert_type(found.azimuth, NDArray[np.float64])
+    assert found.azimuth == pytest.approx([0.3])
+    radar = rc.Radar(rc.Waveform(74.9e9, 1e8, 20e-6, n_chirps=8, n_samples=16), elements=line)
+    cube = Cube(np.tile(wave[:, None, None], (1, 8, 16)).astype(np.complex64), 0.0)
+    angles = assert_type(rc.range_azimuth(cube, radar), rc.RangeAzimuth)
+    assert angles.azimuth[angles.power[:, 0].argmax()] == pytest.approx(0.3, abs=0.02)
 
 
 def test_rcs_of_a_mesh() -> None:
