@@ -27,6 +27,8 @@ _HOME = {
     "PEC": "raychan.world.material",
     "Radar": "raychan.radar.radar",
     "Waveform": "raychan.radar.waveform",
+    "uniform_array": "raychan.radar.array",
+    "mimo_array": "raychan.radar.array",
     "Antenna": "raychan.radar.antenna",
     "IsotropicAntenna": "raychan.radar.antenna",
     "CosineAntenna": "raychan.radar.antenna",
@@ -49,6 +51,9 @@ _HOME = {
     "synthesize": "raychan.run.stages",
     "range_doppler": "raychan.run.stages",
     "detect": "raychan.run.stages",
+    "range_azimuth": "raychan.run.directions",
+    "RangeAzimuth": "raychan.processing.range_azimuth",
+    "doa": "raychan.processing.doa",
     "SceneRoutes": "raychan.run.stages",
     "Detector": "raychan.processing.detection_theory",
     "detection_probability": "raychan.processing.detection_theory",
@@ -69,10 +74,14 @@ if TYPE_CHECKING:
     from raychan.kinds import InteractionType as InteractionType
     from raychan.processing.detection_theory import Detector as Detector
     from raychan.processing.detection_theory import detection_probability as detection_probability
+    from raychan.processing.doa import doa as doa
+    from raychan.processing.range_azimuth import RangeAzimuth as RangeAzimuth
     from raychan.radar.antenna import Antenna as Antenna
     from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
     from raychan.radar.antenna import CosineAntenna as CosineAntenna
     from raychan.radar.antenna import IsotropicAntenna as IsotropicAntenna
+    from raychan.radar.array import mimo_array as mimo_array
+    from raychan.radar.array import uniform_array as uniform_array
     from raychan.radar.impairments import ChirpError as ChirpError
     from raychan.radar.impairments import Converter as Converter
     from raychan.radar.impairments import Impairments as Impairments
@@ -84,6 +93,7 @@ if TYPE_CHECKING:
     from raychan.radar.waveform import Waveform as Waveform
     from raychan.records import Paths as Paths
     from raychan.records import SpecularPaths as SpecularPaths
+    from raychan.run.directions import range_azimuth as range_azimuth
     from raychan.run.explain import explain as explain
     from raychan.run.rcs import rcs as rcs
     from raychan.run.result import Result as Result

@@ -9,8 +9,7 @@ Integer sentinel: -1 means "none". SI units and radians throughout.
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -226,7 +225,7 @@ class Paths(PropagationPaths):
     @classmethod
     def of(cls, **columns: object) -> Paths:
         """Return paths of columns of which each has a row a path, those of `Trajectories` among them."""
-        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in dataclasses.fields(Trajectories)}
+        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in fields(Trajectories)}
         rows: dict[str, Any] = columns
         return cls(trajectory=np.arange(len(rows["length"]), dtype=np.int32), trajectories=Trajectories(**held), **rows)
 
@@ -294,6 +293,8 @@ class Detections(Record):
     rate: Floats = column("n", unit="m/s")
     speed: Floats = column("n", unit="m/s", doc="range rate with the scalar ego speed added")
     azimuth: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
+    elevation: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
+    ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="whether a grating lobe shows another direction alike")
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
     cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")

@@ -7,11 +7,12 @@ number of patches have the statistics of a surface of many more scatterers (Rayl
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.ends import RadarEnds
+from raychan.channel.ends import RadarEnds, paths_record, rx_fields
 from raychan.em.diffuse import Diffuse, texture
 from raychan.em.fresnel import coefficients_array
 from raychan.geometry.patches import Patches
@@ -55,16 +56,18 @@ def diffuse_paths(
         sigma[some] *= texture(law.k_shape, squares, rng)
         cross[some] = 0.0 if law.cross_db is None else 10.0 ** (-0.1 * law.cross_db)
     speckle = rng.standard_normal((len(cosine), 2, 2)) @ np.array([1.0, 1.0j]) * np.sqrt(0.5)
-    coupled = _coupled(radar, look, speckle, np.sqrt(cross))
-    if facets.attenuation:
-        coupled = coupled * np.exp(-2.0 * facets.attenuation * distance)
+    air = np.exp(-2.0 * facets.attenuation * distance) if facets.attenuation else 1.0
     size = C0 / frequency * np.sqrt(sigma * patches.area) / ((4.0 * np.pi) ** 1.5 * np.maximum(distance, 1e-9) ** 2)
     body = facets.body[patches.facet] if len(patches.facet) else np.zeros(0, np.int32)
     arm = patches.point - facets.origin[body]
     moves = facets.velocity[body] + np.cross(facets.spin[body], arm) - np.asarray(radar.velocity, float)
-    return Paths.of(
+    received = {
+        name: size * (_coupled(radar, rx_field, look, speckle, np.sqrt(cross)) * air)
+        for name, rx_field in zip(("amplitude", "cross"), rx_fields(radar), strict=False)
+    }
+    return paths_record(radar).of(
         length=2.0 * distance,
-        amplitude=size * coupled,
+        **received,
         length_rate=2.0 * np.einsum("ij,ij->i", moves, look),
         departure=look,
         arrival=look,
@@ -91,13 +94,14 @@ def _lambert_of_roughness(facets: Facets, row: int, cosine: Floats, frequency: f
     return np.asarray(4.0 * (np.abs(smooth) ** 2).mean(axis=1) * lost * cosine**2)
 
 
-def _coupled(radar: RadarEnds, look: Floats, speckle: Complexes, cross: Floats) -> Complexes:
-    """Return what a patch couples (n,) from the transmitting to the receiving antenna in directions (n, 3).
+def _coupled(radar: RadarEnds, rx_field: Any, look: Floats, speckle: Complexes, cross: Floats) -> Complexes:
+    """Return what a patch couples (n,) from the transmitting to a receiving antenna in directions (n, 3).
 
-    Args: speckle (n, 2) of the co- and the cross-polarised return; cross (n,) amplitude of the latter over the former.
+    Args: rx_field of the receiving antenna; speckle (n, 2) of the co- and the cross-polarised return; cross (n,)
+    amplitude of the latter over the former.
     """
     theta, phi = theta_phi(look)
-    sent, heard = (np.asarray(f(look)) for f in (radar.tx_field, radar.rx_field))
+    sent, heard = (np.asarray(f(look)) for f in (radar.tx_field, rx_field))
     v_in, h_in, v_out, h_out = (np.einsum("ij,ij->i", e, axis) for e in (sent, heard) for axis in (theta, phi))
     same = v_in * v_out + h_in * h_out
     other = cross * (v_in * h_out + h_in * v_out)

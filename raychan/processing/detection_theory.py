@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainc, gammaincc, gammaln
 from scipy.stats import gamma, ncx2
 
-from raychan.processing.cfar import factor, statistic
+from raychan.processing.cfar import factor, quantiles_of
 from raychan.units import db, undb
 
 Floats = NDArray[np.float64]
@@ -93,7 +93,7 @@ def detection_probability(snr_db: ArrayLike, detector: Detector = Detector(), sw
     snr, looks = np.asarray(undb(np.asarray(snr_db, float))), int(detector.looks)
     if detector.cfar is None:
         return over_threshold(snr, _threshold(detector), looks, swerling)
-    quantiles, weights = statistic(detector.cells, detector.cfar, looks)
+    quantiles, weights = quantiles_of(detector.cells, detector.cfar, looks)
     scale = factor(detector.pfa, detector.cells, detector.cfar, looks)
     thresholds, index = np.unique(np.maximum(scale * quantiles, _least(detector)), return_inverse=True)
     shares = np.bincount(index, weights)

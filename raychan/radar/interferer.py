@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from raychan.radar.radar import Radar
+from raychan.radar.waveform import OwnWaveform
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,7 +16,7 @@ class Interferer:
 
     Args: radar, whose receiver and samples do not matter; start [s] of its first ramp after the victim's; locked:
     whether its ramps keep their phase to the victim's from ramp to ramp, else each begins at a phase of its own.
-    Raises: ValueError for a start that is not finite.
+    Raises: ValueError for a start that is not finite, and for several transmitters or a waveform of one's own.
     """
 
     radar: Radar
@@ -28,6 +29,8 @@ class Interferer:
     def __post_init__(self) -> None:
         if not np.isfinite(self.start):
             raise ValueError(f"Interferer.start = {self.start!r}: must be finite")
+        if len(self.radar.tx_elements) > 1 or isinstance(self.radar.waveform, OwnWaveform):
+            raise ValueError("Interferer.radar: one transmitter of linear ramps wanted")
 
     def at(self, time: float) -> Interferer:
         """Return the interferer where its velocity has brought it at a time [s]; each frame meets the same timing."""

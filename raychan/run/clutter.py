@@ -14,6 +14,7 @@ from raychan.radar.radar import Radar
 from raychan.records import Facets, Paths
 from raychan.tracing.diffuse_patches import PatchSize, visible_patches
 from raychan.units import C0
+from raychan.world.errors import SceneError
 from raychan.world.geometry import Geometry
 
 _RANGE_CELLS = 0.5  # side of a patch in range cells: a share of sinc^2(0.25), 0.9 dB, is smeared (not measured)
@@ -42,10 +43,18 @@ def clutter_of(geometry: Geometry, radar: Radar, model: Any, rng: np.random.Gene
     """Return the diffuse returns of a scene for a monostatic radar, none where no material scatters diffusely.
 
     Only what the radar sees directly returns: no wave reaches a rough surface over a mirror or through a layer.
+    Raises: SceneError for receivers elsewhere.
     """
     which = scatters_diffusely(geometry.facets, model)
     if not which.any():
         return nothing(geometry.facets, radar)
+    if radar.rx_position is not None:
+        raise SceneError(
+            "diffuse returns to receivers elsewhere",
+            key="model.diffuse",
+            value=model.diffuse,
+            allowed="'off' where radar.rx_position is given",
+        )
     patches = visible_patches(geometry, np.asarray(radar.position, float), which, patch_size(radar))
     return diffuse_paths(
         patches, geometry.facets, geometry.normal, radar, radar.waveform.carrier, laws_of(geometry.facets), rng
@@ -57,7 +66,7 @@ def patch_size(radar: Radar) -> PatchSize:
     wave = radar.waveform
     speed = float(np.linalg.norm(radar.velocity))
     angle = _WIDEST if speed == 0.0 else min(_WIDEST, _RATE_CELLS * wave.rate_resolution / speed)
-    span = float(np.ptp(np.asarray(radar.elements), axis=0).max())
+    span = float(np.ptp(radar.virtual_elements, axis=0).max())
     if span > 0.0:
         angle = min(angle, 0.25 * C0 / wave.carrier / span)
     return PatchSize(_RANGE_CELLS * wave.range_resolution, max(angle, 1e-3), _BEYOND * wave.unambiguous_range)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from raychan.columns import take
 from raychan.processing.detection_theory import fluctuation
+from raychan.radar.dual_paths import scaled
 from raychan.records import POINT, Cube, Paths
 from raychan.run.path_stream import Launched
 from raychan.signal.baseband import synthesize
@@ -58,8 +59,7 @@ def fluctuated(quiet: Cube, launched: Launched, factors: dict[int, Floats]) -> t
         profile = profile + (factor.mean() - 1.0) * response(own, radar.waveform, radar.power, launched.window)
         scale[mine] = factor.mean()
     cube = Cube(samples=samples.astype(np.complex64), noise_power=quiet.noise_power)
-    there = paths.replace(amplitude=paths.amplitude * scale)
-    return cube, replace(launched, paths=there, sums=(cube.samples, profile))
+    return cube, replace(launched, paths=scaled(paths, scale), sums=(cube.samples, profile))
 
 
 def of_target(paths: Paths, body: int) -> NDArray[np.bool_]:

@@ -20,11 +20,13 @@ from raychan.channel.paths import join
 from raychan.channel.slow_time import Poses, strengths
 from raychan.channel.transfer import departures
 from raychan.columns import take
+from raychan.radar.array import Transmission, Wavefronts, wavefronts
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.between_chirps import carried_between
 from raychan.run.segments import Keyframe, Retraced, Segment, Traced, echoes, joined, reach
 from raychan.run.solver import Batch, solve_into
+from raychan.run.turning import carried_on, check_radar
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import ramp_sums
 from raychan.tracing.settings import PruneRule
@@ -41,51 +43,9 @@ _CHIRPS = 48  # least chirps per keyframe: bounds the number of tracings
 _AT_ONCE = 64  # chirps whose routes are held in memory at once
 _FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
 _HELPS = 0.5  # of the error power before: a keyframe that leaves more is the last one in its segment
-_NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
 _BETWEEN = 0.6e-3
 """From one computed pose to the next in a spectrogram [s]: a walker's samples are then off by -44 dB (0.3 ms: -47,
 1.2 ms: -37), in 0.75 of the time (`pytest tests/run/test_walker_frames.py -k poses`)."""
-_SLOWEST = 1e-9  # rad/s: a limb may stand still for a moment
-
-
-def turning(scene: Scene) -> NDArray[np.bool_]:
-    """Return which bodies (b,) turn."""
-    return np.array([b.motion.turns for b in scene.bodies], bool)
-
-
-def moving(scene: Scene) -> NDArray[np.bool_]:
-    """Return which bodies (b,) turn or move relative to the radar."""
-    own = np.asarray(scene.radar.velocity, float)
-    return turning(scene) | np.array([not np.array_equal(b.motion.velocity, own) for b in scene.bodies], bool)
-
-
-def carried_on(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
-    """Return which bodies (b,) are extrapolated between tracings: those that turn, or all that move."""
-    return turning(scene) if retrace == "auto" else moving(scene)
-
-
-def bend(scene: Scene, edge: float) -> float:
-    """Return the phase error [rad] of constant rates over a frame: at the outermost point of a turning body, by its
-    centripetal acceleration, and across a tube of a given edge [m]."""
-    wave, worst = scene.radar.waveform, 0.0
-    k, half = 4.0 * np.pi / wave.wavelength, 0.5 * wave.frame_duration
-    for body in (b for b, t in zip(scene.bodies, turning(scene), strict=True) if t):
-        rate = max(float(np.linalg.norm(body.motion.spin())), _SLOWEST)
-        vertices = body.geometry.vertices
-        radius = float(
-            np.linalg.norm(np.cross(body.motion.rotation().T @ body.motion.spin() / rate, vertices), axis=1).max()
-        )
-        size = float(np.ptp(vertices, axis=0).max())
-        worst = max(worst, k * radius * (rate * half) ** 2 / 2.0, k * min(edge, size) * rate * half)
-        worst = max(worst, k * body.motion.swerve(half))
-    return worst
-
-
-def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
-    """Return whether a frame needs more than one tracing."""
-    if retrace == 1 or scene.radar.waveform.n_chirps < 3:
-        return False
-    return bend(scene, edge) > _NEEDED if retrace == "auto" else bool(moving(scene).any())
 
 
 def retraced(
@@ -127,10 +87,18 @@ def stretches(
         before = key
 
 
+def fronts_of_routes(routes: Routes) -> Wavefronts:
+    """Return the spherical waves of routes at both ends."""
+    ends = (np.broadcast_to(x, (len(routes.kind), 1, 3)) for x in (routes.tx, routes.rx))
+    stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
+    return wavefronts(stops, routes.scatter, *departures(routes), routes.length)
+
+
 class _Frame:
     """One frame as it is assembled from keyframes."""
 
     def __init__(self, scene: Scene, rule: PruneRule, model: Any, progress: Callable[[float], None] | None) -> None:
+        check_radar(scene.radar)
         self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
         self.turns = carried_on(scene, model.retrace)
         self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
@@ -232,10 +200,9 @@ class _Frame:
             amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
-        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame)).samples
+        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples
         for routes, strength in zip(key.routes, key.strengths, strict=True):
-            # A receiver moved towards the arriving wave has a shorter path.
-            nearer = departures(routes)[1] @ self.radar.elements_world.T
+            fronts = fronts_of_routes(routes)
             for start in range(first, last + 1, _AT_ONCE):
                 count = min(_AT_ONCE, last + 1 - start)
                 # One instant more than chirps: the rate is the change from chirp to chirp.
@@ -243,36 +210,49 @@ class _Frame:
                 lengths, amplitudes = carried_between(
                     routes, strength, partial(self.poses, key), at, self.every, wave.carrier
                 )
-                rows = slice(start - first, start - first + count)
-                for layer, near in zip(out[0], nearer.T, strict=True):
-                    layer[rows] += self.ramps(lengths - near[:, None], amplitudes * self.turn(near)[:, None])
+                rows = out[0, :, start - first : start - first + count]
+                for sent in self.radar.transmissions:
+                    self.add_ramps(rows, start, sent, lengths, amplitudes, fronts)
         return out
 
-    def turn(self, nearer: Floats) -> Complexes:
-        """Return the transmitted amplitude [sqrt(W)] times the carrier phase of paths shorter by some lengths [m]."""
-        wave = self.radar.waveform
-        return np.asarray(np.sqrt(self.radar.power) * np.exp(2j * np.pi / wave.wavelength * nearer))
+    def add_ramps(
+        self, out: Samples, start: int, sent: Transmission, lengths: Floats, amplitudes: Complexes, fronts: Wavefronts
+    ) -> None:
+        """Add to samples (antenna, chirp, sample) from chirp number `start` on what one transmitter brings over parts
+        (chirp + 1, n, 3) of routes of these lengths [m]."""
+        wave, chirps = self.radar.waveform, slice(sent.since(start).first, None, sent.step)
+        code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
+        for layer, element in zip(out, self.radar.elements_world, strict=True):
+            longer = fronts.longer(sent.offset, element)
+            turn = np.sqrt(self.radar.power) * np.exp(-2j * np.pi / wave.wavelength * longer)
+            brought = self.ramps(lengths + longer[:, None], amplitudes * turn[:, None], chirps)
+            layer[chirps] += brought if sent.turn == 0.0 else brought * code
 
-    def ramps(self, lengths: Floats, amplitudes: Complexes) -> Samples:
-        """Return the samples (chirp, sample) of parts (chirp + 1, n, 3) of routes with these lengths [m]."""
+    def ramps(self, lengths: Floats, amplitudes: Complexes, chirps: slice) -> Samples:
+        """Return the samples (chirp, sample) of some chirps, of parts (chirp + 1, n, 3) of routes with these lengths
+        [m]."""
         wave, count = self.radar.waveform, len(lengths) - 1
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
         length = lengths.reshape(count + 1, -1)[:, parts]
         delay = length / C0
-        delay_rate, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
-        strength = amplitudes.reshape(count + 1, -1)[:-1, parts]
+        delay_rate, delay = (np.diff(delay, axis=0) / self.step)[chirps], delay[:-1][chirps]
+        strength = np.ascontiguousarray(amplitudes.reshape(count + 1, -1)[:-1, parts][chirps])
+        length, delay = length[:-1][chirps], np.ascontiguousarray(delay)
+        delay_rate = np.ascontiguousarray(delay_rate)
+        if not len(delay):
+            return np.zeros((0, wave.n_samples), np.complex128)
         if len(parts) * wave.n_samples <= _FEW:
             step = wave.chirp_duration / wave.n_samples
             rows = ramp_sums(strength, delay, delay_rate, wave.carrier, wave.slope, step, wave.n_samples)
             return np.asarray(rows)
         here = np.zeros(3)
-        one = dataclasses.replace(
-            self.radar, elements=here[None], power=1.0, waveform=dataclasses.replace(wave, n_chirps=1)
-        )
+        single: dict[str, Any] = {"elements": here[None], "tx_elements": here[None], "multiplexing": "none"}
+        single |= {"ddm_slots": None, "waveform": dataclasses.replace(wave, n_chirps=1)}
+        one = dataclasses.replace(self.radar, **single, power=1.0)
         return np.stack(
             [
                 synthesize(echoes(*row, here), one).samples[0, 0]
-                for row in zip(length[:-1], strength, delay_rate, strict=True)
+                for row in zip(length, strength, delay_rate, strict=True)
             ]
         )
 

@@ -13,13 +13,14 @@ from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.directions import beam_to
 from raychan.run.fluctuation import check
 from raychan.run.interferers import interference
 from raychan.run.labels import provenance
 from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages import counts, told, uncut
-from raychan.run.micro_doppler import carried_on, needed, retraced
+from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
 from raychan.run.realization import realized
@@ -30,6 +31,7 @@ from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
 from raychan.run.streams import Stage, stream
+from raychan.run.turning import carried_on, needed
 from raychan.run.unmodelled import ledger
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
@@ -152,7 +154,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     channel = replace(channel, launched=launched)
     windows = settings.range_window, settings.rate_window
     names = background(channel.geometry.facets)
-    receiver = Receiver(radar.waveform, *windows, radar.power, radar.ego_speed, names)
+    receiver = Receiver(radar.channel_waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
         reasons, left_out = _explained(scene, channel, rdmap, detections, receiver, error)
     known = ExplainedDetections.of(detections, reasons)
@@ -201,7 +203,7 @@ def _explained(
     paths, model = channel.launched.paths, channel.model
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
     reasons, left_out = run_pair(
-        lambda: provenance(paths, rdmap, found, receiver, error.power),
+        lambda: provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths)),
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
     )
     if turned:

@@ -82,6 +82,8 @@ def spectrogram(
     """
     TRACED.check("tracings_per_second", tracings_per_second)
     SEED.check("seed", seed, whole=True)
+    if len(scene.radar.tx_elements) > 1:
+        raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
     chirps, length = _chirps(scene, duration, resolution)
     model = asked(scene, tolerance_db, max_bounces)
     wave = scene.radar.waveform

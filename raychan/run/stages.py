@@ -86,9 +86,12 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     return received(samples_of(paths, radar), paths, radar, seed)[0]
 
 
-def range_doppler(cube: Cube, radar: Radar) -> RangeDoppler:
-    """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`."""
-    return map_of(cube, radar, radar.processing)
+def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler:
+    """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`.
+
+    Args: cross: of the cross-polarised receivers of a radar with `rx_polarization="both"`, else of the co-polarised.
+    """
+    return map_of(cube, radar, radar.processing, cross)
 
 
 def detect(rdmap: RangeDoppler, radar: Radar) -> Detections:

@@ -9,7 +9,7 @@ import numpy as np
 from raychan.processing.cfar import GUARD, TRAIN, Grid, fitting_guard, training
 from raychan.processing.detection_theory import Detector, detection_probability
 from raychan.radar.radar import Radar
-from raychan.run.receiver import noise_of_cell
+from raychan.run.receiver import beam_gain, looks_of, noise_of_cell
 from raychan.tracing.point_targets import bistatic_sigma
 from raychan.units import db
 from raychan.world.scene import Scene
@@ -22,7 +22,8 @@ RCS is drawn anew for each; of exponential RCS pi / 4, of chi-square of four deg
 @dataclass(frozen=True)
 class TargetLink:
     """A target given by its RCS over the direct path, nothing in between: `name`, `range` [m], `rcs` [dBsm] towards the
-    radar, `snr` [dB] of its peak in the map on average, Swerling case, `probability` of detection in one frame."""
+    radar, `snr` [dB] of its peak in the map, or in the beam towards it, on average, Swerling case, `probability` of
+    detection in one frame."""
 
     name: str
     range: float
@@ -34,7 +35,7 @@ class TargetLink:
 
 def detector_of(radar: Radar) -> Detector | None:
     """Return the detector of a radar's map; None where its map is too small for a CFAR."""
-    wave, settings = radar.waveform, radar.processing
+    wave, settings = radar.channel_waveform, radar.processing
     counts = wave.n_chirps, wave.n_samples // (1 if wave.complex_sampling else 2)
     wanted, cells = ((pair[::-1] if pair else None) for pair in (settings.guard, settings.train))
     guard = fitting_guard(counts, wanted or GUARD, cells or TRAIN)
@@ -42,7 +43,8 @@ def detector_of(radar: Radar) -> Detector | None:
         return None
     windows = settings.rate_window, settings.range_window
     ring = training(Grid(settings.pad[::-1], counts), guard, cells or TRAIN, windows)
-    return Detector(settings.pfa, len(radar.elements), settings.cfar, ring.worth, settings.min_snr_db)
+    looks, pfa = looks_of(radar, settings)
+    return Detector(pfa, looks, settings.cfar, ring.worth, settings.min_snr_db)
 
 
 def target_links(scene: Scene) -> tuple[TargetLink, ...]:
@@ -55,17 +57,20 @@ def target_links(scene: Scene) -> tuple[TargetLink, ...]:
     detector, noise = detector_of(radar), noise_of_cell(radar, radar.processing)
     if detector is None or noise == 0.0:
         return ()
+    noise /= beam_gain(radar, radar.processing)
     noise *= 1.0 if radar.waveform.complex_sampling else 2.0
     found = []
     for p, b in enumerate(points.body):
-        way = points.position[p] - radar.position
-        far = float(np.linalg.norm(way))
-        look = way[None] / far
-        gain = float(np.abs(radar.tx_field(look)[0] @ radar.rx_field(look)[0]) ** 2)
-        sigma = bistatic_sigma(points, p, -look[0], -look[0])
-        power = radar.power * gain * radar.waveform.wavelength**2 * sigma / ((4.0 * np.pi) ** 3 * far**4)
+        there, back = points.position[p] - radar.position, points.position[p] - radar.rx_place
+        near, far = float(np.linalg.norm(there)), float(np.linalg.norm(back))
+        sent, look = there[None] / near, back[None] / far
+        gain = float(np.abs(radar.tx_field(sent)[0] @ radar.rx_field(look)[0]) ** 2)
+        sigma = bistatic_sigma(points, p, -sent[0], -look[0])
+        power = radar.power * gain * radar.waveform.wavelength**2 * sigma / ((4.0 * np.pi) ** 3 * (near * far) ** 2)
         case = scene.bodies[b].swerling
         snr = float(db(power / noise))
         probability = detection_probability(snr + _COHERENT_DB[case], detector, case if case in (1, 3) else 0)
-        found.append(TargetLink(scene.bodies[b].name, far, float(db(sigma)), snr, case, float(probability)))
+        found.append(
+            TargetLink(scene.bodies[b].name, 0.5 * (near + far), float(db(sigma)), snr, case, float(probability))
+        )
     return tuple(found)

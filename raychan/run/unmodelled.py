@@ -39,7 +39,7 @@ def ledger(
     """
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
-    found = {
+    found: dict[str, Entry] = {
         "further bounces": _further(paths, radar, settings, model.max_bounces, weakest),
         "transmission": _transmission(paths, radar, settings, weakest),
         "diffraction": _diffraction(geometry, radar, weakest),
@@ -49,6 +49,9 @@ def ledger(
         "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
         "intra-frame motion": _motion(paths, geometry.facets, radar),
     }
+    if radar.rx_position is not None:
+        aside = Entry(UNKNOWN, "none", "not estimated for receivers elsewhere than the transmitter")
+        found |= dict.fromkeys(_MONOSTATIC, aside)
     return {name: found[name] for name in _NAMES}
 
 
@@ -62,6 +65,10 @@ _NAMES = (
     "range migration",
     "intra-frame motion",
 )
+
+
+_MONOSTATIC = "diffraction", "diffraction to point targets", "diffuse scattering", "intra-frame motion"
+"""Effects whose estimates take the way back to be the way out."""
 
 
 def _further(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:

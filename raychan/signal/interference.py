@@ -14,11 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
+from raychan.radar.dual_paths import amplitudes_of
 from raychan.radar.interferer import Interferer
 from raychan.radar.radar import Radar
+from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.records import Paths
+from raychan.signal.baseband import fronts_of
 from raychan.units import C0
 
+Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
@@ -30,38 +34,49 @@ def burst(victim: Radar, interferer: Interferer, paths: Paths, rng: np.random.Ge
     Source: Brooker, IEEE Trans. EMC 49(1), 2007; Toth et al., Asilomar Conf., 2018.
     """
     wave, other = victim.waveform, interferer.radar.waveform
-    elements = victim.elements_world
-    out = np.zeros((len(elements), wave.n_chirps, wave.n_samples), np.complex128)
+    if isinstance(wave, OwnWaveform):
+        raise ValueError("interference into a radar whose waveform is its own: only ramps are mixed with ramps")
+    elements, fronts = victim.elements_world, fronts_of(paths)
+    out = np.zeros((victim.receivers, wave.n_chirps, wave.n_samples), np.complex128)
     phases = interferer.ramp_phases(rng)
     rate = wave.sample_rate
     band = (-rate, 0.0) if wave.complex_sampling else (-0.5 * rate, 0.5 * rate)
-    own = (wave.carrier, wave.slope, wave.repetition, wave.chirp_duration / wave.n_samples, *band)
-    theirs = (other.carrier, other.slope, other.repetition, other.chirp_duration, interferer.start)
-    for layer, element in zip(out, elements, strict=True):
-        later = -(paths.arrival @ element) / C0
-        size = np.sqrt(interferer.radar.power) * paths.amplitude * np.exp(-2j * np.pi * other.carrier * later)
-        _burst(size, paths.delay + later, paths.length_rate / C0, own, theirs, phases, layer)
+    own = (wave.carrier, wave.slope, wave.chirp_duration / wave.n_samples, *band)
+    others = (other.carrier, other.slope, other.chirp_duration)
+    begin, begins = _starts(wave), interferer.start + _starts(other)
+    here, rows = np.zeros(3), iter(out)
+    for name in amplitudes_of(paths):
+        for element in elements:
+            later = fronts.longer(here, element) / C0
+            size = np.sqrt(interferer.radar.power) * getattr(paths, name)
+            size = size * np.exp(-2j * np.pi * other.carrier * later)
+            _burst(size, paths.delay + later, paths.length_rate / C0, own, others, begin, begins, phases, next(rows))
     if not wave.complex_sampling:
         out.imag = 0.0
     return out
 
 
+def _starts(wave: Waveform) -> Floats:
+    """Return when the ramps (c,) start [s]."""
+    return np.array([wave.start_of(m) for m in range(wave.n_chirps)])
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _burst(amplitude, delay, delay_rate, own, theirs, phases, out):  # type: ignore[no-untyped-def]
+def _burst(amplitude, delay, delay_rate, own, others, begin, begins, phases, out):  # type: ignore[no-untyped-def]
     """Add to samples (c, s) of one receiver; amplitudes hold the phase of the carrier over the delay at time 0."""
-    f_v, s_v, repetition, step, low, high = own
-    f_i, s_i, interval, duration, start = theirs
+    f_v, s_v, step, low, high = own
+    f_i, s_i, duration = others
     for p in range(amplitude.size):
         for m in range(out.shape[0]):
             for s in range(out.shape[1]):
                 t = s * step
-                now = m * repetition + t
+                now = begin[m] + t
                 grown = delay_rate[p] * now
-                sent = now - (delay[p] + grown) - start
-                n = math.floor(sent / interval)
-                u = sent - n * interval
-                if n < 0 or n >= phases.size or u >= duration:
+                sent = now - (delay[p] + grown)
+                n = np.searchsorted(begins, sent, "right") - 1
+                if n < 0 or sent - begins[n] >= duration:
                     continue
+                u = sent - begins[n]
                 if not low <= f_i + s_i * u - f_v - s_v * t <= high:
                     continue
                 # The carrier's phase over the delay is in the amplitude.

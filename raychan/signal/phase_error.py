@@ -19,6 +19,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from raychan.radar.dual_paths import amplitudes_of, columns_of, scaled
 from raychan.radar.impairments import ChirpError, PhaseNoise
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
@@ -98,10 +99,15 @@ class PhaseTrack:
 
     def turn(self, delay: float) -> Complexes:
         """Return exp(j [phi(t - delay) - phi(t)]) in all samples (chirps, samples) of a frame; delay [s]."""
-        chirps = np.arange(self.wave.n_chirps)[:, None] * self.wave.repetition
+        chirps = starts(self.wave)
         if self.phase is None:
             chirps = chirps[:1]
         return np.asarray(np.exp(1j * (self.at(chirps, delay) - self.at(chirps, 0.0))))
+
+
+def starts(wave: Waveform) -> Floats:
+    """Return when the ramps (c, 1) of a frame start [s]."""
+    return np.array([[wave.start_of(m)] for m in range(wave.n_chirps)])
 
 
 def lagrange(u: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -167,7 +173,7 @@ def _straightened(paths: Paths, radar: Radar, error: ChirpError | None) -> tuple
     rest = ChirpError(np.column_stack([times, error.frequency(times) - a - b * times]))
     bent = replace(wave, carrier=wave.carrier + a, bandwidth=wave.bandwidth + b * wave.chirp_duration)
     # Amplitudes hold exp(-j 2 pi f_c tau_0) of the carrier as it should be.
-    turned = paths.replace(amplitude=paths.amplitude * np.exp(-2j * np.pi * a * paths.delay))
+    turned = scaled(paths, np.exp(-2j * np.pi * a * paths.delay))
     return replace(radar, waveform=bent), rest, turned
 
 
@@ -192,8 +198,8 @@ def _grouped(paths: Paths, radar: Radar, track: PhaseTrack, delay: Floats, h: fl
 def _direct(paths: Paths, radar: Radar, track: PhaseTrack) -> Complexes:
     """Return the sum of paths one by one, each with its own delay at each instant."""
     wave, rate = radar.waveform, paths.length_rate / C0
-    t = np.arange(wave.n_chirps)[:, None] * wave.repetition + np.arange(wave.n_samples) * track.step
-    chirps = np.arange(wave.n_chirps)[:, None] * wave.repetition
+    chirps = starts(wave)
+    t = chirps + np.arange(wave.n_samples) * track.step
     now = track.at(chirps, 0.0)
     total = _nothing(paths, radar)
     for i in range(len(rate)):
@@ -209,5 +215,6 @@ def _nothing(paths: Paths, radar: Radar) -> Complexes:
 
 def _rows(paths: Paths, rows: slice | NDArray[np.int64], share: Floats | float) -> Paths:
     """Return some of the paths, their amplitudes times a share."""
-    columns = {name: getattr(paths, name)[rows] for name in ("length", "length_rate", "trajectory")}
-    return replace(paths, amplitude=paths.amplitude[rows] * share, **columns)
+    columns = {name: getattr(paths, name)[rows] for name in (*columns_of(paths), "trajectory")}
+    columns |= {name: columns[name] * share for name in amplitudes_of(paths)}
+    return replace(paths, **columns)

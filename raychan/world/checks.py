@@ -1,5 +1,5 @@
-"""Checks of a whole scene: a radar inside a body or in the plane of a facet, targets beyond the unambiguous range or
-range rate."""
+"""Checks of a whole scene: a radar inside a body or in the plane of a facet, an array unfit for its processing, targets
+beyond the unambiguous range or range rate."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from raychan.radar.aperture import Aperture
+from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.records import MIRROR
+from raychan.units import C0
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
@@ -18,8 +21,15 @@ from raychan.world.schema import RadarTable
 
 def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
     """Raise SceneError where the radar is inside a body, on its surface, or below a mirror."""
-    if radar is not None:
-        outside(bodies, np.array(radar.position), "radar", "radar.position")
+    if radar is None:
+        return
+    outside(bodies, np.array(radar.position), "radar", "radar.position")
+    if radar.rx_position is not None:
+        outside(bodies, np.array(radar.rx_position), "receiver", "radar.rx_position")
+        if radar.rx_position == radar.position:
+            where = "a place apart from radar.position; without this key the receiver stands beside the transmitter"
+            problem = "the receiver stands where the transmitter does"
+            raise SceneError(problem, key="radar.rx_position", value=radar.rx_position, allowed=where)
 
 
 def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
@@ -43,6 +53,18 @@ def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
             allowed = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
             problem = f"{what} is {where} '{body.name}'"
             raise SceneError(problem, key=key, value=at.tolist(), allowed=allowed)
+
+
+def array_fits(radar: Radar) -> None:
+    """Raise SceneError where the array cannot have what [processing] asks of it: ESPRIT, or a taper over its beams."""
+    asked, aperture = radar.processing, Aperture(radar.virtual_elements, C0 / radar.waveform.middle)
+    if asked.doa == "esprit" and not aperture.uniform:
+        allowed = "bartlett, capon or music; esprit only with elements on a uniform line along y or z"
+        raise SceneError("no uniform line of elements", key="processing.doa", value="esprit", allowed=allowed)
+    if asked.beam_window != "rect" and aperture.table is None:
+        allowed = "rect; a taper only over elements that fill a uniform line or rectangle"
+        problem = "no uniform line or rectangle of elements"
+        raise SceneError(problem, key="processing.beam_window", value=asked.beam_window, allowed=allowed)
 
 
 def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:

@@ -114,6 +114,7 @@ Roughness = Annotated[float, _REAL, _within(limits.ROUGHNESS_MM)]
 Chirps = Annotated[int, _WHOLE, _whole(limits.CHIRPS)]
 Samples = Annotated[int, _WHOLE, _whole(limits.SAMPLES)]
 Row = Annotated[int, _WHOLE, _whole(limits.ELEMENTS)]
+Slots = Annotated[int, _WHOLE, _whole(limits.SLOTS)]
 Pad = Annotated[int, _WHOLE, _whole(limits.PAD)]
 Cells = Annotated[int, _WHOLE, _whole(limits.CELLS)]
 Bounces = Annotated[int, _WHOLE, _whole(limits.BOUNCES)]
@@ -138,5 +139,9 @@ Bearings = Annotated[list[Bearing], Field(min_length=2), _listed("2 or more pair
 Offsets = Annotated[
     list[Offset], Field(min_length=1, max_length=4096), _listed("1 to 4096 receivers, each [x, y, z] in mm")
 ]
+TxOffsets = Annotated[
+    list[Offset], Field(min_length=1, max_length=64), _listed("1 to 64 transmitters, each [x, y, z] in mm")
+]
+Stagger = Annotated[list[Ramp], Field(min_length=2, max_length=16), _listed("2 to 16 times [us]")]
 CellPair = Annotated[tuple[Cells, Cells], _listed(f"2 whole numbers, each {limits.CELLS.allowed}")]
 PadPair = Annotated[tuple[Pad, Pad], _listed(f"2 whole numbers, each {limits.PAD.allowed}")]

@@ -12,7 +12,8 @@ import numpy as np
 from raychan.units import watt
 from raychan.world import bundled, overrides
 from raychan.world.errors import SceneError, nearest
-from raychan.world.schema import AntennaTable, ProcessingTable, RadarTable
+from raychan.world.schema import ProcessingTable, RadarTable
+from raychan.world.schema_antenna import AntennaTable
 from raychan.world.schema_errors import checked
 from raychan.world.schema_impairments import ImpairmentsTable
 
@@ -55,7 +56,8 @@ def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any 
         carrier=w.carrier_ghz * 1e9,
         bandwidth=w.bandwidth_mhz * 1e6,
         chirp_duration=w.chirp_us * 1e-6,
-        repetition=(w.repetition_us or w.chirp_us) * 1e-6,
+        repetition=None if w.stagger_us else (w.repetition_us or w.chirp_us) * 1e-6,  # type: ignore[arg-type]
+        stagger=tuple(t * 1e-6 for t in w.stagger_us or ()),
         n_chirps=w.chirps,
         n_samples=w.samples,
         complex_sampling=w.iq,
@@ -70,6 +72,13 @@ def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any 
         roll_deg=table.roll_deg,
         velocity=table.velocity_mps,
         elements=1e-3 * np.array(table.elements_mm),
+        tx_elements=1e-3 * np.array(table.tx_elements_mm),
+        multiplexing=table.multiplexing,
+        ddm_slots=table.ddm_slots,
+        rx_polarization=table.rx_polarization,
+        rx_position=table.rx_position,
+        rx_velocity=table.rx_velocity_mps,
+        rx_yaw_deg=table.rx_yaw_deg,
         processing=processing,
         power=float(watt(table.power_dbm)),
         noise_figure_db=table.noise_figure_db,

@@ -195,7 +195,7 @@ class Scene(Described):
         checks.radar_outside(self.bodies, self.radar_table)
         check_places(self.interferers, self.bodies, self.radar_table)
         if self.radar_table is not None:
-            _ = self.radar
+            checks.array_fits(self.radar)
 
     @cached_property
     def radar(self) -> Radar:

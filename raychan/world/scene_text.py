@@ -18,6 +18,9 @@ from raychan.world.schema import RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from raychan.radar.antenna import Antenna
     from raychan.radar.radar import Radar
     from raychan.radar.waveform import Waveform
@@ -74,7 +77,11 @@ def radar_table_of(radar: Radar) -> RadarTable:
             "noise_temperature_k": float(radar.noise_temperature_k),
             "noise": radar.noise,
             **_antennas(radar),
-            "elements_mm": [[figure(1e3 * x, x, _milli) for x in row] for row in radar.elements.tolist()],
+            **{f"{name}_mm": _millimetres(getattr(radar, name)) for name in ("elements", "tx_elements")},
+            "multiplexing": radar.multiplexing,
+            "ddm_slots": radar.ddm_slots,
+            "rx_polarization": radar.rx_polarization,
+            **_elsewhere(radar),
             "waveform": _waveform_table(radar.waveform),
             "impairments": impairments_table(radar.impairments),
         },
@@ -107,8 +114,19 @@ def figure(guess: float, value: float, read: Callable[[float], float]) -> float:
     return next((x for x in near if read(x) == value), guess)
 
 
+def _elsewhere(radar: Radar) -> dict[str, Any]:
+    if radar.rx_position is None:
+        return {}
+    speed = None if radar.rx_velocity is None else radar.rx_velocity.tolist()
+    return {"rx_position": radar.rx_position.tolist(), "rx_velocity_mps": speed, "rx_yaw_deg": radar.rx_yaw_deg}
+
+
+def _millimetres(places: NDArray[np.float64]) -> list[list[float]]:
+    return [[figure(1e3 * x, x, _milli) for x in row] for row in places.tolist()]
+
+
 def _waveform_table(wave: Waveform) -> dict[str, Any]:
-    table = {
+    table: dict[str, Any] = {
         "carrier_ghz": figure(wave.carrier / 1e9, wave.carrier, _giga),
         "bandwidth_mhz": figure(wave.bandwidth / 1e6, wave.bandwidth, _mega),
         "chirp_us": figure(wave.chirp_duration * 1e6, wave.chirp_duration, _micro),
@@ -116,7 +134,9 @@ def _waveform_table(wave: Waveform) -> dict[str, Any]:
         "samples": wave.n_samples,
         "iq": wave.complex_sampling,
     }
-    if wave.repetition != wave.chirp_duration:
+    if wave.stagger:
+        table["stagger_us"] = [figure(t * 1e6, t, _micro) for t in wave.stagger]
+    elif wave.repetition != wave.chirp_duration:
         table["repetition_us"] = figure(wave.repetition * 1e6, wave.repetition, _micro)
     return table
 

@@ -79,7 +79,8 @@ def check_places(interferers: Iterable[Interferer], bodies: Iterable[Body], rada
         key, at = f"interferers.{one.name}.position", one.radar.position
         if radar is None:
             raise SceneError("an interferer and no radar", key=f"interferers.{one.name}", allowed="a [radar] table")
-        if float(np.linalg.norm(at - np.array(radar.position))) < _NEAREST:
+        ends = (np.array(x) for x in (radar.position, radar.rx_position) if x is not None)
+        if min(float(np.linalg.norm(at - end)) for end in ends) < _NEAREST:
             raise SceneError(
                 "an interferer at the radar's own place", key=key, value=at.tolist(), allowed="a place of its own"
             )

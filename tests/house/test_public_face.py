@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import raychan as rc
 from raychan.columns import take
+from raychan.processing.doa import Directions
 from raychan.radar.pattern import gain_dbi
 from raychan.records import Cube, Detections, Profile, RangeDoppler
 from raychan.run.explain import CellExplanation
@@ -104,6 +105,13 @@ def public_annotations(name: str) -> Iterator[tuple[str, str]]:
 def test_nothing_on_the_public_face_is_of_any_type(name: str) -> None:
     assert [where for where, written in public_annotations(name) if re.search(r"\bAny\b", written)] == []
     assert (getattr(rc, name).__doc__ or "").strip()
+
+
+def test_arrays_of_a_mimo_radar_are_made_by_name() -> None:
+    wave = rc.Waveform(carrier=77e9, bandwidth=300e6, chirp_duration=20e-6, n_chirps=48, n_samples=64)
+    radar = rc.Radar(wave, **rc.mimo_array(3, 8, 0.5 * wave.wavelength), multiplexing="tdm")
+    line = assert_type(rc.uniform_array(24, 0.5 * wave.wavelength), NDArray[np.float64])
+    np.testing.assert_allclose(radar.virtual_elements, line, atol=1e-15)
 
 
 def test_every_public_name_is_used_here() -> None:
@@ -258,6 +266,18 @@ def test_explain_and_load_result(result: rc.Result, tmp_path: Path) -> None:
     assert back.paths.length.tobytes() == result.paths.length.tobytes()
     why = assert_type(rc.explain(back, detection=1), CellExplanation)
     assert "wall" in why.bodies
+
+
+def test_directions_of_waves_at_an_array() -> None:
+    line = np.arange(8)[:, None] * np.array([0.0, 2e-3, 0.0])
+    wave = np.exp(2j * np.pi / 4e-3 * line[:, 1] * np.sin(0.3))
+    found = assert_type(rc.doa(wave, line, 4e-3, "esprit", sources=1), Directions)
+    assert_type(found.azimuth, NDArray[np.float64])
+    assert found.azimuth == pytest.approx([0.3])
+    radar = rc.Radar(rc.Waveform(74.9e9, 1e8, 20e-6, n_chirps=8, n_samples=16), elements=line)
+    cube = Cube(np.tile(wave[:, None, None], (1, 8, 16)).astype(np.complex64), 0.0)
+    angles = assert_type(rc.range_azimuth(cube, radar), rc.RangeAzimuth)
+    assert angles.azimuth[angles.power[:, 0].argmax()] == pytest.approx(0.3, abs=0.02)
 
 
 def test_rcs_of_a_mesh() -> None:

@@ -8,9 +8,10 @@ import pytest
 import raychan as rc
 from raychan.radar.beam_table import beam_of
 from raychan.run import micro_doppler
-from raychan.run.micro_doppler import bend, needed, retraced, stretches
+from raychan.run.micro_doppler import retraced, stretches
 from raychan.run.rules import fine_rule
 from raychan.run.solver import solve
+from raychan.run.turning import bend, needed
 from raychan.signal.baseband import synthesize
 from raychan.tracing.settings import PruneRule, refinement
 

@@ -91,7 +91,11 @@ def test_bad_overrides_are_named(change, key, says):
         ),
         (BARE_RADAR.replace("[radar]", '[radar]\nantenna = { kind = "cosine" }'), "radar.antenna", "hpbw"),
         (BARE_RADAR.replace("[radar]", '[radar]\nantenna = { kind = "array", nx = 2 }'), "radar.antenna.nx", "ny"),
-        (BARE_RADAR.replace("[radar]", "[radar]\nnoise_figure_db = inf"), "radar.noise_figure_db", "number between 0 and"),
+        (
+            BARE_RADAR.replace("[radar]", "[radar]\nnoise_figure_db = inf"),
+            "radar.noise_figure_db",
+            "number between 0 and",
+        ),
         (BARE_RADAR.replace("60.5", "-60.5"), "radar.waveform.chirp_us", "between 0.001"),
         (BARE_RADAR.replace("60.5", '"60.5 us"'), "radar.waveform.chirp_us", "number"),
         (BARE_RADAR + "samples = 0\n", "radar.waveform.samples", "between 1 and"),
