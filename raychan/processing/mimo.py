@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing.own_waveform import map_by_waveform
-from raychan.processing.staggered import STRONG, doppler, fold_range, resolved, staggered_map
+from raychan.processing.staggered import doppler, fold_range, hypotheses, least_power, resolved, staggered_map
 from raychan.radar.radar import Radar
 from raychan.records import Cube, RangeDoppler
 from raychan.units import C0
@@ -55,10 +55,10 @@ def virtual_range_doppler(
         return map_by_waveform(cube, radar.waveform, *given)
     made = _by_time if radar.multiplexing == "tdm" else _by_doppler
     plain, channels = made(cube, radar, given)
-    many, receivers = len(radar.tx_elements), channels.shape[1]
+    many = len(radar.tx_elements)
     if not resolve:
         return replace(plain, spectrum=np.concatenate(list(channels[:many])))
-    fold = _folds(channels, radar, plain) if receivers > 1 else np.zeros(plain.power.shape, np.int8)
+    fold = _folds(channels, radar, plain) if hypotheses(radar) > 1 else np.zeros(plain.power.shape, np.int8)
     spectrum = channels[:many].copy()
     for cells, h in _groups(fold):
         spectrum[:, :, *cells] = _under(channels[:, :, *cells], h, radar)
@@ -113,7 +113,7 @@ def _under(channels: Complexes, h: int, radar: Radar) -> Complexes:
 def _folds(channels: Complexes, radar: Radar, map: RangeDoppler) -> NDArray[np.int8]:
     """Return by how many spans the strongest echo of each cell is folded (v, r)."""
     fold = np.zeros(map.power.shape, np.int8)
-    level = STRONG * (map.noise or float(np.median(map.power)))
+    level = least_power(map, len(radar.virtual_elements))
     at = np.argwhere((np.abs(channels) ** 2).mean(axis=(0, 1)) > level)
     steering = _steering(radar)
     for some in np.array_split(at, max(1, len(at) * len(steering) // _BATCH)):

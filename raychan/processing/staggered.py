@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from raychan.columns import column
 from raychan.processing.own_waveform import map_by_waveform
 from raychan.radar.radar import Radar
-from raychan.radar.waveform import OwnWaveform, Waveform
+from raychan.radar.waveform import OwnWaveform
 from raychan.records import Cube, Detections, RangeDoppler
 from raychan.units import C0
 
 Complexes = NDArray[np.complex64]
 
-STRONG = 10.0
-"""Times the noise, or the median without noise: weaker cells keep the hypothesis "not folded" (not measured)."""
+_STRONG = 10.0
+"""Times the noise, in the beam over all channels: weaker echoes keep the hypothesis "not folded" (not measured)."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,22 @@ def resolved(map: RangeDoppler, spectrum: Complexes, fold: NDArray[np.int8], noi
 def fold_range(count: int) -> list[int]:
     """Return `count` folds about 0, nearest first."""
     return sorted(range(-((count - 1) // 2), count // 2 + 1), key=lambda h: (abs(h), h))
+
+
+def hypotheses(radar: Radar) -> int:
+    """Return how many folds are tested in a cell: 1 where none are, or where one receiver cannot tell them apart."""
+    if radar.waveform.stagger:
+        return radar.waveform.fold_count
+    return radar.slots if len(radar.elements) > 1 else 1
+
+
+def least_power(map: RangeDoppler, channels: int) -> float:
+    """Return the mean power [W] over the channels of a cell from which its folds are tested.
+
+    A beam sees an echo `channels` times stronger over the noise than one channel does. Without noise its place is taken
+    by the median cell.
+    """
+    return (1.0 + _STRONG / channels) * (map.noise or float(np.median(map.power)))
 
 
 def doppler(map: RangeDoppler, radar: Radar) -> NDArray[np.float64]:
@@ -69,8 +85,7 @@ def staggered_map(cube: Cube, radar: Radar, given: Any, resolve: bool = True) ->
     undone = np.exp(2j * np.pi * np.outer(starts, doppler(map, radar))).astype(np.complex64)
     channels = channels * undone[:, None, :, None]
     sums, fold = channels.mean(axis=0), np.zeros(map.power.shape, np.int8)
-    level = STRONG * (map.noise or float(np.median(map.power)))
-    rows, columns = np.nonzero(map.power > level)
+    rows, columns = np.nonzero(map.power > least_power(map, len(map.spectrum)))
     held, best = channels[:, :, rows, columns], np.zeros(len(rows))
     for h in fold_range(radar.waveform.fold_count):
         turn = np.exp(2j * np.pi * h * starts / wave.repetition).astype(np.complex64) / count
@@ -82,7 +97,7 @@ def staggered_map(cube: Cube, radar: Radar, given: Any, resolve: bool = True) ->
     return resolved(map, sums, fold, map.noise / count)
 
 
-def unfolded(map: RangeDoppler, found: Detections, waveform: Waveform) -> Detections:
+def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:
     """Return detections with the true rates, speeds and ranges that the folds of a ResolvedMap give; of other maps the
     same. A folded rate leaves part of its Doppler shift in the beat frequency, which is taken off the range."""
     if not isinstance(map, ResolvedMap) or not len(found.rate):
@@ -90,6 +105,9 @@ def unfolded(map: RangeDoppler, found: Detections, waveform: Waveform) -> Detect
     span, (rows, columns) = 2.0 * map.unambiguous_rate, found.cell.T
     # A peak between two cells may lie beyond the end of the axis that its own cell is on.
     folds = map.fold[rows, columns] + np.rint((map.rate[rows] - found.rate) / span)
-    more = span * folds
+    # Folds as many as are tested apart look alike.
+    tested = hypotheses(radar)
+    folds -= tested * np.rint((found.rate + span * folds) / (span * tested))
+    more, waveform = span * folds, radar.waveform
     shift = 0.0 if isinstance(waveform, OwnWaveform) else more * waveform.middle / waveform.slope
     return found.replace(rate=found.rate + more, speed=found.speed + more, range=found.range - shift)

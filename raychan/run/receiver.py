@@ -12,7 +12,7 @@ from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Grid, fitting_guard
 from raychan.processing.detection import Array, detect
 from raychan.processing.mimo import virtual_range_doppler
-from raychan.processing.staggered import unfolded
+from raychan.processing.staggered import hypotheses, unfolded
 from raychan.radar.aperture import Aperture
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
@@ -47,9 +47,10 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
     guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
     if guard is not None:
         sizes["guard"] = guard
+    # Each fold that is tested in a cell is one more chance of a false alarm.
     found = detect(
         rdmap,
-        pfa=settings.pfa,
+        pfa=settings.pfa / hypotheses(radar),
         min_snr_db=settings.min_snr_db,
         method=settings.cfar,
         ego_speed=radar.ego_speed,
@@ -59,7 +60,7 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
         array=Array(settings.beams, settings.doa, settings.beam_window),
         **sizes,
     )
-    return unfolded(rdmap, found, radar.waveform)
+    return unfolded(rdmap, found, radar)
 
 
 def receivers(radar: Radar) -> Floats:
@@ -86,8 +87,8 @@ def bank_of(radar: Radar, settings: Any) -> BeamBank | None:
 def looks_of(radar: Radar, settings: Any) -> tuple[int, float]:
     """Return how many powers the detector adds in a cell, and the false alarm probability that it keeps for each beam
     so that a cell keeps that of the settings."""
-    bank = bank_of(radar, settings)
-    return (len(receivers(radar)), settings.pfa) if bank is None else (1, bank.single(settings.pfa))
+    bank, pfa = bank_of(radar, settings), settings.pfa / hypotheses(radar)
+    return (len(receivers(radar)), pfa) if bank is None else (1, bank.single(pfa))
 
 
 def beam_gain(radar: Radar, settings: Any) -> float:
@@ -105,7 +106,7 @@ def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
     azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
     look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
     ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
-    amplitude = np.sqrt(noise_of_cell(radar, settings) / beam_gain(radar, settings) / radar.power)
+    amplitude = np.sqrt(noise_of_beam(radar, settings) / radar.power)
     return float(amplitude * 4.0 * np.pi / radar.waveform.wavelength / np.prod(list(ends)))
 
 
@@ -117,6 +118,11 @@ def noise_of_cell(radar: Radar, settings: Any) -> float:
     # By time division a channel has a share of the chirps, by Doppler division or stagger all of them.
     chirps = (radar.channel_waveform if radar.multiplexing == "tdm" else radar.waveform).n_chirps
     return float(radar.noise_power / gain / processing_gain(window(settings.rate_window, chirps)))
+
+
+def noise_of_beam(radar: Radar, settings: Any) -> float:
+    """Return the thermal noise [W] of what the detector looks at: a beam in a cell, or the cell; 0 without noise."""
+    return noise_of_cell(radar, settings) / beam_gain(radar, settings)
 
 
 def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapError:

@@ -25,7 +25,7 @@ from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
 from raychan.run.realization import realized
 from raychan.run.received import notes, received
-from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
+from raychan.run.receiver import detections_in, map_error, map_of, noise_of_beam, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
@@ -100,7 +100,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         # The check launch, with all mechanisms, tells which of them the fine one needs.
         with clock.stage("check"):
             others, more = launch(replace(checked, diffraction=True))
-            chosen = choose(others.paths, radar, settings, noise_of_cell(radar, settings), model.tolerance_db)
+            chosen = choose(others.paths, radar, settings, noise_of_beam(radar, settings), model.tolerance_db)
             model = chosen.applied_to(model)
     rule = fine_rule(radar, settings, model)
     again = needed(scene, model.retrace, rule.refinement.max_edge)

@@ -9,7 +9,7 @@ import numpy as np
 from raychan.processing.cfar import GUARD, TRAIN, Grid, fitting_guard, training
 from raychan.processing.detection_theory import Detector, detection_probability
 from raychan.radar.radar import Radar
-from raychan.run.receiver import beam_gain, looks_of, noise_of_cell
+from raychan.run.receiver import looks_of, noise_of_beam
 from raychan.tracing.point_targets import bistatic_sigma
 from raychan.units import db
 from raychan.world.scene import Scene
@@ -54,10 +54,9 @@ def target_links(scene: Scene) -> tuple[TargetLink, ...]:
     within a frame: to a steady target of the mean amplitude.
     """
     radar, points = scene.radar, scene.points(0.0)
-    detector, noise = detector_of(radar), noise_of_cell(radar, radar.processing)
+    detector, noise = detector_of(radar), noise_of_beam(radar, radar.processing)
     if detector is None or noise == 0.0:
         return ()
-    noise /= beam_gain(radar, radar.processing)
     noise *= 1.0 if radar.waveform.complex_sampling else 2.0
     found = []
     for p, b in enumerate(points.body):

@@ -10,8 +10,8 @@ import raychan as rc
 WAVE = rc.Waveform(77e9, 300e6, 15e-6, 20e-6, n_chirps=192, n_samples=128)
 
 
-@pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
-def test_a_mover_at_20_m_per_s_has_its_azimuth_its_rate_and_its_body(multiplexing, tmp_path):
+@pytest.mark.parametrize(("multiplexing", "doa"), [("tdm", "bartlett"), ("tdm", "music"), ("ddm", "bartlett")])
+def test_a_mover_at_20_m_per_s_has_its_azimuth_its_rate_and_its_body(multiplexing, doa, tmp_path):
     """20 m/s are beyond the 16.2 m/s (12.2 m/s) that three (four) shares of the chirps tell apart."""
     azimuth = np.radians(17.0)
     look = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -22,7 +22,7 @@ def test_a_mover_at_20_m_per_s_has_its_azimuth_its_rate_and_its_body(multiplexin
         ],
         radar=rc.Radar(
             WAVE, power=1.0, antenna=rc.CosineAntenna(90.0, 40.0), multiplexing=multiplexing,
-            **rc.mimo_array(3, 8, 0.5 * WAVE.wavelength),
+            **rc.mimo_array(3, 8, 0.5 * WAVE.wavelength), processing=rc.Processing(doa=doa),
         ),
     )  # fmt: skip
     result = rc.simulate(scene, seed=4)
