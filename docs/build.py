@@ -21,7 +21,7 @@ from markdown_it import MarkdownIt
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 MODULES = ("raychan", "raychan.records")
-TUTORIALS = ("first_scene", "own_mesh", "hidden_pedestrian", "ghost", "sweep")
+TUTORIALS = ("first_scene", "own_mesh", "hidden_pedestrian", "ghost", "sweep", "own_waveform")
 MENU = (
     ("Start", ("index.md",)),
     (

@@ -27,6 +27,8 @@ _HOME = {
     "PEC": "raychan.world.material",
     "Radar": "raychan.radar.radar",
     "Waveform": "raychan.radar.waveform",
+    "uniform_array": "raychan.radar.array",
+    "mimo_array": "raychan.radar.array",
     "Antenna": "raychan.radar.antenna",
     "IsotropicAntenna": "raychan.radar.antenna",
     "CosineAntenna": "raychan.radar.antenna",
@@ -34,6 +36,12 @@ _HOME = {
     "MeasuredAntenna": "raychan.radar.pattern",
     "load_antenna": "raychan.world.radar_mount",
     "Processing": "raychan.radar.processing",
+    "Impairments": "raychan.radar.impairments",
+    "PhaseNoise": "raychan.radar.impairments",
+    "ChirpError": "raychan.radar.impairments",
+    "Converter": "raychan.radar.impairments",
+    "Interferer": "raychan.radar.interferer",
+    "Atmosphere": "raychan.em.atmosphere",
     "Paths": "raychan.records",
     "SpecularPaths": "raychan.records",
     "InteractionType": "raychan.kinds",
@@ -43,11 +51,18 @@ _HOME = {
     "synthesize": "raychan.run.stages",
     "range_doppler": "raychan.run.stages",
     "detect": "raychan.run.stages",
+    "range_azimuth": "raychan.run.directions",
+    "RangeAzimuth": "raychan.processing.range_azimuth",
+    "doa": "raychan.processing.doa",
     "SceneRoutes": "raychan.run.stages",
+    "Detector": "raychan.processing.detection_theory",
+    "detection_probability": "raychan.processing.detection_theory",
     "frames": "raychan.run.sequence",
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
     "load_result": "raychan.run.storage",
+    "spectrogram": "raychan.run.spectrogram",
+    "Spectrogram": "raychan.run.spectrogram",
     "rcs": "raychan.run.rcs",
     "specular_paths": "raychan.run.specular_paths",
     "visibility": "raychan.study.visibility",
@@ -55,22 +70,37 @@ _HOME = {
 """Where each public name is at home; the imports below say the same to type checkers."""
 
 if TYPE_CHECKING:
+    from raychan.em.atmosphere import Atmosphere as Atmosphere
     from raychan.kinds import InteractionType as InteractionType
+    from raychan.processing.detection_theory import Detector as Detector
+    from raychan.processing.detection_theory import detection_probability as detection_probability
+    from raychan.processing.doa import doa as doa
+    from raychan.processing.range_azimuth import RangeAzimuth as RangeAzimuth
     from raychan.radar.antenna import Antenna as Antenna
     from raychan.radar.antenna import ArrayAntenna as ArrayAntenna
     from raychan.radar.antenna import CosineAntenna as CosineAntenna
     from raychan.radar.antenna import IsotropicAntenna as IsotropicAntenna
+    from raychan.radar.array import mimo_array as mimo_array
+    from raychan.radar.array import uniform_array as uniform_array
+    from raychan.radar.impairments import ChirpError as ChirpError
+    from raychan.radar.impairments import Converter as Converter
+    from raychan.radar.impairments import Impairments as Impairments
+    from raychan.radar.impairments import PhaseNoise as PhaseNoise
+    from raychan.radar.interferer import Interferer as Interferer
     from raychan.radar.pattern import MeasuredAntenna as MeasuredAntenna
     from raychan.radar.processing import Processing as Processing
     from raychan.radar.radar import Radar as Radar
     from raychan.radar.waveform import Waveform as Waveform
     from raychan.records import Paths as Paths
     from raychan.records import SpecularPaths as SpecularPaths
+    from raychan.run.directions import range_azimuth as range_azimuth
     from raychan.run.explain import explain as explain
     from raychan.run.rcs import rcs as rcs
     from raychan.run.result import Result as Result
     from raychan.run.sequence import frames as frames
     from raychan.run.simulate import simulate as simulate
+    from raychan.run.spectrogram import Spectrogram as Spectrogram
+    from raychan.run.spectrogram import spectrogram as spectrogram
     from raychan.run.specular_paths import specular_paths as specular_paths
     from raychan.run.storage import load_result as load_result
     from raychan.study.visibility import visibility as visibility

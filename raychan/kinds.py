@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 __all__ = ["InteractionType", "MaterialKind", "Role"]
-__all__ += ["DIFFRACT", "NONE", "POINT", "REFLECT", "SCATTER", "TRANSMIT"]
+__all__ += ["DIFFRACT", "DIFFUSE", "NONE", "POINT", "REFLECT", "SCATTER", "TRANSMIT"]
 __all__ += ["BLOCKER", "HALF_SPACE", "LAYER", "MIRROR", "PEC", "SCATTERER"]
 
 
@@ -18,6 +18,7 @@ class InteractionType(IntEnum):
     SCATTER = 3  # by physical optics over a footprint
     POINT = 4  # at a target of given RCS
     DIFFRACT = 5  # at a wedge, by UTD
+    DIFFUSE = 6  # at a rough surface, as speckle
 
 
 class MaterialKind(IntEnum):
@@ -37,6 +38,6 @@ class Role(IntEnum):
 
 
 # The same as plain integers: numba compiles a global integer into the code.
-NONE, REFLECT, TRANSMIT, SCATTER, POINT, DIFFRACT = map(int, InteractionType)
+NONE, REFLECT, TRANSMIT, SCATTER, POINT, DIFFRACT, DIFFUSE = map(int, InteractionType)
 PEC, HALF_SPACE, LAYER = map(int, MaterialKind)
 SCATTERER, MIRROR, BLOCKER = map(int, Role)

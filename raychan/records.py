@@ -9,8 +9,7 @@ Integer sentinel: -1 means "none". SI units and radians throughout.
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -35,6 +34,8 @@ class Materials(Record):
     eps: Complexes = column("m", np.complex128, doc="relative permittivity eps_r - j sigma/(omega eps0); 1 for PEC")
     thickness: Floats = column("m", unit="m", doc="layer thickness; 0 unless LAYER")
     roughness: Floats = column("m", unit="m", doc="rms height")
+    diffuse: tuple[object, ...] = ()
+    """How each scatters diffusely (em.diffuse.Diffuse or None); empty: none does."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,8 @@ class Facets(Record):
     materials: Materials
     body_names: tuple[str, ...]
     part_names: tuple[str, ...]
+    attenuation: float = 0.0
+    """Of the air between them: a field falls by exp(-attenuation L) over a length L [1/m]."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +225,7 @@ class Paths(PropagationPaths):
     @classmethod
     def of(cls, **columns: object) -> Paths:
         """Return paths of columns of which each has a row a path, those of `Trajectories` among them."""
-        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in dataclasses.fields(Trajectories)}
+        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in fields(Trajectories)}
         rows: dict[str, Any] = columns
         return cls(trajectory=np.arange(len(rows["length"]), dtype=np.int32), trajectories=Trajectories(**held), **rows)
 
@@ -290,6 +293,8 @@ class Detections(Record):
     rate: Floats = column("n", unit="m/s")
     speed: Floats = column("n", unit="m/s", doc="range rate with the scalar ego speed added")
     azimuth: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
+    elevation: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
+    ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="whether a grating lobe shows another direction alike")
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
     cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")

@@ -163,7 +163,7 @@ def _map(m: Any) -> Facts:
 
 
 def detection_rows(d: Any) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return heads and rows of a table of detections; an azimuth only where an array gives one."""
+    """Return heads and rows of a table of detections; angles only where an array gives them."""
     columns = [
         ("range m", [f"{x:.2f}" for x in d.range]),
         ("range rate m/s", [f"{x:+.2f}" for x in d.rate]),
@@ -171,8 +171,10 @@ def detection_rows(d: Any) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         ("SNR dB", [f"{x:.1f}" for x in d.snr]),
         ("power dBm", [f"{dbm(x):.1f}" for x in d.power]),
     ]
-    if np.isfinite(d.azimuth).any():
-        columns.insert(3, ("azimuth deg", [f"{x:.1f}" if np.isfinite(x) else "" for x in np.degrees(d.azimuth)]))
+    for name in ("elevation", "azimuth"):
+        angle = np.degrees(getattr(d, name))
+        if np.isfinite(angle).any():
+            columns.insert(3, (f"{name} deg", [f"{x:.1f}" if np.isfinite(x) else "" for x in angle]))
     return tuple(head for head, _ in columns), list(zip(*(cells for _, cells in columns), strict=True))
 
 

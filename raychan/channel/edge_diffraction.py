@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.ends import RadarEnds
+from raychan.channel.ends import RadarEnds, paths_record, rx_fields
 from raychan.em.diffraction import diffract
 from raychan.em.fresnel import coefficients
 from raychan.records import DiffractedRoutes, Facets, Paths
@@ -26,16 +26,20 @@ def diffracted_paths(routes: DiffractedRoutes, facets: Facets, radar: RadarEnds,
     """
     k = 2.0 * np.pi * frequency / C0
     n = len(routes.kind)
-    amplitude = np.zeros(n, complex)
+    ends = rx_fields(radar)
+    received = {name: np.zeros(n, complex) for name in ("amplitude", "cross")[: len(ends)]}
     for r in range(n):
         there = leg_field(_leg(routes, r, 0), facets, radar.tx_field, k)
-        back = leg_field(_leg(routes, r, 1), facets, radar.rx_field, k)
-        amplitude[r] = 0.5 / k * np.sqrt(routes.sigma[r] / (4.0 * np.pi)) * (there @ back)
+        for out, rx_field in zip(received.values(), ends, strict=True):
+            back = leg_field(_leg(routes, r, 1), facets, rx_field, k)
+            out[r] = 0.5 / k * np.sqrt(routes.sigma[r] / (4.0 * np.pi)) * (there @ back)
     length = (routes.near + routes.far).sum(axis=1)
+    if facets.attenuation:
+        received = {name: x * np.exp(-facets.attenuation * length) for name, x in received.items()}
     rate = np.array([_length_rate(routes, r, facets, np.asarray(radar.velocity)) for r in range(n)])
-    return Paths.of(
+    return paths_record(radar).of(
         length=length,
-        amplitude=amplitude,
+        **received,
         length_rate=rate,
         departure=routes.leaves[:, 0],
         arrival=routes.leaves[:, 1],

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from raychan.radar.dual_paths import DualPaths
+from raychan.records import Paths
 
 Floats = NDArray[np.float64]
 
@@ -19,3 +23,35 @@ class RadarEnds(Protocol):
     def velocity(self) -> Floats: ...
     def tx_field(self, direction_world: Floats) -> Any: ...
     def rx_field(self, direction_world: Floats) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where transmitter and receiver are (3,) [m] and how they move (3,) [m/s]."""
+
+    tx: Floats
+    rx: Floats
+    tx_velocity: Floats
+    rx_velocity: Floats
+
+
+def ends_of(radar: RadarEnds) -> Ends:
+    """Return the ends of a radar; one without `rx_position` is monostatic."""
+    here, moves = np.asarray(radar.position, float), np.asarray(radar.velocity, float)
+    there = getattr(radar, "rx_position", None)
+    if there is None:
+        return Ends(here, here, moves, moves)
+    given: Any = radar
+    return Ends(here, np.asarray(there, float), moves, np.asarray(given.rx_motion, float))
+
+
+def rx_fields(radar: RadarEnds) -> tuple[Any, ...]:
+    """Return the receivers' fields: the co-polarised, and the cross-polarised where the radar has such receivers."""
+    if getattr(radar, "rx_polarization", None) == "both":
+        return radar.rx_field, radar.cross_field  # type: ignore[attr-defined]
+    return (radar.rx_field,)
+
+
+def paths_record(radar: RadarEnds) -> type[Paths]:
+    """Return the class of a radar's paths: DualPaths where it has receivers of both polarisations."""
+    return Paths if len(rx_fields(radar)) == 1 else DualPaths

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.edge_diffraction import diffracted_paths
-from raychan.channel.ends import RadarEnds
+from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
+from raychan.radar.dual_paths import columns_of
 from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Trajectories
 
 Floats = NDArray[np.float64]
@@ -22,27 +23,31 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     """Return what routes carry for a radar at a frequency [Hz]; a footprint long in range becomes three paths."""
     if isinstance(routes, DiffractedRoutes):
         return diffracted_paths(routes, facets, radar, frequency)
-    a = transfer(
+    gains = transfer(
         routes,
         facets,
         frequency,
         lambda d: np.asarray(radar.tx_field(d))[:, None],
-        lambda d: np.asarray(radar.rx_field(d))[:, None],
+        lambda d: np.stack([np.asarray(f(d)) for f in rx_fields(radar)], axis=1),
         corners=True,
-    )[:, 0, 0]
+    )[:, :, 0]
     away, look = departures(routes)
-    v = np.asarray(radar.velocity, float)
-    rate = rates(routes, facets, v, v)
+    speeds = ends_of(radar).tx_velocity, ends_of(radar).rx_velocity
+    rate = rates(routes, facets, *speeds)
     corner = routes.lengths[:, :3]
     spans = np.maximum(np.maximum(corner[:, 0], corner[:, 1]), corner[:, 2])
     spans -= np.minimum(np.minimum(corner[:, 0], corner[:, 1]), corner[:, 2])
     long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
     whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
     part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
-    return Paths(
+    received = {
+        name: np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])
+        for name, a in zip(("amplitude", "cross"), gains.swapaxes(0, 1), strict=False)
+    }
+    return paths_record(radar)(
         length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
-        amplitude=np.concatenate([a[whole].sum(axis=1), a[rows].ravel()]),
-        length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, v).ravel()]),
+        **received,
+        length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, *speeds).ravel()]),
         trajectory=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
         trajectories=Trajectories(
             departure=away.astype(np.float32),
@@ -61,10 +66,11 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
 
 def nothing(facets: Facets, radar: RadarEnds) -> Paths:
     """Return the empty record of a scene of which nothing is in view."""
-    end, none = np.asarray(radar.position, float), np.zeros((0, 1), np.int8)
-    return Paths.of(
+    ends, none = ends_of(radar), np.zeros((0, 1), np.int8)
+    names = ("amplitude", "cross")[: len(rx_fields(radar))]
+    return paths_record(radar).of(
         length=np.zeros(0),
-        amplitude=np.zeros(0, complex),
+        **{name: np.zeros(0, complex) for name in names},
         length_rate=np.zeros(0),
         departure=np.zeros((0, 3)),
         arrival=np.zeros((0, 3)),
@@ -74,8 +80,8 @@ def nothing(facets: Facets, radar: RadarEnds) -> Paths:
         vertices=np.zeros((0, 1, 3)),
         body_names=facets.body_names,
         part_names=facets.part_names,
-        tx=end,
-        rx=end,
+        tx=ends.tx,
+        rx=ends.rx,
     )
 
 
@@ -97,9 +103,7 @@ def join(parts: list[Paths]) -> Paths:
             trajectories[f.name] = out
         else:
             trajectories[f.name] = np.concatenate(held)
-    rows: dict[str, Any] = {
-        name: np.concatenate([getattr(p, name) for p in parts]) for name in ("length", "length_rate", "amplitude")
-    }
+    rows: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in columns_of(parts[0])}
     trajectory = np.concatenate([p.trajectory + np.int32(first) for p, first in zip(parts, begin, strict=True)])
     return dataclasses.replace(parts[0], **rows, trajectory=trajectory, trajectories=Trajectories(**trajectories))
 
@@ -115,5 +119,5 @@ def strongest(paths: Paths, most: int) -> Paths:
     trajectories = Trajectories(
         **{f.name: getattr(paths.trajectories, f.name)[keep] for f in dataclasses.fields(Trajectories)}
     )
-    columns = {name: getattr(paths, name)[rows] for name in ("length", "length_rate", "amplitude")}
+    columns = {name: getattr(paths, name)[rows] for name in columns_of(paths)}
     return dataclasses.replace(paths, **columns, trajectory=number[paths.trajectory[rows]], trajectories=trajectories)

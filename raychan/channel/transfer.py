@@ -74,6 +74,8 @@ def transfer(
         )  # fmt: skip
 
     parallel_for(len(out), some)
+    if facets.attenuation:
+        out *= np.exp(-facets.attenuation * routes.length)[:, None, None, None]
     return out if corners else out[..., 0]
 
 

@@ -17,6 +17,7 @@ from raychan.cli.options import help_of
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
 from raychan.cli.show import Interrupted
+from raychan.cli.spectrogram import spectrogram
 from raychan.cli.study import study
 from raychan.cli.validate import validate
 from raychan.cli.view import view
@@ -70,7 +71,7 @@ def _top(
     pass
 
 
-for command in (run, info, rcs, explain, view, validate):
+for command in (run, info, rcs, spectrogram, explain, view, validate):
     app.command(help=help_of(command))(command)
 app.add_typer(study, name="study")
 

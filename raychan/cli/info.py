@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
+from raychan.cli.info_impairments import impairment_rows
+from raychan.cli.rcs_options import writable
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -48,24 +50,34 @@ def info(
             help="Axis of the mesh file that points up; if not given, y for GLB and z for others.", show_default=False
         ),
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw the scene's probability of detection against SNR to this file.", metavar="FILE.png"),
+    ] = None,
 ) -> None:
     """Show what is in a scene, an antenna or a mesh.
 
-    For a scene: bodies, parts, materials, link budget, resolutions, and the figures of its antennas. For an antenna:
+    For a scene: bodies, parts, materials, link budget, SNR and probability of detection of targets given by their RCS,
+    resolutions, and the figures of its antennas. For an antenna:
     its figures, computed from its pattern, beside the published ones if its file has them. For a mesh: its size and
     defects."""
     from raychan.world.bundled import found
     from raychan.world.mesh_io import SUFFIXES, load
 
+    writable(plot, (".png", ".pdf", ".svg"))
     source = found(source)
     if source.suffix.lower() in SUFFIXES:
+        if plot is not None:
+            raise typer.BadParameter(f"{source} is no scene file", param_hint="--plot")
         _mesh(load(source, unit=unit or "m", up=up), source, unit or "m", up)
         return
+    from raychan.world.radar_mount import antenna_of, antenna_table, is_antenna
+
+    if plot is not None and is_antenna(source):
+        raise typer.BadParameter(f"{source} is no scene file", param_hint="--plot")
     for option, value in (("--unit", unit), ("--up", up)):
         if value is not None:
             raise typer.BadParameter(f"{source} is not a mesh file ({', '.join(SUFFIXES)})", param_hint=option)
-    from raychan.world.radar_mount import antenna_of, antenna_table, is_antenna
-
     if is_antenna(source):
         table, _ = antenna_table(source.name, source.parent, "")
         made = antenna_of(source.name, "V", source.parent, "")
@@ -73,7 +85,10 @@ def info(
         return
     from raychan.world.scene import Scene
 
-    _scene(Scene.load(source))
+    scene = Scene.load(source)
+    _scene(scene)
+    if plot is not None:
+        _drawn(scene, plot)
 
 
 def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
@@ -104,8 +119,10 @@ def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
 def _scene(scene: Any) -> None:
     screen = show.console()
     screen.print(scene.title, style="bold", markup=False)
-    for made in (_bodies(scene), _parts(scene), *_radar(scene.radar), *_antennas(scene)):
+    for made in (_bodies(scene), _parts(scene), *_radar(scene.radar), *_targets(scene), *_antennas(scene)):
         screen.print(made)
+    if rows := impairment_rows(scene):
+        screen.print(show.table("", ("receiver, air, other radars", ""), rows, left=(0,)))
     show.warn(scene.warnings)
 
 
@@ -171,6 +188,37 @@ def _radar(radar: Any) -> list[Table]:
         show.table("Radar", ("link budget", ""), budget, left=(0,)),
         show.table("", ("waveform", ""), chirp_rows, left=(0,)),
     ]
+
+
+def _targets(scene: Any) -> list[Table]:
+    """Return the SNR and the probability of detection of targets given by their RCS."""
+    from raychan.run.target_links import target_links
+
+    rows = [
+        (
+            t.name,
+            f"{t.range:.2f}",
+            f"{round(t.rcs, 1) + 0.0:.1f}",
+            str(t.swerling),
+            f"{t.snr:.1f}",
+            f"{t.probability:.3f}",
+        )
+        for t in target_links(scene)
+    ]
+    heads = ("target", "range m", "RCS dBsm", "Swerling", "SNR in a cell dB", "probability of detection")
+    return [show.table("Targets given by their RCS, direct path", heads, rows, left=(0,))] if rows else []
+
+
+def _drawn(scene: Any, plot: Path) -> None:
+    from raychan.report.detection_figure import detection_picture
+    from raychan.run.output_files import write_whole
+    from raychan.run.target_links import detector_of, target_links
+
+    detector = detector_of(scene.radar)
+    if detector is None:
+        raise typer.BadParameter("the radar's map is too small for a CFAR", param_hint="--plot")
+    write_whole(plot, detection_picture(detector, target_links(scene), scene.title or "Detector", plot.suffix))
+    show.console().print(f"written: {plot}", soft_wrap=True)
 
 
 def _chirp(w: Any) -> list[tuple[str, str]]:

@@ -100,7 +100,7 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
     from raychan.run.messages import notes as result_notes
     from raychan.run.output_files import staging
     from raychan.run.simulate import simulate
-    from raychan.run.storage import CONTENTS, PICTURES, save_result
+    from raychan.run.storage import ARRAY_PICTURES, CONTENTS, PICTURES, save_result
 
     with staging(out, CONTENTS) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
@@ -118,7 +118,8 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
     took = sum(result.timings.values())
     screen.print(f"{len(result.paths.delay)} paths in {took:.1f} s; seed {result.seed}")
     if pictures:
-        screen.print("pictures: " + ", ".join(str(out / name) for name in PICTURES), soft_wrap=True)
+        drawn = [name for name in (*PICTURES, *ARRAY_PICTURES) if (out / name).exists()]
+        screen.print("pictures: " + ", ".join(str(out / name) for name in drawn), soft_wrap=True)
     screen.print(f"results: {out / 'result.nc'}, detections.csv and summary.json beside it", soft_wrap=True)
 
 
@@ -157,6 +158,7 @@ def _sequence(
 
 
 def _pictures(result: Result, stage: Path, tell) -> list[str]:  # type: ignore[no-untyped-def]
+    from raychan.report.direction_figures import direction_pictures
     from raychan.report.figures import profile_picture, rdmap_picture
     from raychan.view.scene import drawing_of, scene_picture
 
@@ -165,5 +167,6 @@ def _pictures(result: Result, stage: Path, tell) -> list[str]:  # type: ignore[n
     tell("pictures", 0.6)
     profile_picture(result, stage / "profile.png")
     rdmap_picture(result, stage / "rdmap.png")
+    direction_pictures(result, stage)
     tell("pictures", 1.0)
     return warnings

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 _COMPILING = "compiling"
 _LONG = 3.0  # s: compiling for longer prints a line where there is no progress bar
-_SOME = ("azimuth deg", "error dB", "folded: true m", "true m/s")  # columns shown only where a row has a value
+_SOME = ("azimuth deg", "elevation deg", "error dB", "folded: true m", "true m/s")
+# columns shown only where a row has a value
 _WIDE = 150  # columns of output to a file or pipe: no table line is cut
 
 
@@ -86,6 +87,7 @@ def _detections(result: Result, rows: Sequence[int], title: str) -> Table:
         "range rate m/s": [f"{d.rate[i]:+.2f}" for i in rows],
         "speed m/s": [f"{d.speed[i]:+.2f}" for i in rows],
         "azimuth deg": [_known(math.degrees(d.azimuth[i]), ".1f") for i in rows],
+        "elevation deg": [_known(math.degrees(d.elevation[i]), ".1f") for i in rows],
         "SNR dB": [f"{d.snr[i]:.1f}" for i in rows],
         "power dBm": [f"{dbm(d.power[i]):.1f}" for i in rows],
         "error dB": [_known(d.error_db[i], ".2f") for i in rows],

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,15 @@ class Training:
     """Map cells by which an offset that falls outside the range axis is moved outwards on the other side."""
     worth: float
     """Effective number of independent cells."""
+
+    def around(self, cells: Ints, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
+        """Return the rate and range indices (c, t) of the training cells around map cells (c, 2)."""
+        rates, ranges = shape
+        off = self.offsets[:, 1]
+        r = cells[:, 1:] + off
+        # Mirrored and moved outwards, beyond all cells that are used already.
+        r = np.where((r >= 0) & (r < ranges), r, cells[:, 1:] - off - np.sign(off) * self.reach) % ranges
+        return (cells[:, :1] + self.offsets[:, 0]) % rates, r
 
 
 def _offsets(count: tuple[int, int], guard: tuple[int, int], train: tuple[int, int]) -> tuple[Ints, list[int]]:
@@ -150,29 +160,47 @@ def least_snr_db(pfa: float, count: float, method: str, looks: int = 1) -> float
     return float(db(factor(pfa, count, method, looks) * bias(count, method, looks)))
 
 
+def quantiles_of(count: float, method: str, looks: int = 1) -> tuple[Floats, Floats]:
+    """Return quantiles and weights for averages over the training statistic of `count` sums of `looks` exponentials:
+    their mean (ca) or their ordered statistic (os)."""
+    if method == "os":
+        return _ordered(count, looks)
+    x, weights = _knots()
+    return np.asarray(gamma.ppf(x, looks * count) / count), weights
+
+
 def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Floats:
     """Return the mean or ordered statistic (c,) of the training cells around map cells (c, 2)."""
-    rates, ranges = power.shape
     out = np.empty(len(cells))
-    rank = max(1, round(RANK * len(ring.offsets))) - 1
-    for start in range(0, len(cells), max(1, _GATHER // len(ring.offsets))):
-        part = cells[start : start + max(1, _GATHER // len(ring.offsets))]
-        v = (part[:, :1] + ring.offsets[:, 0]) % rates
-        off = ring.offsets[:, 1]
-        r = part[:, 1:] + off
-        # Mirrored and moved outwards, beyond all cells that are used already.
-        r = np.where((r >= 0) & (r < ranges), r, part[:, 1:] - off - np.sign(off) * ring.reach) % ranges
-        values = power[v, r]
-        out[start : start + len(part)] = (
-            values.mean(axis=1) if method == "ca" else np.partition(values, rank, axis=1)[:, rank]
-        )
+    for at in batches(len(cells), len(ring.offsets)):
+        out[at] = statistic(power[ring.around(cells[at], power.shape)], method)
     return out
+
+
+def batches(count: int, size: int) -> list[slice]:
+    """Return slices of `count` rows of which each gathers `size` values, so many at a time as memory should hold."""
+    step = max(1, _GATHER // size)
+    return [slice(start, start + step) for start in range(0, count, step)]
+
+
+def statistic(values: Floats, method: str) -> Floats:
+    """Return the mean (ca) or the ordered statistic (os) of training cells (c, t)."""
+    rank = max(1, round(RANK * values.shape[1])) - 1
+    found: Floats = values.mean(axis=1) if method == "ca" else np.partition(values, rank, axis=1)[:, rank]
+    return found
 
 
 def _ordered(count: float, looks: int) -> tuple[Floats, Floats]:
     """Return quantiles and weights for averages over the ordered statistic of `count` sums of `looks` exponentials."""
+    x, weights = _knots()
+    rank = max(1.0, RANK * count)
+    return np.asarray(gamma.ppf(beta.ppf(x, rank, count - rank + 1.0), looks)), weights
+
+
+@cache
+def _knots() -> tuple[Floats, Floats]:
+    """Return probabilities and weights of a quadrature, dense where low probabilities arise; to find them takes longer
+    than a small map's detection."""
     knots, weights = np.polynomial.legendre.leggauss(200)
     x = 0.5 * (knots + 1.0)
-    rank = max(1.0, RANK * count)
-    quantiles = gamma.ppf(beta.ppf(x**_FLAT, rank, count - rank + 1.0), looks)
-    return np.asarray(quantiles), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))
+    return np.asarray(x**_FLAT), np.asarray(0.5 * weights * _FLAT * x ** (_FLAT - 1))

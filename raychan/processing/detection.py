@@ -1,27 +1,45 @@
 """Detections in a range-Doppler map: local maxima over the CFAR threshold that are no side lobes, with sub-bin
-interpolation."""
+interpolation, and the echoes that an array tells apart within them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
-from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, level, training
-from raychan.processing.doa import azimuth
-from raychan.radar.side_lobes import SideLobeEnvelope
+from raychan.processing.angles import Scan
+from raychan.processing.beams import BeamBank
+from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
+from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, training
+from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
+from raychan.processing.peaks import SideLobes, refine
+from raychan.radar.aperture import Aperture
 from raychan.radar.waveform import Waveform
 from raychan.records import Detections, RangeDoppler
 from raychan.units import C0, db, undb
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
-_MARGIN = 2.0  # side lobes of two equal echoes add in voltage: twice the sum of their powers
-_FLOOR = 1e-12  # of a peak: rounding errors of single precision and of the fast sum are below
-_SLACK = 0.25  # resolution cells by which side lobes of other echoes may shift a peak (not measured)
-_STEEP = 5.0  # Np of power: more than any window falls in half a resolution cell
 _TINY = 1e-300
+METHODS = ("bartlett", "capon", "music", "esprit")
+
+
+@dataclass(frozen=True)
+class Array:
+    """What an array does with its receivers. Raises: ValueError for words that are none of these."""
+
+    beams: str = "coherent"
+    """coherent: the CFAR sees the strongest of a bank of beams; mean: the mean power of the receivers."""
+    doa: str = "bartlett"
+    """How directions are found: bartlett, capon, music or esprit (see processing.doa)."""
+    beam_window: str = "rect"
+    """Taper of the detector's beams; directions are found without."""
+
+    def __post_init__(self) -> None:
+        for name, value, known in (("beams", self.beams, BEAMS), ("doa", self.doa, METHODS)):
+            if value not in known:
+                raise ValueError(f"{name} = {value!r}: must be one of {', '.join(known)}")
 
 
 def detect(
@@ -36,102 +54,91 @@ def detect(
     windows: tuple[str, str] = ("hann", "hann"),
     waveform: Waveform | None = None,
     elements: Floats | None = None,
+    array: Array | None = None,
 ) -> Detections:
     """Return the detections of a map: local maxima over CFAR threshold and minimum SNR that are no side lobes.
 
     SNR is the power at the sub-bin peak over the thermal noise per cell, or, where that is unknown (0), over the noise
-    estimated from the training cells. Speed is rate plus ego_speed. Peaks below the window's response to stronger
-    detections are dropped.
+    estimated from the training cells; of an echo with a direction, over the noise in its beam. Speed is rate plus
+    ego_speed. Peaks below the window's response to stronger detections are dropped.
     Args: method ca or os; guard [resolution cells], train [cells a side] and windows: all (rate, range), see
-    processing.cfar; waveform, for the range migration of movers and, with elements (a, 3) [m], for azimuths.
+    processing.cfar; waveform, for the range migration of movers and, with elements (a, 3) [m], for angles; array, how
+    these are used.
     Raises: ValueError on bad arguments.
     """
     grid = Grid.of(map)
     ring = training(grid, guard, train, windows)
-    looks = len(map.spectrum)
-    threshold = factor(pfa, ring.worth, method, looks)
-    weakest = float(undb(min_snr_db)) * map.noise
+    array, aperture = array or Array(), _aperture(map, waveform, elements)
+    bank = BeamBank(aperture, array.beam_window) if aperture else None
+    seen: DetectorMap = StrongestBeam(map, bank) if bank and array.beams == "coherent" else MeanPower(map)
+    threshold = factor(seen.single(pfa), ring.worth, method, seen.looks)
 
-    cells = _maxima(map.power, 0.5 * weakest)
-    local = level(map.power, cells, ring, method)
-    over = map.power[tuple(cells.T)] > threshold * local
+    cells = seen.maxima(seen.dip * float(undb(min_snr_db)) * seen.noise)
+    local = seen.level(cells, ring, method)
+    over = seen.power[tuple(cells.T)] > threshold * local
     cells, local = cells[over], local[over]
-    shift, power = _refine(map.power, cells)
-    noise = np.full(len(cells), map.noise) if map.noise > 0.0 else local / bias(ring.worth, method, looks)
-    snr = db(power / np.maximum(noise, _TINY))
-    strong = np.flatnonzero(snr >= min_snr_db)
+    shift, power = refine(seen.power, cells)
+    seen_noise = local / bias(ring.worth, method, seen.looks)
+    noise = np.full(len(cells), seen.noise) if seen.noise > 0.0 else seen_noise
+    # The SNR of an echo with a direction is known when that is found; here it may be the dip lower.
+    strong = np.flatnonzero(db(power / np.maximum(noise, _TINY)) >= min_snr_db + (db(seen.dip) if aperture else 0.0))
     strong = strong[np.argsort(-power[strong], kind="stable")]
-    cells, power, snr, place = cells[strong], power[strong], snr[strong], (cells + shift)[strong]
+    cells, shift = cells[strong], shift[strong]
+    power, noise, local = power[strong], noise[strong], local[strong]
 
-    steps = map.rate_resolution / grid.pad[0], map.range_resolution / grid.pad[1]
-    rate = _within(map.rate[0] + place[:, 0] * steps[0], map.unambiguous_rate)
+    lobes = SideLobes(grid, windows)
     duration = waveform.frame_duration if waveform else 0.0
-    kept = _own(place / np.array(grid.pad), power, np.abs(rate) * duration / map.range_resolution, grid, windows)
-    cells, power, snr, place, rate = cells[kept], power[kept], snr[kept], place[kept], rate[kept]
-    angle = np.full(len(cells), np.nan)
-    if waveform is not None and elements is not None:
-        angle = azimuth(map.spectrum[:, cells[:, 0], cells[:, 1]].T, elements, C0 / waveform.middle)
-    return Detections(
-        range=map.range[0] + place[:, 1] * steps[1],
-        rate=rate,
-        speed=rate + ego_speed,
-        azimuth=angle,
-        snr=snr,
-        power=power,
-        cell=cells.astype(np.int32),
-    )
+    smear = np.abs(_rate(map, grid, cells + shift)) * duration / map.range_resolution
+    if aperture is None or bank is None:
+        kept = lobes.own((cells + shift) / np.array(grid.pad), power, smear)
+        return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
+    # A beam of a cell is noise below the threshold of the bank; the mean power of several looks has another one.
+    beam, level = threshold, local
+    if not isinstance(seen, StrongestBeam):
+        beam, level = factor(bank.single(pfa), ring.worth, method), seen_noise[strong] * bank.noise_gain
+    towards = bank.directions[bank.towards(map.spectrum, cells)]
+    peaks = Peaks(cells, shift, power, noise, beam * level, smear, towards)
+    scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
+    echoes = Splitter(map, grid, lobes, scan, seen.receiver_noise, coherent).split(peaks)
+    loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
+    return _reported(map, grid, echoes.take(loud), ego_speed, aperture)
 
 
-def _within(rate: Floats, limit: float) -> Floats:
-    """Return the unambiguous aliases of rates, from -limit to limit [m/s]."""
+def _aperture(map: RangeDoppler, waveform: Waveform | None, elements: Floats | None) -> Aperture | None:
+    """Return the aperture of the receivers; None where it is not known or measures no angle."""
+    if waveform is None or elements is None:
+        return None
+    aperture = Aperture(elements, C0 / waveform.middle)
+    if len(aperture.elements) != len(map.spectrum):
+        raise ValueError(f"elements: {len(aperture.elements)} given for a map of {len(map.spectrum)} receivers")
+    return aperture if any(aperture.scans) else None
+
+
+def _rate(map: RangeDoppler, grid: Grid, place: Floats) -> Floats:
+    """Return the unambiguous rates [m/s] at places (n, 2) in map cells."""
+    rate: Floats = map.rate[0] + place[:, 0] * (map.rate_resolution / grid.pad[0])
+    limit = map.unambiguous_rate
     return np.where(np.abs(rate) <= limit, rate, (rate + limit) % (2.0 * limit) - limit)
 
 
-def _maxima(power: Floats, least: float) -> Ints:
-    """Return the local maxima (c, 2) of a map; both axes wrap as the transforms do."""
-    top = (power >= maximum_filter(power, size=3, mode="wrap")) & (power > least)
-    return np.argwhere(top)
-
-
-def _refine(power: Floats, cells: Ints) -> tuple[Floats, Floats]:
-    """Return the offsets (c, 2) in cells and the power (c,) of the peaks, by parabolas in dB along both axes."""
-    shift = np.zeros(cells.shape)
-    gain = np.zeros(len(cells))
-    top = np.log(np.maximum(power[tuple(cells.T)], _TINY))
-    for axis, size in enumerate(power.shape):
-        # A null beside a peak (unpadded, or without noise) must not distort the parabola.
-        below, above = (np.maximum(_beside(power, cells, axis, step), top - _STEEP) for step in (-1, 1))
-        bend = below - 2.0 * top + above
-        inside = (bend < 0.0) & (size > 2)
-        if axis == 1:
-            inside &= (cells[:, 1] > 0) & (cells[:, 1] < size - 1)
-        offset = np.divide(0.5 * (below - above), bend, out=np.zeros(len(cells)), where=inside)
-        shift[:, axis] = np.clip(offset, -0.5, 0.5)
-        gain += 0.25 * (above - below) * shift[:, axis]
-    return shift, np.exp(top + gain)
-
-
-def _beside(power: Floats, cells: Ints, axis: int, step: int) -> Floats:
-    at = cells.copy()
-    at[:, axis] = (at[:, axis] + step) % power.shape[axis]
-    return np.asarray(np.log(np.maximum(power[tuple(at.T)], _TINY)))
-
-
-def _own(place: Floats, power: Floats, smear: Floats, grid: Grid, windows: tuple[str, str]) -> NDArray[np.bool_]:
-    """Return which peaks (n,), strongest first, are not explained by side lobes of stronger ones.
-
-    Args: place (n, 2) and smear (n,) in resolution cells; an echo that migrates over `smear` range cells spreads over
-    as many rate cells."""
-    envelopes = [SideLobeEnvelope(name, n) for name, n in zip(windows, grid.count, strict=True)]
-    lobes = np.zeros(len(power))
-    kept = np.zeros(len(power), bool)
-    for i in range(len(power)):
-        kept[i] = power[i] > _MARGIN * lobes[i]
-        if kept[i]:
-            response = power[i]
-            for axis, envelope in enumerate(envelopes):
-                away = np.abs(place[i:, axis] - place[i, axis])
-                away = np.minimum(away, grid.count[axis] - away)
-                response = response * envelope(np.maximum(away - 0.5 * smear[i] - _SLACK, 0.0))
-            lobes[i:] += np.maximum(response, _FLOOR * power[i])
-    return kept
+def _reported(
+    map: RangeDoppler, grid: Grid, found: Found, ego_speed: float, aperture: Aperture | None = None
+) -> Detections:
+    """Return what is found as detections; with an aperture, of echoes with their directions."""
+    rate = _rate(map, grid, found.place)
+    angles = np.full((2, len(rate)), np.nan)
+    ambiguous = np.zeros(len(rate), bool)
+    if aperture is not None and isinstance(found, Echoes):
+        angles = np.array(aperture.angles(found.direction))
+        ambiguous = aperture.ambiguous(found.direction)
+    return Detections(
+        range=map.range[0] + found.place[:, 1] * (map.range_resolution / grid.pad[1]),
+        rate=rate,
+        speed=rate + ego_speed,
+        azimuth=angles[0],
+        elevation=angles[1],
+        ambiguous=ambiguous,
+        snr=db(found.power / np.maximum(found.noise, _TINY)),
+        power=found.power,
+        cell=found.cells.astype(np.int32),
+    )

@@ -74,6 +74,24 @@ class IsotropicAntenna:
 
 
 @dataclass(frozen=True)
+class Repolarized:
+    """Another antenna's pattern with another polarisation: V or H alone, or "cross", V and H exchanged."""
+
+    antenna: Antenna
+    polarization: str
+
+    def field(self, direction: Floats) -> Complexes:
+        """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
+        given = self.antenna.field(direction)
+        if self.polarization == "cross":
+            return np.asarray(given[:, ::-1])
+        out = np.zeros_like(given)
+        # One of both is zero where the antenna has one polarisation.
+        out[:, POLARIZATIONS.index(self.polarization)] = given.sum(axis=1)
+        return out
+
+
+@dataclass(frozen=True)
 class CosineAntenna:
     """A patch: gain falls as cos^p of the angle off boresight, p by the half-power widths; nothing behind.
 

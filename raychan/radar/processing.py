@@ -31,9 +31,15 @@ class Processing:
     """Guard cells to each side of the cell under test; None: the detector's choice."""
     train: tuple[int, int] | None = None
     """Training cells to each side beyond the guard; None: the detector's choice."""
+    beams: str = "coherent"
+    """Of several receivers: 'coherent' detects in the strongest of a bank of beams, 'mean' in their mean power."""
+    doa: str = "bartlett"
+    """Directions of echoes: 'bartlett', 'capon', 'music' or 'esprit'."""
+    beam_window: str = "rect"
+    """Taper of the detector's beams over a uniform line or rectangle of receivers."""
 
     def __post_init__(self) -> None:
-        for name in ("range_window", "rate_window"):
+        for name in ("range_window", "rate_window", "beam_window"):
             value = getattr(self, name)
             if value not in ("rect", "hann"):  # others need scipy to be checked
                 from raychan.radar.windows import window
@@ -41,6 +47,10 @@ class Processing:
                 window(value, 2)
         if self.cfar not in ("ca", "os"):
             raise ValueError(f"Processing.cfar = {self.cfar!r}: must be 'ca' or 'os'")
+        if self.beams not in ("coherent", "mean"):
+            raise ValueError(f"Processing.beams = {self.beams!r}: must be 'coherent' or 'mean'")
+        if self.doa not in ("bartlett", "capon", "music", "esprit"):
+            raise ValueError(f"Processing.doa = {self.doa!r}: must be 'bartlett', 'capon', 'music' or 'esprit'")
         if not 0.0 < self.pfa < 1.0:
             raise ValueError(f"Processing.pfa = {self.pfa!r}: must lie between 0 and 1")
         if not math.isfinite(self.min_snr_db):

@@ -10,29 +10,43 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from raychan.poses import rotation
-from raychan.radar.antenna import Antenna, IsotropicAntenna
+from raychan.radar.antenna import Antenna, IsotropicAntenna, Repolarized
+from raychan.radar.array import (
+    Transmission,
+    check_multiplexing,
+    check_receiver_elsewhere,
+    numbers,
+    offsets,
+    virtual_elements,
+)
+from raychan.radar.impairments import Impairments
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.processing import Processing
 from raychan.radar.spherical_vectors import turned, vectors
-from raychan.radar.waveform import Waveform
+from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.units import K_BOLTZMANN, T0, dbm, undb, watt
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _AHEAD, _POWER, _PROCESSING = IsotropicAntenna(front=True), float(watt(12.0)), Processing()
-_NUMBERS = ("yaw_deg", "pitch_deg", "roll_deg", "noise_figure_db")
-_VECTORS = {"position": "(3,)", "velocity": "(3,)", "elements": "(a, 3)"}
+_IDEAL = Impairments()
+_NUMBERS = ("yaw_deg", "pitch_deg", "roll_deg", "noise_figure_db", "noise_temperature_k")
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class Radar:
-    """A monostatic radar: one transmitter, one or several receivers of one pattern. Defaults as in a scene file.
+    """A radar: transmitters of one pattern, receivers of one pattern. Defaults as in a scene file.
 
     Args: waveform; position (3,) [m] of the phase centre in the world; antenna of transmitter and receiver, or
-    tx_antenna and rx_antenna of their own; power [W] into the antenna; noise_figure_db [dB]; noise: whether samples get
-    noise; yaw_deg, pitch_deg, roll_deg [deg] of the boresight; velocity (3,) [m/s], world axes; elements (a, 3) [m],
-    the receivers' phase centres in the antenna's frame; processing of the receiver.
+    tx_antenna and rx_antenna of their own; power [W] into the antenna of each transmitter; noise_figure_db [dB];
+    noise_temperature_k [K] of the antenna; noise: whether samples get noise; yaw_deg, pitch_deg, roll_deg [deg] of the
+    boresight; velocity (3,) [m/s], world axes; elements (a, 3) and tx_elements (t, 3) [m], phase centres of receivers
+    and transmitters in the antenna's frame; multiplexing of the transmitters: "tdm", chirp m is sent by transmitter m
+    modulo t, or "ddm", transmitter i advances its phase by i / ddm_slots of a turn from chirp to chirp (default t + 1:
+    the empty slot tells folds); rx_polarization V, H or "both" of the receivers; rx_position (3,) [m] of receivers
+    elsewhere, with the radar's clock, their rx_velocity [m/s] and rx_yaw_deg [deg] (default the radar's); processing
+    and impairments of the receiver.
     Raises: ValueError for values that cannot be.
     """
 
@@ -45,13 +59,24 @@ class Radar:
     """None: `antenna`."""
     power: float
     noise_figure_db: float
+    noise_temperature_k: float
     noise: bool
     yaw_deg: float
     pitch_deg: float
     roll_deg: float
     velocity: Floats
     elements: Floats
+    tx_elements: Floats
+    multiplexing: str
+    ddm_slots: int | None
+    rx_polarization: str | None
+    """V, H, or both: co-polarised receivers, then as many cross-polarised ones; None: that of the antenna."""
+    rx_position: Floats | None
+    """Receivers elsewhere than the transmitter; None: a monostatic radar."""
+    rx_velocity: Floats | None
+    rx_yaw_deg: float | None
     processing: Processing
+    impairments: Impairments
 
     def __init__(
         self,
@@ -63,13 +88,22 @@ class Radar:
         rx_antenna: Antenna | None = None,
         power: float = _POWER,
         noise_figure_db: float = 15.0,
+        noise_temperature_k: float = T0,
         noise: bool = True,
         yaw_deg: float = 0.0,
         pitch_deg: float = 0.0,
         roll_deg: float = 0.0,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         elements: ArrayLike = ((0.0, 0.0, 0.0),),
+        tx_elements: ArrayLike = ((0.0, 0.0, 0.0),),
+        multiplexing: str = "none",
+        ddm_slots: int | None = None,
+        rx_polarization: str | None = None,
+        rx_position: ArrayLike | None = None,
+        rx_velocity: ArrayLike | None = None,
+        rx_yaw_deg: float | None = None,
         processing: Processing = _PROCESSING,
+        impairments: Impairments = _IDEAL,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
         if not (power > 0.0 and np.isfinite(power)):
@@ -77,14 +111,23 @@ class Radar:
         for name in _NUMBERS:
             if not np.isfinite(given[name]):
                 raise ValueError(f"Radar.{name} = {given[name]!r}: must be finite")
-        for name, wanted in _VECTORS.items():
-            value = np.array(given[name], np.float64)
-            if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
-                raise ValueError(f"Radar.{name}: numbers of shape {wanted} wanted, {value.tolist()} given")
-            if not np.isfinite(value).all():
-                raise ValueError(f"Radar.{name}: finite numbers wanted, {value.tolist()} given")
-            value.flags.writeable = False
-            given[name] = value
+        if noise_temperature_k < 0.0:
+            raise ValueError(f"Radar.noise_temperature_k = {noise_temperature_k!r}: must be 0 or more")
+        if not (impairments.iq_balanced or waveform.complex_sampling):
+            raise ValueError("Radar.impairments: I/Q imbalance needs I/Q sampling, and the waveform has real sampling")
+        if impairments.chirp_error is not None and isinstance(waveform, OwnWaveform):
+            raise ValueError("Radar.impairments: a chirp error needs linear ramps, and the waveform is one of its own")
+        check_receiver_elsewhere(rx_position, rx_velocity, rx_yaw_deg, len(np.atleast_2d(tx_elements)))
+        for name in ("position", "velocity", "rx_position", "rx_velocity"):
+            if given[name] is not None:
+                given[name] = numbers(f"Radar.{name}", given[name], "(3,)")
+        for name in ("elements", "tx_elements"):
+            given[name] = offsets(f"Radar.{name}", given[name])
+        check_multiplexing(multiplexing, len(given["tx_elements"]), ddm_slots)
+        if rx_polarization not in (None, "V", "H", "both"):
+            raise ValueError(f"Radar.rx_polarization = {rx_polarization!r}: must be V, H or both")
+        if waveform.stagger and len(given["tx_elements"]) > 1:
+            raise ValueError("Radar.tx_elements: one transmitter wanted where the repetition is staggered")
         for name, value in given.items():
             object.__setattr__(self, name, value)
 
@@ -110,9 +153,27 @@ class Radar:
 
     def at(self, time: float) -> Radar:
         """Return the radar where its velocity has brought it at a time [s]."""
-        moved = replace(self, position=self.position + time * self.velocity)
+        there = None if self.rx_position is None else self.rx_position + time * self.rx_motion
+        moved = replace(self, position=self.position + time * self.velocity, rx_position=there)
         moved.__dict__["kept"] = self.kept
         return moved
+
+    @property
+    def rx_place(self) -> Floats:
+        """Position (3,) [m] of the receivers' phase centre: the radar's, or that of receivers elsewhere."""
+        return self.position if self.rx_position is None else self.rx_position
+
+    @property
+    def rx_motion(self) -> Floats:
+        """Velocity (3,) [m/s] of the receivers, world axes."""
+        return self.velocity if self.rx_velocity is None else self.rx_velocity
+
+    @cached_property
+    def rx_axes(self) -> Floats:
+        """Matrix (3, 3) from the receiving antenna's frame to the world's."""
+        if self.rx_yaw_deg is None:
+            return self.axes
+        return rotation(*map(float, np.radians([self.rx_yaw_deg, self.pitch_deg, self.roll_deg])))
 
     @property
     def boresight(self) -> Floats:
@@ -122,7 +183,42 @@ class Radar:
     @property
     def elements_world(self) -> Floats:
         """Receiver offsets (a, 3) from the position, world axes [m]."""
-        return np.array(self.elements @ self.axes.T)
+        return np.array(self.elements @ self.rx_axes.T)
+
+    @property
+    def virtual_elements(self) -> Floats:
+        """Elements (t * a, 3) [m] of the virtual array in the antenna's frame: row i * a + j is transmitter i with
+        receiver j, at the sum of their positions."""
+        return virtual_elements(self.tx_elements, self.elements)
+
+    @property
+    def receivers(self) -> int:
+        """Number of receivers whose samples are recorded: the elements, twice where both polarisations are."""
+        return len(self.elements) * (2 if self.rx_polarization == "both" else 1)
+
+    @property
+    def slots(self) -> int:
+        """By what multiplexing or stagger divides the rates that do not fold: transmitters, slots, staggered times."""
+        if self.waveform.stagger:
+            return len(self.waveform.stagger)
+        count = len(self.tx_elements)
+        return self.ddm_slots or count + 1 if self.multiplexing == "ddm" else count
+
+    @property
+    def transmissions(self) -> tuple[Transmission, ...]:
+        """What each transmitter sends, as ramps at equal distances each."""
+        places, slots = np.array(self.tx_elements @ self.axes.T), self.slots
+        if self.waveform.stagger:
+            return tuple(Transmission(places[0], first=k, step=slots) for k in range(slots))
+        if self.multiplexing == "tdm":
+            return tuple(Transmission(x, first=i, step=slots) for i, x in enumerate(places))
+        return tuple(Transmission(x, turn=i / slots) for i, x in enumerate(places))
+
+    @property
+    def channel_waveform(self) -> Waveform:
+        """The waveform of one virtual channel: fewer chirps, farther apart, over the same frame; of one transmitter the
+        waveform itself. Raises: ValueError if the chirps are no multiple of the slots."""
+        return self.waveform.every(self.slots)
 
     @property
     def ego_speed(self) -> float:
@@ -132,16 +228,25 @@ class Radar:
 
     @property
     def noise_power(self) -> float:
-        """Thermal noise power per complex sample, k T0 F f_s [W], whether or not noise is on."""
-        return float(K_BOLTZMANN * T0 * self.waveform.sample_rate * undb(self.noise_figure_db))
+        """Thermal noise power per complex sample, k (T_a + T0 (F - 1)) f_s [W], whether or not noise is on."""
+        rate = self.waveform.sample_rate
+        own = K_BOLTZMANN * T0 * rate * undb(self.noise_figure_db)
+        # Apart, so that an antenna at T0 gives k T0 F f_s to the last digit.
+        return float(own + K_BOLTZMANN * (self.noise_temperature_k - T0) * rate)
 
     def tx_field(self, direction_world: Floats) -> Complexes:
         """Return sqrt(gain) times polarisation (n, 3), world axes, in unit directions (n, 3) away from the radar."""
-        return self._vector(self.tx, direction_world)
+        return self._vector(self.tx, direction_world, self.axes)
 
     def rx_field(self, direction_world: Floats) -> Complexes:
         """Return sqrt(gain) times polarisation (n, 3), world axes, looking in unit directions (n, 3)."""
-        return self._vector(self.rx, direction_world)
+        if self.rx_polarization in (None, "both"):
+            return self._vector(self.rx, direction_world, self.rx_axes)
+        return self._vector(Repolarized(self.rx, str(self.rx_polarization)), direction_world, self.rx_axes)
+
+    def cross_field(self, direction_world: Floats) -> Complexes:
+        """Return the same of the cross-polarised receivers: the same pattern with V and H exchanged."""
+        return self._vector(Repolarized(self.rx, "cross"), direction_world, self.rx_axes)
 
     def link_budget(self, sensitivity_dbm: float | None = None) -> dict[str, float]:
         """Return the sums of the link at boresight, by name with unit.
@@ -166,7 +271,7 @@ class Radar:
             "max_path_loss_db": power + tx - sensitivity,
         }
 
-    def _vector(self, antenna: Antenna, direction_world: Floats) -> Complexes:
-        local = turned(np.asarray(direction_world, float), self.axes)
-        found: Complexes = vectors(antenna.field(local), local, self.axes)
+    def _vector(self, antenna: Antenna, direction_world: Floats, axes: Floats) -> Complexes:
+        local = turned(np.asarray(direction_world, float), axes)
+        found: Complexes = vectors(antenna.field(local), local, axes)
         return found

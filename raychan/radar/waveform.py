@@ -1,4 +1,4 @@
-"""Waveform: a frame of equal linear frequency ramps, and what it can tell apart.
+"""Waveform: a frame of equal linear frequency ramps, at equal or staggered distances, and what it can tell apart.
 
 The dechirped sample of a path of delay tau at time t after the start of ramp m is, with propagation exp(-j 2 pi f tau),
 
@@ -10,9 +10,35 @@ where a is the path's amplitude at the start of the frame, which already holds e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complexfloating[Any, Any]]
+
+
+@runtime_checkable
+class OwnWaveform(Protocol):
+    """A waveform of one's own: a subclass of `Waveform` that says what is received and how it is compressed in range.
+
+    The inherited figures say what it can tell apart: carrier, bandwidth (that of the range cell c/2B), chirp_duration
+    (of one repetition's samples), repetition, n_chirps (repetitions), n_samples.
+    """
+
+    def received(self, amplitude: Complexes, delay: Floats, delay_rate: Floats) -> Complexes:
+        """Return samples (n_chirps, n_samples) of echoes (n,): amplitude and delay [s] at the start of the frame,
+        delay_rate the change of the delay per time; the amplitude holds the phase of the carrier there."""
+        ...
+
+    def compressed(self, samples: Complexes) -> Complexes:
+        """Return the range profile (..., n_chirps, n_samples) of samples (..., n_chirps, n_samples), a range cell each
+        from range 0 on, scaled so that a lone echo reads its amplitude."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -38,19 +64,66 @@ class Waveform:
     n_samples: int = 256
     complex_sampling: bool = True
     """I/Q sampling; else real."""
+    stagger: tuple[float, ...] = ()
+    """Times [s] from ramp to ramp in turn, in place of `repetition`, which becomes their mean."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "stagger", tuple(map(float, self.stagger)))
+        if self.stagger:
+            self._check_stagger()
+            object.__setattr__(self, "repetition", sum(self.stagger) / len(self.stagger))
         if self.repetition is None:
             object.__setattr__(self, "repetition", self.chirp_duration)
         for f in fields(self):
             value = getattr(self, f.name)
-            if not (f.name == "complex_sampling" or (math.isfinite(value) and value > 0)):
+            if not (f.name in ("complex_sampling", "stagger") or (math.isfinite(value) and value > 0)):
                 raise ValueError(f"Waveform.{f.name} = {value!r}: must be positive and finite")
         for name in ("n_chirps", "n_samples"):
             if int(getattr(self, name)) != getattr(self, name):
                 raise ValueError(f"Waveform.{name} = {getattr(self, name)!r}: must be a whole number")
         if self.repetition < self.chirp_duration * (1.0 - 1e-9):
             raise ValueError(f"Waveform.repetition = {self.repetition:g} s: shorter than the chirp")
+
+    def _check_stagger(self) -> None:
+        least = self.chirp_duration * (1.0 - 1e-9)
+        if any(not (math.isfinite(t) and t >= least) for t in self.stagger):
+            raise ValueError(
+                f"Waveform.stagger = {self.stagger!r}: each at least the chirp's {self.chirp_duration:g} s"
+            )
+        if self.n_chirps % len(self.stagger):
+            raise ValueError(
+                f"Waveform.n_chirps = {self.n_chirps}: a multiple of the {len(self.stagger)} staggered times"
+            )
+        mean = sum(self.stagger) / len(self.stagger)
+        if self.repetition is not None and abs(self.repetition - mean) > 1e-9 * mean:
+            raise ValueError("Waveform: either repetition or stagger")
+
+    def start_of(self, chirp: int) -> float:
+        """Return the time [s] from the start of the frame to that of a ramp."""
+        if not self.stagger:
+            return chirp * self.repetition
+        rounds, rest = divmod(chirp, len(self.stagger))
+        return rounds * sum(self.stagger) + sum(self.stagger[:rest])
+
+    @property
+    def fold_count(self) -> int:
+        """How many times farther than those of every K-th ramp rates are told apart by K staggered times: their sum
+        over their greatest common divisor (to the nanosecond), 64 at most; 1 without stagger."""
+        if not self.stagger:
+            return 1
+        steps = [round(1e9 * t) for t in self.stagger]
+        return min(sum(steps) // math.gcd(*steps), 64)
+
+    def every(self, step: int) -> Waveform:
+        """Return the waveform of every `step`-th ramp. Raises: ValueError if the ramps are no multiple of it."""
+        if step == 1:
+            return self
+        if self.n_chirps % step:
+            raise ValueError(
+                f"{self.n_chirps} chirps cannot be shared among {step} transmitters or Doppler slots: "
+                f"a multiple of {step} is wanted"
+            )
+        return replace(self, n_chirps=self.n_chirps // step, repetition=step * self.repetition, stagger=())
 
     @property
     def slope(self) -> float:

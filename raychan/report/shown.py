@@ -6,15 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.records import Profile, RangeDoppler
 from raychan.report.canvas import show_figure, style
+from raychan.report.direction_figures import draw_range_azimuth
 from raychan.report.figures import levels, profile_picture, rdmap_picture
+from raychan.report.spectrogram_figure import draw_spectrogram
 from raychan.run.result import Result
+from raychan.run.spectrogram import Spectrogram
 from raychan.units import dbm, watt
 
 
 def draw(thing: Any, axes: Any = None) -> Any:
-    """Draw a Result, a RangeDoppler or a Profile and return the axes.
+    """Draw a Result, a RangeDoppler, a RangeAzimuth, a Profile or a Spectrogram and return the axes.
 
     Args: axes to draw into; of a Result two, for map and profile; None makes a figure of pyplot.
     """
@@ -29,6 +33,10 @@ def draw(thing: Any, axes: Any = None) -> Any:
             axes = show_figure(8.2, 4.6).add_subplot()
         if isinstance(thing, RangeDoppler):
             _map(thing, axes)
+        elif isinstance(thing, Spectrogram):
+            draw_spectrogram(thing, axes)
+        elif isinstance(thing, RangeAzimuth):
+            draw_range_azimuth(thing, axes)
         elif isinstance(thing, Profile):
             axes.plot(thing.range, dbm(np.maximum(thing.power, watt(-300.0))), lw=1.1, color="#225588")
             axes.set(xlabel="range [m]", ylabel="received power [dBm]", title="Power-delay profile")

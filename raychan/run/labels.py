@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,6 +46,7 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
     targets: list[int] = []
     known: dict[tuple[str, ...], int] = {}
     trajectories = paths.trajectories
+    backdrop = set(map(whole, background))
     first, index = _alike(paths)
     for row in first:
         met = [
@@ -54,7 +56,7 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
         ]
         names.append(tuple(_name(paths, b, p, k) for b, p, k in met))
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
-        left = [b for b in bodies[-1] if b not in background]
+        left = [b for b in map(whole, bodies[-1]) if b not in backdrop]
         link = tuple(b for i, b in enumerate(left) if i == 0 or b != left[i - 1])
         # A chain and its reverse have equal gains, by reciprocity.
         targets.append(known.setdefault(min(link, link[::-1]), len(known)))
@@ -150,19 +152,36 @@ def waves_in(
 
 
 def provenance(
-    paths: Paths, rdmap: RangeDoppler, detections: Detections, receiver: Receiver, error: Floats
+    paths: Paths,
+    rdmap: RangeDoppler,
+    detections: Detections,
+    receiver: Receiver,
+    error: Floats,
+    beam: Callable[[int], NDArray[np.complexfloating[Any, Any]]] | None = None,
 ) -> tuple[Explanation, ...]:
-    """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate."""
+    """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate.
+
+    Args: beam, what the beam towards a detection (row) passes of each path (n,) as a factor of its wave: of detections
+    that an array tells apart in one cell, each is explained by the paths in its own beam.
+    """
     known, response = chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
     at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
     sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.range_rate, at)
+    _, which, sharing = np.unique(detections.cell, axis=0, return_inverse=True, return_counts=True)
     found = []
     for i in range(len(at)):
-        shown = Shown(*map(float, (at[i, 0], at[i, 1], detections.range[i], detections.rate[i])))
-        cell = _Cell(shown, float(powers[i]), float(errors[i]))
-        why = _explained(paths, known, response, tuple(x[i] for x in sums), cell, receiver)
+        # What the receiver took off the range of a folded rate is put back: cells stand where the beat does.
+        folds = np.rint((detections.rate[i] - at[i, 1]) / response.periods[1])
+        stands = detections.range[i] + folds * response.periods[1] * response.drift
+        shown = Shown(*map(float, (at[i, 0], at[i, 1], stands, detections.rate[i])))
+        cell, own = _Cell(shown, float(powers[i]), float(errors[i])), tuple(x[i] for x in sums)
+        if beam is not None and sharing[which.ravel()[i]] > 1:
+            wave = paths.amplitude * beam(i)
+            one = response.in_cells(known.part, len(known.names), wave, paths.delay, paths.range_rate, at[i : i + 1])
+            cell, own = replace(cell, power=float(detections.power[i])), tuple(x[0] for x in one)
+        why = _explained(paths, known, response, own, cell, receiver)
         found.append(replace(why, speed=float(detections.speed[i]), power=float(detections.power[i])))
     return tuple(found)
 
@@ -206,20 +225,25 @@ def _name(paths: Paths, body: int, part: int, kind: int) -> str:
     return f"({name})" if kind == TRANSMIT else name
 
 
+def whole(name: str) -> str:
+    """Return the name of the body that a limb, such as 'walker.foot_left', belongs to: limbs of one are one target."""
+    return name.partition(".")[0]
+
+
 def label_of(paths: Paths, row: int, bodies: tuple[str, ...], receiver: Receiver) -> str:
     """Return the label of a cell whose strongest path is `row`, over `bodies`."""
-    targets = set(bodies) - set(receiver.background)
+    met = set(map(whole, bodies))
+    targets = met - set(map(whole, receiver.background))
     if not targets:
         return CLUTTER
-    if len(set(bodies)) == 1:
+    if len(met) == 1:
         return DIRECT
     if len(targets) > 1:
         return MULTIPATH
     # Over the ground and one target: an echo of the target, or a ghost behind it if the detour is long.
     trajectory = paths.trajectory[row]
-    index = [paths.body_names[b] in targets for b in paths.trajectories.body[trajectory]]
-    straight = np.linalg.norm(
-        paths.trajectories.vertices[trajectory][index] - 0.5 * (paths.tx + paths.rx), axis=1
-    ).min()
+    index = [whole(paths.body_names[b]) in targets for b in paths.trajectories.body[trajectory]]
+    spots = paths.trajectories.vertices[trajectory][index]
+    straight = sum(0.5 * np.linalg.norm(spots - end, axis=1) for end in (paths.tx, paths.rx)).min()
     detour = 0.5 * paths.length[row] - straight
     return DIRECT if detour < max(receiver.waveform.range_resolution, _DEPTH) else MULTIPATH

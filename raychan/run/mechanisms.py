@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import take
-from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, TRANSMIT, Paths
 from raychan.run.ledger import NOTHING, ModelChoice
+from raychan.run.receiver import quiet_map
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 
@@ -34,9 +34,13 @@ def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> 
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
     if not rows.any():
         return 0.0
-    cube = synthesize(take(paths, rows), dataclasses.replace(radar, noise=False), tolerance=_LEVEL)
-    rdmap = range_doppler(cube, radar.waveform, settings.range_window, settings.rate_window, settings.pad)
-    return float(rdmap.power.max())
+    # One pair of elements is as loud as the mean over all.
+    one = dataclasses.replace(
+        radar, noise=False, elements=radar.elements[:1], tx_elements=radar.tx_elements[:1], multiplexing="none",
+        ddm_slots=None, rx_polarization=None if radar.rx_polarization == "both" else radar.rx_polarization,
+    )  # fmt: skip
+    cube = synthesize(take(paths, rows), one, tolerance=_LEVEL)
+    return float(quiet_map(cube.samples, one, settings).max())
 
 
 def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db: float) -> ModelChoice:

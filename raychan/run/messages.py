@@ -51,6 +51,12 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
             f"{rdmap.unambiguous_range:.4g} m or {rdmap.unambiguous_rate:.4g} m/s an echo shows elsewhere; "
             f"number {first + 1} is at {true}, shown at {shown}"
         )
+    if found.ambiguous.any():
+        said.append(
+            f"{_of(found.ambiguous)} {_verb(found.ambiguous)} ambiguous in direction ({_numbers(found.ambiguous)}): "
+            "elements stand more than half a wavelength apart, so a grating lobe shows another direction alike; the "
+            "one nearest boresight is given"
+        )
     return said
 
 

@@ -8,7 +8,8 @@ than the tolerance, another keyframe is traced in the middle; their difference i
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -16,13 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join
-from raychan.channel.slow_time import Poses, extrapolated, strengths
+from raychan.channel.slow_time import Poses, strengths
 from raychan.channel.transfer import departures
 from raychan.columns import take
+from raychan.radar.array import Transmission, Wavefronts, wavefronts
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
+from raychan.run.between_chirps import carried_between
 from raychan.run.segments import Keyframe, Retraced, Segment, Traced, echoes, joined, reach
 from raychan.run.solver import Batch, solve_into
+from raychan.run.turning import carried_on, check_radar
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import ramp_sums
 from raychan.tracing.settings import PruneRule
@@ -39,41 +43,9 @@ _CHIRPS = 48  # least chirps per keyframe: bounds the number of tracings
 _AT_ONCE = 64  # chirps whose routes are held in memory at once
 _FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
 _HELPS = 0.5  # of the error power before: a keyframe that leaves more is the last one in its segment
-_NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
-
-
-def turning(scene: Scene) -> NDArray[np.bool_]:
-    """Return which bodies (b,) turn."""
-    return np.array([b.motion.spin().any() for b in scene.bodies], bool)
-
-
-def moving(scene: Scene) -> NDArray[np.bool_]:
-    """Return which bodies (b,) turn or move relative to the radar."""
-    own = np.asarray(scene.radar.velocity, float)
-    return turning(scene) | np.array([not np.array_equal(b.motion.velocity, own) for b in scene.bodies], bool)
-
-
-def bend(scene: Scene, edge: float) -> float:
-    """Return the phase error [rad] of constant rates over a frame: at the outermost point of a turning body, by its
-    centripetal acceleration, and across a tube of a given edge [m]."""
-    wave, worst = scene.radar.waveform, 0.0
-    k, half = 4.0 * np.pi / wave.wavelength, 0.5 * wave.frame_duration
-    for body in (b for b, t in zip(scene.bodies, turning(scene), strict=True) if t):
-        rate = float(np.linalg.norm(body.motion.spin()))
-        vertices = body.geometry.vertices
-        radius = float(
-            np.linalg.norm(np.cross(body.motion.rotation().T @ body.motion.spin() / rate, vertices), axis=1).max()
-        )
-        size = float(np.ptp(vertices, axis=0).max())
-        worst = max(worst, k * radius * (rate * half) ** 2 / 2.0, k * min(edge, size) * rate * half)
-    return worst
-
-
-def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
-    """Return whether a frame needs more than one tracing."""
-    if retrace == 1 or scene.radar.waveform.n_chirps < 3:
-        return False
-    return bend(scene, edge) > _NEEDED if retrace == "auto" else bool(moving(scene).any())
+_BETWEEN = 0.6e-3
+"""From one computed pose to the next in a spectrogram [s]: a walker's samples are then off by -44 dB (0.3 ms: -47,
+1.2 ms: -37), in 0.75 of the time (`pytest tests/run/test_walker_frames.py -k poses`)."""
 
 
 def retraced(
@@ -96,15 +68,43 @@ def retraced(
     return work.even(last, first, int(model.retrace))
 
 
+def stretches(
+    scene: Scene, rule: PruneRule, model: Any, count: int, progress: Callable[[float], None] | None = None
+) -> Iterator[tuple[Samples, Samples]]:
+    """Yield the samples (antenna, chirp, sample) of a frame that is too long to be held, and their error, part by part.
+
+    Args: as of `retraced`; count of tracings at equal distances; all that moves is carried on between them. A part
+    begins with the chirp after the last one of the part before.
+    """
+    work = _Frame(scene, rule, model.model_copy(update={"retrace": count}), progress)
+    work.most, work.every = count, max(1.0, _BETWEEN / work.step)
+    at = np.unique(np.rint(np.linspace(0, scene.radar.waveform.n_chirps - 1, count)).astype(int))
+    before = work.keyframe(int(at[0]))
+    for chirp in at[1:]:
+        key = work.keyframe(int(chirp))
+        part, first = work.segment(before, key), min(before.chirp, 1)
+        yield part.blend().sum(axis=0)[:, first:], part.error().sum(axis=0)[:, first:]
+        before = key
+
+
+def fronts_of_routes(routes: Routes) -> Wavefronts:
+    """Return the spherical waves of routes at both ends."""
+    ends = (np.broadcast_to(x, (len(routes.kind), 1, 3)) for x in (routes.tx, routes.rx))
+    stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
+    return wavefronts(stops, routes.scatter, *departures(routes), routes.length)
+
+
 class _Frame:
     """One frame as it is assembled from keyframes."""
 
     def __init__(self, scene: Scene, rule: PruneRule, model: Any, progress: Callable[[float], None] | None) -> None:
+        check_radar(scene.radar)
         self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
-        self.turns = turning(scene) if model.retrace == "auto" else moving(scene)
+        self.turns = carried_on(scene, model.retrace)
         self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
         wave = self.radar.waveform
         self.chirps, self.step = wave.n_chirps, wave.repetition
+        self.every = 1.0  # chirps from one computed pose to the next
         self.rays, self.times = 0, list[float]()
         self.most = max(3, 1 + self.chirps // _CHIRPS)
         self.reached = True
@@ -200,60 +200,74 @@ class _Frame:
             amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
-        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame)).samples
+        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples
         for routes, strength in zip(key.routes, key.strengths, strict=True):
-            # A receiver moved towards the arriving wave has a shorter path.
-            nearer = departures(routes)[1] @ self.radar.elements_world.T
+            fronts = fronts_of_routes(routes)
             for start in range(first, last + 1, _AT_ONCE):
                 count = min(_AT_ONCE, last + 1 - start)
                 # One instant more than chirps: the rate is the change from chirp to chirp.
-                poses = self.poses(key, np.arange(start, start + count + 1))
-                lengths, amplitudes = extrapolated(routes, strength, poses, wave.carrier)
-                rows = slice(start - first, start - first + count)
-                for layer, near in zip(out[0], nearer.T, strict=True):
-                    layer[rows] += self.ramps(lengths - near[:, None], amplitudes * self.turn(near)[:, None])
+                at = np.arange(start, start + count + 1, dtype=float)
+                lengths, amplitudes = carried_between(
+                    routes, strength, partial(self.poses, key), at, self.every, wave.carrier
+                )
+                rows = out[0, :, start - first : start - first + count]
+                for sent in self.radar.transmissions:
+                    self.add_ramps(rows, start, sent, lengths, amplitudes, fronts)
         return out
 
-    def turn(self, nearer: Floats) -> Complexes:
-        """Return the transmitted amplitude [sqrt(W)] times the carrier phase of paths shorter by some lengths [m]."""
-        wave = self.radar.waveform
-        return np.asarray(np.sqrt(self.radar.power) * np.exp(2j * np.pi / wave.wavelength * nearer))
+    def add_ramps(
+        self, out: Samples, start: int, sent: Transmission, lengths: Floats, amplitudes: Complexes, fronts: Wavefronts
+    ) -> None:
+        """Add to samples (antenna, chirp, sample) from chirp number `start` on what one transmitter brings over parts
+        (chirp + 1, n, 3) of routes of these lengths [m]."""
+        wave, chirps = self.radar.waveform, slice(sent.since(start).first, None, sent.step)
+        code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
+        for layer, element in zip(out, self.radar.elements_world, strict=True):
+            longer = fronts.longer(sent.offset, element)
+            turn = np.sqrt(self.radar.power) * np.exp(-2j * np.pi / wave.wavelength * longer)
+            brought = self.ramps(lengths + longer[:, None], amplitudes * turn[:, None], chirps)
+            layer[chirps] += brought if sent.turn == 0.0 else brought * code
 
-    def ramps(self, lengths: Floats, amplitudes: Complexes) -> Samples:
-        """Return the samples (chirp, sample) of parts (chirp + 1, n, 3) of routes with these lengths [m]."""
+    def ramps(self, lengths: Floats, amplitudes: Complexes, chirps: slice) -> Samples:
+        """Return the samples (chirp, sample) of some chirps, of parts (chirp + 1, n, 3) of routes with these lengths
+        [m]."""
         wave, count = self.radar.waveform, len(lengths) - 1
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
         length = lengths.reshape(count + 1, -1)[:, parts]
         delay = length / C0
-        delay_rate, delay = np.diff(delay, axis=0) / self.step, delay[:-1]
-        strength = amplitudes.reshape(count + 1, -1)[:-1, parts]
+        delay_rate, delay = (np.diff(delay, axis=0) / self.step)[chirps], delay[:-1][chirps]
+        strength = np.ascontiguousarray(amplitudes.reshape(count + 1, -1)[:-1, parts][chirps])
+        length, delay = length[:-1][chirps], np.ascontiguousarray(delay)
+        delay_rate = np.ascontiguousarray(delay_rate)
+        if not len(delay):
+            return np.zeros((0, wave.n_samples), np.complex128)
         if len(parts) * wave.n_samples <= _FEW:
             step = wave.chirp_duration / wave.n_samples
             rows = ramp_sums(strength, delay, delay_rate, wave.carrier, wave.slope, step, wave.n_samples)
             return np.asarray(rows)
         here = np.zeros(3)
-        one = dataclasses.replace(
-            self.radar, elements=here[None], power=1.0, waveform=dataclasses.replace(wave, n_chirps=1)
-        )
+        single: dict[str, Any] = {"elements": here[None], "tx_elements": here[None], "multiplexing": "none"}
+        single |= {"ddm_slots": None, "waveform": dataclasses.replace(wave, n_chirps=1)}
+        one = dataclasses.replace(self.radar, **single, power=1.0)
         return np.stack(
             [
                 synthesize(echoes(*row, here), one).samples[0, 0]
-                for row in zip(length[:-1], strength, delay_rate, strict=True)
+                for row in zip(length, strength, delay_rate, strict=True)
             ]
         )
 
-    def poses(self, key: Keyframe, chirps: NDArray[np.signedinteger]) -> Poses:
+    def poses(self, key: Keyframe, chirps: Floats) -> Poses:
         """Return the poses of bodies and radar at chirps, relative to a keyframe."""
         late = (chirps - key.chirp) * self.step
         motions, radar = [b.motion for b in key.scene.bodies], key.scene.radar
         turn = np.broadcast_to(np.eye(3), (len(late), len(motions), 3, 3)).copy()
         for b in np.flatnonzero(self.turns):
-            turn[:, b] = [motions[b].rotation(t) @ motions[b].rotation().T for t in late]
-        origin, velocity = (np.array([f(m) for m in motions]) for f in (lambda m: m.origin(), lambda m: m.velocity))
+            turn[:, b] = motions[b].poses(late)[0] @ motions[b].rotation().T
+        origin = np.array([m.origin() for m in motions])
         return Poses(
             origin=origin,
             turn=turn,
-            place=origin + late[:, None, None] * velocity,
+            place=np.stack([m.poses(late)[1] for m in motions], axis=1),
             radar=radar.position + late[:, None] * radar.velocity,
         )
 

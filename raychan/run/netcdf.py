@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler, Trajectories
+from raychan.run.directions import angles_in
 from raychan.run.result import ExplainedDetections, Result
 from raychan.units import C0, dbm
 
@@ -29,12 +31,23 @@ GROUPS: dict[str, Any] = {
     "error": MapError,
     "detections": ExplainedDetections,
 }
-_AXES = {"a": "antenna", "c": "chirp", "s": "sample", "v": "range_rate", "r": "range", "p": "peak", "d": "vertex"}
+_AXES = {
+    "a": "antenna",
+    "c": "chirp",
+    "s": "sample",
+    "v": "range_rate",
+    "r": "range",
+    "p": "peak",
+    "d": "vertex",
+    "b": "azimuth",
+}
 _ROWS = {"paths": "path", "detections": "detection"}
 _CALLED = {"rate": "range_rate", "true_rate": "true_range_rate"}
 """Columns with another name in the file than in their record."""
 _FORMER = {"length": ("delay", C0), "length_rate": ("range_rate", 2.0)}
 """Columns that files of format 2 have instead, and the factor on them."""
+_ADDED = {"elevation": np.nan, "ambiguous": False}
+"""Columns that older files of format 3 do not have, and what stands for them."""
 _UNITS = {"sqrt(W)": "V"}
 """Units as UDUNITS writes them, for waves at 1 ohm. UDUNITS has no decibel: it is written dB."""
 _TITLES = {
@@ -83,6 +96,9 @@ def as_netcdf(result: Result, attrs: dict[str, Any]) -> memoryview:
             # Most slots of paths are unused and compress well; samples are noise and do not.
             packed = name == "paths" and len(result.paths.delay) > 0
             _write(file.create_group(name), name, result, {"compression": 1, "shuffle": True} if packed else {})
+        angles = angles_in(result)
+        if angles is not None:
+            _directions(file.create_group("range_azimuth"), angles)
     return made.getbuffer()
 
 
@@ -97,6 +113,8 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
             if name not in data and kind is Paths and name in _FORMER:
                 former, factor = _FORMER[name]
                 values[f.name] = factor * data[former].values
+            elif f.name in _ADDED and name not in data:
+                values[f.name] = np.full(data.sizes[_ROWS[group]], _ADDED[f.name], f.metadata["dtype"])
             elif f.name == "cell" and "cell" not in data:
                 values[f.name] = np.stack([data[axis].values for axis in _CELL], axis=1)
             elif "axes" not in f.metadata:
@@ -143,7 +161,8 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
                 _column(group, name, f, getattr(result.rdmap, f.name), {})
     if name == "cube":
         times = (
-            ("chirp", wave.repetition, "start of the ramp"),
+            # The receiver's waveform is that of a virtual channel; samples are those of all chirps as sent.
+            ("chirp", wave.repetition * (wave.n_chirps / len(group.dimensions["chirp"])), "start of the ramp"),
             ("sample", 1.0 / wave.sample_rate, "time in the ramp"),
         )
         for axis, step, title in times:
@@ -155,6 +174,15 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
         _decibels(group, record)
     if name == "detections":
         _told(group, result)
+
+
+def _directions(group: Any, angles: RangeAzimuth) -> None:
+    """Write the range-azimuth map, which is made again from the range-Doppler map when a result is read."""
+    for f in columns(RangeAzimuth):
+        if "axes" in f.metadata:
+            _column(group, "range_azimuth", f, getattr(angles, f.name), {})
+    group.attrs.update({"noise": angles.noise, "noise_units": "W"})
+    _decibels(group, angles)
 
 
 def _column(group: Any, name: str, f: dataclasses.Field[Any], value: Any, packed: dict[str, Any]) -> None:

@@ -5,19 +5,39 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.poses import direction
+from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Grid, fitting_guard
-from raychan.processing.detection import detect
-from raychan.processing.range_doppler import range_doppler
+from raychan.processing.detection import Array, detect
+from raychan.processing.mimo import virtual_range_doppler
+from raychan.processing.staggered import hypotheses, unfolded
+from raychan.radar.aperture import Aperture
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
 
 
-def map_of(cube: Cube, radar: Radar, settings: Any) -> RangeDoppler:
-    """Return the range-Doppler map of samples; settings: windows and padding of a scene file's [processing]."""
-    return range_doppler(cube, radar.waveform, settings.range_window, settings.rate_window, settings.pad)
+def map_of(cube: Cube, radar: Radar, settings: Any, cross: bool = False) -> RangeDoppler:
+    """Return the range-Doppler map of samples; settings: windows and padding of a scene file's [processing]; cross: of
+    the cross-polarised receivers, else of the co-polarised."""
+    cube = channel(cube, radar, cross)
+    return virtual_range_doppler(cube, radar, settings.range_window, settings.rate_window, settings.pad)
+
+
+def channel(cube: Cube, radar: Radar, cross: bool = False) -> Cube:
+    """Return the samples of the co-polarised receivers, or of the cross-polarised. Raises: ValueError if there are
+    none."""
+    if radar.rx_polarization != "both":
+        if cross:
+            raise ValueError('a radar without cross-polarised receivers: rx_polarization = "both" is wanted')
+        return cube
+    many = len(radar.elements)
+    return cube.replace(samples=cube.samples[many:] if cross else cube.samples[:many])
 
 
 def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detections:
@@ -27,29 +47,66 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
     guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
     if guard is not None:
         sizes["guard"] = guard
-    return detect(
+    # Each fold that is tested in a cell is one more chance of a false alarm.
+    found = detect(
         rdmap,
-        pfa=settings.pfa,
+        pfa=settings.pfa / hypotheses(radar),
         min_snr_db=settings.min_snr_db,
         method=settings.cfar,
         ego_speed=radar.ego_speed,
         windows=(settings.rate_window, settings.range_window),
         waveform=radar.waveform,
-        elements=np.asarray(radar.elements),
+        elements=receivers(radar),
+        array=Array(settings.beams, settings.doa, settings.beam_window),
         **sizes,
     )
+    return unfolded(rdmap, found, radar)
+
+
+def receivers(radar: Radar) -> Floats:
+    """Return the phase centres (t * a, 3) [m] of the map's antennas, in the antenna's frame: the virtual elements.
+
+    Cross-polarised receivers stand at the places of the co-polarised; a map is of one or the other (see `map_of`).
+    """
+    return radar.virtual_elements
+
+
+def aperture_of(radar: Radar) -> Aperture:
+    """Return the aperture of the map's antennas, at the middle of the ramp as their phases in a map are."""
+    return Aperture(receivers(radar), C0 / radar.waveform.middle)
+
+
+def bank_of(radar: Radar, settings: Any) -> BeamBank | None:
+    """Return the bank of beams in which the detector looks; None for one receiver, or for the mean of several."""
+    aperture = aperture_of(radar)
+    if settings.beams != "coherent" or not any(aperture.scans):
+        return None
+    return BeamBank(aperture, settings.beam_window)
+
+
+def looks_of(radar: Radar, settings: Any) -> tuple[int, float]:
+    """Return how many powers the detector adds in a cell, and the false alarm probability that it keeps for each beam
+    so that a cell keeps that of the settings."""
+    bank, pfa = bank_of(radar, settings), settings.pfa / hypotheses(radar)
+    return (len(receivers(radar)), pfa) if bank is None else (1, bank.single(pfa))
+
+
+def beam_gain(radar: Radar, settings: Any) -> float:
+    """Return by how much the detector's beams raise an echo above the noise: 1 for one receiver or their mean."""
+    bank = bank_of(radar, settings)
+    return 1.0 if bank is None else 1.0 / bank.noise_gain
 
 
 def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
     """Return the scattered amplitude [1/m, unit field at 1 m] of a return as strong as the noise in one cell of the
-    map."""
+    map, or of a beam over it."""
     if not radar.noise:
         return 0.0
     # The strongest direction of both antennas, on a grid finer than any beam of use.
     azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
     look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
     ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
-    amplitude = np.sqrt(noise_of_cell(radar, settings) / radar.power)
+    amplitude = np.sqrt(noise_of_beam(radar, settings) / radar.power)
     return float(amplitude * 4.0 * np.pi / radar.waveform.wavelength / np.prod(list(ends)))
 
 
@@ -57,9 +114,15 @@ def noise_of_cell(radar: Radar, settings: Any) -> float:
     """Return the thermal noise [W] of one cell of the map; 0 when noise is off."""
     if not radar.noise:
         return 0.0
-    wave = radar.waveform
-    gain = processing_gain(window(settings.range_window, wave.n_samples))
-    return float(radar.noise_power / gain / processing_gain(window(settings.rate_window, wave.n_chirps)))
+    gain = processing_gain(window(settings.range_window, radar.waveform.n_samples))
+    # By time division a channel has a share of the chirps, by Doppler division or stagger all of them.
+    chirps = (radar.channel_waveform if radar.multiplexing == "tdm" else radar.waveform).n_chirps
+    return float(radar.noise_power / gain / processing_gain(window(settings.rate_window, chirps)))
+
+
+def noise_of_beam(radar: Radar, settings: Any) -> float:
+    """Return the thermal noise [W] of what the detector looks at: a beam in a cell, or the cell; 0 without noise."""
+    return noise_of_cell(radar, settings) / beam_gain(radar, settings)
 
 
 def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapError:
@@ -69,12 +132,6 @@ def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapErro
 
 def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     """Return the powers (v, r) [W] of the map of samples (antenna, chirp, sample) without noise."""
-    cube = Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0)
+    cube = channel(Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0), radar)
     windows = (settings.range_window, settings.rate_window, settings.pad)
-    return range_doppler(cube, radar.waveform, *windows).power
-
-
-def noise_stream(seed: int) -> np.random.Generator:
-    """Return the random numbers of the noise of a run. Streams are numbered by stage, so that one more random stage
-    leaves the others as they are."""
-    return np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    return virtual_range_doppler(cube, radar, *windows, resolve=False).power

@@ -18,7 +18,7 @@ import numpy as np
 from raychan.processing.cfar import GUARD, TRAIN, Grid, fitting_guard, full_count, least_snr_db, training
 from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
-from raychan.run.receiver import noise_equivalent_amplitude
+from raychan.run.receiver import looks_of, noise_equivalent_amplitude
 from raychan.tracing.settings import PruneRule, refinement
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
@@ -70,7 +70,8 @@ def _rule(radar: Radar, settings: Any, model: Any, tolerance_db: float, jitter: 
 def rule_of(radar: Radar, noise: float, refined: Refinement, bounces: int, diffraction: bool = False) -> PruneRule:
     """Return the prune rule of a radar: where it is, where its antennas look, and its noise [1/m] (see
     `receiver.noise_equivalent_amplitude`)."""
-    return PruneRule(np.asarray(radar.position, float), beam_of(radar), refined, bounces, noise, diffraction)
+    place = np.asarray(radar.position, float)
+    return PruneRule(place, beam_of(radar), refined, bounces, noise, diffraction, radar.rx_position)
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ class Demand:
 def demand(scene: Scene) -> Demand:
     """Return the estimated memory and time of a run."""
     wave = scene.radar.waveform
-    samples = float(len(scene.radar.elements)) * wave.n_chirps * wave.n_samples
+    samples = float(scene.radar.receivers) * wave.n_chirps * wave.n_samples
     cells = samples * scene.processing.pad[0] * scene.processing.pad[1]
     facets = sum(len(body.geometry.faces) for body in scene.bodies)
     tracings = 1 if scene.model.retrace == "auto" else scene.model.retrace
@@ -145,7 +146,7 @@ def long_run(scene: Scene, frames: int = 1) -> list[str]:
 
 def _refused(scene: Scene, need: float, may: float) -> SceneError:
     """Return the error that names the key by which a scene needs too much memory, and the value that is possible."""
-    wave, pad, receivers = scene.radar.waveform, scene.processing.pad, len(scene.radar.elements)
+    wave, pad, receivers = scene.radar.waveform, scene.processing.pad, scene.radar.receivers
     plain = float(wave.n_chirps) * wave.n_samples * (_SAMPLE_BYTES + _CELL_BYTES)
     key: str
     value: Any
@@ -169,7 +170,7 @@ def _refused(scene: Scene, need: float, may: float) -> SceneError:
 def _detector(scene: Scene) -> list[str]:
     """Return a line where the map is so small that the CFAR's guard must be smaller than set, and one where it has so
     few training cells that the detector misses echoes above the least SNR."""
-    wave, asked = scene.radar.waveform, scene.processing
+    wave, asked = scene.radar.channel_waveform, scene.processing
     count = wave.n_chirps, wave.n_samples if wave.complex_sampling else wave.n_samples // 2
     guard, train = (sizes and sizes[::-1] for sizes in (asked.guard, asked.train))
     fitted = fitting_guard(count, guard, train)
@@ -183,8 +184,10 @@ def _detector(scene: Scene) -> list[str]:
         said.append(f"{size} is small for the detector: processing.guard = {list(fitted[::-1])} taken")
     windows = asked.rate_window, asked.range_window
     found, full = training(Grid((1, 1), count), fitted, train or TRAIN, windows), full_count(fitted, train or TRAIN)
-    least = least_snr_db(asked.pfa, found.worth, asked.cfar, len(scene.radar.elements))
-    if scene.radar.noise and len(found.offsets) < full and least > asked.min_snr_db:
+    few = scene.radar.noise and len(found.offsets) < full
+    looks, pfa = looks_of(scene.radar, asked) if few else (1, asked.pfa)
+    least = least_snr_db(pfa, found.worth, asked.cfar, looks)
+    if few and least > asked.min_snr_db:
         said.append(
             f"{size} has {len(found.offsets)} of the detector's {full} training cells: only echoes "
             f"{least:.0f} dB above the noise are detected, not all above processing.min_snr_db = {asked.min_snr_db:g} "

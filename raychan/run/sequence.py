@@ -13,12 +13,12 @@ from raychan.run.clock import Clock, Progress
 from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
 from raychan.run.simulate import Channel, channel_of, result_of
-from raychan.run.storage import COLUMNS, CONTENTS, rows, save_result
+from raychan.run.storage import CONTENTS, columns_of, rows, save_result
 from raychan.world.geometry import geometry_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
 
-HEAD = ("frame", "time_s", *COLUMNS)
+HEAD = ("frame", "time_s")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def _frames(
 def moves_as_one(scene: Scene) -> bool:
     """Return whether all bodies move with the radar, so that its channel does not change."""
     own = np.asarray(scene.radar.velocity, float)
-    return all(np.array_equal(b.motion.velocity, own) and not b.motion.spin().any() for b in scene.bodies)
+    return all(np.array_equal(b.motion.velocity, own) and not b.motion.turns for b in scene.bodies)
 
 
 def _shifted(channel: Channel, scene: Scene, time: float) -> Channel:
@@ -125,7 +125,7 @@ class Store:
                 place = stage / frame.name
                 place.mkdir()
                 _fill(place, frame, draw)
-                (stage / "detections.csv").write_bytes(csv_bytes([HEAD]) + lines)
+                (stage / "detections.csv").write_bytes(csv_bytes([(*HEAD, *columns_of(frame.result))]) + lines)
         else:
             place = self.directory / frame.name
             with staging(place, CONTENTS) as stage:

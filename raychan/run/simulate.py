@@ -13,20 +13,27 @@ from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.directions import beam_to
+from raychan.run.fluctuation import check
+from raychan.run.interferers import interference
 from raychan.run.labels import provenance
 from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages import counts, told, uncut
-from raychan.run.micro_doppler import needed, retraced
+from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
-from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, noise_stream, quiet_map
+from raychan.run.realization import realized
+from raychan.run.received import notes, received
+from raychan.run.receiver import detections_in, map_error, map_of, noise_of_beam, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
+from raychan.run.streams import Stage, stream
+from raychan.run.turning import carried_on, needed
 from raychan.run.unmodelled import ledger
-from raychan.signal.baseband import noisy, synthesize
+from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats
@@ -56,7 +63,7 @@ class Channel:
 
     @property
     def quiet(self) -> Cube:
-        """The samples of the frame without noise."""
+        """The samples of the frame without noise, of steady targets and without clutter."""
         return self.turned.cube if self.turned else self.launched.quiet
 
 
@@ -93,7 +100,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         # The check launch, with all mechanisms, tells which of them the fine one needs.
         with clock.stage("check"):
             others, more = launch(replace(checked, diffraction=True))
-            chosen = choose(others.paths, radar, settings, noise_of_cell(radar, settings), model.tolerance_db)
+            chosen = choose(others.paths, radar, settings, noise_of_beam(radar, settings), model.tolerance_db)
             model = chosen.applied_to(model)
     rule = fine_rule(radar, settings, model)
     again = needed(scene, model.retrace, rule.refinement.max_edge)
@@ -106,6 +113,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
             (launched, stats), (others, more) = run_pair(fine, lambda: launch(checked, heard=not again))
     turned = None
     if again:
+        check(scene, carried_on(scene, model.retrace))
         with clock.stage("retrace"):
             traced = Traced(launched.paths, tuple(routes))
             turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
@@ -135,22 +143,24 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     """Return what the receiver makes of a channel, and how each detection came about."""
     radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
+        quiet, launched = realized(scene, channel.geometry, channel.model, channel.quiet, channel.launched, seed)
         noise = radar.noise_power if radar.noise else 0.0
-        pdp = profile_of(channel.launched.response, radar.waveform, noise, settings.range_window)
-        cube = noisy(channel.quiet, radar, noise_stream(seed))
+        pdp = profile_of(launched.response, radar.waveform, noise, settings.range_window)
+        cube, heard = _received(scene, channel, launched, quiet, seed)
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
         error = _error_of(channel, radar, settings)
+    channel = replace(channel, launched=launched)
     windows = settings.range_window, settings.rate_window
     names = background(channel.geometry.facets)
-    receiver = Receiver(radar.waveform, *windows, radar.power, radar.ego_speed, names)
+    receiver = Receiver(radar.channel_waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
         reasons, left_out = _explained(scene, channel, rdmap, detections, receiver, error)
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
-        paths=channel.launched.paths,
+        paths=launched.paths,
         profile=pdp,
         cube=cube,
         rdmap=rdmap,
@@ -167,12 +177,22 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *check_demand(scene),
             *channel.launched.notes(),
             *channel.warnings,
+            *heard,
             *told(known, tolerance, rdmap, left_out),
         ),
         scene=scene.without_caches(),
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
+
+
+def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:
+    """Return what the receiver records of noise-free samples, and what a user should know of it."""
+    turned = channel.turned
+    paths = without(launched.paths, turned.turns) if turned else launched.paths
+    others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
+    cube, said = received(quiet, paths, scene.radar, seed, others)
+    return cube, said + notes(scene.radar, launched.whole, turned is not None)
 
 
 def _explained(
@@ -183,7 +203,7 @@ def _explained(
     paths, model = channel.launched.paths, channel.model
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
     reasons, left_out = run_pair(
-        lambda: provenance(paths, rdmap, found, receiver, error.power),
+        lambda: provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths)),
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
     )
     if turned:

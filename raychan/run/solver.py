@@ -31,14 +31,15 @@ def solve(
     bounces: int,
     diffraction: bool = False,
 ) -> tuple[Paths, Stats]:
-    """Return the paths of one launch from a monostatic radar, and what they cost.
+    """Return the paths of one launch from a radar to its receivers, and what they cost.
 
     Args: facets, or the geometry made of them, which serves many launches; points the targets given by their RCS;
     frequency [Hz] of the carrier phase; refinement how finely tubes are cut; bounces the most interactions, both legs
     counted; diffraction over single wedges on the legs to point targets.
     """
     geometry = facets if isinstance(facets, Geometry) else Geometry(facets)
-    rule = PruneRule(np.asarray(radar.position, float), beam_of(radar), refinement, bounces, 0.0, diffraction)
+    there = getattr(radar, "rx_position", None)
+    rule = PruneRule(np.asarray(radar.position, float), beam_of(radar), refinement, bounces, 0.0, diffraction, there)
     parts: list[Paths] = []
     stats = solve_into(parts.append, geometry, points, radar, frequency, rule)
     return join(parts), stats

@@ -38,7 +38,7 @@ def specular_routes(geometry: Geometry, tx: Floats, rx: Floats, bounces: int, la
             chains += _every_chain(geometry, planes, tx, bounces)
         else:
             chains += _found_chains(geometry, tx, rx, bounces, seed)
-    return _exact(geometry, tx, rx, chains, bounces + layers, layers)
+    return exact_routes(geometry, tx, rx, chains, bounces + layers, layers)
 
 
 def _planes(geometry: Geometry) -> Ints:
@@ -102,7 +102,7 @@ def _found_chains(geometry: Geometry, tx: Floats, rx: Floats, bounces: int, seed
     return sorted(found, key=lambda c: (len(c), c))
 
 
-def _exact(geometry: Geometry, tx: Floats, rx: Floats, chains: list[Chain], slots: int, layers: int) -> Routes:
+def exact_routes(geometry: Geometry, tx: Floats, rx: Floats, chains: list[Chain], slots: int, layers: int) -> Routes:
     """Return the routes of the chains that are real: bounce points on their planes, in order, nothing in between."""
     rows = []
     known = {step: Mirror.of(geometry, *step) for step in {s for chain in chains for s in chain}}

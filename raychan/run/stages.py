@@ -9,7 +9,8 @@ import numpy as np
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
-from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude, noise_stream
+from raychan.run.received import received
+from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
 from raychan.signal.baseband import synthesize as samples_of
@@ -76,17 +77,21 @@ def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
 
 
 def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
-    """Return the dechirped samples of a frame, with the radar's noise.
+    """Return the dechirped samples of a frame, with the radar's noise and impairments, without interferers.
 
     Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
+    Targets are steady here: only `simulate`, which knows their bodies, draws those that fluctuate.
     """
     SEED.check("seed", seed, whole=True)
-    return samples_of(paths, radar, noise_stream(seed))
+    return received(samples_of(paths, radar), paths, radar, seed)[0]
 
 
-def range_doppler(cube: Cube, radar: Radar) -> RangeDoppler:
-    """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`."""
-    return map_of(cube, radar, radar.processing)
+def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler:
+    """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`.
+
+    Args: cross: of the cross-polarised receivers of a radar with `rx_polarization="both"`, else of the co-polarised.
+    """
+    return map_of(cube, radar, radar.processing, cross)
 
 
 def detect(rdmap: RangeDoppler, radar: Radar) -> Detections:

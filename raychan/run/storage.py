@@ -16,14 +16,17 @@ from raychan.radar.waveform import Waveform
 from raychan.run.ledger import entry_of
 from raychan.run.netcdf import GROUPS, as_netcdf, read_record
 from raychan.run.output_files import Contents, StoreError, csv_bytes
+from raychan.run.receiver import aperture_of
 from raychan.run.result import Contribution, Explanation, Receiver, Result
 from raychan.units import dbm
 
 FORMAT = 3
 _READS = (2, FORMAT)  # format 2 has delay and range rate of paths instead of length and its rate
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
+ARRAY_PICTURES = ("range_azimuth.png", "beams.png")
+"""Drawn where an array measures azimuth."""
 CONTENTS = Contents(
-    names=("result.nc", "detections.csv", "summary.json", *PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
+    names=("result.nc", "detections.csv", "summary.json", *PICTURES, *ARRAY_PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
     signs=("result.nc", "summary.json", "frame_[0-9][0-9][0-9][0-9]*/result.nc"),
 )
 """What `raychan run` writes into its folder; a sequence has a folder of the same for each frame."""
@@ -54,7 +57,7 @@ def save_result(result: Result, directory: str | Path) -> None:
     directory = Path(directory)
     try:
         (directory / "result.nc").write_bytes(as_netcdf(result, _attrs(result)))
-        (directory / "detections.csv").write_bytes(csv_bytes([COLUMNS, *rows(result)]))
+        (directory / "detections.csv").write_bytes(csv_bytes([columns_of(result), *rows(result)]))
         (directory / "summary.json").write_text(json.dumps(summary(result), indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise StoreError(f"{directory}: cannot write the result: {error.strerror or error}") from error
@@ -100,19 +103,32 @@ def load_result(path: str | Path) -> Result:
     )
 
 
+def columns_of(result: Result) -> tuple[str, ...]:
+    """Return the names of the columns of detections.csv: COLUMNS, and elevation_deg where an array measures it."""
+    at = COLUMNS.index("azimuth_deg") + 1
+    return (*COLUMNS[:at], "elevation_deg", *COLUMNS[at:]) if elevated(result) else COLUMNS
+
+
+def elevated(result: Result) -> bool:
+    """Return whether the receivers of a result measure elevation."""
+    radar = result.scene.radar if result.scene is not None else None
+    return bool(np.isfinite(result.detections.elevation).any()) if radar is None else aperture_of(radar).scans[1]
+
+
 def rows(result: Result) -> list[tuple[str, ...]]:
-    """Return the detections as text, a tuple of COLUMNS each.
+    """Return the detections as text, a tuple of `columns_of(result)` each.
 
     Empty is what is unknown: an azimuth that no array gives, the error of a detection that is not converged, the true
     place of noise.
     """
-    d = result.detections
+    d, elevation = result.detections, elevated(result)
     return [
         (
             f"{d.range[i]:.4f}",
             f"{d.rate[i]:.4f}",
             f"{d.speed[i]:.4f}",
             _known(math.degrees(d.azimuth[i]), 3),
+            *([_known(math.degrees(d.elevation[i]), 3)] if elevation else []),
             f"{d.snr[i]:.2f}",
             f"{dbm(d.power[i]):.2f}",
             _known(d.error_db[i], 2),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from raychan.em.fresnel import coefficients_array
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
+from raychan.run.clutter import scatters_diffusely
 from raychan.run.ledger import NOTHING, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, peak
 from raychan.run.solver import paths_over_wedges
@@ -38,16 +39,19 @@ def ledger(
     """
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
-    found = {
+    found: dict[str, Entry] = {
         "further bounces": _further(paths, radar, settings, model.max_bounces, weakest),
         "transmission": _transmission(paths, radar, settings, weakest),
         "diffraction": _diffraction(geometry, radar, weakest),
         "diffraction to point targets": _around(geometry, points, radar, settings, model, weakest),
-        "diffuse scattering": _diffuse(geometry, radar, weakest),
+        "diffuse scattering": _diffuse(geometry, radar, model, weakest),
         "tessellation": _tessellation(paths, geometry, bodies, radar, settings, weakest),
         "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
         "intra-frame motion": _motion(paths, geometry.facets, radar),
     }
+    if radar.rx_position is not None:
+        aside = Entry(UNKNOWN, "none", "not estimated for receivers elsewhere than the transmitter")
+        found |= dict.fromkeys(_MONOSTATIC, aside)
     return {name: found[name] for name in _NAMES}
 
 
@@ -61,6 +65,10 @@ _NAMES = (
     "range migration",
     "intra-frame motion",
 )
+
+
+_MONOSTATIC = "diffraction", "diffraction to point targets", "diffuse scattering", "intra-frame motion"
+"""Effects whose estimates take the way back to be the way out."""
 
 
 def _further(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
@@ -131,12 +139,15 @@ def _around(geometry: Geometry, points: Points, radar: Radar, settings: Any, mod
     return Entry(float(db(max(level, 1e-40) / weakest)), "estimate", "strongest cell of the diffracted returns (UTD)")
 
 
-def _diffuse(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
+def _diffuse(geometry: Geometry, radar: Radar, model: Any, weakest: float) -> Entry:
     """Return the entry of diffuse scattering, of the strongest range cell: the power that roughness takes from the
     specular reflection (Ament, Proc. IRE 41, 1953), scattered by Lambert's law."""
     f = geometry.facets
     m = f.materials
-    rough = m.roughness[f.material] > 0.0
+    modelled = scatters_diffusely(f, model)
+    rough = ((m.roughness > 0.0) & ~modelled)[f.material]
+    if modelled.any() and not rough.any():
+        return Entry(NOTHING, "exact", "modelled: what the radar sees directly of rough surfaces")
     if not rough.any():
         return Entry(UNKNOWN, "none", "no material states a roughness")
     rng = np.random.default_rng(0)

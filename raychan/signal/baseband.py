@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.radar.array import Wavefronts, wavefronts
+from raychan.radar.dual_paths import DualPaths
 from raychan.radar.radar import Radar
-from raychan.radar.waveform import Waveform
-from raychan.records import Cube, Paths
+from raychan.radar.waveform import OwnWaveform, Waveform
+from raychan.records import DIFFUSE, POINT, SCATTER, Cube, Paths
 from raychan.signal.dechirp import beat_sum
 from raychan.signal.keystone import Echoes, Keystone, keystones, middle
 from raychan.units import C0
@@ -33,37 +36,90 @@ def synthesize(
     rng: np.random.Generator | None = None,
     tolerance: float = 1e-6,
     method: str = "auto",
+    first: int = 0,
 ) -> Cube:
-    """Return the samples of all receivers and chirps, with thermal noise if `rng` is given and the radar has noise.
+    """Return the samples of all receivers and chirps as sent, with thermal noise if `rng` is given and the radar has
+    noise.
 
     Args: tolerance relative to the sum of the paths' |amplitude|; method nufft, direct (exact, slow), or auto: direct
-    for few paths. With real sampling the samples are real parts, noise included.
+    for few paths; first, the number in the frame of the chirp at which `paths` are given, which is then the first of
+    the samples. With real sampling the samples are real parts, noise included.
     Returns: Cube; its noise power is 0 if none was added. Raises: ValueError on an unknown method or a bad tolerance.
     """
     if method not in METHODS:
         raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
     if not 1e-13 <= tolerance < 1.0:
         raise ValueError(f"tolerance = {tolerance!r}: must lie from 1e-13 to 1")
-    wave = radar.waveform
-    delay_rate = paths.length_rate / C0
-    elements = radar.elements_world
+    wave, elements = radar.waveform, radar.elements_world
     samples = np.zeros((len(elements), wave.n_chirps, wave.n_samples), np.complex64)
-    if len(delay_rate):
-        scaled, arrival = np.sqrt(radar.power) * paths.amplitude, paths.arrival
-        echoes = Echoes(paths.delay + delay_rate * middle(wave)[0], delay_rate, scaled, arrival)
-        grids = keystones(echoes, wave, tolerance, float(np.linalg.norm(elements, axis=1).max()) / C0)
-        cells = sum(grid.cells for grid, _ in grids) / (wave.n_chirps * wave.n_samples)
-        if method == "direct" or (method == "auto" and len(delay_rate) <= _FEW * cells):
-            for layer, element in zip(samples, elements, strict=True):
-                later = -(arrival @ element) / C0
-                turned = scaled * np.exp(-2j * np.pi * wave.carrier * later)
-                layer[...] = _direct(turned, paths.delay + later, delay_rate, wave)
-        else:
-            _add_fast(samples, grids, elements)
+    if len(paths.length):
+        sent = [one.since(first) for one in radar.transmissions]
+        placed = elements.any() or any(one.offset.any() for one in sent)
+        fronts = fronts_of(paths) if placed else None
+        amplitude = np.sqrt(radar.power) * paths.amplitude
+        echoes = Echoes(paths.delay, paths.length_rate / C0, amplitude, fronts)
+        for one in sent:
+            rows = samples[:, one.first :: one.step]
+            if not rows.size:
+                continue
+            part = replace(wave, n_chirps=rows.shape[1], repetition=one.step * wave.repetition, stagger=())
+            begun = echoes.after(wave.start_of(first + one.first) - wave.start_of(first), wave.carrier)
+            brought = np.zeros(rows.shape, np.complex64) if one.turn else rows
+            _fill(brought, begun, [(one.offset, element) for element in elements], part, tolerance, method)
+            if one.turn:
+                turns = one.turn * (first + np.arange(wave.n_chirps)) % 1.0
+                rows += brought * np.exp(2j * np.pi * turns).astype(np.complex64)[:, None]
     if not wave.complex_sampling:
         samples.imag = 0.0
+    if radar.rx_polarization == "both":
+        if not isinstance(paths, DualPaths):
+            raise ValueError("paths of a radar with receivers of one polarisation: transfer the routes to this one")
+        co = replace(radar, rx_polarization=None)
+        crossed = synthesize(paths.replace(amplitude=paths.cross), co, None, tolerance, method, first).samples
+        samples = np.concatenate([samples, crossed])
     quiet = Cube(samples=samples, noise_power=0.0)
     return quiet if rng is None else noisy(quiet, radar, rng)
+
+
+def fronts_of(paths: Paths) -> Wavefronts:
+    """Return the spherical waves of paths at both ends."""
+    met = paths.trajectories
+    at = (met.kind == SCATTER) | (met.kind == POINT) | (met.kind == DIFFUSE)
+    scatterer = np.where(at.any(axis=1), np.argmax(at, axis=1), -1)
+    ends = (np.broadcast_to(x, (len(at), 1, 3)) for x in (paths.tx, paths.rx))
+    stops = np.concatenate([next(ends), met.vertices, next(ends)], axis=1)
+    length = np.zeros(len(at))
+    length[paths.trajectory] = paths.length
+    fronts = wavefronts(stops, scatterer, np.asarray(met.departure, float), met.arrival, length)
+    return fronts[paths.trajectory]
+
+
+def _fill(
+    out: Samples, echoes: Echoes, pairs: list[tuple[Floats, Floats]], wave: Waveform, tolerance: float, method: str
+) -> None:
+    """Write the samples (a, chirps, samples) of ramps at equal distances between pairs of elements of one transmitter.
+
+    Args: echoes at the start of the first ramp; the rest as for `synthesize`.
+    """
+    rate = echoes.delay_rate
+    if isinstance(wave, OwnWaveform):
+        for layer, pair in zip(out, pairs, strict=True):
+            later = echoes.later(*pair)
+            turned = echoes.amplitude * np.exp(-2j * np.pi * wave.carrier * later)
+            layer[...] = wave.received(turned, echoes.delay + later, rate)
+        return
+    # The grid adds the carrier's phase over the time to the middle: its amplitudes are those of the start.
+    centred = replace(echoes, delay=echoes.delay + rate * middle(wave)[0])
+    reach = max(float(np.linalg.norm(rx)) for _, rx in pairs) + float(np.linalg.norm(pairs[0][0]))
+    grids = keystones(centred, wave, tolerance, reach / C0)
+    cells = sum(grid.cells for grid, _ in grids) / (wave.n_chirps * wave.n_samples)
+    if method == "direct" or (method == "auto" and len(rate) <= _FEW * cells):
+        for layer, pair in zip(out, pairs, strict=True):
+            later = echoes.later(*pair)
+            turned = echoes.amplitude * np.exp(-2j * np.pi * wave.carrier * later)
+            layer[...] = _direct(turned, echoes.delay + later, rate, wave)
+    else:
+        _add_fast(out, grids, pairs)
 
 
 def noisy(quiet: Cube, radar: Radar, rng: np.random.Generator) -> Cube:
@@ -86,8 +142,8 @@ def _direct(amplitude: Complexes, delay: Floats, delay_rate: Floats, wave: Wavef
     return np.asarray(beat_sum(a, d, g, *ramp, wave.n_chirps, wave.n_samples))
 
 
-def _add_fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: Floats) -> None:
-    """Write the samples of all receivers, one grid after the other: of a long frame each may take gigabytes."""
+def _add_fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: list[tuple[Floats, Floats]]) -> None:
+    """Write the samples of all pairs of elements, one grid after the other: of a long frame each may take gigabytes."""
     threads = os.cpu_count() or 1
     sums = samples if len(grids) == 1 else np.zeros(samples.shape, np.complex128)
     # One buffer for all grids: allocating so much again costs more than filling it.
@@ -99,9 +155,11 @@ def _add_fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: 
             grid, echoes = grids.pop()
             ready = grid.prepared(echoes, buffer)
 
-            def receiver(layer: Complexes, element: Floats, grid: Keystone = grid, ready: Echoes = ready) -> None:
+            def receiver(
+                layer: Complexes, pair: tuple[Floats, Floats], grid: Keystone = grid, ready: Echoes = ready
+            ) -> None:
                 total = np.zeros(layer.shape, np.complex128)
-                grid.add(total, ready, element, inner)
+                grid.add(total, ready, pair, inner)
                 layer += total
 
             for _ in outer(receiver, sums, elements):

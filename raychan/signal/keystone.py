@@ -24,6 +24,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from raychan.radar.array import Wavefronts
 from raychan.radar.waveform import Waveform
 from raychan.signal.keystone_kernels import place_samples, place_sources
 from raychan.signal.nufft import (
@@ -58,18 +59,31 @@ _CROWD = 64  # echoes in a box up to which they are summed in single precision: 
 
 @dataclass(frozen=True)
 class Echoes:
-    """Echoes at the middle sample of a frame; rows (n,)."""
+    """Echoes at one instant; rows (n,). `Keystone` takes them at the middle sample of a frame."""
 
     delay: Floats
     """[s]"""
     delay_rate: Floats
     """Change of the delay per time, 2 v / c."""
     amplitude: Complexes
-    arrival: Floats
-    """Unit directions (n, 3) to which the receiver looks."""
+    fronts: Wavefronts | None = None
+    """The waves at both ends; None where all elements stand at the phase centres."""
 
     def __getitem__(self, rows: Any) -> Echoes:
-        return Echoes(self.delay[rows], self.delay_rate[rows], self.amplitude[rows], self.arrival[rows])
+        fronts = None if self.fronts is None else self.fronts[rows]
+        return Echoes(self.delay[rows], self.delay_rate[rows], self.amplitude[rows], fronts)
+
+    def after(self, time: float, carrier: float) -> Echoes:
+        """Return the echoes a time [s] later, their amplitudes with the phase of the carrier [Hz] until then."""
+        if time == 0.0:
+            return self
+        grown = self.delay_rate * time
+        turned = self.amplitude * np.exp(-2j * np.pi * carrier * grown)
+        return Echoes(self.delay + grown, self.delay_rate, turned, self.fronts)
+
+    def later(self, tx: Floats, rx: Floats) -> Floats:
+        """Return by how much later (n,) [s] they come between elements at tx and rx (3,) [m] off the phase centres."""
+        return np.zeros(len(self.delay)) if self.fronts is None else self.fronts.longer(tx, rx) / C0
 
 
 def middle(wave: Waveform) -> tuple[float, float, float]:
@@ -84,7 +98,7 @@ class Keystone:
 
     def __init__(self, echoes: Echoes, wave: Waveform, tolerance: float, reach: float) -> None:
         """Size the grid. Args: echoes, one at least; tolerance relative to the sum of their |amplitude|; reach [s], the
-        most by which a receiver's delays differ from those of the array's origin."""
+        most by which delays between two elements differ from those between the phase centres."""
         self.then, self.t, self.step = middle(wave)
         self.wave, slope = wave, wave.slope
         chirps, samples = wave.n_chirps, wave.n_samples
@@ -169,10 +183,13 @@ class Keystone:
         self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
         return echoes[order]
 
-    def add(self, out: Complexes, echoes: Echoes, element: Floats, each: Each, chunk: int = CHUNK) -> None:
-        """Add to out (chirps, samples) the beat signal of the `prepared` echoes at a receiver at `element` (3,) [m].
+    def add(
+        self, out: Complexes, echoes: Echoes, elements: tuple[Floats, Floats], each: Each, chunk: int = CHUNK
+    ) -> None:
+        """Add to out (chirps, samples) the beat signal of the `prepared` echoes between two elements.
 
-        Args: each, `map` or that of a thread pool; chunk, most echoes spread at a time.
+        Args: elements, positions (3,) [m] of transmitter and receiver; each, `map` or that of a thread pool; chunk,
+        most echoes spread at a time.
         """
         count, samples, half = len(echoes.delay), self.wave.n_samples, self.width // 2
         ramp = np.array([self.wave.carrier, self.wave.slope, self.then, self.t, self.step])
@@ -182,8 +199,7 @@ class Keystone:
 
         def gridded(part: slice) -> tuple[int, NDArray[Any]]:
             some = echoes[part]
-            # A receiver moved towards the arriving wave has a shorter path.
-            later = (some.arrival @ element) * (-1.0 / C0)
+            later = some.later(*elements)
             x, y = np.empty(len(later)), np.empty(len(later))
             strength = np.empty((len(later), self.planes), self.sort)
             waves = some.amplitude, some.delay, some.delay_rate, later

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from raychan.study.regimes_base import Floats, Outcome, Regime, Row, geometry_of
 from raychan.world.mesh import Mesh
 from raychan.world.ray_caster import RayCaster
-from raychan.world.shapes import SHAPES, build
+from raychan.world.shapes import RIGID, build
 
 Ints = NDArray[np.int64]
 
@@ -38,11 +38,11 @@ def leaks(quick: bool) -> Outcome:
     rng = np.random.default_rng(7)
     rows: list[Row] = []
     counts: list[list[_Count]] = []
-    for name in SHAPES:
+    for name in RIGID:
         mesh = build(name)
         geometry = geometry_of(mesh)
         # Half of all rays at edges, a quarter at vertices, a quarter at corner rays.
-        wanted = [total // (k * len(SHAPES)) + 1 for k in (2, 4, 4)]
+        wanted = [total // (k * len(RIGID)) + 1 for k in (2, 4, 4)]
         found = [_leaks(geometry, mesh, target, n, rng) for target, n in zip(_TARGETS, wanted, strict=True)]
         counts.append(found)
         rows += [_row(name, target, c) for target, c in zip(_TARGETS, found, strict=True) if c.rays]
@@ -51,7 +51,7 @@ def leaks(quick: bool) -> Outcome:
         whole = _Count(sum(c.rays for c in every), sum(c.leaks for c in every), sum(c.moved for c in every))
         rows.append(_row("all shapes", target, whole))
     table = {key: np.array([[vars(c)[key] for c in row] for row in counts]) for key in ("rays", "leaks", "moved")}
-    return Outcome(rows, {"shape": list(SHAPES), "target": list(_TARGETS), **table})
+    return Outcome(rows, {"shape": list(RIGID), "target": list(_TARGETS), **table})
 
 
 def _row(name: str, target: str, c: _Count) -> Row:

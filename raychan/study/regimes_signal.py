@@ -13,7 +13,7 @@ from raychan.processing.range_doppler import range_doppler
 from raychan.radar.antenna import IsotropicAntenna
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
-from raychan.records import Paths, RangeDoppler
+from raychan.records import POINT, Paths, RangeDoppler
 from raychan.signal.baseband import synthesize
 from raychan.study.regimes_base import FREQUENCY, LAMBDA, K, Outcome, Regime, Row, at_most
 
@@ -27,14 +27,14 @@ def _sensor(wave: Waveform = _WAVE, **changes: Any) -> Radar:
 
 
 def _echoes(ranges: Any, rates: Any = 0.0, amplitudes: Any = 1.0) -> Paths:
-    """Return paths of ranges [m], range rates [m/s] and complex amplitudes, from straight ahead."""
+    """Return paths over points straight ahead at ranges [m], of range rates [m/s] and complex amplitudes."""
     r, v, a = np.broadcast_arrays(np.atleast_1d(np.asarray(ranges, float)), rates, amplitudes)
     n = len(r)
     look = np.broadcast_to([1.0, 0.0, 0.0], (n, 3))
-    none = np.full((n, 1), -1, np.int16)
+    none, at = np.full((n, 1), -1, np.int16), (r[:, None] * look)[:, None].astype(np.float32)
     return Paths.of(
         length=2.0 * r, amplitude=a.astype(complex), length_rate=2.0 * v, departure=look, arrival=look,
-        body=none, part=none, kind=np.zeros((n, 1), np.int8), vertices=np.zeros((n, 1, 3), np.float32),
+        body=none, part=none, kind=np.full((n, 1), POINT, np.int8), vertices=at,
         body_names=(), part_names=(), tx=np.zeros(3), rx=np.zeros(3),
     )  # fmt: skip
 
@@ -161,7 +161,7 @@ def folding(quick: bool) -> Outcome:
 
 
 def near_array(quick: bool) -> Outcome:
-    """Check targets in the near field of a receiving array, for which a path is one plane wave."""
+    """Check targets in the near field of a receiving array: the wave at its elements is spherical."""
     rows = []
     count = 16
     y = (np.arange(count) - 0.5 * (count - 1)) * LAMBDA / 2
@@ -177,10 +177,8 @@ def near_array(quick: bool) -> Outcome:
         detour = np.hypot(distance, y) - np.hypot(distance, y[count // 2])
         off = np.angle(np.exp(1j * (seen + mid * detour)))
         worst.append(float(np.abs(off).max()))
-        note = "" if worst[-1] <= np.pi / 8 else "paths end at the phase centre; the elements see a plane wave"
-        truth = "closed form: spherical wave; pi/8 is the usual far-field limit"
         name = f"array of {count}, target at {distance / edge:g} of 2 D2/lambda ({distance:.2f} m)"
-        rows.append(Row(name, 0.0, worst[-1], np.pi / 8, "rad", truth, note))
+        rows.append(Row(name, 0.0, worst[-1], 1e-4, "rad", "closed form: spherical wave"))
     return Outcome(rows, {"distance": distances / edge, "phase": np.array(worst)})
 
 

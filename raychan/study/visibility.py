@@ -13,7 +13,7 @@ from raychan.processing.range_doppler import range_doppler
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points
 from raychan.run.labels import Chains, chains, label_of
-from raychan.run.receiver import noise_of_cell
+from raychan.run.receiver import noise_of_beam
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
 from raychan.run.solver import paths_over_wedges
 from raychan.signal.baseband import synthesize
@@ -98,7 +98,7 @@ def _holds(why: Explanation, target: str) -> bool:
 
 def _levels(result: Result, facets: Facets, points: Points, radar: Radar, target: str) -> dict[str, Level | None]:
     settings = result.require_scene().processing
-    weakest = noise_of_cell(radar, settings) * float(undb(settings.min_snr_db))
+    weakest = noise_of_beam(radar, settings) * float(undb(settings.min_snr_db))
     kind = ways_of(result, chains(result.paths, result.receiver.background), target)
     found: dict[str, Level | None] = {
         name: _level(take(result.paths, kind == i), radar, settings, weakest) for i, name in enumerate(WAYS)

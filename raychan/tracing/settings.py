@@ -32,11 +32,14 @@ class PruneRule:
     bounces: int
     noise: float = 0.0
     diffraction: bool = False
+    rx: Floats | None = None
+    """Position (3,) [m] of a receiver elsewhere."""
 
     def refusal(self, other: PruneRule) -> str:
         """Return why routes traced by this rule do not serve the radar of another, empty where they do."""
         mine, theirs = self.refinement, other.refinement
-        if np.linalg.norm(other.position - self.position) > _ALIKE:
+        ends = [(x.position, x.position if x.rx is None else x.rx) for x in (self, other)]
+        if max(np.linalg.norm(a - b) for a, b in zip(*ends, strict=True)) > _ALIKE:
             return "its position differs: trace the scene for it"
         if abs(theirs.wavenumber - mine.wavenumber) > _ALIKE * mine.wavenumber:
             return "its carrier differs, for whose wavelength tubes are cut: trace the scene for it"

@@ -35,17 +35,18 @@ def tube_routes(
     bounces: int,
     so_far: Contributions | None = None,
     first: Callable[[Tubes, Contributions], None] | None = None,
+    ins: list[Leg] | None = None,
 ) -> Iterator[Routes]:
     """Yield the routes of tubes launched over `leg`, one batch for each bounce and outgoing leg.
 
     Args: outs the outgoing legs, the direct one first; pieces (p,) that may carry the first bounce; bounces the most
     interactions, both legs counted; so_far contributions to prune against; first is given the tubes on their first
-    surface, whose own routes are then not yielded.
+    surface, whose own routes are then not yielded; ins all legs in, by default those out.
     """
     direct = outs[0]
     found = so_far or Contributions(rule.for_depth(bounces))
     more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone
-    images = _Images.of(geometry, outs)
+    images = _Images.of(geometry, outs if ins is None else ins, outs)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
     for tubes in launch(geometry, leg, direct, pieces, found, more, others):
         if first is not None:
@@ -177,19 +178,21 @@ def resolve_return_leg(
 
 @dataclass(frozen=True)
 class _Images:
-    """Returns that legs over mirrors carry already and tubes must not carry again; `planes` (p,) are those mirrors.
+    """Returns that legs over mirrors carry already and tubes must not carry again; `planes` (p,) are the mirrors of
+    legs in, `outward` (p,) those of legs out.
 
     Over several such mirrors in a row a wave scatters at the last one. Legs pass layers on their last stretch only:
     routes through a layer before it are left to the tubes.
     """
 
     planes: Bools
+    outward: Bools
 
     @staticmethod
-    def of(geometry: Geometry, legs: list[Leg]) -> _Images:
-        """Return the mirrors of legs."""
-        used = {int(geometry.plane[m.facet]) for leg in legs for m in leg.mirrors}
-        return _Images(np.isin(np.arange(geometry.plane.max(initial=-1) + 1), list(used)))
+    def of(geometry: Geometry, ins: list[Leg], outs: list[Leg]) -> _Images:
+        """Return the mirrors of legs in and out."""
+        used = [{int(geometry.plane[m.facet]) for leg in legs for m in leg.mirrors} for legs in (ins, outs)]
+        return _Images(*(np.isin(np.arange(geometry.plane.max(initial=-1) + 1), list(some)) for some in used))
 
     def over(self, geometry: Geometry, out: Leg) -> bool:
         """Tell whether an outgoing leg has a mirror that also scatters (the ground does not)."""
@@ -198,10 +201,10 @@ class _Images:
     def returns(self, geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> Bools:
         """Tell which tubes (n,) stand on a mirror whose image carries their return: on their first surface those that
         leave over other mirrors, later all that came from another piece."""
-        mirror = self.planes[geometry.plane[tubes.facet]]
+        plane = geometry.plane[tubes.facet]
         if first:
-            return mirror & (tubes.slots == len(leg.mirrors))
-        return mirror & (geometry.piece[tubes.came_from()] != geometry.piece[tubes.facet])
+            return self.planes[plane] & (tubes.slots == len(leg.mirrors))
+        return self.outward[plane] & (geometry.piece[tubes.came_from()] != geometry.piece[tubes.facet])
 
     def carry(self, geometry: Geometry, tubes: Tubes) -> Bools:
         """Tell which tubes (n,) a leg covers: it leads over the mirror where they bounced first to where they are."""

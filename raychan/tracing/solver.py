@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Contributions
+from raychan.tracing.direct_routes import direct_routes
 from raychan.tracing.legs import Leg, legs_over, reachable
 from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
@@ -40,22 +41,30 @@ class Stats:
 def launch_routes(
     geometry: Geometry, points: Points, rule: PruneRule, stats: Stats, progress: Progress | None = None
 ) -> Iterator[Routes | DiffractedRoutes]:
-    """Yield the routes of a scene, batch by batch.
+    """Yield the routes of a scene from transmitter to receiver, batch by batch.
 
     Args: geometry, which serves many launches; points the targets given by their RCS; rule what may be left out; stats
     is filled; progress is told ("trace", share done).
     """
     refined, bounces, before = rule.refinement, rule.bounces, geometry.rays
     legs = legs_over(geometry, np.asarray(rule.position, float), bounces - 1, rule.beam)
+    outs = legs if rule.rx is None else legs_over(geometry, np.asarray(rule.rx, float), bounces - 1, rule.beam)
     stats.legs = len(legs)
-    found = point_routes(geometry, points, legs, legs, bounces, refined.slots, refined.layers)
+    found = point_routes(geometry, points, legs, outs, bounces, refined.slots, refined.layers)
     if found is not None:
         yield found
+    if rule.diffraction and rule.rx is not None:
+        raise ValueError(
+            "diffraction is modelled for a receiver beside the transmitter only: model.diffraction = false"
+        )
     if rule.diffraction:
         over = diffracted_routes(geometry, points, legs[0].end, refined.wavenumber, refined.slots)
         if over is not None:
             yield over
-    found = _foot_points(geometry, legs, refined)
+    if rule.rx is None:
+        found = _foot_points(geometry, legs, refined)
+    else:
+        found = direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
     if found is not None:
         yield found
     cuts = _CUTS + _CUTS_A_FACET * len(geometry.facets.vertices)
@@ -70,7 +79,8 @@ def launch_routes(
         pieces = reachable(geometry, leg)
         if not pieces.any():
             continue
-        for routes in tube_routes(geometry, leg, legs, pieces, refined, bounces, direct if i == 0 else direct.forked()):
+        so_far = direct if i == 0 else direct.forked()
+        for routes in tube_routes(geometry, leg, outs, pieces, refined, bounces, so_far, ins=legs):
             stats.tubes += len(routes.kind)
             yield routes
     stats.rays, stats.uncut = geometry.rays - before, direct.budget.uncut

@@ -16,6 +16,7 @@ from raychan.units import undb
 from raychan.world import limits, shapes
 from raychan.world.creases import uncertain_folds
 from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.limbs import LimbMotion, limbs_of
 from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
@@ -37,7 +38,7 @@ class Body:
     Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; spin_dps (3,) [deg/s] about its own axes;
     `material` for all parts or `materials` by part (patterns), a name or a Material. `rcs_dbsm` [dBsm], a number or
     (azimuth_deg, dBsm) pairs relative to its heading, makes it a point target at `rcs_point` (body frame [m]) whose
-    mesh only blocks.
+    mesh only blocks; that RCS fluctuates by its Swerling case `swerling`, 0 to 4.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Body:
     spin_dps: Sequence[float] = (0.0, 0.0, 0.0)
     rcs_dbsm: float | Sequence[tuple[float, float]] | None = None
     rcs_point: Sequence[float] | None = None
+    swerling: int = 0
     role: str | None = None
     unit: str = "m"
     up: str | None = None
@@ -103,10 +105,23 @@ class Body:
             raise SceneError(f"{shown(value)} is not possible", key=f"{self.name}.{name}", value=value, allowed=allowed)
         return found
 
+    @cached_property
+    def limbs(self) -> tuple[Body, ...]:
+        """The rigid bodies 'NAME.LIMB' of which a walker or a cyclist is made; of others the body itself."""
+        try:
+            skeleton = shapes.skeleton(self.shape, dict(self.params))
+            return (
+                (self,)
+                if skeleton is None or isinstance(self.__dict__.get("motion"), LimbMotion)
+                else limbs_of(self, skeleton)
+            )
+        except SceneError as e:
+            raise e.at(key="bodies") from None
+
     @property
     def moves(self) -> bool:
         """Whether it moves or turns."""
-        return any(self.motion.velocity) or bool(self.motion.spin().any())
+        return self.motion.moves
 
     def at(self, time: float) -> Body:
         """Return the body where it is at a time [s], itself if it does not move; the mesh is shared."""
@@ -130,6 +145,14 @@ class Body:
         if self.rcs_dbsm is not None:
             return Role.BLOCKER
         return Role.MIRROR if self.shape == "ground" else Role.SCATTERER
+
+    @property
+    def fluctuates(self) -> bool:
+        """Whether its RCS does; SceneError for an unknown Swerling case, or where no RCS is given."""
+        if self.swerling not in range(5) or (self.swerling and self.rcs_dbsm is None):
+            key, allowed = f"{self.name}.swerling", "0, 1, 2, 3 or 4, above 0 only with rcs_dbsm"
+            raise SceneError(f"{shown(self.swerling)} is not possible", key=key, value=self.swerling, allowed=allowed)
+        return self.swerling > 0
 
     def part_materials(self) -> list[str | Material]:
         """Return the material of each part: by name or pattern, else the body's, else the shape's, else PEC."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from raychan.em.diffuse import Diffuse
 from raychan.world import bundled, overrides
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, nearest
 from raychan.world.material import Material
-from raychan.world.schema import BodyTable, MaterialTable
+from raychan.world.schema import BodyTable
+from raychan.world.schema_materials import MaterialTable
 
 _FORM = ("shape", "params", "mesh", "unit", "up", "forward", "scale", "crease_deg")
 
@@ -62,6 +64,7 @@ def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = No
         spin_dps=t.spin_dps,
         rcs_dbsm=t.rcs_dbsm,
         rcs_point=t.rcs_point,
+        swerling=t.swerling,
         role=t.role,
         unit=t.unit,
         up=t.up,
@@ -78,6 +81,7 @@ def material_of(name: str, t: MaterialTable, file: Path | None) -> Material:
     """Return the material of a table; SceneError where it cannot be."""
     thickness = None if t.thickness_mm is None else t.thickness_mm * 1e-3
     try:
-        return Material(t.eps_r, t.sigma, thickness, t.roughness_mm * 1e-3, t.pec, name, t.source)
+        diffuse = None if t.diffuse is None else Diffuse(**t.diffuse.model_dump())
+        return Material(t.eps_r, t.sigma, thickness, t.roughness_mm * 1e-3, t.pec, name, t.source, diffuse)
     except SceneError as e:
         raise e.at(file=file, key=f"materials.{name}") from None

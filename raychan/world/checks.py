@@ -1,5 +1,5 @@
-"""Checks of a whole scene: a radar inside a body or in the plane of a facet, targets beyond the unambiguous range or
-range rate."""
+"""Checks of a whole scene: a radar inside a body or in the plane of a facet, an array unfit for its processing, targets
+beyond the unambiguous range or range rate."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from raychan.radar.aperture import Aperture
+from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.records import MIRROR
+from raychan.units import C0
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
@@ -20,7 +23,20 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
     """Raise SceneError where the radar is inside a body, on its surface, or below a mirror."""
     if radar is None:
         return
-    at = np.array(radar.position)
+    outside(bodies, np.array(radar.position), "radar", "radar.position")
+    if radar.rx_position is not None:
+        outside(bodies, np.array(radar.rx_position), "receiver", "radar.rx_position")
+        if radar.rx_position == radar.position:
+            where = "a place apart from radar.position; without this key the receiver stands beside the transmitter"
+            problem = "the receiver stands where the transmitter does"
+            raise SceneError(problem, key="radar.rx_position", value=radar.rx_position, allowed=where)
+
+
+def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
+    """Raise SceneError where a place (3,) [m] is inside a body, on its surface, or below a mirror.
+
+    Args: what stands there, as messages call it; key that gives the place.
+    """
     for body in bodies:
         local, mesh = body.motion.to_body(at), body.geometry
         if body.resolved_role == MIRROR:
@@ -28,17 +44,27 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
             n = np.cross(c[1] - c[0], c[2] - c[0])
             if n @ (local - c[0]) <= 0.0:
                 where = "a place on its lit side"
-                raise SceneError(
-                    f"radar is behind '{body.name}'", key="radar.position", value=at.tolist(), allowed=where
-                )
+                raise SceneError(f"{what} is behind '{body.name}'", key=key, value=at.tolist(), allowed=where)
             continue
         place = place_of(mesh.corners, local)
         if place != Place.OUTSIDE:
             where = "inside" if place == Place.INSIDE else "on the surface of"
             # A mesh in the wrong unit may enclose the radar.
             allowed = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
-            problem = f"radar is {where} '{body.name}'"
-            raise SceneError(problem, key="radar.position", value=at.tolist(), allowed=allowed)
+            problem = f"{what} is {where} '{body.name}'"
+            raise SceneError(problem, key=key, value=at.tolist(), allowed=allowed)
+
+
+def array_fits(radar: Radar) -> None:
+    """Raise SceneError where the array cannot have what [processing] asks of it: ESPRIT, or a taper over its beams."""
+    asked, aperture = radar.processing, Aperture(radar.virtual_elements, C0 / radar.waveform.middle)
+    if asked.doa == "esprit" and not aperture.uniform:
+        allowed = "bartlett, capon or music; esprit only with elements on a uniform line along y or z"
+        raise SceneError("no uniform line of elements", key="processing.doa", value="esprit", allowed=allowed)
+    if asked.beam_window != "rect" and aperture.table is None:
+        allowed = "rect; a taper only over elements that fill a uniform line or rectangle"
+        problem = "no uniform line or rectangle of elements"
+        raise SceneError(problem, key="processing.beam_window", value=asked.beam_window, allowed=allowed)
 
 
 def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from raychan.em.diffuse import Diffuse
 from raychan.records import LAYER, MaterialKind, Materials
 from raychan.units import EPS0
 from raychan.world.errors import SceneError, nearest
@@ -24,7 +25,7 @@ class Material:
     """A material at one frequency; `raychan.world.material.names()` lists the built-in ones.
 
     Args: eps_r relative permittivity; sigma [S/m]; thickness [m] of a thin layer that reflects and passes, None for an
-    opaque half space; roughness rms height [m]; pec perfect conductor.
+    opaque half space; roughness rms height [m]; pec perfect conductor; diffuse, how it scatters diffusely, None: not.
     Raises: SceneError for values no passive material has.
     """
 
@@ -35,6 +36,7 @@ class Material:
     pec: bool = False
     name: str = ""
     source: str = ""
+    diffuse: Diffuse | None = None
 
     def __post_init__(self) -> None:
         for key, limit in (("eps_r", EPS_R), ("sigma", SIGMA), ("roughness", _ROUGHNESS), ("thickness", _THICKNESS)):
@@ -146,4 +148,5 @@ def resolve(materials: Iterable[str | Material], frequency: float) -> Materials:
         eps=np.array([m.eps(frequency) for m in rows], np.complex128),
         thickness=np.array([m.thickness or 0.0 for m in rows], float) * [m.kind == LAYER for m in rows],
         roughness=np.array([m.roughness for m in rows], float),
+        diffuse=tuple(m.diffuse for m in rows),
     )

@@ -47,6 +47,29 @@ class Motion:
         turn = np.array([0.0, 0.0, self.turn_rate])
         return turn + self.rotation(time) @ np.asarray(self.own_spin) if any(self.own_spin) else turn
 
+    @property
+    def moves(self) -> bool:
+        """Whether it moves or turns."""
+        return any(self.velocity) or self.turns
+
+    @property
+    def turns(self) -> bool:
+        """Whether its velocity and its turn do not tell where its points are after some time."""
+        return bool(self.spin().any())
+
+    def poses(self, times: Array) -> tuple[Array, Array]:
+        """Return rotations (t, 3, 3) to world axes and origins (t, 3) [m] at times (t,) [s]."""
+        turns = np.array([self.rotation(t) for t in times]).reshape(-1, 3, 3)
+        return turns, self.origin() + np.asarray(times)[:, None] * np.asarray(self.velocity)
+
+    def velocity_of_origin(self, time: float = 0.0) -> Array:
+        """Return the velocity (3,) [m/s] of the origin at a time [s]."""
+        return np.asarray(self.velocity, float)
+
+    def swerve(self, time: float) -> float:
+        """Return how far [m] the origin is from even motion a time [s] before or after now; it never is."""
+        return 0.0
+
     def at(self, time: float) -> Motion:
         """Return the same motion counted from a time [s]."""
         x, y, z = map(float, self.origin(time))
@@ -66,7 +89,7 @@ class Motion:
     def velocity_at(self, point: Array, time: float = 0.0) -> Array:
         """Return the velocity (..., 3) [m/s] of the body's matter at world points (..., 3)."""
         arm = np.asarray(point, float) - self.origin(time)
-        return np.asarray(self.velocity, float) + np.cross(self.spin(time), arm)
+        return self.velocity_of_origin(time) + np.cross(self.spin(time), arm)
 
 
 def _about(turn: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from raychan.records import MIRROR
 from raychan.world.body import Body
+from raychan.world.limbs import alike
 from raychan.world.mesh import Floats
 
 _SAMPLES = 400  # points on a body's surface
@@ -45,7 +46,7 @@ def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
     boxes = {i: _box(bodies[i]) for i in solid}
     for i, k in combinations(solid, 2):
         low, high = np.maximum(boxes[i][0], boxes[k][0]), np.minimum(boxes[i][1], boxes[k][1])
-        if (high - low > _DEPTH).all():
+        if (high - low > _DEPTH).all() and not alike(bodies[i], bodies[k]):
             said += _told(bodies[i], bodies[k], opaque[i], opaque[k])
     return said
 

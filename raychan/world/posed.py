@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.triangles import pose
-from raychan.records import Facets, Points
+from raychan.records import LAYER, MIRROR, Facets, Points
 from raychan.world.body import Body
 from raychan.world.material import Material, resolve
 from raychan.world.mesh import Floats
@@ -46,6 +46,37 @@ def _shared(facets: Facets, static: StaticGeometry) -> Facets:
     return kept
 
 
+def index_of(bodies: Sequence[Body], chosen: Sequence[Sequence[Material]]) -> Index:
+    """Return all materials, all part names, and for each body the material and the part number of its parts.
+
+    Args: chosen, for each body the materials of its parts.
+    """
+    materials: dict[Material, int] = {}
+    parts: dict[str, int] = {}
+    rows = []
+    for body, own in zip(bodies, chosen, strict=True):
+        mesh = body.geometry
+        lone = len(mesh.part_names) == 1
+        part = [parts.setdefault("" if lone and p == "body" else p, len(parts)) for p in mesh.part_names]
+        kind = [materials.setdefault(m, len(materials)) for m in own]
+        rows.append((np.array(kind, np.int32), np.array(part, np.int32)))
+    return list(materials), list(parts), rows
+
+
+def spheres_inside(
+    bodies: Sequence[Body], chosen: Sequence[Sequence[Material]]
+) -> tuple[Floats, Floats, NDArray[np.int32]]:
+    """Return centres (k, 3) [m], radii (k,) [m] and bodies (k,) of spheres inside bodies at time 0; args as
+    `index_of`."""
+    found = []
+    for i, (b, own) in enumerate(zip(bodies, chosen, strict=True)):
+        if b.resolved_role != MIRROR:
+            centre, radius = b.geometry.inner_spheres(tuple(m.kind != LAYER for m in own))
+            found.append((b.motion.to_world(centre), radius, np.full(len(radius), i, np.int32)))
+    centres, radii, owners = zip(*found, strict=True) if found else ((), (), ())
+    return stack(list(centres), (3,), float), stack(list(radii), (), float), stack(list(owners), (), np.int32)
+
+
 def _posed(bodies: Sequence[Body], which: Sequence[int], index: Index, frequency: float, time: float) -> Facets:
     """Return a record of all bodies with the facets of those numbered `which` only."""
     materials, parts, numbers = index
@@ -64,7 +95,7 @@ def _posed(bodies: Sequence[Body], which: Sequence[int], index: Index, frequency
         material=stack([numbers[b][0][m.part] for b, m in zip(which, meshes, strict=True)], (), np.int32),
         role=np.array([b.resolved_role for b in bodies], np.int8),
         origin=origins,
-        velocity=np.array([b.motion.velocity for b in bodies], float).reshape(-1, 3),
+        velocity=np.array([b.motion.velocity_of_origin(time) for b in bodies], float).reshape(-1, 3),
         spin=np.array([b.motion.spin(time) for b in bodies]).reshape(-1, 3),
         materials=resolve(materials, frequency),
         body_names=tuple(b.name for b in bodies),

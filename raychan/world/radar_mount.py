@@ -12,11 +12,14 @@ import numpy as np
 from raychan.units import watt
 from raychan.world import bundled, overrides
 from raychan.world.errors import SceneError, nearest
-from raychan.world.schema import AntennaTable, ProcessingTable, RadarTable
+from raychan.world.schema import ProcessingTable, RadarTable
+from raychan.world.schema_antenna import AntennaTable
 from raychan.world.schema_errors import checked
+from raychan.world.schema_impairments import ImpairmentsTable
 
 if TYPE_CHECKING:
     from raychan.radar.antenna import Antenna
+    from raychan.radar.impairments import Impairments
     from raychan.radar.processing import Processing
     from raychan.radar.radar import Radar
 
@@ -53,7 +56,8 @@ def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any 
         carrier=w.carrier_ghz * 1e9,
         bandwidth=w.bandwidth_mhz * 1e6,
         chirp_duration=w.chirp_us * 1e-6,
-        repetition=(w.repetition_us or w.chirp_us) * 1e-6,
+        repetition=None if w.stagger_us else (w.repetition_us or w.chirp_us) * 1e-6,  # type: ignore[arg-type]
+        stagger=tuple(t * 1e-6 for t in w.stagger_us or ()),
         n_chirps=w.chirps,
         n_samples=w.samples,
         complex_sampling=w.iq,
@@ -68,11 +72,43 @@ def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any 
         roll_deg=table.roll_deg,
         velocity=table.velocity_mps,
         elements=1e-3 * np.array(table.elements_mm),
+        tx_elements=1e-3 * np.array(table.tx_elements_mm),
+        multiplexing=table.multiplexing,
+        ddm_slots=table.ddm_slots,
+        rx_polarization=table.rx_polarization,
+        rx_position=table.rx_position,
+        rx_velocity=table.rx_velocity_mps,
+        rx_yaw_deg=table.rx_yaw_deg,
         processing=processing,
         power=float(watt(table.power_dbm)),
         noise_figure_db=table.noise_figure_db,
+        noise_temperature_k=table.noise_temperature_k,
         noise=table.noise,
+        impairments=_impairments(table.impairments, w.iq, file),
     )
+
+
+def _impairments(table: ImpairmentsTable, iq: bool, file: Any) -> Impairments:
+    """Return the impairments of a table; SceneError where they need I/Q sampling and there is none."""
+    from raychan.radar.impairments import ChirpError, Converter, Impairments, PhaseNoise
+
+    errors, mask, bits, scale = (
+        table.chirp_error_us_khz, table.phase_noise_hz_dbc, table.adc_bits, table.adc_full_scale_dbm,
+    )  # fmt: skip
+    found = Impairments(
+        chirp_error=None if errors is None else ChirpError([(1e-6 * t, 1e3 * f) for t, f in errors]),
+        phase_noise=None if mask is None else PhaseNoise(mask),
+        converter=None if bits is None or scale is None else Converter(bits, scale),
+        iq_gain_db=table.iq_gain_db,
+        iq_phase_deg=table.iq_phase_deg,
+        dc_offset_dbm=table.dc_offset_dbm,
+    )
+    if not (iq or found.iq_balanced):
+        raise SceneError(
+            "I/Q imbalance of a radar with real sampling", file=file, key="radar.impairments",
+            allowed="waveform.iq = true, or iq_gain_db and iq_phase_deg of 0",
+        )  # fmt: skip
+    return found
 
 
 def mounted(table: RadarTable) -> list[tuple[str, str | AntennaTable]]:

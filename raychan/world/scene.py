@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import LAYER, MIRROR, Facets, Points
+from raychan.records import LAYER, Facets, Points
 from raychan.reprs import Described
 from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
@@ -22,15 +22,19 @@ from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
-from raychan.world.posed import points_of, posed, stack
+from raychan.world.posed import index_of, points_of, posed, spheres_inside
 from raychan.world.radar_mount import mount, processing_of, radar_of
-from raychan.world.schema import BodyTable, Model, RadarTable, SceneFile
+from raychan.world.schema import BodyTable, InterfererTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
+from raychan.world.schema_impairments import AtmosphereTable
 from raychan.world.seams import over_seams
 from raychan.world.static_geometry import StaticGeometry
+from raychan.world.surroundings import atmosphere_of, attenuation_of, check_places, interferers_of
 from raychan.world.topology import MeshTopology
 
 if TYPE_CHECKING:
+    from raychan.em.atmosphere import Atmosphere
+    from raychan.radar.interferer import Interferer
     from raychan.radar.processing import Processing
     from raychan.radar.radar import Radar
 
@@ -42,8 +46,9 @@ class Scene(Described):
 
     Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar an object, a table as
     in a scene file, or None; processing of the receiver, an object or a table (default the radar's own); model a table
-    of what is modelled; materials by name, which bodies may use; folder to which file names refer.
-    Raises: SceneError for a scene that cannot be simulated.
+    of what is modelled; materials by name, which bodies may use; folder to which file names refer; atmosphere, an
+    object or a table (default none: no loss on the way); interferers, objects or tables.
+    Raises: SceneError for a scene that cannot be.
 
     >>> Scene(bodies=[Body(name="wall", shape="plate", position=(10, 0, 0))]).frequency
     77000000000.0
@@ -61,10 +66,13 @@ class Scene(Described):
         text: str = "",
         path: Path | None = None,
         folder: Path | None = None,
+        atmosphere: Atmosphere | AtmosphereTable | Mapping[str, object] | None = None,
+        interferers: Iterable[Interferer | InterfererTable | Mapping[str, object]] = (),
     ) -> None:
         self.title, self.text, self.path = title, text, path
         self.folder = folder or Path.cwd()
-        self.bodies = tuple(bodies)
+        self._given = tuple(bodies)
+        self.bodies = tuple(limb for body in self._given for limb in body.limbs)
         self.radar_table: RadarTable | None = mount(radar, path)
         self.processing: Processing = processing_of(processing, radar, path)
         self.is_radar_object = not isinstance(radar, RadarTable | Mapping | None)
@@ -78,6 +86,9 @@ class Scene(Described):
                 f"{frequency!r} is not possible", key="frequency", value=frequency, allowed=FREQUENCY.allowed
             )
         self.materials = dict(materials or {})
+        self.atmosphere = atmosphere_of(atmosphere, path)
+        self.attenuation = attenuation_of(self.atmosphere, self.frequency, self.radar_table, path)
+        self.interferers = interferers_of(interferers, self.folder, path)
         self._data: dict[str, Any] | None = None
         self._tables: Sequence[BodyTable] = ()
         # What `geometry_of` derives from the bodies at time 0, by class; shared by scenes with the same bodies.
@@ -115,7 +126,7 @@ class Scene(Described):
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
         ghz = tables.scene.frequency_ghz
-        known = {t.name: (t, b) for t, b in zip(like._tables, like.bodies, strict=True)} if like else {}
+        known = {t.name: (t, b) for t, b in zip(like._tables, like._given, strict=True)} if like else {}
         scene = cls(
             bodies=[body_of(b, folder, known.get(b.name)) for b in tables.bodies],
             frequency=None if ghz is None else ghz * 1e9,
@@ -127,6 +138,8 @@ class Scene(Described):
             text=text,
             path=file,
             folder=folder,
+            atmosphere=tables.atmosphere,
+            interferers=tables.interferers,
         )
         scene._data, scene._tables = dict(data), tables.bodies
         if like is not None and scene._stands_as(like):
@@ -161,7 +174,8 @@ class Scene(Described):
     def _stands_as(self, other: Scene) -> bool:
         """Return whether both scenes have the same bodies at the same places, of the same materials."""
         alike = len(self.bodies) == len(other.bodies) and all(map(is_, self.bodies, other.bodies))
-        return alike and (self.materials, self.frequency) == (other.materials, other.frequency)
+        mine, others = ((x.materials, x.frequency, x.attenuation) for x in (self, other))
+        return alike and mine == others
 
     def _prepare(self) -> None:
         """Check everything once: a scene that exists can be simulated."""
@@ -174,13 +188,14 @@ class Scene(Described):
             seen.add(body.name)
             try:
                 self._chosen(body)
-                _ = body.motion, body.resolved_role
+                _ = body.motion, body.resolved_role, body.fluctuates
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.bodies = over_seams(self.bodies)
         checks.radar_outside(self.bodies, self.radar_table)
+        check_places(self.interferers, self.bodies, self.radar_table)
         if self.radar_table is not None:
-            _ = self.radar
+            checks.array_fits(self.radar)
 
     @cached_property
     def radar(self) -> Radar:
@@ -204,10 +219,12 @@ class Scene(Described):
             there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
             moved.radar_table = self.radar_table.model_copy(update={"position": there.tolist()})
             moved.__dict__["radar"] = self.radar_at(time)
+        moved.interferers = tuple(x.at(time) for x in self.interferers)
         moved.__dict__.pop("warnings", None)
         moved.text, moved._data = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
         try:
             checks.radar_outside(moved.bodies, moved.radar_table)
+            check_places(moved.interferers, moved.bodies, moved.radar_table)
         except SceneError as e:
             late = f"{e.problem} {time:g} s on"
             raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
@@ -251,16 +268,7 @@ class Scene(Described):
     @cached_property
     def _index(self) -> tuple[list[Material], list[str], list[tuple[Any, Any]]]:
         """All materials, all part names, and for each body the material and the part number of its parts."""
-        materials: dict[Material, int] = {}
-        parts: dict[str, int] = {}
-        rows = []
-        for body in self.bodies:
-            mesh = body.geometry
-            lone = len(mesh.part_names) == 1
-            part = [parts.setdefault("" if lone and p == "body" else p, len(parts)) for p in mesh.part_names]
-            kind = [materials.setdefault(m, len(materials)) for m in self._chosen(body)]
-            rows.append((np.array(kind, np.int32), np.array(part, np.int32)))
-        return list(materials), list(parts), rows
+        return index_of(self.bodies, [self._chosen(b) for b in self.bodies])
 
     @property
     def static_geometry(self) -> StaticGeometry | None:
@@ -272,7 +280,8 @@ class Scene(Described):
 
     def facets(self, time: float = 0.0) -> Facets:
         """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        return posed(self.bodies, self._index, self.frequency, time, self.static_geometry)
+        found = posed(self.bodies, self._index, self.frequency, time, self.static_geometry)
+        return found.replace(attenuation=self.attenuation) if self.attenuation else found
 
     @property
     def topology(self) -> list[MeshTopology]:
@@ -282,13 +291,7 @@ class Scene(Described):
     @property
     def inner_spheres(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
         """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of spheres inside bodies at time 0."""
-        found = []
-        for i, b in enumerate(self.bodies):
-            if b.resolved_role != MIRROR:
-                centre, radius = b.geometry.inner_spheres(tuple(m.kind != LAYER for m in self._chosen(b)))
-                found.append((b.motion.to_world(centre), radius, np.full(len(radius), i, np.int32)))
-        centres, radii, owners = zip(*found, strict=True) if found else ((), (), ())
-        return stack(list(centres), (3,), float), stack(list(radii), (), float), stack(list(owners), (), np.int32)
+        return spheres_inside(self.bodies, [self._chosen(b) for b in self.bodies])
 
     def points(self, time: float = 0.0) -> Points:
         """Return the targets given by their RCS at a time [s]."""

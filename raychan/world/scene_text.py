@@ -6,23 +6,31 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from raychan.units import dbm, watt
 from raychan.world import bundled
+from raychan.world.limbs import wholes
 from raychan.world.material import Material, material, names
 from raychan.world.schema import RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from raychan.radar.antenna import Antenna
     from raychan.radar.radar import Radar
     from raychan.radar.waveform import Waveform
     from raychan.world.body import Body
     from raychan.world.scene import Scene
 
-_BODY = ("shape", "unit", "up", "forward", "role", "rcs_dbsm", "scale", "crease_deg", "turn_rate_dps", "params")
+_BODY = (
+    "shape", "unit", "up", "forward", "role", "rcs_dbsm", "swerling", "scale", "crease_deg",
+    "turn_rate_dps", "params",
+)  # fmt: skip
 _ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -37,12 +45,15 @@ def toml_of(scene: Scene) -> str:
         "scene": {"title": scene.title, "frequency_ghz": figure(scene.frequency / 1e9, scene.frequency, _giga)},
         "processing": {k: v for k, v in vars(scene.processing).items() if v is not None},
         "model": scene.model.model_dump(),
-        "bodies": [_body_table(body, materials, scene.frequency) for body in scene.bodies],
+        "bodies": [_body_table(body, materials, scene.frequency) for body in wholes(scene.bodies)],
     }
     if scene.radar_table is not None:
         if scene.is_radar_object and not _antennas(scene.radar):
             raise ValueError("antennas of a class of their own, from files, or of two polarisations cannot be written")
-        data["radar"] = _with_files(scene.radar_table.model_dump(exclude_defaults=True), scene.folder)
+        data["radar"] = with_files(scene.radar_table.model_dump(exclude_defaults=True), scene.folder)
+    from raychan.world.surroundings_text import surroundings_tables
+
+    data |= surroundings_tables(scene)
     data["materials"] = {name: _material_table(m) for name, m in materials.items()}
     tables = checked(SceneFile, data, scene.path)
     return "\n".join(_lines(tables.model_dump(exclude_defaults=True))).lstrip() + "\n"
@@ -53,6 +64,8 @@ def radar_table_of(radar: Radar) -> RadarTable:
 
     Raises: SceneError for a value beyond the limits of scene files.
     """
+    from raychan.world.surroundings_text import impairments_table
+
     return checked(  # type: ignore[no-any-return]
         RadarTable,
         {
@@ -61,10 +74,16 @@ def radar_table_of(radar: Radar) -> RadarTable:
             "velocity_mps": radar.velocity.tolist(),
             "power_dbm": figure(float(dbm(radar.power)), radar.power, lambda x: float(watt(x))),
             "noise_figure_db": float(radar.noise_figure_db),
+            "noise_temperature_k": float(radar.noise_temperature_k),
             "noise": radar.noise,
             **_antennas(radar),
-            "elements_mm": [[figure(1e3 * x, x, _milli) for x in row] for row in radar.elements.tolist()],
+            **{f"{name}_mm": _millimetres(getattr(radar, name)) for name in ("elements", "tx_elements")},
+            "multiplexing": radar.multiplexing,
+            "ddm_slots": radar.ddm_slots,
+            "rx_polarization": radar.rx_polarization,
+            **_elsewhere(radar),
             "waveform": _waveform_table(radar.waveform),
+            "impairments": impairments_table(radar.impairments),
         },
     )
 
@@ -95,8 +114,19 @@ def figure(guess: float, value: float, read: Callable[[float], float]) -> float:
     return next((x for x in near if read(x) == value), guess)
 
 
+def _elsewhere(radar: Radar) -> dict[str, Any]:
+    if radar.rx_position is None:
+        return {}
+    speed = None if radar.rx_velocity is None else radar.rx_velocity.tolist()
+    return {"rx_position": radar.rx_position.tolist(), "rx_velocity_mps": speed, "rx_yaw_deg": radar.rx_yaw_deg}
+
+
+def _millimetres(places: NDArray[np.float64]) -> list[list[float]]:
+    return [[figure(1e3 * x, x, _milli) for x in row] for row in places.tolist()]
+
+
 def _waveform_table(wave: Waveform) -> dict[str, Any]:
-    table = {
+    table: dict[str, Any] = {
         "carrier_ghz": figure(wave.carrier / 1e9, wave.carrier, _giga),
         "bandwidth_mhz": figure(wave.bandwidth / 1e6, wave.bandwidth, _mega),
         "chirp_us": figure(wave.chirp_duration * 1e6, wave.chirp_duration, _micro),
@@ -104,7 +134,9 @@ def _waveform_table(wave: Waveform) -> dict[str, Any]:
         "samples": wave.n_samples,
         "iq": wave.complex_sampling,
     }
-    if wave.repetition != wave.chirp_duration:
+    if wave.stagger:
+        table["stagger_us"] = [figure(t * 1e6, t, _micro) for t in wave.stagger]
+    elif wave.repetition != wave.chirp_duration:
         table["repetition_us"] = figure(wave.repetition * 1e6, wave.repetition, _micro)
     return table
 
@@ -141,7 +173,7 @@ def _loss(loss_db: float) -> dict[str, float]:
     return {"loss_db": loss_db} if loss_db else {}
 
 
-def _with_files(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def with_files(table: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return a radar's table with the files of its antennas by their whole path."""
     for key in ("antenna", "tx_antenna", "rx_antenna"):
         given = table.get(key)
@@ -185,13 +217,14 @@ def _named(given: str | Material, materials: dict[str, Material], frequency: flo
 
 
 def _material_table(m: Material) -> dict[str, Any]:
+    own = {} if m.diffuse is None else {"diffuse": {k: v for k, v in asdict(m.diffuse).items() if v is not None}}
     if m.pec:
-        return {"pec": True, "source": m.source}
+        return {"pec": True, "source": m.source} | own
     table: dict[str, Any] = {"eps_r": float(m.eps_r), "sigma": float(m.sigma), "source": m.source}
     table["roughness_mm"] = figure(1e3 * m.roughness, m.roughness, _milli)
     if m.thickness is not None:
         table["thickness_mm"] = figure(1e3 * m.thickness, m.thickness, _milli)
-    return table
+    return table | own
 
 
 def _lines(table: Mapping[str, Any], path: str = "") -> Iterator[str]:
@@ -211,7 +244,7 @@ def _lines(table: Mapping[str, Any], path: str = "") -> Iterator[str]:
 
 
 def _is_table(key: str, value: Any) -> bool:
-    return (isinstance(value, dict) and key not in ("params", "element")) or key == "bodies"
+    return (isinstance(value, dict) and key not in ("params", "element")) or key in ("bodies", "interferers")
 
 
 def _key(key: str) -> str:

@@ -4,53 +4,45 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from raychan.world.limits import ROW_WAVELENGTHS
 from raychan.world.quantities import (
     Angle,
     Bandwidth,
-    Beam,
     Bearings,
     Bounces,
     Carrier,
     CellPair,
     Chirps,
-    Conductivity,
     Crease,
-    Gain,
+    Kelvin,
     Layers,
-    Level,
-    Loss,
     Noise,
     Offsets,
     PadPair,
-    Permittivity,
     Pfa,
     Place,
     Power,
     Ramp,
     Rcs,
-    Roughness,
-    Row,
     Samples,
     Scale,
+    Slots,
     Snr,
-    Spacing,
     Speed,
     Spin,
-    Thickness,
+    Stagger,
+    Start,
     Tolerance,
     Tracings,
     Turn,
+    TxOffsets,
     Window,
 )
-
-
-class Table(BaseModel):
-    """A table of a scene file: unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+from raychan.world.schema_antenna import AntennaTable
+from raychan.world.schema_base import Table
+from raychan.world.schema_impairments import AtmosphereTable, ImpairmentsTable
+from raychan.world.schema_materials import MaterialTable
 
 
 class Header(Table):
@@ -59,66 +51,6 @@ class Header(Table):
     title: str = ""
     frequency_ghz: Carrier | None = None
     """Frequency of the materials; default the radar's carrier, or 77 GHz without a radar."""
-
-
-class PublishedTable(Table):
-    """[published] of an antenna: figures that its source prints; `raychan info` shows them beside the computed ones."""
-
-    gain_dbi: Gain | None = None
-    hpbw_h_deg: Beam | None = None
-    hpbw_v_deg: Beam | None = None
-    sll_h_db: Level | None = None
-    sll_v_db: Level | None = None
-
-
-class AntennaTable(Table):
-    """An antenna: a kind with what that kind takes, in a scene or in a TOML file of its own."""
-
-    kind: Literal["isotropic", "cosine", "array", "measured"]
-    source: str = ""
-    published: PublishedTable | None = None
-    gain_dbi: Gain | None = None
-    """At boresight; the loss follows."""
-    loss_db: Loss | None = None
-    """Default 0 dB."""
-    hpbw_h_deg: Beam | None = None
-    hpbw_v_deg: Beam | None = None
-    ny: Row = 1
-    nz: Row = 1
-    spacing_y: Spacing = 0.5
-    """Wavelengths."""
-    spacing_z: Spacing = 0.5
-    taper_y: Window = "rect"
-    taper_z: Window = "rect"
-    element: AntennaTable | None = None
-    """Default: isotropic ahead."""
-    front: bool = False
-    file: str | None = None
-
-    @model_validator(mode="after")
-    def _fits(self) -> AntennaTable:
-        own = _OF_KIND[self.kind]
-        if strange := sorted(self.model_fields_set - own - _OF_ANY):
-            known = ", ".join(sorted(own | _OF_ANY))
-            raise ValueError(f"{strange[0]} is no key of kind = '{self.kind}', which takes {known}")
-        if self.gain_dbi is not None and self.loss_db is not None:
-            raise ValueError("either gain_dbi or loss_db")
-        if self.kind == "cosine" and (self.hpbw_h_deg is None or self.hpbw_v_deg is None):
-            raise ValueError("hpbw_h_deg and hpbw_v_deg for kind = 'cosine'")
-        if self.kind == "measured" and self.file is None:
-            raise ValueError("file for kind = 'measured'")
-        if max(self.ny * self.spacing_y, self.nz * self.spacing_z) > ROW_WAVELENGTHS:
-            raise ValueError(f"elements times spacing at most {ROW_WAVELENGTHS:g} wavelengths, along y and z")
-        return self
-
-
-_OF_KIND = {
-    "isotropic": {"front"},
-    "cosine": {"hpbw_h_deg", "hpbw_v_deg"},
-    "array": {"ny", "nz", "spacing_y", "spacing_z", "taper_y", "taper_z", "element"},
-    "measured": {"file"},
-}
-_OF_ANY = {"kind", "source", "published", "gain_dbi", "loss_db"}
 
 
 class WaveformTable(Table):
@@ -132,6 +64,8 @@ class WaveformTable(Table):
     """Sampled time of a ramp."""
     repetition_us: Ramp | None = None
     """From ramp to ramp; default chirp_us."""
+    stagger_us: Stagger | None = None
+    """Times from ramp to ramp in turn, in place of repetition_us."""
     chirps: Chirps = 128
     samples: Samples = 256
     iq: bool = True
@@ -140,6 +74,11 @@ class WaveformTable(Table):
     def _fits(self) -> WaveformTable:
         if self.repetition_us is not None and self.repetition_us < self.chirp_us * (1.0 - 1e-9):
             raise ValueError("repetition_us not shorter than chirp_us")
+        if self.stagger_us is not None:
+            if self.repetition_us is not None or min(self.stagger_us) < self.chirp_us * (1.0 - 1e-9):
+                raise ValueError("either repetition_us or stagger_us, none of it shorter than chirp_us")
+            if self.chirps % len(self.stagger_us):
+                raise ValueError(f"chirps a multiple of the {len(self.stagger_us)} times of stagger_us")
         if self.bandwidth_mhz >= 1e3 * self.carrier_ghz:
             raise ValueError(f"bandwidth_mhz below the carrier of {self.carrier_ghz:g} GHz")
         return self
@@ -155,15 +94,70 @@ class RadarTable(Table):
     velocity_mps: Speed = [0.0, 0.0, 0.0]
     power_dbm: Power = 12.0
     noise_figure_db: Noise = 15.0
+    noise_temperature_k: Kelvin = 290.0
+    """Of the antenna: the noise power is k (T + 290 K (F - 1)) times the sample rate."""
     noise: bool = True
     antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
     """Of transmitter and receiver; a text names an antenna file, relative to the scene's."""
     tx_antenna: str | AntennaTable | None = None
     rx_antenna: str | AntennaTable | None = None
     polarization: Literal["V", "H"] = "V"
+    rx_polarization: Literal["V", "H", "both"] | None = None
+    """Of the receivers; default `polarization`; both: co-polarised, then as many cross-polarised ones."""
     elements_mm: Offsets = [[0.0, 0.0, 0.0]]
     """Receiver phase centres in the antenna's frame."""
+    tx_elements_mm: TxOffsets = [[0.0, 0.0, 0.0]]
+    """Transmitter phase centres in the antenna's frame."""
+    multiplexing: Literal["none", "tdm", "ddm"] = "none"
+    """Of transmitters: by time division, chirp m by transmitter m modulo their number, or by Doppler division."""
+    rx_position: Place | None = None
+    """Of receivers elsewhere, with the radar's clock; default beside the transmitter."""
+    rx_velocity_mps: Speed | None = None
+    """Default the radar's, as rx_yaw_deg."""
+    rx_yaw_deg: Angle | None = None
+    ddm_slots: Slots | None = None
+    """Doppler slots; default one more than transmitters."""
     waveform: WaveformTable
+    impairments: ImpairmentsTable = ImpairmentsTable()
+
+    @model_validator(mode="after")
+    def _transmitters_fit(self) -> RadarTable:
+        many, chirps = len(self.tx_elements_mm), self.waveform.chirps
+        if self.waveform.stagger_us is not None and many > 1:
+            raise ValueError("one transmitter with waveform.stagger_us")
+        if self.rx_position is None and (self.rx_velocity_mps is not None or self.rx_yaw_deg is not None):
+            raise ValueError("rx_velocity_mps and rx_yaw_deg only with rx_position")
+        if self.rx_position is not None and many > 1:
+            raise ValueError("one transmitter with rx_position")
+        if self.multiplexing == "none" and many > 1:
+            raise ValueError(f"multiplexing = 'tdm' or 'ddm' for {many} transmitters")
+        if self.ddm_slots is not None and (self.multiplexing != "ddm" or self.ddm_slots < many):
+            raise ValueError(f"ddm_slots only with multiplexing = 'ddm', and not below the {many} transmitters")
+        slots = (self.ddm_slots or many + 1) if self.multiplexing == "ddm" else many
+        if chirps % slots:
+            what = "Doppler slots" if self.multiplexing == "ddm" else "transmitters"
+            raise ValueError(f"waveform.chirps a multiple of the {slots} {what}, not {chirps}")
+        return self
+
+
+class InterfererTable(Table):
+    """Table [[interferers]]: a second radar that transmits into the receiver."""
+
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    position: Place
+    yaw_deg: Angle = 0.0
+    pitch_deg: Angle = 0.0
+    roll_deg: Angle = 0.0
+    velocity_mps: Speed = [0.0, 0.0, 0.0]
+    power_dbm: Power = 12.0
+    antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
+    polarization: Literal["V", "H"] = "V"
+    waveform: WaveformTable
+    """Its samples do not matter."""
+    start_us: Start = 0.0
+    """Start of its first ramp after that of the radar."""
+    locked: bool = False
+    """Ramps keep their phase to the radar's; else each begins at a random phase."""
 
 
 class ProcessingTable(Table):
@@ -179,6 +173,12 @@ class ProcessingTable(Table):
     guard: CellPair | None = None
     """Cells along range and range rate; none: the detector's own choice."""
     train: CellPair | None = None
+    beams: Literal["coherent", "mean"] = "coherent"
+    """Of several receivers: detect in the strongest of a bank of beams, or in their mean power."""
+    doa: Literal["bartlett", "capon", "music", "esprit"] = "bartlett"
+    """Directions of echoes."""
+    beam_window: Window = "rect"
+    """Taper of the detector's beams over a uniform line or rectangle."""
 
 
 class Model(Table):
@@ -192,20 +192,11 @@ class Model(Table):
     retrace: Literal["auto"] | Tracings = "auto"
     """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, and paths keep the
     range rates of the frame's start; more: all moving bodies are extrapolated between the tracings."""
+    diffuse: Literal["stated", "rough", "off"] = "stated"
+    """Diffuse scattering, as clutter. stated: of materials with a diffuse table; rough: also of those with a roughness,
+    by Lambert's law; off: none."""
     diffraction: bool = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
-
-
-class MaterialTable(Table):
-    """Table [materials.NAME]."""
-
-    eps_r: Permittivity = 1.0
-    sigma: Conductivity = 0.0
-    """S/m."""
-    thickness_mm: Thickness | None = None
-    roughness_mm: Roughness = 0.0
-    pec: bool = False
-    source: str = ""
 
 
 class BodyTable(Table):
@@ -236,12 +227,16 @@ class BodyTable(Table):
     """Makes the body a point target: a number, or [azimuth_deg, dBsm] pairs relative to its heading."""
     rcs_point: Place | None = None
     """Place of the point target, body frame [m]; default the middle of the body."""
+    swerling: Literal[0, 1, 2, 3, 4] = 0
+    """How that RCS fluctuates: 0 steady, 1 and 3 from frame to frame, 2 and 4 from chirp to chirp."""
     role: Literal["scatterer", "mirror", "blocker"] | None = None
 
     @model_validator(mode="after")
     def _one_of(self) -> BodyTable:
         if (self.shape is None) == (self.mesh is None):
             raise ValueError("either shape or mesh")
+        if self.swerling and self.rcs_dbsm is None:
+            raise ValueError("rcs_dbsm with swerling: only a given RCS fluctuates")
         return self
 
 
@@ -250,6 +245,9 @@ class SceneFile(Table):
 
     scene: Header = Header()
     radar: RadarTable | None = None
+    interferers: list[InterfererTable] = []
+    atmosphere: AtmosphereTable | None = None
+    """None: no loss on the way."""
     processing: ProcessingTable = ProcessingTable()
     model: Model = Model()
     materials: dict[str, MaterialTable] = {}

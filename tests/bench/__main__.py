@@ -21,13 +21,15 @@ from bench.measure import Row
 from bench.memory import memory
 from bench.rays import rays
 from bench.size import size
-from bench.synthesis import scaling, synthesis
+from bench.synthesis import phase_noise, scaling, synthesis
 from bench.turbine import turbine
 from raychan.run.output_files import write_whole
 from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
-ALL: dict[str, Benchmark] = {f.__name__: f for f in (rays, synthesis, scaling, frame, turbine, size, memory)}
+ALL: dict[str, Benchmark] = {
+    f.__name__: f for f in (rays, synthesis, phase_noise, scaling, frame, turbine, size, memory)
+}
 _ROOT = Path(__file__).parents[2]
 
 

@@ -13,10 +13,12 @@ from support.echoes import echoes, make_radar
 from bench.direct import recurrent_sum
 from bench.measure import Row, against, barred, rounds
 from raychan.columns import take
+from raychan.radar.impairments import Impairments, PhaseNoise
 from raychan.radar.waveform import Waveform
 from raychan.records import Paths
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import beat_sum
+from raychan.signal.phase_error import faulty, spacing
 from raychan.units import C0, db
 
 WAVE = Waveform(77e9, 4e9, 60e-6, 60e-6, 128, 1024)
@@ -65,6 +67,25 @@ def synthesis(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
         scipy.fft.fft2(cube, workers=2)
 
     yield against("synthesis", name, ours, "2-D FFT of the cube", fft, repeats)
+
+
+def phase_noise(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
+    """Synthesis with phase noise against without: few and many groups of paths."""
+    count = 10_000 if quick else 100_000
+    mask = PhaseNoise([[1e4, -75.0], [1e6, -95.0], [1e7, -115.0]])
+    for samples in (256, 1024):
+        wave = replace(WAVE, n_samples=samples)
+        paths, radar = some_paths(count), make_radar(wave, impairments=Impairments(phase_noise=mask))
+        groups = round(float(np.ptp(paths.delay)) / spacing(wave, mask, None))
+        name = f"{count:,} paths, 128 x {samples}, {groups} groups"
+        yield against(
+            "phase noise",
+            name,
+            lambda p=paths, r=radar: faulty(p, r, np.random.default_rng(0), "groups"),
+            "the same without phase noise",
+            lambda p=paths, r=radar: synthesize(p, r),
+            repeats,
+        )
 
 
 def scaling(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:

@@ -7,8 +7,9 @@ import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
-from support.scene_texts import PLATE, but_compiling
+from support.scene_texts import PLATE, but_compiling, walker
 
 from raychan.cli import invoke
 
@@ -67,6 +68,32 @@ def test_set_overrides_a_key_and_the_result_remembers(scene, tmp_path):
 def test_a_scene_with_nothing_in_view_is_a_valid_result(scene, tmp_path, capsys):
     assert run(scene, tmp_path / "out", "--set", "bodies.sign.position=[-9, 0, 1]") == 0
     assert "0 detections" in capsys.readouterr().out
+
+
+def test_info_tells_how_often_a_target_is_detected(tmp_path, capsys):
+    file, picture = tmp_path / "two.toml", tmp_path / "pd.png"
+    file.write_text(PLATE + walker(12.0, 2.0) + "swerling = 1\n")
+    assert invoke(["info", str(file), "--plot", str(picture)]) == 0
+    assert re.search(r"walker +12\.17 +0\.0 +1 +-?\d+\.\d +[01]\.\d{3}", capsys.readouterr().out)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert invoke(["info", "antennas/array_2x2", "--plot", str(picture)]) == 2
+    assert "is no scene file" in capsys.readouterr().err
+
+
+def test_spectrogram_writes_a_picture_and_netcdf(tmp_path, capsys):
+    import xarray as xr
+
+    file, out = tmp_path / "plate.toml", tmp_path / "out"
+    file.write_text(PLATE)
+    command = ["spectrogram", str(file), "--out", str(out), "--seconds", "0.01", "--resolution", "0.5"]
+    assert invoke([*command, "--near", "5", "--far", "12"]) == 0
+    assert "tracings" in capsys.readouterr().out
+    with xr.open_dataset(out / "spectrogram.nc", engine="h5netcdf") as data:
+        ridge = data.range_rate[data.power_dbm.argmax("range_rate")]
+        assert np.allclose(ridge, -5.0, atol=0.2) and data.power_dbm.attrs["units"] == "dBm"
+    assert (out / "spectrogram.png").read_bytes().startswith(b"\x89PNG")
+    assert invoke([*command, "--near", "500", "--far", "600"]) == 2
+    assert "no range cell" in capsys.readouterr().err
 
 
 def test_info_tells_of_scenes_and_of_meshes(scene, tmp_path, capsys):

@@ -199,8 +199,7 @@ for kernel in KERNELS:
 
 @pytest.mark.skipif(bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="there frozen arrays stay frozen")
 def test_no_kernel_of_the_three_scenes_is_compiled_twice_for_frozen_arrays_layouts_or_widths_of_integers():
-    scenes = sorted(str(p) for p in SCENES.glob("*.toml"))
-    assert len(scenes) == 3
+    scenes = [str(SCENES / f"{name}.toml") for name in ("living_street", "occluded_pedestrian", "urban")]
     ran = subprocess.run([sys.executable, "-c", _SCENES, *scenes], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout) == (0, ""), ran.stdout + ran.stderr
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import raychan as rc
 from raychan.columns import take
+from raychan.processing.doa import Directions
 from raychan.radar.pattern import gain_dbi
 from raychan.records import Cube, Detections, Profile, RangeDoppler
 from raychan.run.explain import CellExplanation
@@ -106,6 +107,13 @@ def test_nothing_on_the_public_face_is_of_any_type(name: str) -> None:
     assert (getattr(rc, name).__doc__ or "").strip()
 
 
+def test_arrays_of_a_mimo_radar_are_made_by_name() -> None:
+    wave = rc.Waveform(carrier=77e9, bandwidth=300e6, chirp_duration=20e-6, n_chirps=48, n_samples=64)
+    radar = rc.Radar(wave, **rc.mimo_array(3, 8, 0.5 * wave.wavelength), multiplexing="tdm")
+    line = assert_type(rc.uniform_array(24, 0.5 * wave.wavelength), NDArray[np.float64])
+    np.testing.assert_allclose(radar.virtual_elements, line, atol=1e-15)
+
+
 def test_every_public_name_is_used_here() -> None:
     text = Path(__file__).read_text(encoding="utf-8")
     assert [name for name in rc.__all__ if f"rc.{name}" not in text and name not in ELSEWHERE] == []
@@ -168,6 +176,21 @@ def test_scene_and_radar() -> None:
     assert later.radar.position == pytest.approx([0.5, 0.0, 0.6])
     assert assert_type(rc.Material(eps_r=5.24, sigma=1.38), rc.Material).thickness is None
     assert rc.PEC.pec
+
+
+def test_impairments_air_and_interferers_of_a_scene() -> None:
+    wave = rc.Waveform(77e9, 300e6, 20e-6, n_chirps=32, n_samples=64)
+    bad = rc.Impairments(
+        rc.ChirpError([[0.0, 0.0], [2e-5, 1e4]]), rc.PhaseNoise([[1e5, -90.0]]), rc.Converter(12, -20.0), iq_gain_db=0.1
+    )
+    other = rc.Interferer(rc.Radar(wave, (30.0, 0.0, 0.6), yaw_deg=180.0), start=1e-6, name="other")
+    scene = rc.Scene(
+        radar=rc.Radar(wave, impairments=bad), atmosphere=rc.Atmosphere(rain_mmh=10.0), interferers=[other]
+    )
+    assert assert_type(scene.radar.impairments, rc.Impairments) == bad
+    assert assert_type(scene.interferers, tuple[rc.Interferer, ...]) == (other,)
+    assert assert_type(scene.atmosphere, rc.Atmosphere | None) == rc.Atmosphere(rain_mmh=10.0)
+    assert assert_type(scene.attenuation, float) > 0.0
 
 
 def measured_antenna() -> rc.MeasuredAntenna:
@@ -245,7 +268,32 @@ def test_explain_and_load_result(result: rc.Result, tmp_path: Path) -> None:
     assert "wall" in why.bodies
 
 
+def test_directions_of_waves_at_an_array() -> None:
+    line = np.arange(8)[:, None] * np.array([0.0, 2e-3, 0.0])
+    wave = np.exp(2j * np.pi / 4e-3 * line[:, 1] * np.sin(0.3))
+    found = assert_type(rc.doa(wave, line, 4e-3, "esprit", sources=1), Directions)
+    assert_type(found.azimuth, NDArray[np.float64])
+    assert found.azimuth == pytest.approx([0.3])
+    radar = rc.Radar(rc.Waveform(74.9e9, 1e8, 20e-6, n_chirps=8, n_samples=16), elements=line)
+    cube = Cube(np.tile(wave[:, None, None], (1, 8, 16)).astype(np.complex64), 0.0)
+    angles = assert_type(rc.range_azimuth(cube, radar), rc.RangeAzimuth)
+    assert angles.azimuth[angles.power[:, 0].argmax()] == pytest.approx(0.3, abs=0.02)
+
+
 def test_rcs_of_a_mesh() -> None:
     found = assert_type(rc.rcs(trimesh.creation.icosphere(3, 0.2), 10e9, [0.0, 30.0]), Rcs)
     assert_type(found.sigma, NDArray[np.float64])
     assert found.sigma == pytest.approx(np.pi * 0.04, rel=0.1)
+
+
+def test_a_stronger_target_is_detected_more_often() -> None:
+    found = assert_type(rc.detection_probability([10.0, 15.0], rc.Detector(pfa=1e-6), 1), NDArray[np.float64])
+    assert found[0] < found[1]
+
+
+def test_a_spectrogram_shows_the_wall_at_its_range_rate() -> None:
+    found = assert_type(rc.spectrogram(street(), 0.004, resolution=1.0), rc.Spectrogram)
+    ridge = found.rate[found.power.argmax(axis=1)]
+    # 7 m/s towards each other, and the ground at less.
+    assert ridge == pytest.approx(np.full(len(ridge), -7.0), abs=0.3)
+    assert_type(found.power, NDArray[np.float64])

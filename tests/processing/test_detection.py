@@ -6,7 +6,6 @@ from support.echoes import SMALL, WIDE, echoes, make_radar
 
 from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, full_count, least_snr_db, level, training
 from raychan.processing.detection import detect
-from raychan.processing.doa import azimuth
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube
@@ -212,13 +211,11 @@ def test_azimuth_of_a_line_of_receivers(count, degrees):
     assert np.degrees(found.azimuth[0]) == pytest.approx(degrees, abs=0.05)
 
 
-def test_receivers_that_are_no_line_give_no_azimuth():
-    for elements in (
-        np.zeros((1, 3)),
-        np.array([[0, 0, 0], [0, 0, 1.0]]),
-        np.array([[0, 0, 0], [0, 1, 0], [0, 3.0, 0]]),
-    ):
-        assert np.isnan(azimuth(np.ones((3, len(elements)), complex), elements, 1.0)).all()
+@pytest.mark.parametrize("elements", [np.zeros((2, 3)), [[0, 0, 0], [0, 0.002, 0.002]], [[0, 0, 0], [0.002, 0, 0]]])
+def test_receivers_at_one_place_or_on_a_slanted_line_or_ahead_of_each_other_give_no_angle(elements):
+    m = rdmap(echoes([6.0], 0.0, 1e-4), elements=elements)
+    found = detect(m, waveform=SMALL, elements=np.array(elements, float))
+    assert len(found.range) == 1 and np.isnan(found.azimuth).all() and np.isnan(found.elevation).all()
 
 
 @pytest.mark.parametrize("bad", [{"pfa": 0.0}, {"method": "magic"}, {"guard": (-1, 0)}])

@@ -18,7 +18,7 @@ from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.world.radar_mount import antenna_of
-from raychan.world.schema import AntennaTable
+from raychan.world.schema_antenna import AntennaTable
 
 WAVE = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128)
 AHEAD = np.array([[1.0, 0.0, 0.0]])

@@ -12,10 +12,11 @@ import raychan as rc
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.beam_table import beam_of
 from raychan.records import Cube
-from raychan.run.micro_doppler import bend, needed, retraced
+from raychan.run.micro_doppler import retraced
 from raychan.run.sequence import frames
 from raychan.run.simulate import simulate
 from raychan.run.solver import solve
+from raychan.run.turning import bend, needed
 from raychan.signal.baseband import synthesize
 from raychan.tracing.settings import PruneRule, refinement
 from raychan.units import C0

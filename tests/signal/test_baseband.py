@@ -33,7 +33,7 @@ def worst_db(cube, truth) -> float:
 def grids(paths, wave: Waveform, room: int = ROOM):
     delay_rate = paths.length_rate / C0
     middle = paths.delay + delay_rate * centre(wave)[0]
-    return keystones(Echoes(middle, delay_rate, paths.amplitude, paths.arrival), wave, 1e-6, 0.0, room)
+    return keystones(Echoes(middle, delay_rate, paths.amplitude), wave, 1e-6, 0.0, room)
 
 
 def random_paths(seed: int, n: int, wave: Waveform, fastest: float = 30.0):
@@ -93,7 +93,7 @@ def summed(parts, wave: Waveform, chunk: int = CHUNK) -> Cube:
     total = np.zeros((wave.n_chirps, wave.n_samples), complex)
     for grid, echoes_ in parts:
         ready = grid.prepared(echoes_, np.empty(grid.factors, complex))
-        grid.add(total, ready, np.zeros(3), map, chunk)
+        grid.add(total, ready, (np.zeros(3), np.zeros(3)), map, chunk)
     return Cube(samples=total[None].astype(np.complex64), noise_power=0.0)
 
 
@@ -181,9 +181,10 @@ def test_power_is_amplitude_squared_times_transmitted_power():
 def test_a_receiver_set_aside_sees_the_paths_of_a_shifted_receiver():
     azimuth, aside = 0.4, 0.05
     radar = make_radar(SMALL, elements=np.array([[0, 0, 0], [0, aside, 0]]), yaw_deg=np.degrees(0.3))
-    # In the antenna's frame the wave comes from azimuth 0.4; the path to the second receiver is shorter.
+    # In the antenna's frame the wave comes from azimuth 0.4, from a source a whole length of 20 m away.
     paths = echoes([10.0], 3.0, 1.0, azimuth + 0.3)
-    shorter = aside * np.sin(azimuth)
+    source = 20.0 * np.array([np.cos(azimuth), np.sin(azimuth)])
+    shorter = 20.0 - np.linalg.norm(source - [0.0, aside])
     moved = echoes([10.0 - 0.5 * shorter], 3.0, np.exp(2j * np.pi * SMALL.carrier * shorter / C0), azimuth + 0.3)
     both = synthesize(paths, radar).samples
     assert np.allclose(both[1], synthesize(moved, make_radar(SMALL)).samples[0], atol=1e-4)

@@ -13,7 +13,7 @@ import raychan as rc
 from raychan.cli import invoke
 from raychan.processing.cfar import fitting_guard
 from raychan.run import rules
-from raychan.world import limits, schema
+from raychan.world import limits, schema, schema_antenna
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit
 from raychan.world.quantities import Within
@@ -39,7 +39,9 @@ def figures(annotation, metadata=()):
 
 
 def test_every_number_of_the_schema_has_limits():
-    tables = [t for t in vars(schema).values() if isinstance(t, type) and issubclass(t, BaseModel)]
+    tables = [
+        t for t in (vars(schema) | vars(schema_antenna)).values() if isinstance(t, type) and issubclass(t, BaseModel)
+    ]
     fields = [(t, name, f) for t in tables for name, f in t.model_fields.items()]
     numbers = [(f"{t.__name__}.{n}", m) for t, n, f in fields for m in figures(f.annotation, tuple(f.metadata))]
     assert len(numbers) > 50

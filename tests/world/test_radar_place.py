@@ -1,4 +1,4 @@
-"""Where a radar stands to a body: outside, inside, on its surface, or in the plane of a facet."""
+"""Where a radar stands to a body, and whether its array can have what its processing asks for."""
 
 from __future__ import annotations
 
@@ -105,3 +105,45 @@ def test_a_radar_on_a_plate_is_an_error_of_the_scene(tmp_path):
     file.write_text(SCENE.format(at="[4.0, 0.1, 0.1]"))
     with pytest.raises(SceneError, match="on the surface of 'plate'"):
         rc.Scene.load(file)
+
+
+LINE = [[0.0, 1.9 * k, 0.0] for k in range(4)]
+GAP = [[0.0, 1.9 * k, 0.0] for k in (0, 1, 4, 6)]
+PLANE = [[0.0, 1.9 * i, 1.9 * k] for i in range(2) for k in range(2)]
+
+
+@pytest.mark.parametrize(
+    ("elements", "key", "value", "allowed"),
+    [
+        (LINE, "doa", "esprit", True),
+        (GAP, "doa", "esprit", False),
+        (PLANE, "doa", "esprit", False),
+        ([[0.0, 0.0, 0.0]], "doa", "esprit", False),
+        (GAP, "doa", "music", True),
+        (LINE, "beam_window", "hann", True),
+        (PLANE, "beam_window", "taylor(30)", True),
+        (GAP, "beam_window", "hann", False),
+    ],
+)
+def test_esprit_and_tapers_are_for_arrays_that_can_have_them(elements, key, value, allowed):
+    wave = {"bandwidth_mhz": 300, "chirp_us": 20, "chirps": 32, "samples": 64}
+    data = {"radar": {"elements_mm": elements, "waveform": wave}, "processing": {key: value}}
+    if allowed:
+        assert getattr(rc.Scene.from_dict(data).radar.processing, key) == value
+        return
+    with pytest.raises(SceneError, match="no uniform line") as e:
+        rc.Scene.from_dict(data)
+    assert e.value.key == f"processing.{key}" and value not in str(e.value.allowed).split(";")[0]
+
+
+def test_the_array_that_counts_is_the_virtual_one():
+    """Two transmitters with a hole between their copies of the receivers leave no uniform line."""
+    wave = {"bandwidth_mhz": 300, "chirp_us": 20, "chirps": 32, "samples": 64}
+    for apart, fits in ((4 * 1.9, True), (5 * 1.9, False)):
+        radar = {"elements_mm": LINE, "tx_elements_mm": [[0, 0, 0], [0, apart, 0]], "multiplexing": "tdm"}
+        data = {"radar": radar | {"waveform": wave}, "processing": {"doa": "esprit"}}
+        if fits:
+            assert len(rc.Scene.from_dict(data).radar.virtual_elements) == 8
+        else:
+            with pytest.raises(SceneError, match="no uniform line"):
+                rc.Scene.from_dict(data)

@@ -7,27 +7,47 @@ from collections.abc import Callable
 from typing import Any
 
 from raychan.world.errors import SceneError, nearest, shown
-from raychan.world.limits import HOOPS, LENGTH, SAG
+from raychan.world.limits import HOOPS, LENGTH, PHASE, SAG, WALK
 from raychan.world.mesh import Mesh
 from raychan.world.shapes.basic import box, cylinder, dihedral, ground, plate, sphere, trihedral
+from raychan.world.shapes.cyclist import Cyclist
 from raychan.world.shapes.pedestrian import pedestrian
+from raychan.world.shapes.skeleton import Skeleton, at_once
 from raychan.world.shapes.street import bench, bike_rack, guard_rail, lamp_post, trash_bin, wall
 from raychan.world.shapes.truck import truck
 from raychan.world.shapes.vehicle import car, suv, van
+from raychan.world.shapes.walker import Walker
 
 _ALL = (
     plate, sphere, cylinder, box, dihedral, trihedral, ground, car, suv, van, truck, pedestrian,
     lamp_post, guard_rail, wall, bench, trash_bin, bike_rack,
 )  # fmt: skip
-SHAPES: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
+SKELETONS: dict[str, Callable[..., Skeleton]] = {"walker": Walker, "cyclist": Cyclist}
+"""Shapes with limbs that move in themselves."""
+RIGID: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
+"""Shapes in one piece."""
+SHAPES: dict[str, Callable[..., Mesh | Skeleton]] = {**RIGID, **SKELETONS}
+_LIMITS = {"max_sag": SAG, "hoops": HOOPS, "speed": WALK, "phase": PHASE}
 
 
 def build(name: str, params: dict[str, Any] | None = None) -> Mesh:
-    """Return a built-in shape by name with its parameters.
+    """Return a built-in shape by name with its parameters; one with limbs as it stands at time 0.
 
     Raises: SceneError for an unknown shape or parameter (with the nearest name), a size that is not positive, or sizes
     for which the shape cannot be built.
     """
+    made = _made(name, params)
+    return made if isinstance(made, Mesh) else at_once(made)
+
+
+def skeleton(name: str | None, params: dict[str, Any]) -> Skeleton | None:
+    """Return the limbs of a built-in shape that moves in itself, None of any other; errors as of `build`."""
+    made = _made(name, params) if name in SKELETONS else None
+    return None if isinstance(made, Mesh) else made
+
+
+def _made(name: str, params: dict[str, Any] | None) -> Mesh | Skeleton:
+    """Return what a shape makes of its parameters, once they are checked."""
     if name not in SHAPES:
         raise SceneError(f"unknown shape '{name}'", key="shape", value=name, allowed=nearest(name, SHAPES))
     make, given = SHAPES[name], params or {}
@@ -35,12 +55,13 @@ def build(name: str, params: dict[str, Any] | None = None) -> Mesh:
     for key, value in given.items():
         if key not in known:
             raise SceneError(f"unknown parameter of '{name}'", key=key, value=value, allowed=nearest(key, known))
-        default = known[key].default
+        default, limit = known[key].default, _LIMITS.get(key, LENGTH)
         number = (isinstance(default, (int, float)) and not isinstance(default, bool)) or default is None
         if number and (isinstance(value, bool) or not isinstance(value, (int, float))):
-            raise SceneError(f"{value!r} is not a number", key=key, value=value, allowed="a number [m]")
+            raise SceneError(
+                f"{value!r} is not a number", key=key, value=value, allowed=f"a number [{limit.unit or 1}]"
+            )
         may_be_none = value == 0.0 and (default == 0.0 or key == "arm")
-        limit = SAG if key == "max_sag" else HOOPS if key == "hoops" else LENGTH
         if number and not may_be_none and not limit.allows(value):
             allowed = f"a positive number, {limit.allowed}"
             raise SceneError(f"{shown(value)} is not possible", key=key, value=value, allowed=allowed)
@@ -56,4 +77,4 @@ def build(name: str, params: dict[str, Any] | None = None) -> Mesh:
         raise SceneError(f"'{name}' cannot be built with these sizes ({e})", key="shape", value=given) from e
 
 
-__all__ = ["SHAPES", "build"]
+__all__ = ["RIGID", "SHAPES", "SKELETONS", "build", "skeleton"]

@@ -1,0 +1,167 @@
+"""From peaks of a map to echoes: those that an array tells apart within a cell, each with its own place and power."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.processing.angles import CellEchoes, Scan, echoes_in
+from raychan.processing.cfar import Grid
+from raychan.processing.peaks import MARGIN, SideLobes, parabolas
+from raychan.records import RangeDoppler
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Complexes = NDArray[np.complexfloating[Any, Any]]
+
+_LITTLE = 1e-3  # of a peak's power: what an echo may show there without its direction being looked at (not measured)
+_HIDDEN = (
+    10.0  # on what echoes leave in their cell: the fit takes some of an echo that was not told apart (not measured)
+)
+_SAME_BEAM = 0.5  # beam widths: nearer directions of neighbouring peaks are one echo (not measured)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Peaks or echoes (n,) of a map."""
+
+    cells: Ints
+    """(n, 2) rate, range"""
+    shift: Floats
+    """(n, 2) map cells from the cell to the peak"""
+    power: Floats
+    """(n,) [W]"""
+    noise: Floats
+    """(n,) [W] of the cell or the beam that the peak is seen in"""
+
+    def take(self, rows: Any) -> Self:
+        """Return some rows."""
+        return type(self)(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+    @property
+    def place(self) -> Floats:
+        """Places (n, 2) in map cells."""
+        return np.asarray(self.cells + self.shift)
+
+
+@dataclass(frozen=True, eq=False)
+class Peaks(Found):
+    """Peaks of a map before their directions are known."""
+
+    least: Floats
+    """(n,) [W] power below which a beam is noise"""
+    smear: Floats
+    """(n,) resolution cells over which a mover migrates"""
+    direction: Floats
+    """Cosines (n, 2) of the beam that is strongest"""
+
+
+@dataclass(frozen=True, eq=False)
+class Echoes(Found):
+    """Echoes with their directions."""
+
+    direction: Floats
+    """Cosines (n, 2) along y and z"""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One echo: as in `Echoes`, and the peak in whose cell it was found."""
+
+    peak: int
+    cell: Ints
+    shift: Floats
+    power: float
+    noise: float
+    direction: Floats
+    misfit: float
+    """Share of the power that is no plane wave: an echo that was not told apart from it, seen by all beams."""
+
+
+@dataclass(frozen=True, eq=False)
+class Splitter:
+    """What splitting needs to know of the map and of how directions are sought."""
+
+    map: RangeDoppler
+    grid: Grid
+    lobes: SideLobes
+    scan: Scan
+    receiver_noise: float
+    """Noise that SNR counts in a beam of weights w, over the noise of a peak: this times |w|^2."""
+    coherent: bool
+    """Whether the peaks are those of beams, which let little through of echoes from elsewhere."""
+
+    def split(self, peaks: Peaks) -> Echoes:
+        """Return the echoes in the cells of peaks, strongest first.
+
+        A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain."""
+        kept: list[Row] = []
+        for i in range(len(peaks.cells)):
+            beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
+            if not self._clear(float(peaks.power[i]), peaks.place[i], kept, peaks, beams):
+                continue
+            v, r = peaks.cells[i]
+            snapshot = self.map.spectrum[:, v, r]
+            held = echoes_in(snapshot, self.scan, float(peaks.least[i]), float(self.map.range[r]))
+            found = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k, kept))]
+            kept += [row for row in found if row is found[0] or not any(self._same(row, other) for other in kept)]
+        kept.sort(key=lambda row: -row.power)
+        names = ("cell", "shift", "power", "noise", "direction")
+        if not kept:
+            return Echoes(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+        return Echoes(*(np.array([getattr(row, name) for row in kept]) for name in names))
+
+    def _clear(self, power: float, place: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:
+        """Return whether a power at a place in map cells exceeds what the side lobes of echoes may show there.
+
+        Args: beams, None or a function that gives the weights (s, a) of those in which the place is seen."""
+        if not kept:
+            return True
+        pad = np.array(self.grid.pad)
+        at = np.array([row.cell + row.shift for row in kept]) / pad
+        smear = peaks.smear[[row.peak for row in kept]]
+        shown = MARGIN * self.lobes.at(place / pad, at, np.array([row.power for row in kept]), smear)
+        if beams is None or power > shown.sum():
+            return bool(power > shown.sum())
+        # Echoes that all beams let through would matter little: they count as if they did.
+        some = [kept[k] for k in np.flatnonzero(shown > _LITTLE * power)]
+        rest = float(shown[shown <= _LITTLE * power].sum())
+        distances = self.map.range[[row.cell[1] for row in some]]
+        through = self.scan.through(beams(), np.array([row.direction for row in some]).reshape(-1, 2), distances)
+        through = np.maximum(through, [row.misfit for row in some])
+        return bool(power > rest + float(shown[shown > _LITTLE * power] @ through))
+
+    def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int, kept: list[Row]) -> Row | None:
+        """Return echo k in the cell of peak i where its own beam peaks; None for what is none.
+
+        An echo beside the strongest must peak within a resolution cell, above what the side lobes of echoes in other
+        cells show there: else it is the foot of an echo that has a peak of its own.
+        """
+        pad, shape = np.array(self.grid.pad), self.map.power.shape
+        v, r = ((c + np.arange(-p, p + 1)) % n for c, p, n in zip(peaks.cells[i], pad, shape, strict=True))
+        level = np.abs(np.tensordot(held.weights[k], self.map.spectrum[:, v[:, None], r[None, :]], 1)) ** 2
+        at = pad if k == 0 else np.array(np.unravel_index(int(level.argmax()), level.shape))
+        # Along an axis of two cells there is nothing to compare with.
+        at = np.where(np.array(shape) <= 2, pad, at)
+        if not (np.abs(at - pad) < pad).all():
+            return None
+        cell = np.array([v[at[0]], r[at[1]]])
+        beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
+        shift, power = parabolas(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
+        noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
+        misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
+        row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)
+        beams = partial(held.weights.__getitem__, slice(k, k + 1))
+        return row if k == 0 or self._clear(row.power, cell + shift[0], kept, peaks, beams) else None
+
+    def _same(self, one: Row, other: Row) -> bool:
+        """Return whether echoes of neighbouring peaks are one."""
+        apart = np.abs(one.cell - other.cell)
+        apart = np.minimum(apart, np.array(self.map.power.shape) - apart)
+        width = np.where(np.isfinite(self.scan.aperture.beamwidth), self.scan.aperture.beamwidth, 1.0)
+        turn = np.linalg.norm((one.direction - other.direction) / width)
+        return bool((apart <= np.array(self.grid.pad)).all() and turn < _SAME_BEAM)

@@ -1,0 +1,90 @@
+"""Peaks of a map: local maxima, their place between cells, and which of them are side lobes of others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from raychan.processing.cfar import Grid
+from raychan.radar.side_lobes import SideLobeEnvelope
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MARGIN = 2.0
+"""Side lobes of two equal echoes add in voltage: twice the sum of their powers."""
+_FLOOR = 1e-12  # of a peak: rounding errors of single precision and of the fast sum are below
+_SLACK = 0.25  # resolution cells by which side lobes of other echoes may shift a peak (not measured)
+_STEEP = 5.0  # Np of power: more than any window falls in half a resolution cell
+_TINY = 1e-300
+
+
+def maxima(power: Floats, least: float) -> Ints:
+    """Return the local maxima (c, 2) of a map; both axes wrap as the transforms do."""
+    top = (power >= maximum_filter(power, size=3, mode="wrap")) & (power > least)
+    return np.argwhere(top)
+
+
+def refine(power: Floats, cells: Ints) -> tuple[Floats, Floats]:
+    """Return the offsets (c, 2) in cells and the power (c,) of the peaks, by parabolas in dB along both axes."""
+    around = [[power[_beside(power, cells, axis, step)] for step in (-1, 1)] for axis in (0, 1)]
+    return parabolas(power[tuple(cells.T)], np.array(around).reshape(2, 2, -1), cells, power.shape)
+
+
+def parabolas(top: Floats, around: Floats, cells: Ints, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """Return what `refine` does, from the powers (c,) of cells (c, 2) and of those below and above (axis, 2, c)."""
+    shift = np.zeros(cells.shape)
+    gain = np.zeros(len(cells))
+    top = np.log(np.maximum(top, _TINY))
+    for axis, size in enumerate(shape):
+        # A null beside a peak (unpadded, or without noise) must not distort the parabola.
+        below, above = (np.maximum(np.log(np.maximum(x, _TINY)), top - _STEEP) for x in around[axis])
+        bend = below - 2.0 * top + above
+        inside = (bend < 0.0) & (size > 2)
+        if axis == 1:
+            inside &= (cells[:, 1] > 0) & (cells[:, 1] < size - 1)
+        offset = np.divide(0.5 * (below - above), bend, out=np.zeros(len(cells)), where=inside)
+        shift[:, axis] = np.clip(offset, -0.5, 0.5)
+        gain += 0.25 * (above - below) * shift[:, axis]
+    return shift, np.exp(top + gain)
+
+
+def _beside(power: Floats, cells: Ints, axis: int, step: int) -> tuple[Ints, ...]:
+    at = cells.copy()
+    at[:, axis] = (at[:, axis] + step) % power.shape[axis]
+    return tuple(at.T)
+
+
+class SideLobes:
+    """How much peaks show elsewhere in a map, by the side lobes of its windows, named (rate, range)."""
+
+    def __init__(self, grid: Grid, windows: tuple[str, str]) -> None:
+        self.count = grid.count
+        self._envelopes = [SideLobeEnvelope(name, n) for name, n in zip(windows, grid.count, strict=True)]
+
+    def at(self, places: Floats, place: Floats, power: Any, smear: Any) -> Floats:
+        """Return what peaks at `place` show at `places`, (n, 2) or (2,) each, all in resolution cells.
+
+        Args: power [W] and smear of the peaks: range cells over which an echo migrates; it spreads over as many rate
+        cells."""
+        response = power
+        for axis, envelope in enumerate(self._envelopes):
+            away = np.abs(places[..., axis] - place[..., axis])
+            away = np.minimum(away, self.count[axis] - away)
+            response = response * envelope(np.maximum(away - 0.5 * smear - _SLACK, 0.0))
+        return np.maximum(response, _FLOOR * power)
+
+    def own(self, place: Floats, power: Floats, smear: Floats) -> NDArray[np.bool_]:
+        """Return which peaks (n,), strongest first, are not explained by side lobes of stronger ones.
+
+        Args: place (n, 2) and smear (n,) in resolution cells."""
+        lobes = np.zeros(len(power))
+        kept = np.zeros(len(power), bool)
+        for i in range(len(power)):
+            kept[i] = power[i] > MARGIN * lobes[i]
+            if kept[i]:
+                lobes[i:] += self.at(place[i:], place[i], power[i], smear[i])
+        return kept

@@ -1,0 +1,109 @@
+"""Spectra over direction (Bartlett, Capon, MUSIC) and their peaks.
+
+Each spectrum rises with a Hermitian form a^H Q a of the steering vector a, a smooth function of direction: its maxima
+are found on a grid and then between the points by parabolas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from raychan.processing.covariance import Covariance
+from raychan.radar.aperture import Aperture, Grid
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complexfloating[Any, Any]]
+Form = Callable[[Complexes], Floats]
+"""From steering vectors (n, a) to values (n,): greater is better."""
+
+PER_BEAM = 8
+"""Grid points per beam width: maxima of MUSIC nearer than two points are one (not measured)."""
+BEAMS_PER_BEAM = 4
+"""The same of Bartlett's, whose maxima lie a beam width apart."""
+_LOADING = 1e-9  # of the mean eigenvalue: keeps the inverse of a covariance without noise
+_FEW_LOADING = 1e-2  # the same for fewer than 2 p snapshots (Reed, Mallett and Brennan 1974), whose least eigenvalues
+# are chance: echoes 20 dB weaker than the strongest are lost (not measured)
+_SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
+
+
+def bartlett(snapshots: Complexes) -> Form:
+    """Return the power of a beam [W] over snapshots (n, a): |a^H x|^2 / a^2 (Van Trees 2002, section 6.7)."""
+
+    def value(steering: Complexes) -> Floats:
+        wave = steering.conj() @ snapshots.T
+        return np.asarray((wave.real**2 + wave.imag**2).mean(axis=1) / steering.shape[1] ** 2)
+
+    return value
+
+
+def capon(found: Covariance) -> Form:
+    """Return minus the inverse of the power that Capon's beam lets through (Capon 1969): -a^H R^-1 a [1/W]."""
+    size = len(found.matrix)
+    share = _LOADING if found.snapshots >= 2 * size else _FEW_LOADING
+    load = share * float(np.trace(found.matrix).real) / size
+    inverse = np.linalg.inv(found.matrix + max(load, 1e-300) * np.eye(size))
+
+    def value(steering: Complexes) -> Floats:
+        return np.asarray(-np.einsum("ni,ij,nj->n", steering.conj(), inverse, steering, optimize=True).real)
+
+    return value
+
+
+def music(found: Covariance, sources: int) -> Form:
+    """Return minus the share of the steering vector in the noise subspace (Schmidt 1986, eq. 6): 0 at a source."""
+    signal = found.eigen[1][:, :sources]
+
+    def value(steering: Complexes) -> Floats:
+        # As 1 less the share in the signal subspace a source's own value would be rounding: the projection is taken.
+        rest = steering - (steering @ signal.conj()) @ signal.T
+        return np.asarray(-(rest.real**2 + rest.imag**2).sum(axis=1) / steering.shape[1])
+
+    return value
+
+
+def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) -> Floats:
+    """Return the cosines (k, 2) along y and z of at most `count` greatest maxima of a form, greatest first.
+
+    Args: per_beam, grid points to a beam width."""
+    grid, batches = aperture.scanned(per_beam)
+    values = np.full(grid.visible.shape, -np.inf)
+    values[grid.visible] = np.concatenate([form(steering) for steering in batches])
+    modes = ["wrap" if wrap else "constant" for wrap in grid.wraps]
+    top = (values >= maximum_filter(values, size=3, mode=modes, cval=-np.inf)) & np.isfinite(values)
+    m, n = np.nonzero(top)
+    order = np.argsort(-values[m, n], kind="stable")[: 2 * count]  # a maximum between points may be the greater one
+    start = np.stack([grid.u[m[order]], grid.w[n[order]]], axis=1)
+    found, heights = climb(form, aperture, start, grid)
+    order = np.argsort(-heights, kind="stable")[:count]
+    return aperture.canonical(found[order])
+
+
+def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Floats, Floats]:
+    """Return the maxima (k, 2) next to grid points (k, 2), and the form's values (k,) there."""
+    at = np.array(start)
+    best = form(aperture.steering(at))
+    step = grid.step
+    for _ in range(_SHRINKS):
+        for axis in np.flatnonzero(step):
+            aside = np.zeros(2)
+            aside[axis] = step[axis]
+            below, above = (form(aperture.steering(_visible(at + sign * aside))) for sign in (-1.0, 1.0))
+            bend = below - 2.0 * best + above
+            offset = np.divide(0.5 * (below - above), bend, out=np.sign(above - below), where=bend < 0.0)
+            tried = _visible(at + np.clip(offset, -1.0, 1.0)[:, None] * aside)
+            value = form(aperture.steering(tried))
+            better = value > best
+            at, best = np.where(better[:, None], tried, at), np.where(better, value, best)
+        step = 0.5 * step
+    return at, best
+
+
+def _visible(cosines: Floats) -> Floats:
+    """Return cosines (n, 2) moved to the edge of the visible directions where they lie outside."""
+    size = np.linalg.norm(cosines, axis=1, keepdims=True)
+    return cosines / np.maximum(size, 1.0)

@@ -1,0 +1,198 @@
+"""The receivers as an aperture: which angles they measure, how finely, and where grating lobes make them ambiguous.
+
+A direction is given by its cosines (u, w) along the antenna's y and z: u = cos(elevation) sin(azimuth), w =
+sin(elevation). A plane wave from there has the phase 2 pi / wavelength times (element . direction) at an element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Complexes = NDArray[np.complexfloating[Any, Any]]
+
+_SAME = 1e-3  # wavelengths: elements nearer than this along an axis share a coordinate; 6 mrad of phase
+_EDGE = 1e-9
+_KEPT = 1 << 21  # steering values kept between searches, 32 MB; more are made anew each time
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Directions on a grid along y and z."""
+
+    u: Floats
+    """Cosines (m,) along y."""
+    w: Floats
+    """Cosines (n,) along z."""
+    visible: NDArray[np.bool_]
+    """Which of (m, n) are directions of real waves."""
+    wraps: tuple[bool, bool]
+    """Whether the grid spans a whole period of grating lobes along y and z."""
+
+    @cached_property
+    def points(self) -> Floats:
+        """Cosines (g, 2) of the visible directions."""
+        u, w = np.meshgrid(self.u, self.w, indexing="ij")
+        return np.stack([u[self.visible], w[self.visible]], axis=1)
+
+    @property
+    def step(self) -> Floats:
+        """Distance (2,) of neighbours; 0 along an axis of one point."""
+        return np.array([x[1] - x[0] if len(x) > 1 else 0.0 for x in (self.u, self.w)])
+
+
+@dataclass(frozen=True, eq=False)
+class Aperture:
+    """Elements (a, 3) [m] in the antenna's frame, at a wavelength [m].
+
+    A line along y measures azimuth (elevation 0 is assumed), a line along z elevation; elements that spread along y and
+    z, not on one line, measure both; others measure nothing. Directions are taken ahead of the antenna.
+    """
+
+    elements: Floats
+    wavelength: float
+
+    def __post_init__(self) -> None:
+        elements = np.asarray(self.elements, np.float64)
+        if elements.ndim != 2 or elements.shape[1] != 3 or not len(elements):
+            raise ValueError(f"elements: numbers of shape (a, 3) wanted, {elements.shape} given")
+        if not (np.isfinite(elements).all() and np.isfinite(self.wavelength) and self.wavelength > 0.0):
+            raise ValueError("elements and wavelength: finite numbers, the wavelength positive")
+        object.__setattr__(self, "elements", elements)
+
+    @cached_property
+    def scans(self) -> tuple[bool, bool]:
+        """Whether the cosine along y, and that along z, can be measured."""
+        across = self.elements[:, 1:] - self.elements[0, 1:]
+        spread = np.ptp(across, axis=0) > _SAME * self.wavelength
+        if spread.all() and np.linalg.matrix_rank(across, tol=_SAME * self.wavelength) < 2:
+            return False, False  # a slanted line: a cone of directions looks alike
+        return bool(spread[0]), bool(spread[1])
+
+    @cached_property
+    def index(self) -> Ints:
+        """Place (a, 2) of each element on the lattice along y and z."""
+        across = self.elements[:, 1:] - self.elements[:, 1:].min(axis=0)
+        return np.rint(across / np.where(self.pitch > 0.0, self.pitch, 1.0)).astype(np.int64)
+
+    @cached_property
+    def pitch(self) -> Floats:
+        """Lattice spacing (2,) [m] along y and z: the greatest of which all spacings are multiples; 0 for one row."""
+        return np.array([_pitch(x, _SAME * self.wavelength) for x in self.elements[:, 1:].T])
+
+    @cached_property
+    def period(self) -> Floats:
+        """Distance (2,) of grating lobes in the cosines along y and z: wavelength / pitch (Van Trees 2002, 2.4)."""
+        none = np.full(2, np.inf)
+        return np.divide(self.wavelength, self.pitch, out=none, where=self.pitch > 0.0)
+
+    @cached_property
+    def beamwidth(self) -> Floats:
+        """Distance (2,) of the first null from the peak of a beam, in cosines along y and z; infinite for one row."""
+        rows = [np.unique(np.rint(x / (_SAME * self.wavelength))) for x in self.elements[:, 1:].T]
+        extents = np.ptp(self.elements[:, 1:], axis=0)
+        sizes = [x * len(r) / (len(r) - 1) if len(r) > 1 else 0.0 for x, r in zip(extents, rows, strict=True)]
+        return np.array([self.wavelength / x if x > 0.0 else np.inf for x in sizes])
+
+    @cached_property
+    def table(self) -> Ints | None:
+        """Elements (ny, nz) by their place where they fill a rectangle on the lattice, else None."""
+        size = self.index.max(axis=0) + 1
+        flat = self.index[:, 0] * size[1] + self.index[:, 1]
+        if np.prod(size) != len(flat) or len(np.unique(flat)) != len(flat) or np.ptp(self.elements[:, 0]) > 0.0:
+            return None
+        out = np.empty(size, np.int64)
+        out[self.index[:, 0], self.index[:, 1]] = np.arange(len(flat))
+        return out
+
+    @property
+    def uniform(self) -> bool:
+        """Whether the elements are a uniform line along y or z."""
+        return self.table is not None and sum(self.scans) == 1
+
+    def steering(self, cosines: Floats) -> Complexes:
+        """Return the phasors (n, a) that plane waves from cosines (n, 2) have at the elements."""
+        u, w = np.asarray(cosines, np.float64).T
+        ahead = np.sqrt(np.maximum(1.0 - u**2 - w**2, 0.0))
+        phase = np.stack([ahead, u, w], axis=1) @ self.elements.T
+        return np.asarray(np.exp(2j * np.pi / self.wavelength * phase))
+
+    def grid(self, per_beam: int) -> Grid:
+        """Return directions, `per_beam` to a beam width, over what is visible or, if smaller, one period."""
+        axes, wraps = [], []
+        for scanned, width, period in zip(self.scans, self.beamwidth, self.period, strict=True):
+            wrap = scanned and period <= 2.0 * (1.0 + _EDGE)
+            wraps.append(wrap)
+            if not scanned:
+                axes.append(np.zeros(1))
+            elif wrap:
+                n = max(2, int(np.ceil(per_beam * period / width - 1e-6)))
+                axes.append((np.arange(n) - n // 2) * (period / n))
+            else:
+                axes.append(np.linspace(-1.0, 1.0, int(np.ceil(2.0 * per_beam / width)) + 1))
+        inside = axes[0][:, None] ** 2 + axes[1][None, :] ** 2 <= 1.0 + _EDGE
+        return Grid(axes[0], axes[1], inside, (wraps[0], wraps[1]))
+
+    def scanned(self, per_beam: int) -> tuple[Grid, Iterable[Complexes]]:
+        """Return a grid of directions and the steering vectors (n, a) of its points, in batches that memory holds."""
+        if per_beam not in self._scanned:
+            grid = self.grid(per_beam)
+            batch = max(1, _KEPT // len(self.elements))
+            if len(grid.points) > batch:
+                parts = range(0, len(grid.points), batch)
+                return grid, (self.steering(grid.points[i : i + batch]) for i in parts)
+            self._scanned[per_beam] = grid, [self.steering(grid.points)]
+        return self._scanned[per_beam]
+
+    @cached_property
+    def _scanned(self) -> dict[int, tuple[Grid, list[Complexes]]]:
+        return {}
+
+    def canonical(self, cosines: Floats) -> Floats:
+        """Return the aliases of cosines (n, 2) that are nearest to boresight."""
+        period = np.where(np.isfinite(self.period) & (self.period <= 2.0 * (1.0 + _EDGE)), self.period, 4.0)
+        return np.where(np.abs(cosines) <= 0.5 * period, cosines, cosines - period * np.rint(cosines / period))
+
+    def ambiguous(self, cosines: Floats) -> NDArray[np.bool_]:
+        """Return whether a grating lobe of each direction (n, 2) is a visible direction too."""
+        out = np.zeros(len(cosines), bool)
+        for axis in np.flatnonzero(np.isfinite(self.period) & np.array(self.scans)):
+            for turn in (-self.period[axis], self.period[axis]):
+                other = np.array(cosines)
+                other[:, axis] += turn
+                out |= (other**2).sum(axis=1) < 1.0 - 1e-6
+        return out
+
+    def angles(self, cosines: Floats) -> tuple[Floats, Floats]:
+        """Return azimuth and elevation (n,) [rad] of cosines (n, 2); NaN where the array does not measure them."""
+        u, w = np.asarray(cosines, np.float64).reshape(-1, 2).T
+        none = np.full(len(u), np.nan)
+        elevation = np.arcsin(np.clip(w, -1.0, 1.0))
+        level = np.sqrt(np.maximum(1.0 - w**2, 0.0))
+        sine = np.divide(u, level, out=np.zeros(len(u)), where=level > 0.0)
+        azimuth = np.arcsin(np.clip(sine, -1.0, 1.0))
+        return azimuth if self.scans[0] else none, elevation if self.scans[1] else none
+
+
+def cosines(azimuth: Any, elevation: Any = 0.0) -> Floats:
+    """Return the cosines (n, 2) along y and z of azimuths and elevations (n,) [rad]."""
+    az, el = np.broadcast_arrays(np.atleast_1d(np.asarray(azimuth, float)), np.asarray(elevation, float))
+    return np.stack([np.cos(el) * np.sin(az), np.sin(el)], axis=1)
+
+
+def _pitch(x: Floats, tolerance: float) -> float:
+    """Return the greatest length of which all distances of numbers (n,) are multiples, by Euclid's algorithm."""
+    ordered = np.unique(x)
+    found = 0.0
+    for step in (float(s) for s in np.diff(ordered) if s > tolerance):
+        other = step
+        while other > tolerance:
+            found, other = other, abs(found - other * np.rint(found / other))
+    return found

@@ -1,0 +1,202 @@
+"""Arrays: where antenna elements stand, which chirps each transmitter sends, and how much longer a path is between two
+elements than between the phase centres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+MULTIPLEXING = ("none", "tdm", "ddm")
+"""How transmitters are told apart: there is one; by time division; by Doppler division."""
+
+
+_WIDEST = 1.0  # m off the phase centre: a wider array is a slip of unit, or another receiver
+
+
+def numbers(name: str, given: ArrayLike, wanted: str) -> Floats:
+    """Return finite numbers of shape (3,) or (n, 3), read-only. Raises: ValueError that names the argument."""
+    value = np.array(given, np.float64)
+    if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
+        raise ValueError(f"{name}: numbers of shape {wanted} wanted, {value.tolist()} given")
+    if not np.isfinite(value).all():
+        raise ValueError(f"{name}: finite numbers wanted, {value.tolist()} given")
+    value.flags.writeable = False
+    return value
+
+
+def offsets(name: str, given: ArrayLike) -> Floats:
+    """Return elements (n, 3) [m] of an array. Raises: ValueError on none, or on one too far off to belong to it."""
+    value = numbers(name, given, "(n, 3)")
+    far = float(np.linalg.norm(value, axis=1).max())
+    if far > _WIDEST:
+        raise ValueError(
+            f"{name}: an element is {far:g} m off the phase centre; at most {_WIDEST:g} m (positions are in metres)"
+        )
+    return value
+
+
+def check_multiplexing(multiplexing: str, transmitters: int, slots: int | None) -> None:
+    """Raise ValueError on an unknown way to tell transmitters apart, or one that does not fit their number."""
+    if multiplexing not in MULTIPLEXING:
+        raise ValueError(f"Radar.multiplexing = {multiplexing!r}: must be one of {', '.join(MULTIPLEXING)}")
+    if multiplexing == "none" and transmitters > 1:
+        raise ValueError(f"Radar.multiplexing = 'none': {transmitters} transmitters need 'tdm' or 'ddm'")
+    if slots is None:
+        return
+    if multiplexing != "ddm":
+        raise ValueError(f"Radar.ddm_slots = {slots!r}: only for multiplexing = 'ddm'")
+    if int(slots) != slots or not transmitters <= slots <= 64:
+        raise ValueError(f"Radar.ddm_slots = {slots!r}: a whole number from {transmitters} to 64 is wanted")
+
+
+def uniform_array(n: int, spacing: float, axis: str = "y") -> Floats:
+    """Return a uniform line of elements (n, 3) [m] about the origin of the antenna's frame.
+
+    Args: n elements; spacing [m]; axis y (to the left) or z (up). Raises: ValueError for values that cannot be.
+
+    >>> uniform_array(3, 0.002)[:, 1].tolist()
+    [-0.002, 0.0, 0.002]
+    """
+    if int(n) != n or n < 1:
+        raise ValueError(f"n = {n!r}: a whole number of at least 1 is wanted")
+    if not (np.isfinite(spacing) and spacing > 0.0):
+        raise ValueError(f"spacing = {spacing!r}: must be positive and finite [m]")
+    if axis not in ("y", "z"):
+        raise ValueError(f"axis = {axis!r}: must be y or z")
+    out = np.zeros((int(n), 3))
+    out[:, "xyz".index(axis)] = spacing * (np.arange(n) - 0.5 * (n - 1))
+    return out
+
+
+def check_receiver_elsewhere(position: object, velocity: object, yaw_deg: float | None, transmitters: int) -> None:
+    """Raise ValueError where what is said of receivers elsewhere does not fit."""
+    if position is None and not (velocity is None and yaw_deg is None):
+        raise ValueError("Radar.rx_velocity and rx_yaw_deg: only with rx_position")
+    if yaw_deg is not None and not np.isfinite(yaw_deg):
+        raise ValueError(f"Radar.rx_yaw_deg = {yaw_deg!r}: must be finite")
+    if position is not None and transmitters > 1:
+        raise ValueError("Radar.tx_elements: one transmitter wanted where the receivers stand elsewhere (rx_position)")
+
+
+class ArrayElements(TypedDict):
+    """Elements of a MIMO radar, named as the arguments of `Radar`."""
+
+    tx_elements: Floats
+    elements: Floats
+
+
+def mimo_array(n_tx: int, n_rx: int, spacing: float) -> ArrayElements:
+    """Return the elements of a MIMO radar whose virtual array is a uniform line along y, as arguments of `Radar`.
+
+    Args: n_tx transmitters, n_rx receivers; spacing [m] of the receivers and of the n_tx * n_rx virtual elements.
+    Returns: tx_elements (n_tx, 3) and elements (n_rx, 3) [m].
+    Source: Li, Stoica, IEEE Signal Process. Mag. 24(5), 2007.
+
+    >>> array = mimo_array(3, 8, 0.002)
+    >>> len(array["tx_elements"]), len(array["elements"])
+    (3, 8)
+    """
+    receivers = uniform_array(n_rx, spacing)
+    return {"tx_elements": uniform_array(n_tx, n_rx * spacing), "elements": receivers}
+
+
+def virtual_elements(tx: ArrayLike, rx: ArrayLike) -> Floats:
+    """Return the virtual elements (t * a, 3) [m] of transmitters (t, 3) and receivers (a, 3) [m]: each pair acts as one
+    element at the sum of both positions, row i * a + j that of transmitter i and receiver j."""
+    return np.asarray((np.asarray(tx, float)[:, None] + np.asarray(rx, float)[None]).reshape(-1, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Transmission:
+    """What one transmitter sends: every `step`-th chirp from number `first` on, its phase advanced by `turn` [turns]
+    from chirp to chirp of the frame."""
+
+    offset: Floats
+    """Position (3,) [m] from the phase centre, world axes."""
+    first: int = 0
+    step: int = 1
+    turn: float = 0.0
+
+    def since(self, chirp: int) -> Transmission:
+        """Return the same with chirps counted from another number on, but for the phase."""
+        return Transmission(self.offset, (self.first - chirp) % self.step, self.step, self.turn)
+
+
+def excess(radius: Floats, look: Floats, offset: Floats) -> Floats:
+    """Return how much longer (n,) [m] the way to spherical waves' sources is from `offset` (3,) [m] than from 0.
+
+    Args: radius (n,) [m] and unit directions look (n, 3) of the sources as seen from 0. It is |radius look - offset| -
+    radius, without the difference of two large numbers; -look @ offset in the far field.
+    """
+    along, square = look @ offset, float(offset @ offset)
+    far = np.sqrt(np.maximum(radius * (radius - 2.0 * along) + square, 0.0)) + radius
+    # A source at the phase centre itself is as far as the offset is long.
+    return np.where(far > 0.0, (square - 2.0 * radius * along) / np.maximum(far, 1e-300), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Wavefronts:
+    """The spherical waves of paths at both ends; a row a path.
+
+    A wave arrives from its last scatterer's image over the mirrors behind it, `radius` away; likewise at the
+    transmitter by reciprocity. A path without a scatterer has one wave, of the whole length, and `bare` set.
+    """
+
+    arrival: Floats
+    """Unit directions (n, 3) to which the receiver looks, world axes."""
+    radius: Floats
+    """(n,) [m] from the receiver."""
+    departure: Floats
+    """Unit directions (n, 3) in which the transmitter radiates."""
+    tx_radius: Floats
+    """(n,) [m] from the transmitter."""
+    bare: NDArray[np.bool_]
+
+    def __getitem__(self, rows: Any) -> Wavefronts:
+        return Wavefronts(
+            self.arrival[rows], self.radius[rows], self.departure[rows], self.tx_radius[rows], self.bare[rows]
+        )
+
+    def longer(self, tx: Floats, rx: Floats) -> Floats:
+        """Return how much longer (n,) [m] paths are between elements at tx and rx (3,) [m] off the phase centres."""
+        out = np.zeros(len(self.radius))
+        if rx.any():
+            out += excess(self.radius, self.arrival, rx)
+        if tx.any():
+            out += excess(self.tx_radius, self.departure, tx)
+            rows = np.flatnonzero(self.bare)
+            if len(rows):
+                out[rows] = self[rows]._longer_bare(tx, rx)
+        return out
+
+    def _longer_bare(self, tx: Floats, rx: Floats) -> Floats:
+        """Return the same of paths over one mirror or none: the transmitter's image moves as the mirror shows it."""
+        normal = self.departure + self.arrival
+        size = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = np.divide(normal, size, out=np.zeros_like(normal), where=size > 1e-6)
+        shown = tx - 2.0 * (normal @ tx)[:, None] * normal
+        off = rx - shown
+        along, square = (self.arrival * off).sum(axis=1), (off * off).sum(axis=1)
+        far = np.sqrt(np.maximum(self.radius * (self.radius - 2.0 * along) + square, 0.0)) + self.radius
+        return np.asarray((square - 2.0 * self.radius * along) / np.maximum(far, 1e-300))
+
+
+def wavefronts(
+    stops: Floats, scatterer: NDArray[np.signedinteger[Any]], departure: Floats, arrival: Floats, length: Floats
+) -> Wavefronts:
+    """Return the waves of paths at both ends.
+
+    Args: stops (n, d + 2, 3) [m] from transmitter to receiver, unused slots repeat the receiver; scatterer (n,) its
+    slot among the inner stops, -1 where there is none; departure, arrival (n, 3) unit directions; length (n,) [m].
+    """
+    steps = np.linalg.norm(np.diff(np.asarray(stops, float), axis=1), axis=2)
+    way_in = np.arange(steps.shape[1])[None] <= scatterer[:, None]
+    bare = scatterer < 0
+    radius = np.where(bare, length, np.where(way_in, 0.0, steps).sum(axis=1))
+    tx_radius = np.where(bare, length, np.where(way_in, steps, 0.0).sum(axis=1))
+    return Wavefronts(np.asarray(arrival), radius, np.asarray(departure, float), tx_radius, bare)

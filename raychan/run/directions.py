@@ -1,0 +1,60 @@
+"""What a radar's receivers tell of directions beyond its detections: the range-azimuth map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.processing.range_azimuth import RangeAzimuth
+from raychan.processing.range_azimuth import range_azimuth as from_map
+from raychan.radar.aperture import cosines
+from raychan.radar.radar import Radar
+from raychan.records import Cube, Detections, Paths, RangeDoppler
+from raychan.run.receiver import aperture_of, map_of, receivers
+from raychan.run.result import Result
+from raychan.units import C0
+
+Complexes = NDArray[np.complexfloating[Any, Any]]
+
+
+def range_azimuth(data: Cube | RangeDoppler, radar: Radar) -> RangeAzimuth:
+    """Return the range-azimuth map of samples or of a range-Doppler map, of all range rates the strongest.
+
+    Args: data, a Cube or a RangeDoppler with all receivers; radar that recorded it, with its `processing`.
+    Raises: ValueError where the radar's receivers measure no azimuth.
+    """
+    rdmap = map_of(data, radar, radar.processing) if isinstance(data, Cube) else data
+    return from_map(rdmap, receivers(radar), C0 / radar.waveform.middle, radar.processing.beam_window)
+
+
+def angles_in(result: Result) -> RangeAzimuth | None:
+    """Return the range-azimuth map of a result; None where its receivers measure no azimuth or are not known."""
+    radar = result.scene.radar if result.scene is not None else None
+    if radar is None or not aperture_of(radar).scans[0]:
+        return None
+    return range_azimuth(result.rdmap, radar)
+
+
+def beam_to(radar: Radar, found: Detections, paths: Paths) -> Callable[[int], Complexes] | None:
+    """Return a function of a detection's row: what its beam passes of each path's wave (n,); None without an array."""
+    aperture = aperture_of(radar)
+    if not any(aperture.scans):
+        return None
+
+    def passed(row: int) -> Complexes:
+        look = np.nan_to_num([found.azimuth[row], found.elevation[row]])
+        rows = aperture.steering(cosines(*look)).conj()[0] / len(aperture.elements)
+        # A path over several bodies leaves and arrives in different directions.
+        sent, seen = (
+            np.exp(2j * np.pi / aperture.wavelength * (look @ axes @ elements.T))
+            for look, axes, elements in (
+                (paths.departure, radar.axes, radar.tx_elements),
+                (paths.arrival, radar.rx_axes, radar.elements),
+            )
+        )
+        return np.asarray(((sent @ rows.reshape(sent.shape[1], -1)) * seen).sum(axis=1))
+
+    return passed

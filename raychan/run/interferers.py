@@ -1,0 +1,67 @@
+"""What the interferers of a scene add to the samples of its radar."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.ends import paths_record, rx_fields
+from raychan.channel.transfer import departures, rates, transfer
+from raychan.radar.interferer import Interferer
+from raychan.records import Paths, Trajectories
+from raychan.run.specular_paths import Chain, exact_routes
+from raychan.signal.interference import burst
+from raychan.tracing.legs import legs_over
+from raychan.world.geometry import Geometry
+from raychan.world.scene import Scene
+
+_BOUNCES = 1  # mirrors on the way: each further one loses several dB against the direct way; not measured
+
+
+def interference(scene: Scene, geometry: Geometry, rng: np.random.Generator) -> NDArray[np.complex128] | None:
+    """Return what the interferers of a scene add to the samples (a, c, s) [sqrt(W)]; None if there are none."""
+    if not scene.interferers:
+        return None
+    return np.asarray(
+        sum(burst(scene.radar, one, interferer_paths(scene, geometry, one), rng) for one in scene.interferers)
+    )
+
+
+def interferer_paths(scene: Scene, geometry: Geometry, interferer: Interferer) -> Paths:
+    """Return the paths from an interferer to the receivers of the scene's radar: straight, and over one plane mirror of
+    half a square metre or more, both antennas in, at the interferer's carrier."""
+    sender, victim, facets = interferer.radar, scene.radar, geometry.facets
+    chains: list[Chain] = []
+    for leg in legs_over(geometry, np.asarray(sender.position), _BOUNCES):
+        sides = [1 if m.normal @ geometry.normal[m.facet] > 0.0 else -1 for m in leg.mirrors]
+        chains.append(tuple((m.facet, side) for m, side in zip(leg.mirrors, sides, strict=True)))
+    layers = scene.model.max_transmissions
+    routes = exact_routes(geometry, sender.position, victim.rx_place, chains, _BOUNCES + layers, layers)
+    ends = rx_fields(victim)
+    gains = transfer(
+        routes,
+        facets,
+        sender.waveform.carrier,
+        lambda d: np.asarray(sender.tx_field(d))[:, None],
+        lambda d: np.stack([np.asarray(f(d)) for f in ends], axis=1),
+    )[:, :, 0]
+    away, look = departures(routes)
+    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
+    return paths_record(victim)(
+        length=routes.length,
+        length_rate=2.0 * rates(routes, facets, sender.velocity, victim.rx_motion),
+        **dict(zip(("amplitude", "cross"), gains.T, strict=False)),
+        trajectory=np.arange(len(gains), dtype=np.int32),
+        trajectories=Trajectories(
+            departure=away.astype(np.float32),
+            arrival=look,
+            body=routes.body,
+            part=np.where(routes.facet >= 0, part, -1).astype(np.int16),
+            kind=routes.kind,
+            vertices=routes.vertices.astype(np.float32),
+        ),
+        body_names=facets.body_names,
+        part_names=facets.part_names,
+        tx=routes.tx,
+        rx=routes.rx,
+    )

@@ -1,0 +1,47 @@
+"""What a real receiver records: noise-free samples, then phase errors, interference, thermal noise, I/Q imbalance and
+the converter, in this order."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.radar.radar import Radar
+from raychan.records import Cube, Paths
+from raychan.run.streams import Stage, stream
+from raychan.signal.baseband import noisy, synthesize
+from raychan.signal.converter import digitized
+from raychan.signal.phase_error import faulty
+
+
+def received(
+    quiet: Cube, paths: Paths, radar: Radar, seed: int, interference: NDArray[np.complex128] | None = None
+) -> tuple[Cube, list[str]]:
+    """Return what the radar's receiver records, and what a user should know of it.
+
+    Args: quiet, the samples without noise or impairments; paths, of which they are the sum, as far as phase errors
+    apply to them; seed; interference, samples (a, c, s) that other radars add.
+    """
+    cube, said = quiet, []
+    if radar.impairments.phase_errors:
+        errors = faulty(paths, radar, stream(seed, Stage.PHASE_NOISE)).samples - synthesize(paths, radar).samples
+        cube = Cube(samples=quiet.samples + errors, noise_power=0.0)
+    if interference is not None:
+        cube = Cube(samples=(cube.samples + interference).astype(np.complex64), noise_power=0.0)
+    cube = noisy(cube, radar, stream(seed, Stage.NOISE))
+    cube, clipped = digitized(cube, radar.impairments, radar.waveform.complex_sampling)
+    if clipped:
+        share = 100.0 * clipped / cube.samples.size
+        said.append(
+            f"the converter clips {clipped:,} of {cube.samples.size:,} samples ({share:.3g} %): a higher "
+            "adc_full_scale_dbm avoids it"
+        )
+    return cube, said
+
+
+def notes(radar: Radar, whole: bool, turning: bool) -> list[str]:
+    """Return what phase errors leave out: paths that are too many to keep, and bodies that turn."""
+    if not radar.impairments.phase_errors:
+        return []
+    said = [] if whole else ["chirp error and phase noise are those of the strongest paths only, which are kept"]
+    return said + (["returns of bodies that turn are without chirp error and phase noise"] if turning else [])

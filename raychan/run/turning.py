@@ -1,0 +1,63 @@
+"""Which bodies turn or move within a frame, and whether the frame needs more than one tracing for them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.radar.radar import Radar
+from raychan.world.scene import Scene
+
+_NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
+_SLOWEST = 1e-9  # rad/s: a limb may stand still for a moment
+
+
+def turning(scene: Scene) -> NDArray[np.bool_]:
+    """Return which bodies (b,) turn."""
+    return np.array([b.motion.turns for b in scene.bodies], bool)
+
+
+def moving(scene: Scene) -> NDArray[np.bool_]:
+    """Return which bodies (b,) turn or move relative to the radar."""
+    own = np.asarray(scene.radar.velocity, float)
+    return turning(scene) | np.array([not np.array_equal(b.motion.velocity, own) for b in scene.bodies], bool)
+
+
+def carried_on(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
+    """Return which bodies (b,) are extrapolated between tracings: those that turn, or all that move."""
+    return turning(scene) if retrace == "auto" else moving(scene)
+
+
+def bend(scene: Scene, edge: float) -> float:
+    """Return the phase error [rad] of constant rates over a frame: at the outermost point of a turning body, by its
+    centripetal acceleration, and across a tube of a given edge [m]."""
+    wave, worst = scene.radar.waveform, 0.0
+    k, half = 4.0 * np.pi / wave.wavelength, 0.5 * wave.frame_duration
+    for body in (b for b, t in zip(scene.bodies, turning(scene), strict=True) if t):
+        rate = max(float(np.linalg.norm(body.motion.spin())), _SLOWEST)
+        vertices = body.geometry.vertices
+        radius = float(
+            np.linalg.norm(np.cross(body.motion.rotation().T @ body.motion.spin() / rate, vertices), axis=1).max()
+        )
+        size = float(np.ptp(vertices, axis=0).max())
+        worst = max(worst, k * radius * (rate * half) ** 2 / 2.0, k * min(edge, size) * rate * half)
+        worst = max(worst, k * body.motion.swerve(half))
+    return worst
+
+
+def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
+    """Return whether a frame needs more than one tracing."""
+    if retrace == 1 or scene.radar.waveform.n_chirps < 3:
+        return False
+    return bend(scene, edge) > _NEEDED if retrace == "auto" else bool(moving(scene).any())
+
+
+def check_radar(radar: Radar) -> None:
+    """Raise ValueError for a radar whose frames are traced once only."""
+    refused = {
+        "staggered repetition": bool(radar.waveform.stagger),
+        "receivers of both polarisations": radar.rx_polarization == "both",
+        "receivers elsewhere": radar.rx_position is not None,
+    }
+    for what in (name for name, given in refused.items() if given):
+        raise ValueError(f"a frame of {what} is traced once: model.retrace = 1 is wanted where bodies turn")

@@ -1,0 +1,72 @@
+"""The scene file's tables of what degrades a radar: its receiver's imperfections, and the air."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from raychan.world.quantities import (
+    Angle,
+    Bits,
+    Celsius,
+    Decibel,
+    Density,
+    Deviation,
+    Fog,
+    FrequencyOffset,
+    Instant,
+    NoiseDensity,
+    Power,
+    Pressure,
+    RainRate,
+)
+
+_CLOSED = ConfigDict(extra="forbid", frozen=True)
+"""Unknown keys are errors."""
+
+
+class ImpairmentsTable(BaseModel):
+    """Table [radar.impairments]: what the receiver does wrong; nothing by default."""
+
+    model_config = _CLOSED
+
+    chirp_error_us_khz: Annotated[list[tuple[Instant, Deviation]], Field(min_length=2)] | None = None
+    """[time in the ramp, frequency error] pairs; linear in between, level beyond the ends."""
+    phase_noise_hz_dbc: Annotated[list[tuple[FrequencyOffset, NoiseDensity]], Field(min_length=1)] | None = None
+    """[offset, dBc/Hz] pairs of the oscillator's mask; linear in dB over log offset, level beyond the ends."""
+    adc_bits: Bits | None = None
+    adc_full_scale_dbm: Power | None = None
+    """Strongest sine that is not clipped, referred to the antenna."""
+    iq_gain_db: Decibel = 0.0
+    """Of Q over I."""
+    iq_phase_deg: Angle = 0.0
+    """By which Q is off 90 deg from I."""
+    dc_offset_dbm: Power | None = None
+    """A constant in all samples, referred to the antenna."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if (self.adc_bits is None) != (self.adc_full_scale_dbm is None):
+            raise ValueError("adc_bits and adc_full_scale_dbm together")
+        from raychan.radar.impairments import ChirpError, PhaseNoise
+
+        if self.phase_noise_hz_dbc is not None:
+            PhaseNoise(self.phase_noise_hz_dbc)
+        if self.chirp_error_us_khz is not None:
+            ChirpError(self.chirp_error_us_khz)
+        return self
+
+
+class AtmosphereTable(BaseModel):
+    """Table [atmosphere]: the air, the same everywhere."""
+
+    model_config = _CLOSED
+
+    temperature_c: Celsius = 15.0
+    pressure_hpa: Pressure = 1013.25
+    """Of the dry air."""
+    vapour_gm3: Density = 7.5
+    rain_mmh: RainRate = 0.0
+    fog_gm3: Fog = 0.0
+    """Liquid water."""

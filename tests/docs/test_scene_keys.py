@@ -1,0 +1,19 @@
+"""Every key of the radar's tables and of those around it stands in docs/scene_files.md."""
+
+from pathlib import Path
+
+import pytest
+
+from raychan.world.schema import InterfererTable, RadarTable, WaveformTable
+from raychan.world.schema_impairments import AtmosphereTable, ImpairmentsTable
+from raychan.world.schema_materials import DiffuseTable
+
+TEXT = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
+
+
+TABLES = (RadarTable, WaveformTable, ImpairmentsTable, AtmosphereTable, InterfererTable, DiffuseTable)
+
+
+@pytest.mark.parametrize("key", sorted({key for table in TABLES for key in table.model_fields}))
+def test_every_key_of_the_radar_and_its_surroundings_is_told(key):
+    assert f"`{key}`" in TEXT or f"`{key} =" in TEXT
