@@ -82,6 +82,8 @@ def oxygen(ghz: float, kelvin: float, dry_hpa: float, vapour_gm3: float) -> floa
         overlap = (a5 + a6 * theta) * 1e-4 * (dry_hpa + e) * theta**0.8
         # Zeeman splitting widens the lines (eq. 6b).
         total += strength * _shape(ghz, f0, math.sqrt(width**2 + 2.25e-6), overlap)
+    if dry_hpa == 0.0:
+        return 0.0
     debye = 5.6e-4 * (dry_hpa + e) * theta**0.8
     nitrogen = 1.4e-12 * dry_hpa * theta**1.5 / (1.0 + 1.9e-5 * ghz**1.5)
     total += ghz * dry_hpa * theta**2 * (6.14e-5 / (debye * (1.0 + (ghz / debye) ** 2)) + nitrogen)

@@ -61,12 +61,17 @@ def doa(
     if not any(aperture.scans):
         raise ValueError("elements: no spread along y or z, or along a slanted line; such an array measures no angle")
     most = len(aperture.elements) - 1
-    if sources is not None and not 0 <= sources <= most:
+    if sources is not None and not (0 <= sources <= most and int(sources) == sources):
         raise ValueError(f"sources = {sources}: {len(aperture.elements)} elements tell 0 to {most} apart")
+    size = float(np.abs(data).max())
+    if size == 0.0:  # silence has no direction
+        sources = 0
+    data = data / (size or 1.0)
     made = covariance(data, aperture, smoothing)
     count = _counted(data, aperture, criterion, smoothing) if sources is None else sources
     found = estimate(data, aperture, method, count, made) if count else np.zeros((0, 2))
-    power = (np.abs(amplitudes(data, aperture, found)) ** 2).mean(axis=0)
+    power = (size * np.abs(amplitudes(data, aperture, found))) ** 2
+    power = power.mean(axis=0)
     order = np.argsort(-power, kind="stable")
     azimuth, elevation = aperture.angles(found[order])
     return Directions(azimuth, elevation, power[order], aperture.ambiguous(found[order]))

@@ -8,6 +8,7 @@ each sequence and fails where a cell holds two echoes or noise moves a peak by a
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from raychan.columns import column
 from raychan.processing.own_waveform import map_by_waveform
 from raychan.radar.radar import Radar
-from raychan.radar.waveform import OwnWaveform
+from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.records import Cube, Detections, RangeDoppler
 from raychan.units import C0
 
@@ -25,6 +26,8 @@ Complexes = NDArray[np.complex64]
 
 _STRONG = 10.0
 """Times the noise, in the beam over all channels: weaker echoes keep the hypothesis "not folded" (not measured)."""
+CLEAR = 12.0
+"""Times the noise by which a fold must beat a slower one: less gives folds of noise, more asks for a higher SNR."""
 
 
 @dataclass(frozen=True)
@@ -87,14 +90,29 @@ def staggered_map(cube: Cube, radar: Radar, given: Any, resolve: bool = True) ->
     sums, fold = channels.mean(axis=0), np.zeros(map.power.shape, np.int8)
     rows, columns = np.nonzero(map.power > least_power(map, len(map.spectrum)))
     held, best = channels[:, :, rows, columns], np.zeros(len(rows))
+    clear = CLEAR * map.noise / count
     for h in fold_range(radar.waveform.fold_count):
         turn = np.exp(2j * np.pi * h * starts / wave.repetition).astype(np.complex64) / count
         total = np.tensordot(turn, held, 1)
         power = (np.abs(total) ** 2).sum(axis=0)
-        better = np.flatnonzero(power > best)
+        # Folds are tried from the slowest rate on: a faster one must explain clearly more.
+        better = np.flatnonzero(power > best + (clear if h else 0.0))
         best[better], fold[rows[better], columns[better]] = power[better], h
         sums[:, rows[better], columns[better]] = total[:, better]
     return resolved(map, sums, fold, map.noise / count)
+
+
+def least_snr(waveform: Waveform) -> float:
+    """Return the SNR of a detection from which the folds of staggered ramps are told apart; inf: never.
+
+    Two folds differ by the power that the wrong one loses: 1 - |mean_k exp(j 2 pi h t_k / P)|^2.
+    """
+    count = len(waveform.stagger)
+    starts = np.array([waveform.start_of(k) for k in range(count)])
+    apart = np.arange(1, waveform.fold_count)
+    turns = np.exp(2j * np.pi * np.outer(apart, starts) / sum(waveform.stagger))
+    lost = 1.0 - np.abs(turns.mean(axis=1)) ** 2
+    return float(CLEAR / lost.min()) if len(lost) and lost.min() > 0.0 else math.inf
 
 
 def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:

@@ -127,14 +127,14 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
                 values[f.name] = value
             else:
                 values[f.name] = data[name].values.astype(f.metadata["dtype"], copy=False)
-    return Paths.of(**values) if kind is Paths else kind(**values)
+    return kind.of(**values) if issubclass(kind, Paths) else kind(**values)
 
 
 def columns(kind: Any) -> list[dataclasses.Field[Any]]:
     """Return the columns of a record; in a file all columns of paths have a row for each path."""
-    if kind is not Paths:
+    if not issubclass(kind, Paths):
         return list(dataclasses.fields(kind))
-    own = [f for f in dataclasses.fields(Paths) if f.name not in ("trajectory", "trajectories")]
+    own = [f for f in dataclasses.fields(kind) if f.name not in ("trajectory", "trajectories")]
     return [*own, *dataclasses.fields(Trajectories)]
 
 

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from raychan.processing.cfar import GUARD, TRAIN, Grid, fitting_guard, full_count, least_snr_db, training
+from raychan.processing.staggered import least_snr
 from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
-from raychan.run.receiver import looks_of, noise_equivalent_amplitude
+from raychan.run.receiver import aperture_of, looks_of, noise_equivalent_amplitude
 from raychan.tracing.settings import PruneRule, refinement
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
@@ -192,6 +193,24 @@ def _detector(scene: Scene) -> list[str]:
             f"{size} has {len(found.offsets)} of the detector's {full} training cells: only echoes "
             f"{least:.0f} dB above the noise are detected, not all above processing.min_snr_db = {asked.min_snr_db:g} "
             "(radar.waveform.chirps, processing.train)"
+        )
+    return said + _ambiguities(scene)
+
+
+def _ambiguities(scene: Scene) -> list[str]:
+    """Return a line on staggered ramps that tell folds apart at high SNR only, and one on an array without angles."""
+    radar, asked, said = scene.radar, scene.processing, []
+    if radar.waveform.stagger and radar.noise:
+        least = 10.0 * math.log10(least_snr(radar.waveform))
+        if least > asked.min_snr_db:
+            said.append(
+                f"the staggered ramps tell folded rates apart above an SNR of {least:.0f} dB only; below it the "
+                "slowest rate that fits is taken (radar.waveform.stagger_us)"
+            )
+    if len(radar.elements) > 1 and asked.beams == "coherent" and not any(aperture_of(radar).scans):
+        said.append(
+            "the receivers have no spread along y or z: no azimuth, and their powers are averaged instead of added in "
+            "phase (radar.elements_mm)"
         )
     return said
 
