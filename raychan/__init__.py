@@ -23,6 +23,7 @@ _HOME = {
     "Scene": "raychan.world.scene",
     "Body": "raychan.world.body",
     "SceneError": "raychan.world.errors",
+    "Diffuse": "raychan.em.diffuse",
     "Material": "raychan.world.material",
     "PEC": "raychan.world.material",
     "Radar": "raychan.radar.radar",
@@ -72,6 +73,7 @@ _HOME = {
 if TYPE_CHECKING:
     from raychan.em.atmosphere import Atmosphere as Atmosphere
     from raychan.kinds import InteractionType as InteractionType
+    from raychan.em.diffuse import Diffuse as Diffuse
     from raychan.processing.detection_theory import Detector as Detector
     from raychan.processing.detection_theory import detection_probability as detection_probability
     from raychan.processing.doa import doa as doa

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainc, gammaincc, gammaln
 from scipy.stats import gamma, ncx2
 
-from raychan.processing.cfar import factor, quantiles_of
+from raychan.processing.cfar import METHODS, factor, quantiles_of
 from raychan.units import db, undb
 
 Floats = NDArray[np.float64]
 
 SWERLING = (0, 1, 2, 3, 4)
 _TINY = 1e-300
+_SURE = 1e4  # times the threshold: the normal deviate of a miss is then below -100
 _NEGLIGIBLE = 12.0  # standard deviations of a gamma variable beyond which its tail is under 1e-15 of a probability
 
 
@@ -47,6 +48,10 @@ class Detector:
             raise ValueError(f"Detector.pfa = {self.pfa!r}: must lie between 0 and 1")
         if self.looks < 1 or int(self.looks) != self.looks:
             raise ValueError(f"Detector.looks = {self.looks!r}: must be a whole number from 1 on")
+        if self.cfar not in (None, *METHODS):
+            raise ValueError(f"Detector.cfar = {self.cfar!r}: must be None or one of {', '.join(METHODS)}")
+        if np.isnan(self.min_snr_db):
+            raise ValueError(f"Detector.min_snr_db = {self.min_snr_db!r}: must be a number")
         if self.cfar is not None and not (np.isfinite(self.cells) and self.cells > 0.0):
             raise ValueError(f"Detector.cells = {self.cells!r}: a CFAR needs a positive number of training cells")
 
@@ -71,7 +76,10 @@ def over_threshold(snr: ArrayLike, threshold: ArrayLike, looks: int = 1, swerlin
     s, t = np.broadcast_arrays(np.asarray(snr, float), np.asarray(threshold, float))
     shape = shape_of(swerling, looks)
     if np.isinf(shape):
-        steady = ncx2.sf(2.0 * t, 2 * looks, 2.0 * looks * np.maximum(s, _TINY))
+        # Beyond, the library's series fails, and nothing is missed any more.
+        sure = looks * s > _SURE * (t + 1.0)
+        steady = ncx2.sf(2.0 * t, 2 * looks, 2.0 * looks * np.where(sure, 1.0, np.maximum(s, _TINY)))
+        steady = np.where(sure, 1.0, steady)
         return np.asarray(np.where(s > 0.0, steady, gammaincc(looks, t)))
     # The missed share: terms vanish where looks + j is far above the threshold.
     top = float(t.max(initial=0.0))
@@ -90,7 +98,10 @@ def detection_probability(snr_db: ArrayLike, detector: Detector = Detector(), sw
     Raises: ValueError on an unknown Swerling case. Source: Rohling 1983; Gandhi & Kassam 1988 for one look of case 1;
     any other case by the same average.
     """
-    snr, looks = np.asarray(undb(np.asarray(snr_db, float))), int(detector.looks)
+    if np.isnan(snr_db).any():
+        raise ValueError("snr_db: holds NaN")
+    # Beyond 250 dB nothing but the RCS itself decides, and squares overflow.
+    snr, looks = np.asarray(undb(np.minimum(np.asarray(snr_db, float), 250.0))), int(detector.looks)
     if detector.cfar is None:
         return over_threshold(snr, _threshold(detector), looks, swerling)
     quantiles, weights = quantiles_of(detector.cells, detector.cfar, looks)

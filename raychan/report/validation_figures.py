@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from raychan.report.canvas import PALETTE, Placer, figure, outlined, save, style
+from raychan.report.reflector_figures import reflector_pictures
 from raychan.study.validation.data import POINT
 from raychan.study.validation.formulas import both_ways
 from raychan.study.validation.judge import DIFFERS, UNTESTABLE, Check
@@ -27,6 +28,7 @@ def pictures(done: Validation, budgets: list[Budget], gains: list[ArrayGain], fo
         "ghost": _ghost(done, folder / "report-ghost.png"),
         "pedestrians": _pedestrians(done, budgets, folder / "report-pedestrians.png"),
         "array": _array(done, gains, folder / "report-array.png"),
+        **reflector_pictures(done.bench, folder),
     }
 
 

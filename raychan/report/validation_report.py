@@ -10,6 +10,7 @@ import numpy as np
 
 from raychan import __version__
 from raychan.radar.pattern import characteristics
+from raychan.report.reflector_figures import reflector_section
 from raychan.report.validation_page import anchor
 from raychan.study.validation.formulas import ARRAY, both_ways
 from raychan.study.validation.judge import AGREES, DIFFERS, UNTESTABLE, Check, of_item, shown, verdict
@@ -34,6 +35,7 @@ def markdown(
         made, ghosts, budgets, gains = sections
         lines += [*_ablations(made, figures), *_ghosts(done, ghosts), *_budgets(budgets, figures)]
         lines += _array_gains(done, gains, figures)
+        lines += reflector_section(figures)
     lines += [*_tables(done, figures), *_claims(done), *_known(done)]
     if done.bench.results:
         lines += _runs(done)
@@ -63,8 +65,9 @@ def _head(done: Validation) -> list[str]:
     tolerance = "each scene's own" if coarse is None else f"{coarse:g} dB"
     lines = [
         "# Validation", "",
-        "The tables and claims of a ray-tracing study of 77 GHz FMCW radar in urban traffic, compared with simulations "
-        "by raychan. Written by `raychan validate`; the scenes are in `scenes/`, the printed figures in `validation/`. "
+        "The tables and claims of a ray-tracing study of 77 GHz FMCW radar in urban traffic (C001 to C052), and the "
+        "claims of a published FMCW model (C059 to C074), compared with simulations by raychan. Written by "
+        "`raychan validate`; the scenes are in `scenes/`, the printed figures in `validation/`. "
         "The study's ranges and speeds are inputs of the scenes: their agreement tests the chain from the wave to the "
         "detection. Lateral positions and shapes of bodies are inferred. All scenes have one noise figure; nothing is "
         "fitted per target.", "",

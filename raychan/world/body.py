@@ -109,7 +109,10 @@ class Body:
     def limbs(self) -> tuple[Body, ...]:
         """The rigid bodies 'NAME.LIMB' of which a walker or a cyclist is made; of others the body itself."""
         try:
-            skeleton = shapes.skeleton(self.shape, dict(self.params))
+            try:
+                skeleton = shapes.skeleton(self.shape, dict(self.params))
+            except SceneError as e:
+                raise e.at(key=f"{self.name}.params") from None
             return (
                 (self,)
                 if skeleton is None or isinstance(self.__dict__.get("motion"), LimbMotion)

@@ -13,7 +13,8 @@ from raychan.study.validation.measures import Seen, measure
 from raychan.units import db
 
 
-def _of(bench: Bench, run: str, target: str, column: str) -> float | None:
+def of_detection(bench: Bench, run: str, target: str, column: str) -> float | None:
+    """Return a column [SI] of a target's detection; None where it is not detected."""
     row = bench.found(run, target)
     return None if row is None else float(getattr(bench.run(run).detections, column)[row])
 
@@ -22,24 +23,24 @@ def _minus(later: float | None, first: float | None) -> float | None:
     return None if later is None or first is None else later - first
 
 
-def _of_detection(column: str) -> Callable[..., Seen]:
+def _register(column: str) -> Callable[..., Seen]:
     """Register the measure of a column of the detections [m, m/s, dB] where a target is detected, by its name."""
 
     def read(bench: Bench, run: str, target: str) -> Seen:
-        return _of(bench, run, target, column)
+        return of_detection(bench, run, target, column)
 
     read.__name__ = column
     return measure(read)
 
 
 for _column in ("range", "rate", "speed", "snr"):
-    _of_detection(_column)
+    _register(_column)
 
 
 @measure
 def shift(bench: Bench, run: str, target: str) -> Seen:
     """Return the distance [m] in range from a target's place to its detection."""
-    off = _minus(_of(bench, run, target, "range"), bench.place(target)[1])
+    off = _minus(of_detection(bench, run, target, "range"), bench.place(target)[1])
     return None if off is None else abs(off)
 
 
@@ -48,7 +49,7 @@ def speed_shift(bench: Bench, run: str, target: str) -> Seen:
     """Return the difference [m/s] of a target's detected speed from its given one along the line of sight."""
     from raychan.study.validation.parameters import ground_speed
 
-    off = _minus(_of(bench, run, target, "speed"), float(ground_speed(bench, target) or 0.0))
+    off = _minus(of_detection(bench, run, target, "speed"), float(ground_speed(bench, target) or 0.0))
     return None if off is None else abs(off)
 
 
@@ -112,7 +113,7 @@ def count_seen(bench: Bench, run: str, targets: list[str]) -> Seen:
 @measure
 def greatest_off(bench: Bench, run: str, at: dict[str, float]) -> Seen:
     """Return the largest difference [m] of detected targets from the ranges [m] given for them."""
-    offs = [abs(x) for t, r in at.items() if (x := _minus(_of(bench, run, t, "range"), r)) is not None]
+    offs = [abs(x) for t, r in at.items() if (x := _minus(of_detection(bench, run, t, "range"), r)) is not None]
     return max(offs, default=None)
 
 
@@ -132,7 +133,7 @@ def farthest_clutter(bench: Bench, run: str) -> Seen:
 @measure
 def strongest(bench: Bench, run: str, targets: list[str]) -> Seen:
     """Return the title of the target with the highest SNR."""
-    best = max(targets, key=lambda t: _or_least(_of(bench, run, t, "snr")))
+    best = max(targets, key=lambda t: _or_least(of_detection(bench, run, t, "snr")))
     return bench.target(best).title
 
 
@@ -157,21 +158,21 @@ def split(bench: Bench, run: str, at: list[float]) -> Seen:
 @measure
 def range_apart(bench: Bench, run: str, one: str, other: str) -> Seen:
     """Return the distance [m] in range between the detections of two targets."""
-    apart = _minus(_of(bench, run, one, "range"), _of(bench, run, other, "range"))
+    apart = _minus(of_detection(bench, run, one, "range"), of_detection(bench, run, other, "range"))
     return None if apart is None else abs(apart)
 
 
 @measure
 def speed_apart(bench: Bench, run: str, one: str, other: str) -> Seen:
     """Return the difference [m/s] between the detected speeds of two targets."""
-    apart = _minus(_of(bench, run, one, "speed"), _of(bench, run, other, "speed"))
+    apart = _minus(of_detection(bench, run, one, "speed"), of_detection(bench, run, other, "speed"))
     return None if apart is None else abs(apart)
 
 
 @measure
 def snr_change(bench: Bench, first: str, later: str, target: str) -> Seen:
     """Return the rise [dB] of a target's SNR from one run to another."""
-    return _minus(_of(bench, later, target, "snr"), _of(bench, first, target, "snr"))
+    return _minus(of_detection(bench, later, target, "snr"), of_detection(bench, first, target, "snr"))
 
 
 @measure
@@ -183,7 +184,7 @@ def level_change(bench: Bench, first: str, later: str, target: str) -> Seen:
 @measure
 def range_change(bench: Bench, first: str, later: str, target: str) -> Seen:
     """Return the change [m] of a target's range from one run to another."""
-    return _minus(_of(bench, later, target, "range"), _of(bench, first, target, "range"))
+    return _minus(of_detection(bench, later, target, "range"), of_detection(bench, first, target, "range"))
 
 
 @measure

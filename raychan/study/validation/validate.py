@@ -10,7 +10,8 @@ from pathlib import Path
 # Imported because they register their measures.
 import raychan.study.validation.detections
 import raychan.study.validation.formulas
-import raychan.study.validation.parameters  # noqa: F401
+import raychan.study.validation.parameters
+import raychan.study.validation.reflectors  # noqa: F401
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.data import Figure, Item, Study, load
 from raychan.study.validation.judge import Check, cover, judge
