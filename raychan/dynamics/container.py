@@ -12,8 +12,8 @@ import numpy as np
 
 from raychan.dynamics.ship import DELTA, OF_LINEAR, PHI, PSI, Array, LinearShip, N, P, R, U, V, frozen
 
-LENGTH, BEAM, DRAUGHT, VOLUME = 175.0, 25.40, 8.50, 21222.0
-"""Length, beam, mean draught [m] and displaced volume [m3]."""
+LENGTH, VOLUME = 175.0, 21222.0
+"""Length [m] and displaced volume [m3]."""
 GRAVITY = 9.81
 METACENTRIC_HEIGHT = 0.3
 """GM [m]: low, so that the ship heels far in a turn."""

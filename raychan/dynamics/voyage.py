@@ -10,7 +10,7 @@ import numpy as np
 from raychan.dynamics import container
 from raychan.dynamics.kalman import KalmanFilter, Noise
 from raychan.dynamics.ship import DELTA, OF_LINEAR, PHI, PSI, Array, ExactStep, U, V, X, Y
-from raychan.dynamics.steering import Autopilot, SteeringGear, WayPoints
+from raychan.dynamics.steering import Autopilot, SteeringGear
 
 
 class Plant(Protocol):
@@ -111,7 +111,7 @@ def sail(
     plant: Plant,
     start: Array,
     autopilot: Autopilot,
-    programme: Programme | WayPoints,
+    programme: Programme,
     duration: float,
     watch: tuple[Watch, np.random.Generator] | None = None,
 ) -> Track:
