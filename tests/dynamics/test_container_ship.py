@@ -40,6 +40,15 @@ def test_the_published_roll_stiffness_is_that_of_7_m_s():
     assert at_20_knots[2] == pytest.approx(weight * (7.0 / SPEED) ** 2 + 2.1e-5, rel=2e-3)
 
 
+def test_it_rolls_in_27_8_s_at_20_knots_where_the_published_linear_ship_rolls_in_19_7_s():
+    """Near the undamped limit 2 pi / sqrt(stiffness): low GM makes a slow roll."""
+    models = (container.linearised(SPEED), container.published_linear(SPEED), container.published_linear(7.0))
+    periods = [2 * np.pi / model.poles().imag.max() for model in models]
+    np.testing.assert_allclose(periods, [27.8, 19.7, 29.0], atol=0.05)
+    limits = [2 * np.pi / np.sqrt(-model.a[1, 3]) for model in models]
+    np.testing.assert_allclose(periods, limits, rtol=0.05)
+
+
 def test_the_rudder_acts_as_published_but_for_the_flow_of_the_race():
     """One factor, the speed of the flow at the rudder squared, joins all three: 1.16 of the published."""
     _, _, rudder = prime(container.linearised(SPEED))

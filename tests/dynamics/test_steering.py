@@ -39,6 +39,7 @@ def test_the_printed_gain_turns_by_90_degrees_in_44_8_s_and_limits_lengthen_it()
     angle = printed_course_change(SteeringGear(max_angle=np.radians(10.0)))
     both = printed_course_change(SteeringGear(max_angle=np.radians(10.0), max_rate=np.radians(5.0)))
     assert both.settling_time() > angle.settling_time() > free.settling_time() + 10
+    assert (angle.settling_time(), both.settling_time()) == pytest.approx((60.5, 61.4), abs=0.1)
     assert np.degrees(np.abs(both.state[:, ship.DELTA])).max() <= 10.0 + 1e-9
     assert np.degrees(np.abs(np.diff(both.state[:, ship.DELTA]))).max() <= 5.0 * 0.05 + 1e-9
 
