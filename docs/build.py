@@ -29,7 +29,7 @@ MENU = (
         tuple(f"tutorials/{name}.md" for name in TUTORIALS),
     ),
     ("Look up", ("command_line.md", "scene_files.md", "gallery.md", "conventions.md", "glossary.md")),
-    ("Trust", ("theory.md", "accuracy.md", "limits.md")),
+    ("Trust", ("theory.md", "ship.md", "accuracy.md", "limits.md", "measurements.md")),
     ("Project", ("../CONTRIBUTING.md", "../CHANGELOG.md")),
 )
 STYLE = """

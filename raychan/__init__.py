@@ -72,8 +72,8 @@ _HOME = {
 
 if TYPE_CHECKING:
     from raychan.em.atmosphere import Atmosphere as Atmosphere
-    from raychan.kinds import InteractionType as InteractionType
     from raychan.em.diffuse import Diffuse as Diffuse
+    from raychan.kinds import InteractionType as InteractionType
     from raychan.processing.detection_theory import Detector as Detector
     from raychan.processing.detection_theory import detection_probability as detection_probability
     from raychan.processing.doa import doa as doa
