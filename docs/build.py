@@ -28,7 +28,7 @@ MENU = (
         "Tutorials",
         tuple(f"tutorials/{name}.md" for name in TUTORIALS),
     ),
-    ("Look up", ("command_line.md", "scene_files.md", "conventions.md", "glossary.md")),
+    ("Look up", ("command_line.md", "scene_files.md", "conventions.md", "hil.md", "glossary.md")),
     ("Trust", ("theory.md", "accuracy.md", "limits.md")),
     ("Project", ("../CONTRIBUTING.md", "../CHANGELOG.md")),
 )
