@@ -63,9 +63,13 @@ def pashr(attitude: Attitude) -> bytes:
 
 
 def ptnthtm(attitude: Attitude) -> bytes:
-    """Return `$PTNTHTM`, of which gpsd takes heading, pitch and roll; magnetometer and dip fields are 0."""
+    """Return `$PTNTHTM`, of which gpsd takes heading, pitch and roll; each is followed by its status, N (normal).
+
+    Dip angle and strength of the magnetic field are not simulated: 0.
+    Source: gpsd, driver_nmea0183.c, processTNTHTM.
+    """
     pitch, roll = (f"{_finite(a):.3f}" for a in (attitude.pitch_deg, attitude.roll_deg))
-    return _sentence("P", "TNTHTM", [_heading(attitude.heading_deg), "N", pitch, "N", roll, "N", "0.0", "0", "0"])
+    return _sentence("P", "TNTHTM", [_heading(attitude.heading_deg), "N", pitch, "N", roll, "N", "0.0", "0"])
 
 
 def _sentence(talker: str, name: str, fields: list[str]) -> bytes:

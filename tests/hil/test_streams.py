@@ -53,7 +53,8 @@ def test_attitude_has_roll_before_pitch_in_pashr_and_after_it_in_ptnthtm():
     found = NMEAReader.parse(pashr(attitude))
     assert (found.trueHdg, found.roll, found.pitch) == (45.0, -3.25, 1.5)
     fields = checked(ptnthtm(attitude))
-    assert (fields[0], fields[1], fields[3], fields[5]) == ("PTNTHTM", "45.000", "1.500", "-3.250")
+    # As in the compass's own $PTNTHTM,285.2,N,-2.4,N,10.7,N,59.1,3844*27.
+    assert fields == ["PTNTHTM", "45.000", "N", "1.500", "N", "-3.250", "N", "0.0", "0"]
 
 
 @pytest.mark.parametrize("lat, lon, height", [(91.0, 0.0, 0.0), (0.0, -181.0, 0.0), (0.0, np.nan, 0.0), (0, 0, np.inf)])
