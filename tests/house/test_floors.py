@@ -26,7 +26,12 @@ STOREYS = (
 )
 """From the ground up; rooms of one storey do not import each other."""
 FLOOR = {room: floor for floor, rooms in enumerate(STOREYS) for room in rooms}
-HOME = {"embreex": "world/triangle_groups.py", "pyvista": "view/render.py", "matplotlib": "report/canvas.py"}
+HOME = {
+    "embreex": "world/triangle_groups.py",
+    "pyvista": "view/render.py",
+    "matplotlib": "report/canvas.py",
+    "serial": "hil/ports.py",
+}
 UPWARD = {("reprs.py", "raychan.report.shown")}
 """The one door upward: what has a picture is a record, and `.plot()` on it asks, when called, for the pictures."""
 LAZY = {"pyvista", "matplotlib", "serial", "dask"}

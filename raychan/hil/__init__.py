@@ -1,0 +1,1 @@
+"""Hardware in the loop: scanner telegrams, NMEA sentences, serial ports, and a schedule that keeps time."""

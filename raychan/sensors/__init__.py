@@ -1,0 +1,1 @@
+"""Sensors other than radar that share the ray caster."""
