@@ -38,18 +38,17 @@ _COARSER = 3.0  # times the tolerance: the check launch
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
 
-def asked(scene: Scene, tolerance_db: float | None, max_bounces: int | None) -> Any:
-    """Return the scene's model settings with a tolerance [dB] and a number of bounces in place of its own.
+def asked(model: Any, tolerance_db: float | None, max_bounces: int | None) -> Any:
+    """Return a scene's model settings with a tolerance [dB] and a number of bounces in place of its own.
 
-    Raises: ValueError where one is out of range; SceneError where the machine has too little memory.
+    Raises: ValueError where one is out of range.
     """
     if tolerance_db is not None:
         TOLERANCE_DB.check("tolerance_db", tolerance_db)
     if max_bounces is not None:
         BOUNCES.check("max_bounces", max_bounces, whole=True)
-    check_demand(scene)
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
-    return scene.model.model_copy(update=changes) if changes else scene.model
+    return model.model_copy(update=changes) if changes else model
 
 
 def fine_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:

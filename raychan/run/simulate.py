@@ -88,7 +88,8 @@ def simulate(
 
 def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clock: Clock) -> Channel:
     """Return the channel of a scene, from two launches; arguments and errors as those of `simulate`."""
-    model, chosen = asked(scene, tolerance_db, max_bounces), None
+    check_demand(scene)
+    model, chosen = asked(scene.model, tolerance_db, max_bounces), None
     radar, settings = scene.radar, scene.processing
     with clock.stage("geometry"):
         geometry, points = geometry_of(scene), scene.points(0.0)

@@ -21,7 +21,7 @@ from raychan.records import Cube
 from raychan.reprs import Plotted
 from raychan.run.clock import Progress
 from raychan.run.micro_doppler import stretches
-from raychan.run.rules import allowed_memory, asked, fine_rule
+from raychan.run.rules import allowed_memory, asked, check_demand, fine_rule
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy
 from raychan.units import C0, db
@@ -85,7 +85,8 @@ def spectrogram(
     if len(scene.radar.tx_elements) > 1:
         raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
     chirps, length = _chirps(scene, duration, resolution)
-    model = asked(scene, tolerance_db, max_bounces)
+    check_demand(scene)
+    model = asked(scene.model, tolerance_db, max_bounces)
     wave = scene.radar.waveform
     count = max(2, 1 + round(duration * tracings_per_second))
     radar = replace(scene.radar, waveform=replace(wave, n_chirps=chirps))

@@ -53,7 +53,7 @@ def trace(
     traces several instants; these are the routes of its start.
     Raises: ValueError on a tolerance or a number of bounces out of range.
     """
-    model = asked(scene, tolerance_db, max_bounces)
+    model = asked(scene.model, tolerance_db, max_bounces)
     rule = (check_rule if check else fine_rule)(scene.radar, scene.processing, model)
     geometry, stats = geometry_of(scene), Stats()
     batches = tuple(launch_routes(geometry, scene.points(0.0), rule, stats))

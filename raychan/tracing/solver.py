@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
+from raychan.records import MIRROR, REFLECT, TRANSMIT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Contributions
-from raychan.tracing.direct_routes import direct_routes
 from raychan.tracing.legs import Leg, legs_over, reachable
 from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
@@ -19,6 +18,7 @@ from raychan.tracing.shooting import tube_routes
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 
+Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 
@@ -64,7 +64,7 @@ def launch_routes(
     if rule.rx is None:
         found = _foot_points(geometry, legs, refined)
     else:
-        found = direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
+        found = _direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
     if found is not None:
         yield found
     cuts = _CUTS + _CUTS_A_FACET * len(geometry.facets.vertices)
@@ -111,3 +111,39 @@ def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Route
         vertices[i, 0], normals[i, 0], facet[i, 0], kind[i, 0], body[i, 0] = foot, m.normal, m.facet, REFLECT, m.body
     length = np.array([2.0 * height for _, _, height in rows])
     return ray_routes(legs[0].end, legs[0].end, Interactions(vertices, normals, facet, body, kind), length)
+
+
+def _direct_routes(geometry: Geometry, legs: list[Leg], rx: Floats, slots: int, layers: int) -> Routes | None:
+    """Return the exact routes to a receiver elsewhere, at rx (3,) [m], over legs whose mirrors only reflect: line of
+    sight, and over the ground; None if there is none.
+
+    Other surfaces reflect by their tubes. Args: slots for interactions; layers that the last stretch may pass.
+    """
+    body_role, rows = geometry.facets.role, []
+    for leg in legs:
+        if any(body_role[m.body] != MIRROR for m in leg.mirrors) or not leg.may_reach(rx[None], np.zeros(1))[0]:
+            continue
+        view = leg.visible(geometry, rx[None], np.array([-1], np.int32), np.full(1, 1e-6), layers)
+        if not view.seen[0]:
+            continue
+        heading, length = leg.rays(rx[None])
+        stops = [(spot, m.normal, m.facet, REFLECT) for spot, m in zip(view.corners[0], leg.mirrors, strict=True)]
+        start = view.corners[0, -1] if leg.mirrors else leg.end
+        through = []
+        for facet in view.passed[0][view.passed[0] >= 0]:
+            t = geometry.distance(np.array([facet]), start[None], heading)[0]
+            through.append((float(t), (start + t * heading[0], geometry.normal[facet], int(facet), TRANSMIT)))
+        stops += [stop for _, stop in sorted(through, key=lambda pair: pair[0])]
+        rows.append((float(length[0]), stops))
+    if not rows:
+        return None
+    n = len(rows)
+    vertices, normals = np.broadcast_to(rx, (n, slots, 3)).copy(), np.zeros((n, slots, 3))
+    facet, kind = np.full((n, slots), -1, np.int32), np.zeros((n, slots), np.int8)
+    for i, (_, stops) in enumerate(rows):
+        for j, stop in enumerate(stops):
+            vertices[i, j], normals[i, j], facet[i, j], kind[i, j] = stop
+    body = geometry.facets.body[np.maximum(facet, 0)] if len(geometry.facets.body) else facet
+    length = np.array([r[0] for r in rows])
+    met = Interactions(vertices, normals, facet, np.where(facet >= 0, body, -1).astype(np.int16), kind)
+    return ray_routes(legs[0].end, rx, met, length)
