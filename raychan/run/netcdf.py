@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing.range_azimuth import RangeAzimuth
+from raychan.radar.dual_paths import DualPaths
 from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler, Trajectories
 from raychan.run.directions import angles_in
 from raychan.run.result import ExplainedDetections, Result
@@ -108,9 +109,11 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
 
     with xr.open_dataset(file, engine="h5netcdf", group=group, decode_cf=False) as data:
         values: dict[str, Any] = {}
+        if kind is Paths and "cross_re" in data:
+            kind = DualPaths
         for f in columns(kind):
             name = _CALLED.get(f.name, f.name)
-            if name not in data and kind is Paths and name in _FORMER:
+            if name not in data and issubclass(kind, Paths) and name in _FORMER:
                 former, factor = _FORMER[name]
                 values[f.name] = factor * data[former].values
             elif f.name in _ADDED and name not in data:

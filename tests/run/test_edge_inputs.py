@@ -1,0 +1,66 @@
+"""Edges of the receiver's inputs: silence, vacuum, NaN, both polarisations saved, slow folds before fast ones."""
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.em.atmosphere import gas
+from raychan.processing.staggered import least_snr
+from raychan.run.storage import save_result
+
+LINE = rc.uniform_array(8, 2e-3)
+
+
+@pytest.mark.parametrize("method", ["bartlett", "capon", "music", "esprit", "monopulse"])
+def test_silence_has_no_direction(method):
+    assert len(rc.doa(np.zeros(8), LINE, 4e-3, method=method, sources=1).azimuth) == 0
+
+
+def test_directions_do_not_depend_on_the_level():
+    wave = np.exp(1j * np.pi * np.arange(8) * np.sin(0.3))
+    found = [rc.doa(size * wave, LINE, 4e-3, method="music", sources=1) for size in (1.0, 1e150)]
+    assert found[0].azimuth == pytest.approx(found[1].azimuth, abs=1e-9)
+
+
+def test_vacuum_attenuates_nothing():
+    assert gas(77.0, 288.0, 0.0, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("detector", [rc.Detector(), rc.Detector(looks=8), rc.Detector(cfar="os", cells=16)])
+def test_a_very_strong_target_is_detected(detector):
+    assert rc.detection_probability([160.0, 200.0, np.inf], detector) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_what_is_no_number_and_no_cfar_is_refused():
+    with pytest.raises(ValueError, match="NaN"):
+        rc.detection_probability(np.nan)
+    with pytest.raises(ValueError, match="cfar"):
+        rc.Detector(cfar="foo", cells=16)
+
+
+def test_a_wrong_parameter_of_a_walker_names_the_body():
+    with pytest.raises(rc.SceneError, match=r"bodies\.anna\.params\.speed"):
+        rc.Scene(bodies=[rc.Body(name="anna", shape="walker", params={"speed": 100})])
+
+
+def target(**radar):
+    wave = radar.pop("waveform", rc.Waveform(77e9, 5e8, 2e-5, n_chirps=48, n_samples=64))
+    body = rc.Body(name="t", shape="box", rcs_dbsm=10.0, position=(12.0, 0.0, 0.0), velocity=(12.0, 0.0, 0.0))
+    return rc.Scene(bodies=[body], radar=rc.Radar(wave, **radar))
+
+
+def test_a_run_of_both_polarisations_is_saved_and_read(tmp_path):
+    result = rc.simulate(target(rx_polarization="both"))
+    save_result(result, tmp_path)
+    read = rc.load_result(tmp_path / "result.nc")
+    np.testing.assert_array_equal(read.paths.cross, result.paths.cross)
+
+
+def test_staggered_ramps_that_cannot_tell_folds_prefer_slow_rates_and_say_so():
+    wave = rc.Waveform(77e9, 5e8, 2e-5, n_chirps=48, n_samples=64, stagger=(25e-6, 31e-6))
+    scene = target(waveform=wave)
+    assert least_snr(wave) > 10.0**3
+    for seed in range(6):
+        result = rc.simulate(scene, seed=seed)
+        assert any("staggered ramps tell folded rates apart" in w for w in result.warnings)
+        assert np.abs(result.detections.rate[:1] - 12.0).max(initial=0.0) < 0.5
