@@ -104,29 +104,31 @@ class Footprint:
 
 
 @njit(cache=True, nogil=True)
+def _echo(distance, body, power, near, far):  # type: ignore[no-untyped-def]
+    """Return energy, mean range by energy, and the body of the strongest sub-ray of hits (k,) from `near` to `far`."""
+    energy, moment, strongest, of = 0.0, 0.0, 0.0, np.int32(-1)
+    for m in range(len(distance)):
+        r = distance[m]
+        if near <= r <= far and r < np.inf:
+            energy += power[m]
+            moment += power[m] * (r - near)
+            if power[m] > strongest:
+                strongest, of = power[m], body[m]
+    return energy, near + (moment / energy if energy > 0.0 else 0.0), of
+
+
+@njit(cache=True, nogil=True)
 def _reported(distance, body, power, echo, merge, none):  # type: ignore[no-untyped-def]
-    """Return range and body of each row: see `Footprint.report`. An echo is all energy from one hit to `merge` beyond
-    it; its body is that of its strongest sub-ray."""
+    """Return range and body of each row: see `Footprint.report`."""
     n, k = distance.shape
     ranges, bodies = np.full(n, np.inf), np.full(n, none, np.int32)
     for i in range(n):
         best = 0.0
+        nearest = distance[i].min()
         for j in range(k):
-            near = distance[i, j]
-            if not near < np.inf:
-                continue
-            energy, moment, strongest, of = 0.0, 0.0, 0.0, none
-            for m in range(k):
-                r = distance[i, m]
-                if r < np.inf and (echo == _MEAN or near <= r <= near + merge):
-                    energy += power[i, m]
-                    moment += power[i, m] * (r - near)
-                    if power[i, m] > strongest:
-                        strongest, of = power[i, m], body[i, m]
+            near, far = (nearest, np.inf) if echo == _MEAN else (distance[i, j], distance[i, j] + merge)
+            energy, at, of = _echo(distance[i], body[i], power[i], near, far)
             # Less than the least power: no echo, but for what rounding takes of a surface just at its limit.
-            if energy < 1.0 - 1e-12:
-                continue
-            at = near + moment / energy
-            if (at < ranges[i]) if echo == _FIRST else (energy > best):
+            if energy >= 1.0 - 1e-12 and ((at < ranges[i]) if echo == _FIRST else (energy > best)):
                 best, ranges[i], bodies[i] = energy, at, of
     return ranges, bodies
