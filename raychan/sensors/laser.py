@@ -1,6 +1,6 @@
 """Laser scanner with a turning mirror: beams of a moving deck, nearest hits, range by reflectivity, range noise.
 
-A beam is one ray of no width, or has a `sensors.footprint`. Sensor frame: x ahead, y left, z up; beam angles run from
+A beam is one ray of no width, or has a `sensors.spot`. Sensor frame: x ahead, y left, z up; beam angles run from
 the right (negative) to the left.
 """
 
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from raychan.columns import Record, column
 from raychan.poses import direction, rotation
-from raychan.sensors.footprint import Footprint
 from raychan.sensors.sea import Waves, flat_sea_range, wavy_sea_range
+from raychan.sensors.spot import Spot
 from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ class Scanner:
     """An LMS221-like scanner.
 
     Fields: fan [deg]; step [deg]: 1, 0.5 or 0.25; mirror_hz turns of the mirror a second; max_range [m]; dark_range [m]
-    to a surface of 10 % reflectivity (assumed: the paper's Figure 9 is lost); footprint of a beam, None for a ray of
+    to a surface of 10 % reflectivity (assumed: the paper's Figure 9 is lost); spot of a beam, None for a ray of
     no width; lambert: whether power falls with the cosine of the angle of incidence (Table 2 does not say); moving:
     whether each beam leaves at its own time, or all at the scan's start, as the paper has it.
     A step of 1/m deg takes m turns of the mirror, each shifted by a step against the one before: 13.3, 26.7, 53.3 ms.
@@ -54,7 +54,7 @@ class Scanner:
     mirror_hz: float = 75.0
     max_range: float = 80.0
     dark_range: float = 30.0
-    footprint: Footprint | None = None
+    spot: Spot | None = None
     lambert: bool = False
     moving: bool = True
 
@@ -194,7 +194,7 @@ def scan(
     A nearer surface hides what is behind it even where it is too dark to be seen itself.
     """
     targets, (towards, axis) = Targets(caster, reflectivity, sea_reflectivity, waves), _beams(scanner, poses)
-    spot = scanner.footprint
+    spot = scanner.spot
     if spot is None:
         distance, body, reflects = first_hits(scanner, targets, poses.position, towards, scanner.times)
         seen = distance <= scanner.range_limit(reflects)

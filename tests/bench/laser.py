@@ -12,9 +12,9 @@ import trimesh
 from support.facets import facets
 
 from bench.measure import Row, barred
-from raychan.sensors.footprint import Footprint
 from raychan.sensors.laser import LaserScan, Scanner, SensorPoses, scan
 from raychan.sensors.sea import SeaState, waves
+from raychan.sensors.spot import Spot
 from raychan.world.ray_caster import RayCaster
 
 _CALLS = 100  # scans timed together: one is shorter than the clock's ticks
@@ -31,15 +31,15 @@ def laser(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
     poses = SensorPoses(
         position=np.tile([0.0, 0.0, 5.0], (n, 1)), yaw=np.zeros(n), pitch=np.zeros(n), roll=np.full(n, 0.1)
     )
-    wide = Footprint()
+    wide = Spot()
     cases = (
         ("no width", None, None),
         ("7 sub-rays", wide, None),
         ("waves", None, sea),
         ("7 sub-rays, waves", wide, sea),
     )
-    for name, footprint, moving_sea in cases:
-        scanner = Scanner(footprint=footprint)
+    for name, spot, moving_sea in cases:
+        scanner = Scanner(spot=spot)
 
         def once(scanner: Scanner = scanner, moving_sea: object = moving_sea) -> LaserScan:
             return scan(scanner, poses, caster, np.ones(2), 1.0, moving_sea)

@@ -79,6 +79,12 @@ def test_first_order_is_monte_carlo_for_small_errors_and_departs_for_large_ones(
     assert {s for b, s in apart if b == "quay"} == {"roll", "pitch", "yaw", "x", "y", "delay"}
 
 
+def test_typical_errors_together_are_those_of_the_documentation(made):
+    found = {e.body: e.monte_carlo for e in made if e.source == ALL}
+    assert found == {"sea": pytest.approx(5.8, abs=0.3), "quay": pytest.approx(1.6, abs=0.1)}
+    assert departures(made)["quay", "yaw"] == pytest.approx(0.63, abs=0.01)
+
+
 def test_the_mean_error_on_the_sea_abeam_is_the_second_orders():
     """R = h / sin(phi): mean of r(phi + e) - r is r'' s^2 / 2 = r (1 / 2 + cot^2 phi) s^2."""
     deck, sigma = harbour(), np.radians(0.5)

@@ -1,4 +1,4 @@
-"""A beam of finite width: sub-rays over its footprint, and the one range that a scanner reports of their echoes.
+"""A beam of finite width: sub-rays over its spot, and the one range that a scanner reports of their echoes.
 
 Where a spot falls on two surfaces the scanner may report a range between them, where nothing is: a mixed pixel (Ye and
 Borenstein, IEEE Int. Conf. on Robotics and Automation 2002, pp. 2512-2518, on a scanner of this family).
@@ -35,7 +35,7 @@ _FIRST, _MEAN = int(Echo.FIRST), int(Echo.MEAN)
 
 
 @dataclass(frozen=True)
-class Footprint:
+class Spot:
     """The width of a beam and how its echoes become one range.
 
     Fields: divergence [rad], full angle, and exit_diameter [m] of the circle at 1/e^2 of the axis' intensity: 13 mm +
@@ -61,7 +61,7 @@ class Footprint:
 
     @property
     def pattern(self) -> tuple[Floats, Floats]:
-        """Places (k, 2) of the sub-rays in radii of the footprint, and the share (k,) of the energy that each carries.
+        """Places (k, 2) of the sub-rays in radii of the spot, and the share (k,) of the energy that each carries.
 
         Ring j of n lies at j / n of the radius and has the energy of a Gaussian beam, exp(-2 r^2), from (j - 1/2) / n
         to (j + 1/2) / n; the outermost has what lies beyond, too. Source: Winiwarter et al. 2022, Remote Sensing of
@@ -119,7 +119,7 @@ def _echo(distance, body, power, near, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _reported(distance, body, power, echo, merge, none):  # type: ignore[no-untyped-def]
-    """Return range and body of each row: see `Footprint.report`."""
+    """Return range and body of each row: see `Spot.report`."""
     n, k = distance.shape
     ranges, bodies = np.full(n, np.inf), np.full(n, none, np.int32)
     for i in range(n):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support.facets import box, facets
 
-from raychan.sensors.footprint import Echo, Footprint
 from raychan.sensors.laser import NO_BODY, SEA, Scanner, SensorPoses, scan
+from raychan.sensors.spot import Echo, Spot
 from raychan.world.ray_caster import RayCaster
 
 WALL = ((20.0, -30.0, -30.0), (20.5, 30.0, 30.0))
@@ -25,7 +25,7 @@ def seen(scanner, *boxes, reflectivity=1.0, sea=0.0, **pose):
 
 @pytest.mark.parametrize("rings", [1, 2, 3, 8])
 def test_sub_rays_share_the_energy_of_a_gaussian_spot(rings):
-    places, share = Footprint(rings=rings).pattern
+    places, share = Spot(rings=rings).pattern
     assert len(places) == 1 + 3 * rings * (rings + 1)
     assert share.sum() == pytest.approx(1.0, abs=1e-15) and (share > 0.0).all()
     np.testing.assert_allclose(share @ places, 0.0, atol=1e-15)
@@ -40,14 +40,14 @@ def test_the_more_rings_the_nearer_is_the_energy_beside_an_edge_to_the_gaussians
     """The share of exp(-2 r^2) beyond x is erfc(sqrt(2) x) / 2."""
     edges, off = np.linspace(-0.8, 0.8, 33), []
     for rings in (1, 4, 16):
-        places, share = Footprint(rings=rings).pattern
+        places, share = Spot(rings=rings).pattern
         off.append(max(abs(share[places[:, 0] > x].sum() - 0.5 * math.erfc(math.sqrt(2.0) * x)) for x in edges))
     assert off[0] < 0.25 and off[1] < 0.09 and off[2] < 0.03
 
 
 def test_the_spot_is_13_mm_wide_at_the_exit_and_grows_by_4_6_mrad():
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    start, line = Footprint().sub_rays(np.zeros((1, 3)), turn[None, 0], turn[None, 1])
+    start, line = Spot().sub_rays(np.zeros((1, 3)), turn[None, 0], turn[None, 1])
     for away in (0.0, 8.0, 50.0):
         tips = start + away / (line @ turn[0])[:, None] * line
         across = np.linalg.norm(tips - away * turn[0], axis=1)
@@ -58,14 +58,14 @@ def test_the_spot_is_13_mm_wide_at_the_exit_and_grows_by_4_6_mrad():
 
 @pytest.mark.parametrize("echo", list(Echo))
 def test_a_wall_across_the_beam_is_where_a_ray_meets_it(echo):
-    found, body = seen(Scanner(footprint=Footprint(echo=echo)), WALL)
+    found, body = seen(Scanner(spot=Spot(echo=echo)), WALL)
     assert body == 0 and found == pytest.approx(20.0, abs=1e-4)  # sub-rays are longer by 20 m (2.3 mrad)^2 / 2
 
 
 def test_a_spot_across_an_edge_reads_a_range_between_where_nothing_is():
-    spot = Footprint(rings=3)
+    spot = Spot(rings=3)
     near = ((19.7, 1e-4, -5.0), (19.71, 5.0, 5.0))  # a hair's breadth off the axis: no sub-ray meets the edge itself
-    found, _ = seen(Scanner(footprint=spot), WALL, near)
+    found, _ = seen(Scanner(spot=spot), WALL, near)
     places, share = spot.pattern
     left = places[:, 0] > 1e-2
     part = share[~left].sum() * 20.0**-2, share[left].sum() * 19.7**-2
@@ -76,7 +76,7 @@ def test_a_spot_across_an_edge_reads_a_range_between_where_nothing_is():
 def test_of_two_echoes_apart_the_first_the_strongest_or_their_mean_is_reported():
     edge = 0.3 * 0.5 * (0.013 + 4.6e-3 * 15.0)  # leaves less than half of the spot to the nearer
     near = ((15.0, edge, -5.0), (15.1, 5.0, 5.0))
-    spot = {echo: seen(Scanner(footprint=Footprint(rings=4, echo=echo)), WALL, near) for echo in Echo}
+    spot = {echo: seen(Scanner(spot=Spot(rings=4, echo=echo)), WALL, near) for echo in Echo}
     assert spot[Echo.FIRST] == (pytest.approx(15.0, abs=1e-3), 1)
     assert spot[Echo.STRONGEST] == (pytest.approx(20.0, abs=1e-3), 0)
     assert 15.5 < spot[Echo.MEAN][0] < 19.5
@@ -85,7 +85,7 @@ def test_of_two_echoes_apart_the_first_the_strongest_or_their_mean_is_reported()
 def test_an_echo_too_weak_to_be_seen_is_passed_over_for_the_next():
     edge = 0.9 * 0.5 * (0.013 + 4.6e-3 * 15.0)
     near = ((15.0, edge, -5.0), (15.1, 5.0, 5.0))
-    dim = Scanner(footprint=Footprint(rings=4), dark_range=21.0)  # the wall alone just seen
+    dim = Scanner(spot=Spot(rings=4), dark_range=21.0)  # the wall alone just seen
     assert seen(dim, WALL, near, reflectivity=0.1) == (pytest.approx(20.0, abs=1e-3), 0)
     assert seen(dim, near, reflectivity=0.1) == (np.inf, NO_BODY)
 
@@ -93,15 +93,15 @@ def test_an_echo_too_weak_to_be_seen_is_passed_over_for_the_next():
 @pytest.mark.parametrize("x, body", [(29.99, 0), (30.01, NO_BODY)])
 def test_a_surface_that_fills_the_spot_is_seen_as_far_as_by_a_ray(x, body):
     wall = ((x, -30.0, -30.0), (x + 1.0, 30.0, 30.0))
-    for spot in (None, Footprint()):
-        assert seen(Scanner(footprint=spot), wall, reflectivity=0.1)[1] == body
+    for spot in (None, Spot()):
+        assert seen(Scanner(spot=spot), wall, reflectivity=0.1)[1] == body
 
 
 @pytest.mark.parametrize("x, body", [(20.5, 0), (21.6, NO_BODY)])
 def test_a_surface_that_fills_half_the_spot_is_seen_a_root_of_two_less_far(x, body):
     """30 m / sqrt(2) = 21.2 m."""
     half = ((x, 1e-4, -30.0), (x + 1.0, 30.0, 30.0))
-    assert seen(Scanner(footprint=Footprint(rings=24)), half, reflectivity=0.1)[1] == body
+    assert seen(Scanner(spot=Spot(rings=24)), half, reflectivity=0.1)[1] == body
 
 
 @pytest.mark.parametrize("distance, body", [(14.0, 0), (16.0, NO_BODY)])
@@ -127,4 +127,4 @@ def test_all_beams_leave_at_the_scans_start_where_motion_is_switched_off():
 @pytest.mark.parametrize("wrong", [{"divergence": -1.0}, {"exit_diameter": np.nan}, {"rings": 0}, {"merge": np.inf}])
 def test_a_footprint_that_cannot_be_is_refused(wrong):
     with pytest.raises(ValueError, match="allowed"):
-        Footprint(**wrong)
+        Spot(**wrong)
