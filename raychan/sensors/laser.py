@@ -148,11 +148,12 @@ def _beams(scanner: Scanner, poses: SensorPoses) -> tuple[Floats, Floats]:
 
 
 def first_hits(
-    scanner: Scanner, targets: Targets, origin: Floats, towards: Floats, time: Floats
+    scanner: Scanner, targets: Targets, origin: Floats, towards: Floats, time: Floats, together: int = 1
 ) -> tuple[Floats, Ints, Floats]:
     """Return what rays of no width meet first, seen or not.
 
-    Args: origin (n, 3) [m]; towards (n, 3) unit; time (n,) [s] of each on the sea's clock.
+    Args: origin (n, 3) [m]; towards (n, 3) unit; time (n,) [s] of each on the sea's clock; together: so
+    many rows after each other are of one beam.
     Returns: distance (n,) [m], inf for nothing (of waves: within max_range); body (n,), NO_BODY or SEA; how much it
     reflects (n,), times the cosine of incidence with `lambert`.
     """
@@ -168,14 +169,20 @@ def first_hits(
         if scanner.lambert:
             reflects[hit] *= np.abs(np.einsum("ij,ij->i", towards[hit], caster.normal[met]))
     if targets.sea_reflectivity > 0.0:
-        if targets.waves is None:
-            sea, grazing = flat_sea_range(origin, towards), -towards[:, 2]
-        else:
-            reach = np.minimum(distance, scanner.max_range)
-            sea, grazing = wavy_sea_range(targets.waves, origin, towards, time, reach)
+        sea = (
+            flat_sea_range(origin, towards)
+            if targets.waves is None
+            else wavy_sea_range(targets.waves, origin, towards, time, np.minimum(distance, scanner.max_range), together)
+        )
         nearer = sea < distance
         distance, body = np.where(nearer, sea, distance), np.where(nearer, np.int32(SEA), body)
-        reflects[nearer] = targets.sea_reflectivity * (grazing[nearer] if scanner.lambert else 1.0)
+        reflects[nearer] = targets.sea_reflectivity
+        if scanner.lambert:
+            normal = np.array([0.0, 0.0, 1.0])
+            if targets.waves is not None:
+                x, y, _ = (origin[nearer] + sea[nearer, None] * towards[nearer]).T
+                normal = targets.waves.normal(x, y, time[nearer])
+            reflects[nearer] *= -(normal * towards[nearer]).sum(axis=1)
     return distance, body, reflects
 
 
@@ -201,7 +208,7 @@ def scan(
         return LaserScan(range=np.where(seen, distance, np.inf), body=np.where(seen, body, np.int32(NO_BODY)))
     rays = spot.sub_rays(poses.position, towards, axis)
     each = len(rays[0]) // len(towards)
-    distance, body, reflects = first_hits(scanner, targets, *rays, np.repeat(scanner.times, each))
+    distance, body, reflects = first_hits(scanner, targets, *rays, np.repeat(scanner.times, each), each)
     # Power over the least that is detected: 1 where a surface is at its `range_limit`.
     power = np.where(distance <= scanner.max_range, reflects / 0.1 * (scanner.dark_range / distance) ** 2, 0.0)
     shape = len(towards), each

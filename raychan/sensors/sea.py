@@ -81,6 +81,13 @@ class Waves(Record):
             (self.amplitude * np.cos(self.wave_x * x + self.wave_y * y - self.frequency * t + self.phase)).sum(-1)
         )
 
+    def normal(self, x: Floats, y: Floats, time: Floats | float = 0.0) -> Floats:
+        """Return the upward unit normal (..., 3) of the surface at places (...) [m] and times (...) [s]."""
+        x, y, t = (np.asarray(v, float)[..., None] for v in (x, y, time))
+        sine = self.amplitude * np.sin(self.wave_x * x + self.wave_y * y - self.frequency * t + self.phase)
+        up = np.stack([sine @ self.wave_x, sine @ self.wave_y, np.ones(sine.shape[:-1])], axis=-1)
+        return np.asarray(up / np.linalg.norm(up, axis=-1, keepdims=True))
+
 
 def waves(state: SeaState, rng: np.random.Generator, count: int = 48) -> Waves:
     """Return a sea of a state: `count` waves of random phases and directions, at random within equal steps of log w.
@@ -118,21 +125,23 @@ def flat_sea_range(origin: Floats, towards: Floats) -> Floats:
     return np.divide(origin[:, 2], down, out=np.full(len(down), np.inf), where=hits)
 
 
-def wavy_sea_range(sea: Waves, origin: Floats, towards: Floats, time: Floats, reach: Floats) -> tuple[Floats, Floats]:
-    """Return where rays first meet a wavy sea.
+def wavy_sea_range(
+    sea: Waves, origin: Floats, towards: Floats, time: Floats, reach: Floats, together: int = 1
+) -> Floats:
+    """Return the distance (n,) [m] at which rays first meet a wavy sea, inf from below it and beyond reach.
 
-    Args: origin (n, 3) [m]; towards (n, 3) unit; time (n,) [s] of each; reach (n,) [m] to which they are followed.
-    Returns: distance (n,) [m], inf from below the surface and beyond reach; sine (n,) of the grazing angle there.
+    Args: origin (n, 3) [m]; towards (n, 3) unit; time (n,) [s] of each; reach (n,) [m] to which they are followed;
+    together: so many rows after each other are of one time and near each other, which saves time.
     """
     parts = np.stack([sea.amplitude, sea.wave_x, sea.wave_y, sea.frequency, sea.phase])
     rays = (np.ascontiguousarray(x, float) for x in (origin, towards, time, reach))
-    found: tuple[Floats, Floats] = _wave_hits(parts, *rays)
+    found: Floats = _wave_hits(parts, *rays, together)
     return found
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _sums(amplitude, start, rate, s):  # type: ignore[no-untyped-def]
-    """Return sum a cos(start + rate s) and its slope along s; by a polynomial, for compilers make vectors of that.
+    """Return sum a cos(start + rate s) and its slope along s; by polynomials, which compilers turn into vectors.
 
     An angle within a turn is quartered, its sine and cosine are Taylor's to the 14th power (2e-14), then doubled twice.
     """
@@ -153,28 +162,27 @@ def _sums(amplitude, start, rate, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _first_root(amplitude, start, rate, z, rise, reach):  # type: ignore[no-untyped-def]
-    """Return the distance at which a ray of height z + rise s first meets the surface, inf beyond `reach`.
+def _first_root(amplitude, start, rate, z, rise, begin, reach):  # type: ignore[no-untyped-def]
+    """Return the distance at which a ray of height z + rise s first meets the surface after `begin`, inf beyond
+    `reach`, -1 where the ray is below it at the beginning.
 
-    With f the height over the surface, f'' never exceeds C = sum a rate^2, nor |f'| L = |rise| + sum a |rate|: the ray
-    is above the surface for f / L, and up to the root of f + f' h - C h^2 / 2. Steps of the longer of both pass no
-    root, and near one they are Newton's.
+    With f the height over the surface, |f'| never exceeds L = |rise| + sum a |rate|, nor |f''| C = sum a rate^2: the
+    ray is above the surface for f / L, and up to the root of f + f' h - C h^2 / 2. Steps of the longer of both pass no
+    root, and near one they are Newton's: a dozen to a beam.
     """
     top, fastest, bend = 0.0, abs(rise), 0.0
     for i in range(len(amplitude)):
         top += amplitude[i]
         fastest += amplitude[i] * abs(rate[i])
         bend += amplitude[i] * rate[i] * rate[i]
-    s = 0.0
-    if z > top:
-        if rise >= 0.0:
-            return np.inf
-        s = (z - top) / -rise
+    s = begin
+    if z > top and rise < 0.0:
+        s = max(s, (z - top) / -rise)
     while s <= reach:
         height, slope = _sums(amplitude, start, rate, s)
         f, down = z + rise * s - height, slope - rise
         if f < _ON:
-            return s if f > -_ON or s > 0.0 else np.inf
+            return s if f > -_ON or s > begin else -1.0
         if rise >= 0.0 and z + rise * s > top:
             return np.inf
         root = math.sqrt(down * down + 2.0 * bend * f)
@@ -184,24 +192,40 @@ def _first_root(amplitude, start, rate, z, rise, reach):  # type: ignore[no-unty
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _wave_hits(parts, origin, towards, time, reach):  # type: ignore[no-untyped-def]
-    """Return distance (n,) and sine of the grazing angle (n,) of rays on waves (5, m); see `wavy_sea_range`."""
+def _begin(parts, origin, towards, time, reach):  # type: ignore[no-untyped-def]
+    """Return a distance before which none of a few rays (k, 3) of one time meets the surface.
+
+    Up to s all are within e + b s of the first one, over which height above the surface changes by no more than
+    G = |(1, sum a |k|)| times that: a ray lower by so much meets the surface before any of them.
+    """
     amplitude, wave_x, wave_y, frequency, phase = parts
-    n, m = len(origin), len(amplitude)
-    distance, grazing = np.full(n, np.inf), np.zeros(n)
+    start = wave_x * origin[0, 0] + wave_y * origin[0, 1] - frequency * time + phase
+    rate = wave_x * towards[0, 0] + wave_y * towards[0, 1]
+    steep = math.sqrt(1.0 + (amplitude * np.sqrt(wave_x**2 + wave_y**2)).sum() ** 2)
+    beside, apart = 0.0, 0.0
+    for i in range(1, len(origin)):
+        beside = max(beside, math.sqrt(((origin[i] - origin[0]) ** 2).sum()))
+        apart = max(apart, math.sqrt(((towards[i] - towards[0]) ** 2).sum()))
+    lowered = origin[0, 2] - steep * beside, towards[0, 2] - steep * apart
+    return max(0.0, _first_root(amplitude, start, rate, lowered[0], lowered[1], 0.0, reach.max()))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _wave_hits(parts, origin, towards, time, reach, together):  # type: ignore[no-untyped-def]
+    """Return the distance (n,) of rays on waves (5, m); see `wavy_sea_range`."""
+    amplitude, wave_x, wave_y, frequency, phase = parts
+    n, m, begin = len(origin), len(amplitude), 0.0
     start, rate = np.empty(m), np.empty(m)
+    distance = np.full(n, np.inf)
     for i in range(n):
+        if together > 1 and i % together == 0:
+            few = slice(i, i + together)
+            begin = _begin(parts, origin[few], towards[few], time[i], reach[few])
         (x, y, z), (dx, dy, dz) = origin[i], towards[i]
         for k in range(m):
             start[k] = wave_x[k] * x + wave_y[k] * y - frequency[k] * time[i] + phase[k]
             rate[k] = wave_x[k] * dx + wave_y[k] * dy
-        s = _first_root(amplitude, start, rate, z, dz, reach[i])
-        if s < np.inf:
+        s = _first_root(amplitude, start, rate, z, dz, begin, reach[i])
+        if s >= 0.0:
             distance[i] = s
-            east, north = 0.0, 0.0
-            for k in range(m):
-                sine = math.sin(start[k] + rate[k] * s)
-                east -= amplitude[k] * wave_x[k] * sine
-                north -= amplitude[k] * wave_y[k] * sine
-            grazing[i] = (dx * east + dy * north - dz) / math.sqrt(1.0 + east * east + north * north)
-    return distance, grazing
+    return distance

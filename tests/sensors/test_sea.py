@@ -92,18 +92,18 @@ def test_equal_seeds_give_equal_waves():
 
 def test_waves_without_height_are_the_flat_sea():
     origin, towards = rays(2000)
-    found, grazing = wavy_sea_range(realised(0.0), origin, towards, np.zeros(2000), np.full(2000, 1e5))
+    found = wavy_sea_range(realised(0.0), origin, towards, np.zeros(2000), np.full(2000, 1e5))
     flat = flat_sea_range(origin, towards)
     flat = np.where(flat <= 1e5, flat, np.inf)
     np.testing.assert_allclose(found, flat, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(grazing[np.isfinite(flat)], -towards[np.isfinite(flat), 2], atol=1e-12)
+    np.testing.assert_array_equal(realised(0.0).normal(origin[:, 0], origin[:, 1]), np.tile([0.0, 0.0, 1.0], (2000, 1)))
 
 
 @pytest.mark.parametrize("height, period", [(0.3, 3.0), (2.0, 5.0), (3.0, 9.0)])
 def test_a_ray_stops_on_the_surface_and_meets_nothing_nearer(height, period):
     sea = realised(height, period)
     origin, towards = rays(300)
-    found, _ = wavy_sea_range(sea, origin, towards, np.zeros(300), np.full(300, 150.0))
+    found = wavy_sea_range(sea, origin, towards, np.zeros(300), np.full(300, 150.0))
     assert np.isfinite(found).sum() > 200
     for o, d, r in zip(origin, towards, found, strict=True):
         # Every 5 mm; a crest that a ray crosses within less would be lower than 1e-5 m.
@@ -113,27 +113,41 @@ def test_a_ray_stops_on_the_surface_and_meets_nothing_nearer(height, period):
             assert abs(along(sea, o, d, np.array([r]))[0]) < 1e-6
 
 
-def test_grazing_angles_are_those_to_the_surfaces_tangent():
-    sea = realised()
-    origin, towards = rays(400)
-    found, grazing = wavy_sea_range(sea, origin, towards, np.zeros(400), np.full(400, 300.0))
-    hit, h = np.isfinite(found), 1e-5
-    x, y, _ = (origin[hit] + found[hit, None] * towards[hit]).T
-    slopes = [(sea.height(x + a, y + b) - sea.height(x - a, y - b)) / (2.0 * h) for a, b in ((h, 0.0), (0.0, h))]
-    normal = np.stack([-slopes[0], -slopes[1], np.ones(hit.sum())], axis=1)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    np.testing.assert_allclose(grazing[hit], -np.einsum("ij,ij->i", normal, towards[hit]), atol=1e-7)
+@pytest.mark.parametrize("height, period", [(0.3, 3.0), (2.0, 5.0), (3.0, 9.0)])
+def test_rays_of_one_beam_meet_together_what_they_meet_alone(height, period):
+    sea, rng = realised(height, period), np.random.default_rng(4)
+    origin, towards = (np.repeat(x, 7, axis=0) for x in rays(300, top=5.5))
+    origin, towards = (x + size * rng.normal(size=x.shape) for x, size in ((origin, 0.01), (towards, 3e-3)))
+    origin[:70, 2] -= 4.9  # some begin among the waves, and below
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    rest = np.repeat(rng.uniform(0.0, 9.0, 300), 7), np.full(2100, 120.0)
+    alone, together = (wavy_sea_range(sea, origin, towards, *rest, k) for k in (1, 7))
+    assert np.isfinite(alone).sum() > 1000
+    hit = np.isfinite(alone)
+    np.testing.assert_array_equal(hit, np.isfinite(together))
+    p = origin[hit] + alone[hit, None] * towards[hit]
+    grazing = -np.einsum("ij,ij->i", sea.normal(p[:, 0], p[:, 1], rest[0][hit]), towards[hit])
+    # Both end within 1e-9 m of the surface's height.
+    assert (np.abs(together[hit] - alone[hit]) * np.maximum(grazing, 1e-3) < 1e-8).all()
+
+
+def test_normals_are_those_of_the_surfaces_slopes():
+    sea, h = realised(), 1e-5
+    x, y, t = np.random.default_rng(2).uniform(-50.0, 50.0, (3, 200))
+    slopes = [(sea.height(x + a, y + b, t) - sea.height(x - a, y - b, t)) / (2 * h) for a, b in ((h, 0), (0, h))]
+    normal = np.stack([-slopes[0], -slopes[1], np.ones(200)], axis=1)
+    np.testing.assert_allclose(sea.normal(x, y, t), normal / np.linalg.norm(normal, axis=1)[:, None], atol=1e-7)
 
 
 def test_from_below_the_surface_nothing_is_met_and_far_crests_are_met_by_level_rays_only_within_reach():
     sea = realised(4.0, 9.0, spread=False)
     below = np.array([[0.0, 0.0, -20.0]])
     level = np.array([[1.0, 0.0, 0.0]])
-    assert np.isinf(wavy_sea_range(sea, below, level, np.zeros(1), np.full(1, 1e4))[0]).all()
+    assert np.isinf(wavy_sea_range(sea, below, level, np.zeros(1), np.full(1, 1e4))).all()
     trough = np.array([[0.0, 0.0, float(sea.height(0.0, 0.0)) + 0.01]])
-    reached = wavy_sea_range(sea, trough, level, np.zeros(1), np.full(1, 1e4))[0][0]
+    reached = wavy_sea_range(sea, trough, level, np.zeros(1), np.full(1, 1e4))[0]
     assert 0.0 < reached < 1e4
-    assert np.isinf(wavy_sea_range(sea, trough, level, np.zeros(1), np.full(1, 0.5 * reached))[0][0])
+    assert np.isinf(wavy_sea_range(sea, trough, level, np.zeros(1), np.full(1, 0.5 * reached))[0])
 
 
 @pytest.mark.parametrize("moving", [True, False])

@@ -7,6 +7,7 @@ import pytest
 from support.facets import box, facets
 
 from raychan.sensors.laser import NO_BODY, SEA, Scanner, SensorPoses, scan
+from raychan.sensors.sea import SeaState, waves
 from raychan.sensors.spot import Echo, Spot
 from raychan.world.ray_caster import RayCaster
 
@@ -118,6 +119,17 @@ def test_with_lambert_the_sea_fades_with_the_sine_of_the_grazing_angle():
     assert seen(Scanner(lambert=True), sea=0.1, **at)[1] == NO_BODY
     assert seen(Scanner(lambert=True), sea=0.54, **at)[1] == SEA
     assert seen(Scanner(lambert=True), sea=0.52, **at)[1] == NO_BODY
+
+
+def test_with_lambert_waves_without_height_fade_as_the_flat_sea():
+    n, sea = Scanner().count, waves(SeaState(0.0, 5.0), np.random.default_rng(0))
+    poses = SensorPoses(
+        position=np.tile([0.0, 0.0, 5.0], (n, 1)), yaw=np.zeros(n), pitch=np.zeros(n), roll=np.full(n, 0.3)
+    )
+    for spot in (None, Spot()):
+        flat, wavy = (scan(Scanner(lambert=True, spot=spot), poses, None, np.zeros(0), 0.2, s) for s in (None, sea))
+        np.testing.assert_allclose(wavy.range, flat.range, atol=1e-6)
+        assert 20 < (flat.body == SEA).sum() < 90
 
 
 def test_all_beams_leave_at_the_scans_start_where_motion_is_switched_off():
