@@ -44,7 +44,8 @@ def sensitivity(
     """Tell speckle from error: how far each detection's level, range and rate move as bodies turn and shift.
 
     Every body but mirrors such as the ground turns about three axes through its middle and shifts along three, by
-    independent Gaussian amounts; the receiver's noise stays. A level whose spread exceeds the tolerance is speckle.
+    independent Gaussian amounts; the receiver's noise stays. A level whose spread exceeds the tolerance
+    and the stated error is speckle.
     With --out, writes sensitivity.csv and sensitivity.png, and with --each, each.csv."""
     from raychan.run.output_files import Contents, staging
     from raychan.study.sensitivity import Tolerances
@@ -95,8 +96,8 @@ def _print(done: Sensitivity) -> None:
 
 def _table(done: Sensitivity) -> Table:
     heads = [
-        "#", "range\nm", "rate\nm/s", "level\ndBm", "error\ndB", "spread\ndB", "10 to 90 %\ndBm", "range\nspread mm",
-        "seen in", "bodies", "verdict",
+        "#", "range\nm", "rate\nm/s", "level\ndBm", "stated\nerror dB", "spread\ndB", "10 to 90 %\ndBm",
+        "range\nspread mm", "seen in", "bodies", "verdict",
     ]  # fmt: skip
     rows = []
     for i, m in enumerate(done.moves):
@@ -104,7 +105,8 @@ def _table(done: Sensitivity) -> Table:
         low, high = (_known(m.percentile(p), ".1f") for p in (10.0, 90.0))
         rows.append([
             str(i + 1), f"{first.range:.2f}", f"{first.rate:+.2f}", f"{first.level_dbm:.1f}",
-            _known(first.error_db, ".2f") or "unknown", _known(m.spread(), ".2f"), f"{low} to {high}" if low else "",
+            f"{m.stated_db:.2f}" if math.isfinite(m.stated_db) else "unknown",
+            _known(m.spread(), ".2f"), f"{low} to {high}" if low else "",
             _known(1e3 * m.spread("range"), ".1f"), f"{m.count} of {m.draws}", first.bodies,
             m.verdict(done.tolerance_db),
         ])  # fmt: skip

@@ -33,9 +33,11 @@ def sensitivity_picture(done: Sensitivity, path: Path) -> Path:
             if rows:
                 bars = [spreads[i] for i in rows]
                 axes.barh(y[rows] - 0.19, bars, 0.38, color=_COLOUR[verdict], label=f"spread (rms): {verdict}")
-        known = [i for i, m in enumerate(shown) if not math.isnan(m.track.first.error_db)]
-        errors = [shown[i].track.first.error_db for i in known]
-        axes.barh(y[known] + 0.19, errors, 0.38, color="white", edgecolor=_STATED, hatch="////", label="stated error")
+        known = [i for i, m in enumerate(shown) if math.isfinite(m.stated_db)]
+        errors = [shown[i].stated_db for i in known]
+        axes.barh(
+            y[known] + 0.19, errors, 0.38, color="white", edgecolor=_STATED, hatch="////", label="stated error (median)"
+        )
         longest = max([done.tolerance_db, *spreads, *errors])
         for i in sorted(set(range(len(shown))) - set(known)):
             axes.text(0.01 * longest, i + 0.19, "error unknown", fontsize=6, va="center", color=_STATED)

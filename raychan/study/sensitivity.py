@@ -2,8 +2,8 @@
 
 Each draw turns and shifts every body but mirrors such as the ground: independent Gaussian turns about three axes
 through its middle, and independent Gaussian shifts along three. The seed of the receiver stays, so what moves is the
-channel. A level that a millimetre moves by more than the tolerance is speckle: a launch of more rays tells it for one
-pose only.
+channel. A level that a millimetre moves by more than the tolerance, and by more than the launches' own error, is
+speckle: more rays tell it for one pose only.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ SHIFT_MM = Limit(0.0, 1e4, "mm", "a tolerance, not another place")
 SPECKLE, ERROR, STEADY, THRESHOLD = "speckle", "error", "steady", "threshold"
 VERDICTS = {
     STEADY: "spread and stated error within the tolerance",
-    SPECKLE: "spread above the tolerance: poses decide the level, more rays do not",
-    ERROR: "spread within the tolerance, stated error not: more rays would help",
+    SPECKLE: "spread above the tolerance and above the stated error: poses decide the level, more rays do not",
+    ERROR: "stated error above the tolerance and not below the spread, which may be of it: more rays would help",
     THRESHOLD: "not seen in every draw, and of those seen the spread is within the tolerance",
     NOISE: "no path explains it",
 }
@@ -86,15 +86,23 @@ class Moves:
         """Return the level [dBm] that a share [%] of the draws stays below; NaN if no draw sees it."""
         return float(np.percentile(self.track.column("level_dbm"), share)) if self.count else math.nan
 
+    @property
+    def stated_db(self) -> float:
+        """Median of the stated errors [dB] over the draws, infinite where unknown. In the depth of a fade it
+        is large, so that of one pose says little."""
+        errors = self.track.column("error_db") if self.count else np.array([self.track.first.error_db])
+        return float(np.median(np.where(np.isnan(errors), np.inf, errors)))
+
     def verdict(self, tolerance_db: float) -> str:
-        """Return which of VERDICTS holds at a tolerance [dB]; the criterion of speckle is spread > tolerance."""
+        """Return which of VERDICTS holds at a tolerance [dB]; of speckle the spread exceeds tolerance and stated
+        error, as the launches' own error is in the spread too."""
         if self.track.first.bodies == NOISE:
             return NOISE
-        if self.count > 1 and self.spread() > tolerance_db:
+        if self.count > 1 and self.spread() > max(tolerance_db, self.stated_db):
             return SPECKLE
         if self.count < self.draws:
             return THRESHOLD
-        return STEADY if self.track.first.error_db <= tolerance_db else ERROR
+        return STEADY if self.stated_db <= tolerance_db else ERROR
 
 
 @dataclass(frozen=True)
@@ -203,8 +211,9 @@ def _shares(spreads: dict[str, float]) -> dict[str, tuple[float, float]]:
 
 
 COLUMNS = (
-    "detection", "as_is", "range_m", "range_rate_mps", "level_dbm", "error_db", "spread_db", "level_p10_dbm",
-    "level_p90_dbm", "range_spread_m", "rate_spread_mps", "seen", "draws", "label", "bodies", "verdict",
+    "detection", "as_is", "range_m", "range_rate_mps", "level_dbm", "error_db", "median_error_db", "spread_db",
+    "level_p10_dbm", "level_p90_dbm", "range_spread_m", "rate_spread_mps", "seen", "draws", "label", "bodies",
+    "verdict",
 )  # fmt: skip
 
 
@@ -230,7 +239,8 @@ def cells(number: int, moved: Moves, tolerance_db: float) -> tuple[str, ...]:
     first = moved.track.first
     return (
         str(number), "yes" if moved.as_is else "no", _number(first.range, 4), _number(first.rate, 4),
-        _number(first.level_dbm, 2), _number(first.error_db, 2), _number(moved.spread(), 3),
+        _number(first.level_dbm, 2), _number(first.error_db, 2),
+        _number(moved.stated_db, 2), _number(moved.spread(), 3),
         _number(moved.percentile(10.0), 2), _number(moved.percentile(90.0), 2),
         _number(moved.spread("range"), 5), _number(moved.spread("rate"), 5),
         str(moved.count), str(moved.draws), first.label, first.bodies, moved.verdict(tolerance_db),
@@ -238,4 +248,4 @@ def cells(number: int, moved: Moves, tolerance_db: float) -> tuple[str, ...]:
 
 
 def _number(value: float, digits: int) -> str:
-    return "" if math.isnan(value) else f"{value:.{digits}f}"
+    return f"{value:.{digits}f}" if math.isfinite(value) else ""
