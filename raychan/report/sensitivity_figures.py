@@ -9,10 +9,10 @@ import numpy as np
 
 from raychan.report.canvas import PALETTE, figure, save, style
 from raychan.study.detection_tracks import NOISE
-from raychan.study.sensitivity import ERROR, SPECKLE, STEADY, THRESHOLD, VERDICTS, Moves, Sensitivity
+from raychan.study.sensitivity import ERROR, INTERMITTENT, SPECKLE, STEADY, VERDICTS, Moves, Sensitivity
 
 _COLOUR = {
-    STEADY: PALETTE[1], SPECKLE: PALETTE[4], ERROR: PALETTE[2], THRESHOLD: PALETTE[6], NOISE: "#bbbbbb",
+    STEADY: PALETTE[1], SPECKLE: PALETTE[4], ERROR: PALETTE[2], INTERMITTENT: PALETTE[6], NOISE: "#bbbbbb",
 }  # fmt: skip
 _MOST = 40  # detections that a picture shows, the strongest: more labels cannot be read
 _LONGEST = 46  # letters of a label

@@ -34,12 +34,12 @@ DRAWS = Limit(2, 10_000, "", "each is a run of its own")
 TURN_DEG = Limit(0.0, 45.0, "deg", "a tolerance, not another pose")
 SHIFT_MM = Limit(0.0, 1e4, "mm", "a tolerance, not another place")
 
-SPECKLE, ERROR, STEADY, THRESHOLD = "speckle", "error", "steady", "threshold"
+SPECKLE, ERROR, STEADY, INTERMITTENT = "speckle", "error", "steady", "intermittent"
 VERDICTS = {
     STEADY: "spread and stated error within the tolerance",
     SPECKLE: "spread above the tolerance and above the stated error: poses decide the level, more rays do not",
     ERROR: "stated error above the tolerance and not below the spread, which may be of it: more rays would help",
-    THRESHOLD: "not seen in every draw, and of those seen the spread is within the tolerance",
+    INTERMITTENT: "not seen in every draw, and of those seen the spread is within the tolerance",
     NOISE: "no path explains it",
 }
 
@@ -101,7 +101,7 @@ class Moves:
         if self.count > 1 and self.spread() > max(tolerance_db, self.stated_db):
             return SPECKLE
         if self.count < self.draws:
-            return THRESHOLD
+            return INTERMITTENT
         return STEADY if self.stated_db <= tolerance_db else ERROR
 
 

@@ -14,9 +14,9 @@ from raychan.study import detection_tracks
 from raychan.study.detection_tracks import NOISE, Sighting, Track, follow
 from raychan.study.sensitivity import (
     ERROR,
+    INTERMITTENT,
     SPECKLE,
     STEADY,
-    THRESHOLD,
     Moves,
     Tolerances,
     drawn,
@@ -133,7 +133,7 @@ def test_equal_seeds_give_equal_bytes_and_the_first_draws_are_those_of_fewer(tmp
     assert list(few.column("level_dbm")) == list(more.column("level_dbm")[:2])
 
 
-def test_a_detection_that_some_draws_do_not_see_is_counted_and_said_to_be_at_the_threshold():
+def test_a_detection_that_some_draws_do_not_see_is_counted_and_said_to_be_intermittent():
     flat = {"width": 0.3, "height": 0.3}
     plate = rc.Body(name="plate", shape="plate", params=flat, position=(20, 0, 0), yaw_deg=180.6)
     faint = scene(plate, power_dbm=20.0)
@@ -142,7 +142,7 @@ def test_a_detection_that_some_draws_do_not_see_is_counted_and_said_to_be_at_the
     done = sensitivity(faint, Tolerances(0.05, 0.0, draws=12))
     (one,) = done.moves
     assert 0 < one.count < 12
-    assert one.verdict(1e3) == THRESHOLD and "1 " in done.summary()
+    assert one.verdict(1e3) == INTERMITTENT and "1 " in done.summary()
 
 
 def sighting(**given):
@@ -164,8 +164,8 @@ def sighting(**given):
         (2.0, 0.2, 3, "car", SPECKLE),
         (0.1, 3.0, 4, "car", ERROR),
         (0.1, math.nan, 4, "car", ERROR),
-        (0.1, 0.2, 3, "car", THRESHOLD),
-        (0.0, 0.2, 1, "car", THRESHOLD),
+        (0.1, 0.2, 3, "car", INTERMITTENT),
+        (0.0, 0.2, 1, "car", INTERMITTENT),
         (2.0, 0.2, 4, "noise", NOISE),
     ],
 )
