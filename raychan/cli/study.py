@@ -10,6 +10,7 @@ import typer
 from raychan.cli import show
 from raychan.cli.options import help_of
 from raychan.cli.study_laser import laser
+from raychan.cli.study_sensitivity import sensitivity
 from raychan.cli.study_stability import stability
 from raychan.cli.study_sweep import sweep
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
 study = typer.Typer(
     no_args_is_help=True,
-    help="Studies: error against effort; checks where ray methods fail; one body in varied scenes; a laser scanner.",
+    help="Studies: error against effort; checks where ray methods fail; one body in varied scenes; speckle or error; "
+    "a laser scanner.",
 )
 
 
@@ -79,7 +81,7 @@ def tradeoff(
     screen.print(f"figures and table: {out}", soft_wrap=True)
 
 
-for command in (tradeoff, stability, sweep, laser):
+for command in (tradeoff, stability, sweep, sensitivity, laser):
     study.command(help=help_of(command))(command)
 
 
