@@ -122,6 +122,13 @@ def world_pose(state: Array) -> tuple[Array, Array, Array]:
     return place, np.asarray(-s[..., PSI]), np.asarray(s[..., PHI])
 
 
+def over_ground(state: Array) -> Array:
+    """Return the velocity (2,) [m/s] to north and east of a full state (10,)."""
+    c, s = np.cos(state[PSI]), np.sin(state[PSI])
+    across = state[V] * np.cos(state[PHI])
+    return np.array([c * state[U] - s * across, s * state[U] + c * across])
+
+
 _PRINTED_A = (
     (-0.0725, 0.0, 0.0062, 0.0038, 0.0),
     (0.0025, -0.0003, -0.0199, -379.9796, 0.0),
