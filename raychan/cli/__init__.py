@@ -12,6 +12,7 @@ from types import FrameType
 import typer
 
 from raychan.cli.explain import explain
+from raychan.cli.hil import hil
 from raychan.cli.info import info
 from raychan.cli.options import help_of
 from raychan.cli.rcs import rcs
@@ -71,7 +72,7 @@ def _top(
     pass
 
 
-for command in (run, info, rcs, spectrogram, explain, view, validate):
+for command in (run, info, rcs, spectrogram, explain, view, hil, validate):
     app.command(help=help_of(command))(command)
 app.add_typer(study, name="study")
 

@@ -1,0 +1,79 @@
+"""What a run was, in numbers: frames sent and dropped, drift and jitter, what hosts sent; one line and a dictionary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from raychan.hil.channel import Channel
+from raychan.hil.pacing import Timing
+from raychan.hil.session import SCANNER, Session
+
+
+def summary(session: Session) -> dict[str, Any]:
+    """Return the numbers of a run that has ended. Times in ms, angles in degrees."""
+    bad_lines = sum(reader.bad for reader in session.orders.values())
+    ignored = sum(reader.ignored for reader in session.orders.values())
+    instruments, host = session.instruments, session.host
+    return {
+        "ended": session.ended,
+        "seconds": round(session.seconds, 3),
+        "utc_start": instruments.epoch.isoformat(),
+        "origin": {
+            "latitude_deg": instruments.origin.latitude_deg,
+            "longitude_deg": instruments.origin.longitude_deg,
+        },
+        "scans": {
+            **_timing(session.ticks.timing()),
+            "behind_most": session.most_behind - 1,
+            "behind_at_end": max(0, session.behind - 1),
+        },
+        "channels": {name: _channel(channel) for name, channel in session.channels.items()},
+        "host": {
+            "telegrams": host.telegrams,
+            "telegrams_damaged": session.commands.damaged,
+            "telegrams_refused": session.scanner.refused,
+            "bytes_skipped": session.commands.skipped,
+            "orders": host.orders,
+            "orders_refused": host.orders_refused,
+            "sentences_ignored": ignored,
+            "sentences_bad": bad_lines,
+        },
+    }
+
+
+def one_line(numbers: dict[str, Any]) -> str:
+    """Return a summary on one line."""
+    channels = numbers["channels"]
+    sent = ", ".join(f"{name} {c['sent']} of {c['made']}" for name, c in channels.items())
+    first, host = channels[SCANNER], numbers["host"]
+    worst = max((c["jitter_p99_ms"] for c in channels.values()), default=0.0)
+    drift = max((c["drift_ms"] for c in channels.values()), key=abs, default=0.0)
+    return (
+        f"{numbers['seconds']:.1f} s ({numbers['ended']}); sent: {sent}; scans dropped: {first['busy']} line busy, "
+        f"{first['no_peer']} no peer, {first['not_reading']} not read; ticks missed {numbers['scans']['missed']}; "
+        f"drift {drift:.2f} ms, jitter {worst:.2f} ms (99 %); telegrams {host['telegrams']}, damaged "
+        f"{host['telegrams_damaged']}, refused {host['telegrams_refused']}; orders {host['orders']}; "
+        f"reconnects {sum(c['reconnects'] for c in channels.values())}"
+    )
+
+
+def _channel(channel: Channel) -> dict[str, Any]:
+    tally, timing = channel.tally(), _timing(channel.lateness.timing())
+    return {
+        "port": channel.port.name,
+        "baud": channel.line.baud,
+        **vars(tally),
+        "drift_ms": timing["drift_ms"],
+        "jitter_p99_ms": timing["jitter_p99_ms"],
+        "reconnects": channel.port.reconnects,
+        "bytes_unread": channel.port.unread,
+    }
+
+
+def _timing(timing: Timing) -> dict[str, Any]:
+    return {
+        "ticks": timing.ticks,
+        "missed": timing.missed,
+        "drift_ms": round(1e3 * timing.drift, 4),
+        "jitter_p99_ms": round(1e3 * timing.jitter_p99, 4),
+    }
