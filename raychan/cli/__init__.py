@@ -17,6 +17,7 @@ from raychan.cli.info import info
 from raychan.cli.options import help_of
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
+from raychan.cli.ship import ship
 from raychan.cli.show import Interrupted
 from raychan.cli.spectrogram import spectrogram
 from raychan.cli.study import study
@@ -72,7 +73,7 @@ def _top(
     pass
 
 
-for command in (run, info, rcs, spectrogram, explain, view, hil, validate):
+for command in (run, info, rcs, spectrogram, explain, view, ship, hil, validate):
     app.command(help=help_of(command))(command)
 app.add_typer(study, name="study")
 

@@ -167,7 +167,7 @@ def _programme(table: ProgrammeTable, heading: float) -> Programme:
 
 
 class Steered:
-    """A ship under its bridge. `state` (10,) is that of now; `before` that of one step ago."""
+    """A ship under its bridge: `state` (10,) now, `estimate` (5,) of (v, p, r, phi, psi) as the autopilot has it."""
 
     pitch, height = 0.0, 0.0  # no model has them
 
@@ -175,7 +175,7 @@ class Steered:
         self.bridge, self._plant, self._programme = bridge, bridge.plant, bridge.programme
         self._sensors, self._sea = rngs
         self.state = np.array(bridge.start)
-        self._guess = self.state[_PLACES]
+        self.estimate = self.state[_PLACES]
         self._helm: float | None = None
         self.wanted, self.ordered = float(self.state[PSI]), 0.0
         self._k = 0
@@ -194,15 +194,15 @@ class Steered:
         """Carry the ship one step on."""
         watch, before = self.bridge.watch, self.state
         if watch is None:
-            self._guess = before[_PLACES]
+            self.estimate = before[_PLACES]
         else:
-            self._guess = watch.filter.update(self._guess, watch.noise.measure(before[_PLACES], self._sensors))
+            self.estimate = watch.filter.update(self.estimate, watch.noise.measure(before[_PLACES], self._sensors))
         self.wanted, self._programme = self._programme.at(self._k * self._plant.dt, before[[X, Y]])
-        steered = self.bridge.autopilot.order(self._guess, self.wanted)
+        steered = self.bridge.autopilot.order(self.estimate, self.wanted)
         self.ordered = steered if self._helm is None else self._helm
         self.state = self._plant.advance(before, self.ordered)
         if watch is not None:
-            self._guess = watch.filter.predict(self._guess, float(before[DELTA]), float(self.state[DELTA]))
+            self.estimate = watch.filter.predict(self.estimate, float(before[DELTA]), float(self.state[DELTA]))
         if self.bridge.disturbance is not None:
             self.state[_PLACES] += self.bridge.disturbance.draw(self._sea)
         self._k += 1

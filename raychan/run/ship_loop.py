@@ -86,9 +86,14 @@ class ShipLoop:
         return self._k * self._turn
 
     @property
+    def scans(self) -> int:
+        """Whole scans in the scene's duration."""
+        return int(self.scene.duration / (self._turns * self._turn) + 1e-9)
+
+    @property
     def done(self) -> bool:
-        """Whether another scan would go beyond the scene's duration."""
-        return (self._k + self._turns) * self._turn > self.scene.duration * (1.0 + 1e-12)
+        """Whether the scene's duration holds no other scan."""
+        return self._k >= self.scans * self._turns
 
     @property
     def steerable(self) -> bool:

@@ -80,6 +80,9 @@ def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipSc
         given = {t.name: _reflectivity(t) for t in tables.bodies}
     except SceneError as error:
         raise error.at(file=path) from None
+    if tables.run.duration_s < scanner.duration:
+        allowed = f"at least one scan, {scanner.duration:.4g} s"
+        raise SceneError("is too short", file=path, key="run.duration_s", value=tables.run.duration_s, allowed=allowed)
     reflectivity = np.array([given[body.name.split(".")[0]] for body in bodies.bodies], float)
     title = tables.scene.title
     return ShipScene(title, text, path, tables, scanner, bodies, reflectivity, bridge, poses)
@@ -118,5 +121,7 @@ def _reflectivity(t: ShipBodyTable) -> float:
         return _REFLECTIVITY if t.reflectivity is None else t.reflectivity
     if t.material not in REFLECTIVITY:
         key, allowed = f"bodies.{t.name}.material", nearest(t.material, REFLECTIVITY)
+        if not allowed.endswith("?"):  # names hold commas
+            allowed = "one of " + ", ".join(map(repr, REFLECTIVITY))
         raise SceneError(f"unknown material '{t.material}'", key=key, value=t.material, allowed=allowed)
     return REFLECTIVITY[t.material]
