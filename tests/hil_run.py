@@ -2,9 +2,9 @@
 
 PYTHONPATH=tests python -m hil_run --seconds 300 --baud 38400
 
-Prints drift, jitter and drops, and the load of the machine beside them. Exit code 1 where a bar is not met: drift 10 ms,
-jitter 5 ms (99th percentile), a frame that is neither sent nor counted, a reader that gets nothing after it came back.
-The bars are meant for an idle machine.
+Prints drift, jitter and drops, and the load of the machine beside them. Exit code 1 where a bar is not met: drift of
+10 ms, jitter of 5 ms (99th percentile), a frame that is neither sent nor counted, a reader that gets nothing once it is
+back. The bars are meant for an idle machine.
 """
 
 import argparse
@@ -61,16 +61,19 @@ def main():
     parser.add_argument("--seconds", type=float, default=300.0)
     parser.add_argument("--baud", type=int, default=38400)
     parser.add_argument("--lives", type=int, default=4, help="how often the reader is started")
+    parser.add_argument("--realtime", action="store_true", help="as of raychan hil")
     parser.add_argument("--reader", help=argparse.SUPPRESS)
     wanted = parser.parse_args()
     if wanted.reader:
         read_for_ever(wanted.reader)
     with tempfile.TemporaryDirectory() as folder:
         options = ("--baud", str(wanted.baud), "--stream", "--duration", str(wanted.seconds))
+        if wanted.realtime:
+            options += ("--realtime",)
         with Hil(Path(folder), *options) as hil:
             before = os.getloadavg()[0]
             lives = watch(hil, wanted.seconds, wanted.lives)
-            code, said, numbers = hil.end(None)
+            code, _, numbers = hil.end(None)
     return report(wanted, numbers, lives, (before, os.getloadavg()[0])) or code
 
 
@@ -80,7 +83,9 @@ def report(wanted, numbers, lives, load):
     uncounted = sum(c["made"] - sum(c[p] for p in parts) for c in numbers["channels"].values())
     scanner = numbers["channels"]["scanner"]
     print(f"{wanted.seconds:g} s at {wanted.baud} baud; load {load[0]:.1f} before, {load[1]:.1f} after")
-    print(f"scans a second: {scanner['sent'] / numbers['seconds']:.2f} sent of {scanner['made'] / numbers['seconds']:.2f}")
+    print(
+        f"scans a second: {scanner['sent'] / numbers['seconds']:.2f} sent of {scanner['made'] / numbers['seconds']:.2f}"
+    )
     print(json.dumps({**numbers["scans"], **{k: scanner[k] for k in (*parts, "made", "drift_ms", "jitter_p99_ms")}}))
     print(f"readers (scans, damaged): {lives}; reconnects {scanner['reconnects']}; uncounted {uncounted}")
     drift = max(abs(numbers["scans"]["drift_ms"]), abs(scanner["drift_ms"]))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, within
+from raychan.cli.options import Changes, SceneFile, within
 from raychan.world.limits import Limit
 
 if TYPE_CHECKING:
@@ -56,9 +56,7 @@ def _baud(value: int) -> int:
 
 
 def hil(
-    scene: Annotated[
-        Path, typer.Argument(help="Scene file of a ship (TOML), or the name of a bundled one.", metavar="SCENE")
-    ] = Path("ship_turn"),
+    scene: SceneFile = Path("ship_turn"),
     scanner: Device = None,
     position: Device = None,
     heading: Device = None,
@@ -80,6 +78,9 @@ def hil(
         typer.Option(help="Seconds to run; if not given, until Ctrl-C.", metavar="S", callback=within(_DURATION)),
     ] = None,
     stream: Annotated[bool, typer.Option("--stream", help="Send scans from the start, before a host asks.")] = False,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="Run before other programs (SCHED_FIFO), where the system allows it.")
+    ] = False,
     ports: Annotated[bool, typer.Option("--ports", help="Print the names of the ports as JSON, then run.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Directory for summary.json and track.csv.", metavar="DIR")
@@ -89,13 +90,13 @@ def hil(
     """Run a ship in real time: scanner telegrams, position, heading and attitude on four serial lines; orders for
     rudder and shaft come back.
 
-    Ctrl-C or SIGTERM ends the run in order, with exit code 0.
+    Without SCENE: ship_turn. Ctrl-C or SIGTERM ends the run in order, with exit code 0.
     """
     place = _origin(origin)
     names = {"scanner": scanner, "position": position, "heading": heading, "attitude": attitude}
     with ExitStack() as closing:
         channels = _channels(names, baud, nmea_baud, closing)
-        numbers = _run(_Wishes(scene, set_ or [], place, rate, duration, stream, ports, out), channels)
+        numbers = _run(_Wishes(scene, set_ or [], place, rate, duration, stream, realtime, ports, out), channels)
     from raychan.hil.summary import one_line
 
     if out is not None:
@@ -112,6 +113,7 @@ class _Wishes(NamedTuple):
     rate: float
     duration: float | None
     stream: bool
+    realtime: bool
     ports: bool
     out: Path | None
 
@@ -139,15 +141,20 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
     """Run and return the numbers of the run."""
     from raychan.hil.instruments import ScannedShip
     from raychan.hil.lms import STREAM
+    from raychan.hil.pacing import run_first
     from raychan.hil.session import Session
     from raychan.hil.summary import summary
     from raychan.run.ship_scene import read_ship_scene
 
     loaded = read_ship_scene(wishes.scene, wishes.changes)
-    with show.progress(), _track(wishes.out) as tell:
-        session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate, tell)
+    show.warn(loaded.bodies.warnings)
+    with _track(wishes.out) as tell:
+        with show.progress(kernels="ship"):
+            session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate, tell)
         if wishes.stream:
             session.scanner.mode = STREAM
+        if wishes.realtime:
+            show.warn(filter(None, [run_first()]))
         _say({name: channel.port.name for name, channel in channels.items()}, wishes.ports)
         with _stops() as stopped:
             session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)

@@ -6,12 +6,26 @@ Nothing here reads a clock: times [s] are arguments, of one monotonic clock.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field
 
 import numpy as np
 
 BITS_PER_BYTE = 10
 """One start bit, eight data bits, one stop bit."""
+
+
+_PRIORITY = 10
+"""Of SCHED_FIFO, whose threads run before all ordinary ones; kernel threads that move data have 50."""
+
+
+def run_first() -> str:
+    """Ask the system to run this process before ordinary ones; return why not, or ''."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    except (AttributeError, OSError) as error:
+        return f"--realtime is not allowed here: {error}"
+    return ""
 
 
 def line_time(count: int, baud: int) -> float:

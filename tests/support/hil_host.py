@@ -85,7 +85,7 @@ class LmsHost(End):
 
     bad = 0
 
-    def ask(self, payload, within=1.0, answer=None):
+    def ask(self, payload, within=3.0, answer=None):
         """Return the payload of the answer to a command, None after NAK. Raises: TimeoutError."""
         self.flush()
         self.write(command(payload))
