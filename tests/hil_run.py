@@ -61,15 +61,15 @@ def main():
     parser.add_argument("--seconds", type=float, default=300.0)
     parser.add_argument("--baud", type=int, default=38400)
     parser.add_argument("--lives", type=int, default=4, help="how often the reader is started")
-    parser.add_argument("--realtime", action="store_true", help="as of raychan hil")
+    parser.add_argument("--no-realtime", action="store_true", help="as of raychan hil")
     parser.add_argument("--reader", help=argparse.SUPPRESS)
     wanted = parser.parse_args()
     if wanted.reader:
         read_for_ever(wanted.reader)
     with tempfile.TemporaryDirectory() as folder:
         options = ("--baud", str(wanted.baud), "--stream", "--duration", str(wanted.seconds))
-        if wanted.realtime:
-            options += ("--realtime",)
+        if wanted.no_realtime:
+            options += ("--no-realtime",)
         with Hil(Path(folder), *options) as hil:
             before = os.getloadavg()[0]
             lives = watch(hil, wanted.seconds, wanted.lives)

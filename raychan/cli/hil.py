@@ -79,8 +79,11 @@ def hil(
     ] = None,
     stream: Annotated[bool, typer.Option("--stream", help="Send scans from the start, before a host asks.")] = False,
     realtime: Annotated[
-        bool, typer.Option("--realtime", help="Run before other programs (SCHED_FIFO), where the system allows it.")
-    ] = False,
+        bool,
+        typer.Option(
+            "--realtime/--no-realtime", help="Run before other programs (SCHED_FIFO), where the system allows it."
+        ),
+    ] = True,
     ports: Annotated[bool, typer.Option("--ports", help="Print the names of the ports as JSON, then run.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Directory for summary.json and track.csv.", metavar="DIR")
@@ -97,12 +100,13 @@ def hil(
     with ExitStack() as closing:
         channels = _channels(names, baud, nmea_baud, closing)
         numbers = _run(_Wishes(scene, set_ or [], place, rate, duration, stream, realtime, ports, out), channels)
-    from raychan.hil.summary import one_line
+    from raychan.hil.summary import one_line, warnings
 
     if out is not None:
         from raychan.run.output_files import write_together
 
         write_together({out / "summary.json": json.dumps(numbers, indent=2).encode()})
+    show.warn(warnings(numbers))
     print(one_line(numbers), flush=True)
 
 
@@ -141,7 +145,6 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
     """Run and return the numbers of the run."""
     from raychan.hil.instruments import ScannedShip
     from raychan.hil.lms import STREAM
-    from raychan.hil.pacing import run_first
     from raychan.hil.session import Session
     from raychan.hil.summary import summary
     from raychan.run.ship_scene import read_ship_scene
@@ -153,10 +156,8 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
             session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate, tell)
         if wishes.stream:
             session.scanner.mode = STREAM
-        if wishes.realtime:
-            show.warn(filter(None, [run_first()]))
-        _say({name: channel.port.name for name, channel in channels.items()}, wishes.ports)
-        with _stops() as stopped:
+        with _stops() as stopped, _first(wishes.realtime) as session.first:
+            _say({name: channel.port.name for name, channel in channels.items()}, wishes.ports)
             session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)
     return summary(session)
 
@@ -164,6 +165,18 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
 def _say(names: dict[str, str], as_json: bool) -> None:
     text = json.dumps(names) if as_json else "  ".join(f"{name} {port}" for name, port in names.items())
     print(text, flush=True)
+
+
+@contextmanager
+def _first(wanted: bool) -> Iterator[bool]:
+    """Yield whether this thread runs before ordinary ones, as long as this lasts."""
+    from raychan.hil.pacing import run_first
+
+    try:
+        yield wanted and run_first()
+    finally:
+        if wanted:
+            run_first(False)
 
 
 @contextmanager

@@ -16,16 +16,17 @@ BITS_PER_BYTE = 10
 
 
 _PRIORITY = 10
-"""Of SCHED_FIFO, whose threads run before all ordinary ones; kernel threads that move data have 50."""
+"""Of SCHED_FIFO, whose threads run before all ordinary ones. Any does; those of the kernel have 50."""
 
 
-def run_first() -> str:
-    """Ask the system to run this process before ordinary ones; return why not, or ''."""
+def run_first(first: bool = True) -> bool:
+    """Ask the system to run this thread before ordinary ones, or as one of them; return whether it goes first."""
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
-    except (AttributeError, OSError) as error:
-        return f"--realtime is not allowed here: {error}"
-    return ""
+        policy = os.SCHED_FIFO if first else os.SCHED_OTHER
+        os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY if first else 0))
+    except (AttributeError, OSError):
+        return False
+    return first
 
 
 def line_time(count: int, baud: int) -> float:

@@ -21,7 +21,7 @@ from raychan.hil.geodesy import Origin
 from raychan.hil.instruments import Instruments, Reading, ScannedShip, reading
 from raychan.hil.lms import Scanner
 from raychan.hil.orders import OrderReader
-from raychan.hil.pacing import Schedule
+from raychan.hil.pacing import Schedule, run_first
 from raychan.hil.scans import ScanValues
 from raychan.hil.telegrams import Telegram, TelegramReader
 from raychan.run.ship_loop import Frame
@@ -37,6 +37,8 @@ _LOOK = 0.05
 """Time [s] between looks for a peer that has come back. Trades how soon against system calls; not measured."""
 _RESTARTS = 1.0
 """Time [s] that the scanner takes to restart."""
+_TOO_FAR = 2.0
+"""Time [s] that the loop may owe while it runs before other programs; then it cannot keep up, and gives way to them."""
 _LEAD_US, _GRID_US = 50_000, 100_000
 """Least time [us] before the start, and the grid of UTC [us] that it lies on: at 10 sentences a second all have times
 of whole tenths, as a satellite receiver's."""
@@ -57,7 +59,8 @@ class Session:
 
     Fields: loop of the ship; channels by name, one for each of CHANNELS; origin of the scene on the globe; rate [1/s]
     of the sentences; tell is called with each reading whose sentences were sent; behind and most_behind, scans that the
-    loop owes; ended says why the run ended. `scanner` is the scanner's end of the line.
+    loop owes; first, whether it runs before other programs; ended says why the run ended. `scanner` is the scanner's
+    end of the line.
     """
 
     loop: ScannedShip
@@ -66,6 +69,7 @@ class Session:
     rate: float
     tell: Callable[[Instruments, Reading], None] = lambda instruments, at: None
     host: HostTally = field(default_factory=HostTally)
+    first: bool = False
     behind: int = 0
     most_behind: int = 0
     ended: str = ""
@@ -73,7 +77,7 @@ class Session:
     def __post_init__(self) -> None:
         self.commands = TelegramReader(LONGEST_COMMAND)
         self.orders = {name: OrderReader() for name in CHANNELS if name != SCANNER}
-        self._whole = self._newer = self.loop.step_scan()
+        self._whole = self._older = self._newer = self.loop.step_scan()
         fan, baud = self.loop.scene.scanner, self.channels[SCANNER].line.baud
         self.scanner = Scanner(
             lambda: scan_values(self._whole), round(fan.fan_deg), fan.step_deg, baud=baud, set_variant=self._set_fan
@@ -83,6 +87,7 @@ class Session:
 
     def run(self, duration: float, stopped: Callable[[], bool]) -> None:
         """Run for a duration [s] of real time, or until `stopped`, or to the end of logged poses."""
+        self._warm_up()
         gc.collect()
         gc.freeze()  # what is there now stays; collections look only at what is new
         scan_time = self.loop.scene.scanner.duration
@@ -110,10 +115,12 @@ class Session:
         self.seconds = time.monotonic() - start
         gc.unfreeze()
 
-    def close(self) -> None:
-        """Close the ports."""
-        for channel in self.channels.values():
-            channel.port.close()
+    def _warm_up(self) -> None:
+        """Do once what every tick does: the first time imports modules, which takes longer than a scan."""
+        at, instruments = reading(self._older, self._newer, 0.0), Instruments(self.origin, datetime.now(UTC))
+        for sentences in (instruments.position, instruments.heading, instruments.attitude):
+            sentences(at)
+        self.scanner.scan()
 
     def _tick(self, now: float) -> None:
         due = self.ticks.due
@@ -122,26 +129,28 @@ class Session:
             self.channels[SCANNER].frame(now, due, self.scanner.scan())
         self.behind += 1 + self.ticks.tick(now)
         self.most_behind = max(self.most_behind, self.behind)
+        if self.first and self.behind * self.ticks.period > _TOO_FAR:
+            self.first = run_first(False)
 
     def _step(self) -> None:
         """Work out one scan of those that the loop owes."""
         if not self.loop.steerable and self.loop.done:
             self.ended = "end of the logged poses"
             return
-        self._newer = self.loop.step_scan()
+        self._older, self._newer = self._newer, self.loop.step_scan()
         self.behind -= 1
 
     def _reached(self) -> bool:
-        """Whether the loop has come to the time of the sentences that are due, or is so late that it will not."""
-        between = self._newer is not self._whole
-        return between and (self.behind > 1 or self._newer.time >= self.cycles.due - self.cycles.start)
+        """Whether the loop has come to the time of the sentences that are due, or is so late that it will not soon."""
+        moved = self._newer is not self._older
+        return moved and (self.behind > 1 or self._newer.time >= self.cycles.due - self.cycles.start)
 
     def _cycle(self, now: float) -> None:
         """Send the sentences of a time that lies between the last two frames."""
         due = self.cycles.due
         when = min(due - self.cycles.start, self._newer.time)
         self.cycles.tick(now)
-        at = reading(self._whole, self._newer, when)
+        at = reading(self._older, self._newer, when)
         for name, sentences in (
             (POSITION, self.instruments.position),
             (HEADING, self.instruments.heading),

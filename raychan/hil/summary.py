@@ -8,6 +8,9 @@ from raychan.hil.channel import Channel
 from raychan.hil.pacing import Timing
 from raychan.hil.session import SCANNER, Session
 
+_KEPT_UP = 10
+"""Scans that a loop may owe at the end without a warning; a pause of the machine takes some."""
+
 
 def summary(session: Session) -> dict[str, Any]:
     """Return the numbers of a run that has ended. Times in ms, angles in degrees."""
@@ -26,7 +29,9 @@ def summary(session: Session) -> dict[str, Any]:
             **_timing(session.ticks.timing()),
             "behind_most": session.most_behind - 1,
             "behind_at_end": max(0, session.behind - 1),
+            "realtime": session.first,
         },
+        "sentences": _timing(session.cycles.timing()),
         "channels": {name: _channel(channel) for name, channel in session.channels.items()},
         "host": {
             "telegrams": host.telegrams,
@@ -43,18 +48,29 @@ def summary(session: Session) -> dict[str, Any]:
 
 def one_line(numbers: dict[str, Any]) -> str:
     """Return a summary on one line."""
-    channels = numbers["channels"]
-    sent = ", ".join(f"{name} {c['sent']} of {c['made']}" for name, c in channels.items())
-    first, host = channels[SCANNER], numbers["host"]
-    worst = max((c["jitter_p99_ms"] for c in channels.values()), default=0.0)
-    drift = max((c["drift_ms"] for c in channels.values()), key=abs, default=0.0)
-    return (
-        f"{numbers['seconds']:.1f} s ({numbers['ended']}); sent: {sent}; scans dropped: {first['busy']} line busy, "
-        f"{first['no_peer']} no peer, {first['not_reading']} not read; ticks missed {numbers['scans']['missed']}; "
-        f"drift {drift:.2f} ms, jitter {worst:.2f} ms (99 %); telegrams {host['telegrams']}, damaged "
-        f"{host['telegrams_damaged']}, refused {host['telegrams_refused']}; orders {host['orders']}; "
-        f"reconnects {sum(c['reconnects'] for c in channels.values())}"
-    )
+    channels, scans, host = (numbers[key] for key in ("channels", "scans", "host"))
+    first = channels[SCANNER]
+    worst = max(c["jitter_p99_ms"] for c in channels.values())
+    drift = max((c["drift_ms"] for c in channels.values()), key=abs)
+    parts = [
+        f"{numbers['seconds']:.1f} s ({numbers['ended']})",
+        "sent: " + ", ".join(f"{name} {c['sent']} of {c['made']}" for name, c in channels.items()),
+        f"scans dropped: {first['busy']} line busy, {first['no_peer']} no peer, {first['not_reading']} not read",
+        f"ticks missed {scans['missed']}",
+        f"drift {drift:.2f} ms, jitter {worst:.2f} ms (99 %), {'first' if scans['realtime'] else 'ordinary'} in turn",
+        f"telegrams {host['telegrams']}, damaged {host['telegrams_damaged']}, refused {host['telegrams_refused']}",
+        f"orders {host['orders']}",
+        f"reconnects {sum(c['reconnects'] for c in channels.values())}",
+    ]
+    return "; ".join(parts)
+
+
+def warnings(numbers: dict[str, Any]) -> list[str]:
+    """Return what is wrong with a run as a whole."""
+    behind = numbers["scans"]["behind_at_end"]
+    if behind < _KEPT_UP:
+        return []
+    return [f"the ship is {behind} scans behind its clock at the end: the scene is too slow for real time here"]
 
 
 def _channel(channel: Channel) -> dict[str, Any]:
