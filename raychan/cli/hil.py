@@ -199,22 +199,42 @@ def _track(out: Path | None) -> Iterator[Callable[[Instruments, Reading], None]]
     if out is None:
         yield lambda instruments, at: None
         return
+    name = out / "track.csv"
     try:
         out.mkdir(parents=True, exist_ok=True)
-        file = (out / "track.csv").open("w", newline="")
+        file = name.open("w", newline="")
     except OSError as error:
         raise StoreError(f"{out}: cannot write: {error.strerror or error}") from error
-    with file:
-        rows = csv.writer(file)
-        rows.writerow(_TRACK)
+    rows = csv.writer(file)
+    lost: list[str] = []  # why the file ends early: a full disk does not end the run
 
-        def tell(instruments: Instruments, at: Reading) -> None:
-            angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
-            where = (at.time, at.north, at.east)
-            place = (f"{a:.9f}" for a in instruments.place(at))
-            when = instruments.utc(at).isoformat(timespec="milliseconds")
-            rows.writerow(
-                [when, *(f"{v:.4f}" for v in where), *place, *(f"{a:.4f}" for a in angles), f"{at.speed:.4f}"]
-            )
+    def tell(instruments: Instruments, at: Reading) -> None:
+        if not lost:
+            _try(lambda: rows.writerow(_row(instruments, at)), lost)
 
+    _try(lambda: rows.writerow(_TRACK), lost)
+    try:
         yield tell
+    finally:
+        _try(file.close, lost)
+        show.warn(f"{name}: not whole: {why}" for why in lost[:1])
+
+
+def _try(write: Callable[[], object], lost: list[str]) -> None:
+    """Write, and note why not where it cannot be."""
+    try:
+        write()
+    except OSError as error:
+        lost.append(error.strerror or str(error))
+
+
+def _row(instruments: Instruments, at: Reading) -> list[str]:
+    """Return a reading as a row of track.csv."""
+    angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
+    where = (at.time, at.north, at.east)
+    return [
+        instruments.utc(at).isoformat(timespec="milliseconds"),
+        *(f"{v:.4f}" for v in where),
+        *(f"{a:.9f}" for a in instruments.place(at)),
+        *(f"{v:.4f}" for v in (*angles, at.speed)),
+    ]

@@ -105,6 +105,25 @@ def test_orders_turn_the_ship_and_bad_ones_are_counted(tmp_path):
     assert float(rows[-1]["heading_deg"]) not in (0.0, 360.0)
 
 
+def test_an_autopilot_outside_turns_the_ship_through_the_ports(tmp_path):
+    with Hil(tmp_path, scene="[ship]\nmodel = 'yacht'\n") as hil:
+        end, heading, last = End(hil.ports["heading"]), 0.0, 0.0
+        until = time.monotonic() + 9.0
+        while time.monotonic() < until:
+            for line in end.lines(0.15):
+                if line.startswith(b"$HEHDT"):
+                    last, heading = heading, NMEAReader.parse(line + b"\r\n").headingT
+            # PD on a heading of 15 degrees; the rate is over a tenth of a second.
+            off, rate = math.remainder(15.0 - heading, 360.0), math.remainder(heading - last, 360.0) / 0.1
+            end.write(order_sentence(rudder_deg=max(-20.0, min(20.0, 1.5 * off - 1.5 * rate))))
+        code, _, numbers = hil.end()
+    assert code == 0 and numbers["host"]["orders"] > 20 and numbers["host"]["sentences_bad"] == 0
+    with (hil.out / "track.csv").open() as file:
+        headings = [math.remainder(float(row["heading_deg"]), 360.0) for row in csv.DictReader(file)]
+    # Without orders its own autopilot keeps 0.
+    assert headings[-1] == pytest.approx(15.0, abs=6.0)
+
+
 def test_a_reader_that_dies_and_comes_back_reads_on_and_every_frame_is_counted(tmp_path):
     with Hil(tmp_path, "--baud", "500000", "--stream") as hil:
         read = 0
@@ -214,6 +233,15 @@ def test_a_port_that_is_taken_and_a_file_are_said_with_code_2(scene, tmp_path, c
 def test_wrong_options_are_said_with_code_2(scene, capsys, options, word):
     assert invoke(["hil", scene, *options, *([] if "--duration" in options else ["--duration", "0.1"])]) == 2
     assert word in capsys.readouterr().err
+
+
+def test_a_full_disk_ends_the_track_and_not_the_run(scene, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "track.csv").symlink_to("/dev/full")
+    options = ["--rate", "50", "--duration", "2", "--out", str(tmp_path / "out")]
+    assert invoke(["hil", scene, *options]) == 0
+    said = capsys.readouterr()
+    assert "track.csv: not whole: No space left" in said.err and "2.0 s (duration)" in said.out
 
 
 def test_logged_poses_end_the_run_and_take_no_orders(tmp_path):
