@@ -108,6 +108,10 @@ def hil(
         write_together({out / "summary.json": json.dumps(numbers, indent=2).encode()})
     show.warn(warnings(numbers))
     print(one_line(numbers), flush=True)
+    if numbers["failed"]:
+        from raychan.world.errors import SceneError
+
+        raise SceneError(numbers["ended"])
 
 
 class _Wishes(NamedTuple):

@@ -59,8 +59,8 @@ class Session:
 
     Fields: loop of the ship; channels by name, one for each of CHANNELS; origin of the scene on the globe; rate [1/s]
     of the sentences; tell is called with each reading whose sentences were sent; behind and most_behind, scans that the
-    loop owes; first, whether it runs before other programs; ended says why the run ended. `scanner` is the scanner's
-    end of the line.
+    loop owes; first, whether it runs before other programs; ended says why the run ended, failed whether the ship could
+    not sail on. `scanner` is the scanner's end of the line.
     """
 
     loop: ScannedShip
@@ -73,6 +73,7 @@ class Session:
     behind: int = 0
     most_behind: int = 0
     ended: str = ""
+    failed: bool = False
 
     def __post_init__(self) -> None:
         self.commands = TelegramReader(LONGEST_COMMAND)
@@ -84,6 +85,7 @@ class Session:
         )
         self._heard_at = self._look_at = -math.inf
         self._restart_at = math.inf
+        self._gave_back = False
 
     def run(self, duration: float, stopped: Callable[[], bool]) -> None:
         """Run for a duration [s] of real time, or until `stopped`, or to the end of logged poses."""
@@ -137,8 +139,23 @@ class Session:
         if not self.loop.steerable and self.loop.done:
             self.ended = "end of the logged poses"
             return
-        self._older, self._newer = self._newer, self.loop.step_scan()
+        try:
+            self._older, self._newer = self._newer, self.loop.step_scan()
+        except (ValueError, OverflowError) as error:
+            self._give_back(error)
+            return
+        self._gave_back = False
         self.behind -= 1
+
+    def _give_back(self, error: Exception) -> None:
+        """Take the host's orders away where the model does not hold under them; end where it still does not."""
+        if self._gave_back or not self.loop.steerable:
+            self.ended = f"the ship cannot sail on after {self.loop.now:.2f} s: {error}"
+            self.failed = True
+            return
+        self.loop.order()
+        self.host.orders_refused += 1
+        self._gave_back = True
 
     def _reached(self) -> bool:
         """Whether the loop has come to the time of the sentences that are due, or is so late that it will not soon."""

@@ -19,6 +19,7 @@ def summary(session: Session) -> dict[str, Any]:
     instruments, host = session.instruments, session.host
     return {
         "ended": session.ended,
+        "failed": session.failed,
         "seconds": round(session.seconds, 3),
         "utc_start": instruments.epoch.isoformat(),
         "origin": {

@@ -12,6 +12,7 @@ from support.hil_host import SCENE, command
 from raychan.hil.channel import Channel
 from raychan.hil.geodesy import Origin
 from raychan.hil.instruments import ScannedShip
+from raychan.hil.orders import order_sentence
 from raychan.hil.scans import decode_scan
 from raychan.hil.session import CHANNELS, SCANNER, Session
 from raychan.hil.summary import one_line, summary, warnings
@@ -121,3 +122,28 @@ def test_the_ship_goes_on_at_its_place_when_the_fan_changes(session):
 def test_a_run_ends_when_it_is_told_to(session):
     session.run(60.0, lambda: session.loop.now > 0.2)
     assert session.ended == "stopped" and not warnings(summary(session))
+
+
+def test_an_order_that_stops_the_ship_is_taken_back_and_the_lines_go_on(session):
+    real, refuses = session.loop.step_scan, []
+
+    def step_scan():
+        if session.loop._steered._helm is not None:
+            refuses.append(1)
+            raise ValueError("the ship must go ahead")
+        return real()
+
+    session.loop.step_scan = step_scan
+    session.channels["heading"].port.send(order_sentence(rudder_deg=5.0))
+    session.run(1.0, lambda: False)
+    assert (session.host.orders, session.host.orders_refused, len(refuses)) == (1, 1, 1)
+    assert session.ended == "duration" and session.loop.now == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_ship_that_cannot_sail_on_ends_the_run(session):
+    def step_scan():
+        raise ValueError("the model does not hold")
+
+    session.loop.step_scan = step_scan
+    session.run(1.0, lambda: False)
+    assert session.failed and "cannot sail on" in session.ended and "does not hold" in summary(session)["ended"]
