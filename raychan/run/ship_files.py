@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from raychan.run.netcdf import CONVENTIONS
 from raychan.run.output_files import Contents, write_whole
-from raychan.run.ship_loop import Frame, ShipLoop
+from raychan.run.ship_loop import Frame, ShipLoop, hit_points
 from raychan.run.ship_scene import ShipScene
 from raychan.run.storage import versions
-from raychan.sensors.laser import NO_BODY, SEA, Ints, beams
+from raychan.sensors.laser import NO_BODY, SEA, Ints
 
 Floats = NDArray[np.float64]
 
@@ -126,8 +126,7 @@ class Voyage:
             np.minimum.at(self._nearest, met.body[echo], met.range[echo])
         self._roll = [min(self._roll[0], angles[1]), max(self._roll[1], angles[1])]
         if self._k % self._stride == 0:
-            towards = beams(self._scene.scanner, frame.beams)[echo]
-            hits = frame.beams.position[echo] + met.range[echo, None] * towards
+            hits = hit_points(self._scene.scanner, frame.beams, met)
             self._log.append((row, float(np.degrees(frame.heading_wanted)), met.range, met.body, hits, met.body[echo]))
         self._k, self._last = self._k + 1, frame
         if len(self._ranges) == _BLOCK:
