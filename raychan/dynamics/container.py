@@ -105,7 +105,8 @@ class Machinery:
 def _rudder_normal_force(v: float, r: float, delta: float, inflow: float, race: float) -> float:
     """Return the normal force F_N on the rudder (prime system) in the propeller's inflow and its race squared."""
     across = FLOW_STRAIGHTENING * v + FLOW_R * r + FLOW_RRR * r**3 + FLOW_RRV * r * r * v
-    along = RUDDER_WAKE * math.sqrt(inflow * inflow + race)
+    # Of a propeller that brakes (far too slow for the ship's speed) the race comes to rest at most.
+    along = RUDDER_WAKE * math.sqrt(max(inflow * inflow + race, 0.0))
     slope = 6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25) * RUDDER_AREA / LENGTH**2
     return -slope * (along * along + across * across) * math.sin(delta + math.atan2(across, along))
 

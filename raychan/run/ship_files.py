@@ -19,6 +19,7 @@ from raychan.run.ship_loop import Frame, ShipLoop, hit_points
 from raychan.run.ship_scene import ShipScene
 from raychan.run.storage import versions
 from raychan.sensors.laser import NO_BODY, SEA, Ints
+from raychan.world.errors import SceneError
 
 Floats = NDArray[np.float64]
 
@@ -176,6 +177,14 @@ class Voyage:
         }
 
 
+def _next(loop: ShipLoop) -> Frame:
+    """Return the next frame. Raises: SceneError where the model does not hold, as of a ship that stops."""
+    try:
+        return loop.step_scan()
+    except (ValueError, OverflowError) as error:
+        raise SceneError(f"the ship cannot sail on after {loop.now:.2f} s: {error}", file=loop.scene.path) from error
+
+
 def sail_into(scene: ShipScene, folder: Path, tell: Callable[[str, float], None]) -> tuple[ShipLog, dict[str, Any]]:
     """Run a scene's loop over its duration and write ship.csv, scan.nc and summary.json into a folder.
 
@@ -184,7 +193,7 @@ def sail_into(scene: ShipScene, folder: Path, tell: Callable[[str, float], None]
     loop = ShipLoop(scene)
     with Voyage(scene, folder, loop.scans) as files:
         for k in range(loop.scans):
-            files.add(loop.step_scan())
+            files.add(_next(loop))
             if k % 75 == 0:
                 tell("sailing", k / loop.scans)
         tell("sailing", 1.0)

@@ -130,7 +130,8 @@ class ShipLoop:
         self._steered.order(rudder, shaft)
 
     def step_scan(self) -> Frame:
-        """Carry the loop on by one scan and return it. Raises: ValueError beyond the end of logged poses."""
+        """Carry the loop on by one scan and return it. Raises: ValueError beyond the end of logged poses, or
+        where the model does not hold (a container ship that stops)."""
         start, state, moving = self.now, self.state, self._steered
         poses = self._replayed() if moving is None else self._sailed(moving)
         beams = self._mounted(poses)

@@ -129,3 +129,12 @@ def test_beams_of_the_stiff_printed_ship_roll_as_it_does_within_a_step():
     exact = [float((expm(ship.CORRECTED.a * t) @ [0.0, 0.0, 0.0, 0.1, 0.0])[3]) for t in times]
     assert frame.beams.roll == pytest.approx(exact, abs=0.1 * 3e-5)
     assert np.ptp(exact) > 0.03
+
+
+def test_a_container_ship_whose_propeller_brakes_slows_down_and_sails_on():
+    loop = ShipLoop(ship_scene({"ship": {"model": "container"}, "scanner": {"mirror_hz": 5.0}}))
+    loop.order(rudder=np.radians(5.0), shaft=0.1)
+    speeds = [loop.step_scan().speed for _ in range(3000)]
+    assert (np.diff(speeds[50:]) < 0.0).all() and 0.1 < speeds[-1] < 4.0
+    with pytest.raises(ValueError, match="allowed: above 0"):
+        loop.order(shaft=0.0)
