@@ -6,6 +6,7 @@ are matrix exponentials: exact for a rudder that moves evenly over the step.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,9 +125,9 @@ def world_pose(state: Array) -> tuple[Array, Array, Array]:
 
 def over_ground(state: Array) -> Array:
     """Return the velocity (2,) [m/s] to north and east of a full state (10,)."""
-    c, s = np.cos(state[PSI]), np.sin(state[PSI])
-    across = state[V] * np.cos(state[PHI])
-    return np.array([c * state[U] - s * across, s * state[U] + c * across])
+    u, psi = float(state[U]), float(state[PSI])
+    c, s, across = math.cos(psi), math.sin(psi), float(state[V]) * math.cos(float(state[PHI]))
+    return np.array([c * u - s * across, s * u + c * across])
 
 
 _PRINTED_A = (

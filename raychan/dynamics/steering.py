@@ -43,7 +43,10 @@ class SteeringGear:
 
 
 class Autopilot(Protocol):
-    """What orders a rudder angle [rad], of the state (5,) and the heading wanted [rad]."""
+    """What orders a rudder angle [rad], of the state (5,) and the heading wanted [rad], by a linear feedback."""
+
+    @property
+    def gain(self) -> Array: ...  # noqa: D102
 
     def order(self, state: Array, heading: float) -> float: ...  # noqa: D102
 
@@ -54,6 +57,11 @@ class PD:
 
     kp: float
     kd: float
+
+    @property
+    def gain(self) -> Array:
+        """The same as a feedback (5,) of (v, p, r, phi, psi)."""
+        return np.array([0.0, 0.0, self.kd, 0.0, self.kp])
 
     def order(self, state: Array, heading: float) -> float:
         """Return the rudder ordered [rad] of the state (v, p, r, phi, psi) and the heading wanted [rad]."""

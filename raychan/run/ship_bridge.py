@@ -9,23 +9,22 @@ from typing import Any
 import numpy as np
 
 from raychan.dynamics import container, yacht
+from raychan.dynamics.avoidance import Lookout, Prediction
 from raychan.dynamics.kalman import Disturbance, Noise, kalman_filter
 from raychan.dynamics.ship import (
     CORRECTED,
     DELTA,
     KNOT,
     OF_LINEAR,
-    PHI,
     PRINTED,
     PSI,
     Array,
     LinearShip,
-    P,
     U,
     X,
     Y,
     exact_step,
-    world_pose,
+    over_ground,
 )
 from raychan.dynamics.steering import (
     PD,
@@ -38,18 +37,20 @@ from raychan.dynamics.steering import (
     pd_by_poles,
 )
 from raychan.dynamics.voyage import ContainerPlant, LinearPlant, Programme, Watch
-from raychan.run.ship_schema import ProgrammeTable, ShipTable, SteeringNoiseTable, SteeringTable
+from raychan.run.ship_schema import ProgrammeTable, ShipFile, ShipTable, SteeringNoiseTable, SteeringTable
 from raychan.world.errors import SceneError
 
 _PLACES = list(OF_LINEAR)
 _YACHT_SPEED = 12.0 * KNOT
+_CHOICE = 0.2  # seconds from one choice of heading to the next: each takes some milliseconds
 
 
 @dataclass(frozen=True)
 class Bridge:
     """What steers a ship: `plant`, `start` (10,), `ship` about its straight course, `autopilot`, `programme`.
 
-    `watch`: how the autopilot learns the state (LQG), None: it knows it; `disturbance`: what acts on the ship, or None.
+    `watch`: how the autopilot learns the state (LQG), None: it knows it; `disturbance`: what acts on the ship, or None;
+    `avoid`: how the ship answers headings, and the distance [m] that it keeps from echoes, or None.
     """
 
     plant: Any
@@ -59,6 +60,7 @@ class Bridge:
     programme: Programme
     watch: Watch | None = None
     disturbance: Disturbance | None = None
+    avoid: tuple[Prediction, float] | None = None
 
     @property
     def takes_shaft(self) -> bool:
@@ -66,20 +68,25 @@ class Bridge:
         return hasattr(self.plant, "at_shaft")
 
 
-def bridge_of(ship: ShipTable, steering: SteeringTable, programme: ProgrammeTable, dt: float) -> Bridge:
+def bridge_of(tables: ShipFile, dt: float) -> Bridge:
     """Return the bridge of a scene's tables, in steps of `dt` [s]. Raises: SceneError where they do not fit."""
+    ship, steering = tables.ship, tables.steering
     plant, start, linear = _plant(ship, steering, dt)
     start[X], start[Y] = ship.position[0], -ship.position[1]
     noise = _noise(steering)
     watch = None
     if noise is not None and steering.controller == "lqg":
         watch = _tried("steering.controller", lambda: Watch(kalman_filter(linear, noise, dt), noise))
+    autopilot, avoid = _autopilot(steering, linear), None
+    if tables.avoidance is not None:
+        avoid = Prediction.of(linear, autopilot.gain, _gear(steering)), tables.avoidance.distance_m
     return Bridge(
         plant=plant,
         start=start,
         ship=linear,
-        autopilot=_autopilot(steering, linear),
-        programme=_programme(programme, float(start[PSI])),
+        autopilot=autopilot,
+        avoid=avoid,
+        programme=_programme(tables.programme, float(start[PSI])),
         watch=watch,
         disturbance=None if noise is None else Disturbance.of(linear, noise, dt),
     )
@@ -95,11 +102,10 @@ def _tried(key: str, make: Callable[[], Any]) -> Any:
 
 def _plant(ship: ShipTable, steering: SteeringTable, dt: float) -> tuple[Any, Array, LinearShip]:
     """Return a model's plant, its full state (10,) at the start, and it about its straight course."""
-    angle, rate = np.radians([steering.max_rudder_deg, steering.max_rudder_rate_dps])
-    gear, heading = SteeringGear(float(angle), float(rate)), float(np.radians(ship.heading_deg))
+    gear, heading = _gear(steering), float(np.radians(ship.heading_deg))
     if ship.model == "container":
         speed = ship.speed_mps or 20.0 * KNOT
-        machinery = container.Machinery(max_rudder=float(angle), max_rudder_rate=float(rate))
+        machinery = container.Machinery(max_rudder=gear.max_angle, max_rudder_rate=gear.max_rate)
         shaft = container.service_shaft_speed(speed)
         if shaft > machinery.max_shaft:
             fastest = (
@@ -120,6 +126,11 @@ def _plant(ship: ShipTable, steering: SteeringTable, dt: float) -> tuple[Any, Ar
     start = np.zeros(10)
     start[U], start[PSI] = linear.speed, heading
     return LinearPlant(exact_step(linear, dt), gear), start, linear
+
+
+def _gear(steering: SteeringTable) -> SteeringGear:
+    angle, rate = np.radians([steering.max_rudder_deg, steering.max_rudder_rate_dps])
+    return SteeringGear(float(angle), float(rate))
 
 
 def _noise(steering: SteeringTable) -> Noise | None:
@@ -169,8 +180,6 @@ def _programme(table: ProgrammeTable, heading: float) -> Programme:
 class Steered:
     """A ship under its bridge: `state` (10,) now, `estimate` (5,) of (v, p, r, phi, psi) as the autopilot has it."""
 
-    pitch, height = 0.0, 0.0  # no model has them
-
     def __init__(self, bridge: Bridge, rngs: tuple[np.random.Generator, np.random.Generator]) -> None:
         self.bridge, self._plant, self._programme = bridge, bridge.plant, bridge.programme
         self._sensors, self._sea = rngs
@@ -178,7 +187,9 @@ class Steered:
         self.estimate = self.state[_PLACES]
         self._helm: float | None = None
         self.wanted, self.ordered = float(self.state[PSI]), 0.0
-        self._k = 0
+        self.lookout = None if bridge.avoid is None else Lookout(*bridge.avoid)
+        self._avoiding, self._k = 0.0, 0
+        self._every = max(1, round(_CHOICE / bridge.plant.dt))
         self.order(None, None)
 
     def order(self, rudder: float | None, shaft: float | None) -> None:
@@ -198,6 +209,10 @@ class Steered:
         else:
             self.estimate = watch.filter.update(self.estimate, watch.noise.measure(before[_PLACES], self._sensors))
         self.wanted, self._programme = self._programme.at(self._k * self._plant.dt, before[[X, Y]])
+        if self.lookout is not None:
+            if self._k % self._every == 0:
+                self._avoiding = self.lookout.heading(before, self.wanted, self._k * self._plant.dt) - self.wanted
+            self.wanted += self._avoiding
         steered = self.bridge.autopilot.order(self.estimate, self.wanted)
         self.ordered = steered if self._helm is None else self._helm
         self.state = self._plant.advance(before, self.ordered)
@@ -208,17 +223,17 @@ class Steered:
         self._k += 1
 
 
-def between(before: Array, after: Array, dt: float, share: Array) -> Array:
-    """Return the poses (n, 6) x, y, z [m], yaw, pitch, roll [rad] in the world at shares (n,) of a step of `dt` [s].
+def hermite(share: Array, dt: float) -> Array:
+    """Return the weights (n, 4) of pose and rates before and after a step of `dt` [s], at shares (n,) of it.
 
-    Roll by Hermite's cubic, which keeps the printed ship's 0.3 s of roll to 1e-4 of its amplitude within a step of
-    1/75 s; all else moves evenly, which differs by less than 0.1 mm and 1e-5 rad.
+    Hermite's cubic keeps the printed ship's roll of 0.3 s to 1e-5 of its amplitude within a step of 1/75 s.
     """
-    place, yaw, _ = world_pose(np.stack([before, after]))
-    out = np.zeros((len(share), 6))
-    out[:, :3] = place[0] + share[:, None] * (place[1] - place[0])
-    out[:, 3] = yaw[0] + share * (yaw[1] - yaw[0])
     s, t = share, 1.0 - share
-    out[:, 5] = t * t * (1.0 + 2.0 * s) * before[PHI] + s * s * (3.0 - 2.0 * s) * after[PHI]
-    out[:, 5] += dt * s * t * (t * before[P] - s * after[P])
-    return out
+    return np.stack([t * t * (1.0 + 2.0 * s), dt * s * t * t, s * s * (1.0 + 2.0 * t), -dt * s * s * t], axis=1)
+
+
+def pose_and_rates(state: Array) -> Array:
+    """Return x, y, z [m], yaw, pitch, roll [rad] in the world of a full state (10,), and their rates: (2, 6)."""
+    north, east = over_ground(state).tolist()
+    _, _, r, x, y, psi, p, phi, _, _ = state.tolist()
+    return np.array([[x, -y, 0.0, -psi, 0.0, phi], [north, -east, 0.0, -r, 0.0, p]])

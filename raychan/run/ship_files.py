@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from raychan.run.netcdf import CONVENTIONS
 from raychan.run.output_files import Contents, write_whole
-from raychan.run.ship_loop import Frame, ShipLoop
+from raychan.run.ship_loop import Frame, ShipLoop, hit_points
 from raychan.run.ship_scene import ShipScene
 from raychan.run.storage import versions
-from raychan.sensors.laser import NO_BODY, SEA, Ints, beams
+from raychan.sensors.laser import NO_BODY, SEA, Ints
+from raychan.world.errors import SceneError
 
 Floats = NDArray[np.float64]
 
@@ -126,8 +127,7 @@ class Voyage:
             np.minimum.at(self._nearest, met.body[echo], met.range[echo])
         self._roll = [min(self._roll[0], angles[1]), max(self._roll[1], angles[1])]
         if self._k % self._stride == 0:
-            towards = beams(self._scene.scanner, frame.beams)[echo]
-            hits = frame.beams.position[echo] + met.range[echo, None] * towards
+            hits = hit_points(self._scene.scanner, frame.beams, met)
             self._log.append((row, float(np.degrees(frame.heading_wanted)), met.range, met.body, hits, met.body[echo]))
         self._k, self._last = self._k + 1, frame
         if len(self._ranges) == _BLOCK:
@@ -177,6 +177,14 @@ class Voyage:
         }
 
 
+def _next(loop: ShipLoop) -> Frame:
+    """Return the next frame. Raises: SceneError where the model does not hold, as of a ship that stops."""
+    try:
+        return loop.step_scan()
+    except (ValueError, OverflowError) as error:
+        raise SceneError(f"the ship cannot sail on after {loop.now:.2f} s: {error}", file=loop.scene.path) from error
+
+
 def sail_into(scene: ShipScene, folder: Path, tell: Callable[[str, float], None]) -> tuple[ShipLog, dict[str, Any]]:
     """Run a scene's loop over its duration and write ship.csv, scan.nc and summary.json into a folder.
 
@@ -185,7 +193,7 @@ def sail_into(scene: ShipScene, folder: Path, tell: Callable[[str, float], None]
     loop = ShipLoop(scene)
     with Voyage(scene, folder, loop.scans) as files:
         for k in range(loop.scans):
-            files.add(loop.step_scan())
+            files.add(_next(loop))
             if k % 75 == 0:
                 tell("sailing", k / loop.scans)
         tell("sailing", 1.0)

@@ -8,9 +8,10 @@ import numpy as np
 
 from raychan.dynamics.ship import DELTA, PHI, PSI, Array, N, P, R, U, V
 from raychan.poses import rotation
-from raychan.run.ship_bridge import Steered, between
+from raychan.run.ship_bridge import Steered, hermite, pose_and_rates
 from raychan.run.ship_scene import ShipScene
-from raychan.sensors.laser import LaserScan, SensorPoses, noisy, scan
+from raychan.sensors.laser import NO_BODY, LaserScan, Scanner, SensorPoses, noisy, scan
+from raychan.sensors.laser import beams as directions
 from raychan.world.ray_caster import RayCaster
 
 _FULL = 2.0 * np.pi
@@ -54,6 +55,12 @@ class Frame:
         return -self.y
 
 
+def hit_points(scanner: Scanner, poses: SensorPoses, met: LaserScan) -> Array:
+    """Return the places (h, 3) [m] in the world of a scan's echoes, in the order of its beams."""
+    echo = met.body != NO_BODY
+    return np.asarray(poses.position[echo] + met.range[echo, None] * directions(scanner, poses)[echo])
+
+
 class ShipLoop:
     """The loop of a scene, at 0 s; equal seeds give equal bytes.
 
@@ -69,12 +76,12 @@ class ShipLoop:
         self._steered = None if scene.bridge is None else Steered(scene.bridge, (sensors, sea))
         self._turn, self._turns = 1.0 / scanner.mirror_hz, round(scanner.duration * scanner.mirror_hz)
         self._k = 0
-        times = scanner.times if scene.tables.scanner.motion else np.zeros(scanner.count)
-        self._times, shares = times, times / self._turn
-        self._in_turn = np.minimum(shares.astype(int), self._turns - 1)
-        self._share = shares - self._in_turn
+        self._times = scanner.times if scene.tables.scanner.motion else np.zeros(scanner.count)
+        in_turn = np.minimum((self._times / self._turn).astype(int), self._turns - 1)
+        self._of_turn = [np.flatnonzero(in_turn == turn) for turn in range(self._turns)]
+        self._weights = hermite(self._times / self._turn - in_turn, self._turn)
         mount = scene.tables.scanner
-        self._arm = np.array(mount.position)
+        self._arm = mount.position
         angles = np.radians([mount.yaw_deg, mount.pitch_deg, mount.roll_deg])
         self._turned = rotation(*angles) if angles.any() else None
         self._moving = any(body.moves for body in scene.bodies.bodies)
@@ -123,7 +130,8 @@ class ShipLoop:
         self._steered.order(rudder, shaft)
 
     def step_scan(self) -> Frame:
-        """Carry the loop on by one scan and return it. Raises: ValueError beyond the end of logged poses."""
+        """Carry the loop on by one scan and return it. Raises: ValueError beyond the end of logged poses, or
+        where the model does not hold (a container ship that stops)."""
         start, state, moving = self.now, self.state, self._steered
         poses = self._replayed() if moving is None else self._sailed(moving)
         beams = self._mounted(poses)
@@ -134,6 +142,10 @@ class ShipLoop:
             self.scene.scanner, beams, self._caster, self.scene.reflectivity, 0.0 if sea is None else sea.reflectivity
         )
         deviation = self.scene.tables.scanner.noise_m
+        met = noisy(ideal, deviation, self._ranges) if deviation > 0.0 else ideal
+        if moving is not None and moving.lookout is not None:
+            # In the world's axes y is west.
+            moving.lookout.see(hit_points(self.scene.scanner, beams, met) * [1.0, -1.0, 1.0], self.now)
         return Frame(
             time=start,
             x=float(poses[0, 0]),
@@ -149,18 +161,19 @@ class ShipLoop:
             shaft=float(state[N]),
             speed=float(np.hypot(state[U], state[V])),
             heading_wanted=float((state[PSI] if moving is None else moving.wanted) % _FULL),
-            scan=noisy(ideal, deviation, self._ranges) if deviation > 0.0 else ideal,
+            scan=met,
             beams=beams,
         )
 
     def _sailed(self, ship: Steered) -> Array:
         """Return the poses (n, 6) of the ship at each beam, with the ship carried over the scan."""
         poses = np.empty((len(self._times), 6))
-        for turn in range(self._turns):
-            before = ship.state
+        before = pose_and_rates(ship.state)
+        for beams in self._of_turn:
             ship.step()
-            mine = self._in_turn == turn
-            poses[mine] = between(before, ship.state, self._turn, self._share[mine])
+            after = pose_and_rates(ship.state)
+            poses[beams] = self._weights[beams] @ np.concatenate([before, after])
+            before = after
         self._k += self._turns
         return poses
 
@@ -176,7 +189,8 @@ class ShipLoop:
         """Return the scanner's poses of the ship's (n, 6)."""
         yaw, pitch, roll = poses[:, 3], poses[:, 4], poses[:, 5]
         turn = rotation(yaw, pitch, roll)  # type: ignore[arg-type]
-        place = poses[:, :3] + np.einsum("ijn,j->ni", turn, self._arm)
+        x, y, z = self._arm
+        place = poses[:, :3] + (turn[:, 0] * x + turn[:, 1] * y + turn[:, 2] * z).T
         if self._turned is not None:
             m = np.einsum("ijn,jk->ikn", turn, self._turned)
             level = np.hypot(m[0, 0], m[1, 0])

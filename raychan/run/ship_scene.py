@@ -73,7 +73,9 @@ def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipSc
         scanner = _scanner(tables.scanner)
         bridge = poses = None
         if tables.replay is None:
-            bridge = bridge_of(tables.ship, tables.steering, tables.programme, 1.0 / scanner.mirror_hz)
+            bridge = bridge_of(tables, 1.0 / scanner.mirror_hz)
+        elif tables.avoidance is not None:
+            raise SceneError("keys do not fit together", key="avoidance", allowed="avoidance without replay")
         else:
             poses = read_poses(folder / tables.replay.file, tables.replay.max_gap_s)
         bodies = Scene(bodies=[_body(t, folder) for t in tables.bodies], path=path, folder=folder)

@@ -12,6 +12,7 @@ from raychan.world.quantities import (
     Courses,
     Crease,
     Damping,
+    Fan,
     FeedbackGain,
     Gains,
     Heading,
@@ -23,6 +24,7 @@ from raychan.world.quantities import (
     Rudder,
     RudderRate,
     Scale,
+    ScanStep,
     ShipSpeed,
     Speed,
     Spread,
@@ -122,8 +124,8 @@ class ProgrammeTable(Table):
 class ScannerTable(Table):
     """Table [scanner]: the laser scanner and its mount on the ship."""
 
-    step_deg: BeamRange = 1.0
-    fan_deg: BeamRange = 180.0
+    step_deg: ScanStep = 1.0
+    fan_deg: Fan = 180.0
     mirror_hz: Mirror = 75.0
     max_range_m: BeamRange = 80.0
     dark_range_m: BeamRange = 30.0

@@ -159,6 +159,8 @@ Spread = Annotated[float, _REAL, _within(limits.DEVIATION)]
 Strength = Annotated[float, _REAL, _within(limits.STRENGTH)]
 Reflectivity = Annotated[float, _REAL, _within(limits.REFLECTIVITY)]
 BeamRange = Annotated[float, _REAL, _within(limits.BEAM_RANGE)]
+ScanStep = Annotated[float, _REAL, _within(limits.SCAN_STEP_DEG)]
+Fan = Annotated[float, _REAL, _within(limits.FAN_DEG)]
 Mirror = Annotated[float, _REAL, _within(limits.MIRROR_HZ)]
 Horizontal = Annotated[
     list[Annotated[float, _REAL, _within(limits.PLACE)]],

@@ -106,6 +106,19 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
         (["ship", "--seed", "-1", "--out", "OUT"], "seeds are whole numbers"),
         (["ship", "--set", "ship.model=raft", "--out", "OUT"], "ship.model: 'raft' is not possible"),
         (["ship", "--set", "replay.file=none.csv", "--out", "OUT"], "none.csv: file not found"),
+        (
+            [
+                "ship",
+                "ship_trial",
+                "--set",
+                "steering.noise.sway_mps2=1000",
+                "--set",
+                "ship.model=container",
+                "--out",
+                "OUT",
+            ],
+            "the ship cannot sail on after",
+        ),
         (["ship", "--set", "run.duration_s=0.001", "--out", "OUT"], "run.duration_s"),
     ],
 )

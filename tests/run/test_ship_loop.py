@@ -1,7 +1,10 @@
 """The closed loop of ship and scanner: poses of a rolling deck, orders, time, and equal seeds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from raychan.dynamics import ship
 from raychan.dynamics.steering import HeadingProgramme, StateFeedback, SteeringGear
@@ -112,3 +115,26 @@ def test_a_body_that_moves_is_met_where_it_is_then():
     ahead = [f.scan.range[90] for f in found]
     assert ahead[0] == pytest.approx(28.0, abs=1e-6)
     assert ahead[-1] == pytest.approx(28.0 - 3.0 - found[-1].x, abs=1e-4)
+
+
+def test_beams_of_the_stiff_printed_ship_roll_as_it_does_within_a_step():
+    gain = {"steering": {"gain": ship.PRINTED_GAIN.tolist()}}
+    start = np.zeros(10)
+    start[ship.U], start[ship.PHI] = ship.CORRECTED.speed, 0.1
+    scene = ship_scene({**gain, "scanner": {"step_deg": 0.25}})
+    loop = ShipLoop(replace(scene, bridge=replace(scene.bridge, start=start)))
+    frame = loop.step_scan()
+    # Four steps of 1/75 s; the exact roll with the rudder amidships, which hardly rolls this ship.
+    times = scene.scanner.times
+    exact = [float((expm(ship.CORRECTED.a * t) @ [0.0, 0.0, 0.0, 0.1, 0.0])[3]) for t in times]
+    assert frame.beams.roll == pytest.approx(exact, abs=0.1 * 3e-5)
+    assert np.ptp(exact) > 0.03
+
+
+def test_a_container_ship_whose_propeller_brakes_slows_down_and_sails_on():
+    loop = ShipLoop(ship_scene({"ship": {"model": "container"}, "scanner": {"mirror_hz": 5.0}}))
+    loop.order(rudder=np.radians(5.0), shaft=0.1)
+    speeds = [loop.step_scan().speed for _ in range(3000)]
+    assert (np.diff(speeds[50:]) < 0.0).all() and 0.1 < speeds[-1] < 4.0
+    with pytest.raises(ValueError, match="allowed: above 0"):
+        loop.order(shaft=0.0)

@@ -29,6 +29,7 @@ WRONG = {
     "[programme]\nway_points = [[0, 0], [0, 0]]": "programme: at least two way-points, no two running the same",
     "[scanner]\nstep_deg = 0.3": r"scanner: step is 0.3 deg; allowed: 1, 0.5, 0.25",
     "[scanner]\nfan_deg = 180.5": "scanner: fan is 180.5 deg",
+    "[scanner]\nfan_deg = 400": "scanner.fan_deg: 400 is not possible; allowed: a number above 0 and at most 360 deg",
     "[[bodies]]\nname = 'a'\nshape = 'box'\nmaterial = 'PVC'": r"a.material: unknown material 'PVC'; .*'PVC, grey'",
     "[[bodies]]\nname = 'a'\nshape = 'boxx'": "bodies.a.shape: unknown shape 'boxx'; did you mean 'box'",
     "[[bodies]]\nname = 'a'\nmesh = 'nowhere.stl'": "nowhere.stl",
