@@ -9,6 +9,8 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
@@ -155,14 +157,14 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
 
     loaded = read_ship_scene(wishes.scene, wishes.changes)
     show.warn(loaded.bodies.warnings)
-    with _track(wishes.out) as tell:
-        with show.progress(kernels="ship"):
-            session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate, tell)
-        if wishes.stream:
-            session.scanner.mode = STREAM
-        with _stops() as stopped, _first(wishes.realtime) as session.first:
-            _say({name: channel.port.name for name, channel in channels.items()}, wishes.ports)
-            session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)
+    with show.progress(kernels="ship"):
+        session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate)
+    if wishes.stream:
+        session.scanner.mode = STREAM
+    # Threads that are started while this one goes first do so too: none waits for the interpreter behind others.
+    with _stops() as stopped, _first(wishes.realtime) as session.first, _track(wishes.out) as session.tell:
+        _say({name: channel.port.name for name, channel in channels.items()}, wishes.ports)
+        session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)
     return summary(session)
 
 
@@ -211,15 +213,22 @@ def _track(out: Path | None) -> Iterator[Callable[[Instruments, Reading], None]]
         raise StoreError(f"{out}: cannot write: {error.strerror or error}") from error
     rows = csv.writer(file)
     lost: list[str] = []  # why the file ends early: a full disk does not end the run
+    waiting: SimpleQueue[tuple[Instruments, Reading] | None] = SimpleQueue()
 
-    def tell(instruments: Instruments, at: Reading) -> None:
-        if not lost:
-            _try(lambda: rows.writerow(_row(instruments, at)), lost)
+    def write() -> None:
+        _try(lambda: rows.writerow(_TRACK), lost)
+        while (one := waiting.get()) is not None:
+            if not lost:
+                _try(lambda one=one: rows.writerow(_row(*one)), lost)  # type: ignore[misc]
 
-    _try(lambda: rows.writerow(_TRACK), lost)
+    # A disk may keep a writer waiting for longer than a scan takes.
+    writer = Thread(target=write, daemon=True)
+    writer.start()
     try:
-        yield tell
+        yield lambda instruments, at: waiting.put((instruments, at))
     finally:
+        waiting.put(None)
+        writer.join()
         _try(file.close, lost)
         show.warn(f"{name}: not whole: {why}" for why in lost[:1])
 

@@ -59,8 +59,8 @@ class Session:
 
     Fields: loop of the ship; channels by name, one for each of CHANNELS; origin of the scene on the globe; rate [1/s]
     of the sentences; tell is called with each reading whose sentences were sent; behind and most_behind, scans that the
-    loop owes; first, whether it runs before other programs; ended says why the run ended, failed whether the ship could
-    not sail on. `scanner` is the scanner's end of the line.
+    loop owes; longest_step [s] that it took for one; first, whether it runs before other programs; ended says why the
+    run ended, failed whether the ship could not sail on. `scanner` is the scanner's end of the line.
     """
 
     loop: ScannedShip
@@ -72,6 +72,7 @@ class Session:
     first: bool = False
     behind: int = 0
     most_behind: int = 0
+    longest_step: float = 0.0
     ended: str = ""
     failed: bool = False
 
@@ -139,6 +140,7 @@ class Session:
         if not self.loop.steerable and self.loop.done:
             self.ended = "end of the logged poses"
             return
+        began = time.monotonic()
         try:
             self._older, self._newer = self._newer, self.loop.step_scan()
         except (ValueError, OverflowError) as error:
@@ -146,6 +148,7 @@ class Session:
             return
         self._gave_back = False
         self.behind -= 1
+        self.longest_step = max(self.longest_step, time.monotonic() - began)
 
     def _give_back(self, error: Exception) -> None:
         """Take the host's orders away where the model does not hold under them; end where it still does not."""
