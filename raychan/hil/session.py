@@ -60,7 +60,8 @@ class Session:
     Fields: loop of the ship; channels by name, one for each of CHANNELS; origin of the scene on the globe; rate [1/s]
     of the sentences; tell is called with each reading whose sentences were sent; behind and most_behind, scans that the
     loop owes; longest_step [s] that it took for one; first, whether it runs before other programs; ended says why the
-    run ended, failed whether the ship could not sail on. `scanner` is the scanner's end of the line.
+    run ended, failed whether the ship could not sail on. `scanner` is the scanner's end of the line. A run leaves its
+    `ticks` of scans, `cycles` of sentences, `instruments` and `seconds`.
     """
 
     loop: ScannedShip
@@ -128,7 +129,8 @@ class Session:
     def _tick(self, now: float) -> None:
         due = self.ticks.due
         self._whole = self._newer
-        if self.scanner.streaming:
+        # After a change of the fan the scan that had begun is of the old one.
+        if self.scanner.streaming and len(self._whole.scan.range) == self.loop.scene.scanner.count:
             self.channels[SCANNER].frame(now, due, self.scanner.scan())
         self.behind += 1 + self.ticks.tick(now)
         self.most_behind = max(self.most_behind, self.behind)

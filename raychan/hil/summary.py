@@ -28,7 +28,7 @@ def summary(session: Session) -> dict[str, Any]:
         },
         "scans": {
             **_timing(session.ticks.timing()),
-            "behind_most": session.most_behind - 1,
+            "behind_most": max(0, session.most_behind - 1),
             "behind_at_end": max(0, session.behind - 1),
             "longest_step_ms": round(1e3 * session.longest_step, 3),
             "realtime": session.first,
