@@ -130,8 +130,11 @@ class _Wishes(NamedTuple):
 
 def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: ExitStack) -> dict[str, Channel]:
     """Return the channels on their ports, which `closing` closes. Raises: typer.BadParameter for a wrong port."""
-    from raychan.hil.channel import Channel
-    from raychan.hil.ports import PortError, SerialPort, TerminalPort, without_extra
+    try:
+        from raychan.hil.channel import Channel
+        from raychan.hil.ports import PortError, SerialPort, TerminalPort, without_extra
+    except ModuleNotFoundError as error:  # fcntl, termios
+        raise typer.BadParameter("raychan hil needs a system with pseudo-terminals, such as Linux") from error
 
     if without_extra():
         raise typer.BadParameter(_EXTRA)
