@@ -124,6 +124,8 @@ class Scene(Described):
     def _of(cls, data: Mapping[str, object], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
         """Return the scene of tables; bodies equal to those of the scene `like` are shared, with their meshes."""
         file = None if path is None else Path(path)
+        if "ship" in data:
+            raise SceneError("is a scene of a ship, not of a radar", file=file, key="ship", allowed="raychan ship")
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
         ghz = tables.scene.frequency_ghz

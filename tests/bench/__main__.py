@@ -21,6 +21,7 @@ from bench.laser import laser
 from bench.measure import Row
 from bench.memory import memory
 from bench.rays import rays
+from bench.ship import ship
 from bench.size import size
 from bench.synthesis import phase_noise, scaling, synthesis
 from bench.turbine import turbine
@@ -29,7 +30,7 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, size, memory)
+    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, memory)
 }
 _ROOT = Path(__file__).parents[2]
 
