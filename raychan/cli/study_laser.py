@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Seed, within
+from raychan.cli.options import within
+from raychan.world import limits
 from raychan.world.limits import Limit
 
 _DRAWS = Limit(2, 10_000_000, "", "a deviation needs two, and more take hours")
@@ -25,7 +26,9 @@ def laser(
     scans: Annotated[
         int, typer.Option(help="Scans of each amplitude of roll and pitch.", metavar="N", callback=within(_SCANS, True))
     ] = 400,
-    seed: Seed = 0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the draws; equal seeds give equal files.", callback=within(limits.SEED, True))
+    ] = 0,
 ) -> None:
     """Chart the range error of a laser scanner on a deck by the errors of its pose: first order beside Monte Carlo.
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.poses import direction, rotation
-from raychan.sensors.laser import NO_BODY, SEA, Scanner, Targets, first_hits
+from raychan.sensors.laser import NO_BODY, Scanner, Targets, first_hits
 from raychan.world.body import Body
 from raychan.world.ray_caster import RayCaster
 from raychan.world.scene import Scene
@@ -100,6 +100,3 @@ def stratified(count: int, rng: np.random.Generator) -> Floats:
     from scipy.special import ndtri
 
     return np.asarray(ndtri((rng.permutation(count) + rng.uniform(size=count)) / count))
-
-
-__all__ = ["POSE", "SEA", "Deck", "ranges", "rays", "slopes", "standing", "stratified"]

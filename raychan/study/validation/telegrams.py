@@ -5,16 +5,17 @@ from __future__ import annotations
 import os
 from datetime import time
 from functools import cache
+from importlib.util import find_spec
 
 import numpy as np
 
 from raychan.hil.lms import ScanValues, decode_scan, encode_scan
 from raychan.hil.nmea import Attitude, Fix, gga, hdt, pashr
 from raychan.hil.pacing import line_time
-from raychan.hil.ports import open_port, pseudo_terminal
 from raychan.hil.telegrams import TelegramReader, frame
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure
+from raychan.world.errors import SceneError
 
 _AT = time(10, 11, 12)
 _BEAMS = 181
@@ -23,7 +24,13 @@ _BAUD = 38400
 
 @cache
 def _streams() -> dict[str, bytes]:
-    """Return what each of the four channels sends."""
+    """Return what each of the four channels sends.
+
+    Raises: SceneError where what the extra `hil` installs is missing.
+    """
+    for module, package in (("serial", "pyserial"), ("pynmeagps", "pynmeagps")):
+        if find_spec(module) is None:
+            raise SceneError(f"the serial streams need {package}", allowed="pip install -e '.[hil]'")
     return {
         "scanner": frame(encode_scan(ScanValues(_ranges(), np.zeros(_BEAMS, np.uint8)))),
         "position": gga(Fix(_AT, 55.0, -1.5, 3.0)),
@@ -39,6 +46,9 @@ def _ranges() -> np.ndarray:
 @measure
 def stream_comes_through(bench: Bench, channel: str) -> Seen:
     """Return whether a channel's bytes come through a pseudo-terminal unchanged and decode: ranges, or check sum."""
+    # Imported here: other systems than Unix have no pseudo-terminals.
+    from raychan.hil.ports import open_port, pseudo_terminal
+
     sent, pair = _streams()[channel], pseudo_terminal()
     try:
         with open_port(pair.name, _BAUD) as port:
