@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, SceneFile, within
+from raychan.cli.options import Changes, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -19,7 +19,14 @@ if TYPE_CHECKING:
 
 
 def ship(
-    scene: SceneFile = Path("ship_turn"),
+    scene: Annotated[
+        Path,
+        typer.Argument(
+            help="Scene file (TOML), or the name of one that comes along: ship_turn, ship_trial, ship_avoid.",
+            metavar="SCENE",
+            show_default=False,
+        ),
+    ] = Path("ship_turn"),
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR")
     ] = None,
@@ -35,7 +42,8 @@ def ship(
 ) -> None:
     """Sail a ship: its course, and what a laser scanner on its rolling deck meets.
 
-    Without SCENE: ship_turn, a full circle and a change of course by 90 degrees.
+    Without SCENE: ship_turn, a container ship that turns a full circle and changes course by 90 degrees. ship_trial is
+    a yacht on the open sea, ship_avoid one that turns from what its scanner meets.
 
     Writes ship.csv, scan.nc (netCDF-4: range and body of every beam), summary.json and four pictures: the scans over
     time, the track with what beams met, heading and roll, and all of it in space. They replace those of an earlier

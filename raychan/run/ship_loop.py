@@ -10,8 +10,10 @@ from raychan.dynamics.ship import DELTA, PHI, PSI, Array, N, P, R, U, V
 from raychan.poses import rotation
 from raychan.run.ship_bridge import Steered, hermite, pose_and_rates
 from raychan.run.ship_scene import ShipScene
+from raychan.run.ship_schema import WavesTable
 from raychan.sensors.laser import NO_BODY, LaserScan, Scanner, SensorPoses, noisy, scan
 from raychan.sensors.laser import beams as directions
+from raychan.sensors.sea import SeaState, Waves, waves
 from raychan.world.ray_caster import RayCaster
 
 _FULL = 2.0 * np.pi
@@ -61,6 +63,11 @@ def hit_points(scanner: Scanner, poses: SensorPoses, met: LaserScan) -> Array:
     return np.asarray(poses.position[echo] + met.range[echo, None] * directions(scanner, poses)[echo])
 
 
+def _waves(t: WavesTable, rng: np.random.Generator) -> Waves:
+    """Return the waves of a table; headings there are clockwise from north."""
+    return waves(SeaState(t.height_m, t.period_s, t.gamma, -float(np.radians(t.heading_deg)), t.spread), rng)
+
+
 class ShipLoop:
     """The loop of a scene, at 0 s; equal seeds give equal bytes.
 
@@ -72,14 +79,17 @@ class ShipLoop:
 
     def __init__(self, scene: ShipScene) -> None:
         self.scene, scanner = scene, scene.scanner
-        sensors, sea, self._ranges = np.random.default_rng(scene.tables.run.seed).spawn(3)
+        sensors, sea, self._ranges, swell = np.random.default_rng(scene.tables.run.seed).spawn(4)
         self._steered = None if scene.bridge is None else Steered(scene.bridge, (sensors, sea))
         self._turn, self._turns = 1.0 / scanner.mirror_hz, round(scanner.duration * scanner.mirror_hz)
         self._k = 0
-        self._times = scanner.times if scene.tables.scanner.motion else np.zeros(scanner.count)
+        self._times = scanner.times
         in_turn = np.minimum((self._times / self._turn).astype(int), self._turns - 1)
         self._of_turn = [np.flatnonzero(in_turn == turn) for turn in range(self._turns)]
         self._weights = hermite(self._times / self._turn - in_turn, self._turn)
+        water = scene.tables.sea
+        self._sea = 0.0 if water is None else water.reflectivity
+        self._waves = None if water is None or water.waves is None else _waves(water.waves, swell)
         mount = scene.tables.scanner
         self._arm = mount.position
         angles = np.radians([mount.yaw_deg, mount.pitch_deg, mount.roll_deg])
@@ -137,10 +147,8 @@ class ShipLoop:
         beams = self._mounted(poses)
         if self._moving:
             self._caster = self._caster_at(start)
-        sea = self.scene.tables.sea
-        ideal = scan(
-            self.scene.scanner, beams, self._caster, self.scene.reflectivity, 0.0 if sea is None else sea.reflectivity
-        )
+        swell = None if self._waves is None else self._waves.at(start)
+        ideal = scan(self.scene.scanner, beams, self._caster, self.scene.reflectivity, self._sea, swell)
         deviation = self.scene.tables.scanner.noise_m
         met = noisy(ideal, deviation, self._ranges) if deviation > 0.0 else ideal
         if moving is not None and moving.lookout is not None:

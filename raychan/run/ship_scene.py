@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from raychan.run.ship_bridge import Bridge, bridge_of
 from raychan.run.ship_replay import PoseFile, read_poses
-from raychan.run.ship_schema import ScannerTable, ShipBodyTable, ShipFile
+from raychan.run.ship_schema import ScannerTable, ShipBodyTable, ShipFile, SpotTable
 from raychan.sensors.laser import REFLECTIVITY, Scanner
+from raychan.sensors.spot import Echo, Spot
 from raychan.world import overrides
 from raychan.world.body import Body
 from raychan.world.build import scene_text
@@ -92,9 +93,17 @@ def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipSc
 
 def _scanner(t: ScannerTable) -> Scanner:
     try:
-        return Scanner(t.fan_deg, t.step_deg, t.mirror_hz, t.max_range_m, t.dark_range_m)
+        spot = None if t.spot is None else _spot(t.spot)
+        return Scanner(
+            t.fan_deg, t.step_deg, t.mirror_hz, t.max_range_m, t.dark_range_m, spot=spot, lambert=t.lambert,
+            moving=t.motion,
+        )  # fmt: skip
     except ValueError as error:
         raise SceneError(str(error), key="scanner") from error
+
+
+def _spot(t: SpotTable) -> Spot:
+    return Spot(t.divergence_mrad * 1e-3, t.exit_mm * 1e-3, t.rings, Echo[t.echo.upper()], t.merge_m)
 
 
 def _body(t: ShipBodyTable, folder: Path) -> Body:

@@ -12,26 +12,33 @@ from raychan.world.quantities import (
     Courses,
     Crease,
     Damping,
+    Divergence,
     Fan,
     FeedbackGain,
     Gains,
     Heading,
     Horizontal,
     LoopRate,
+    Merge,
     Mirror,
+    Peak,
     Place,
     Reflectivity,
+    Rings,
     Rudder,
     RudderRate,
     Scale,
     ScanStep,
     ShipSpeed,
     Speed,
+    SpotWidth,
     Spread,
     Strength,
     Turn,
     TurnRate,
     Voyage,
+    WaveHeight,
+    WavePeriod,
     WayPointList,
     Weight,
     Weights,
@@ -121,6 +128,18 @@ class ProgrammeTable(Table):
         return self
 
 
+class SpotTable(Table):
+    """Table [scanner.spot]: the width of a beam, which makes mixed pixels."""
+
+    divergence_mrad: Divergence = 4.6
+    """Full angle."""
+    exit_mm: SpotWidth = 13.0
+    rings: Rings = 1
+    echo: Literal["first", "strongest", "mean"] = "first"
+    merge_m: Merge = 0.45
+    """Echoes nearer than this flow into one."""
+
+
 class ScannerTable(Table):
     """Table [scanner]: the laser scanner and its mount on the ship."""
 
@@ -137,15 +156,34 @@ class ScannerTable(Table):
     roll_deg: Angle = 0.0
     noise_m: Spread = 0.0
     """Standard deviation of a range."""
+    lambert: bool = False
+    """Power falls with the cosine of the angle of incidence."""
+    spot: SpotTable | None = None
+    """None: a beam is a ray of no width."""
     motion: bool = True
     """Each beam leaves at the pose of its own time; false: all at the pose of the scan's start."""
 
 
+class WavesTable(Table):
+    """Table [sea.waves]."""
+
+    height_m: WaveHeight
+    """Significant height."""
+    period_s: WavePeriod
+    """Of the spectrum's peak."""
+    gamma: Peak = 1.0
+    heading_deg: Heading = 0.0
+    """Towards which the waves run."""
+    spread: bool = True
+    """Directions vary as cos^2 about the heading."""
+
+
 class SeaTable(Table):
-    """Table [sea]: the plane z = 0."""
+    """Table [sea]: the plane z = 0, or waves about it."""
 
     reflectivity: Reflectivity = 0.1
     """0: no sea."""
+    waves: WavesTable | None = None
 
 
 class ShipBodyTable(Table):

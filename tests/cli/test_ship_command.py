@@ -13,6 +13,7 @@ from raychan.run import ship_files
 from raychan.run.ship_files import CONTENTS
 from raychan.run.ship_loop import ShipLoop
 from raychan.run.ship_scene import read_ship_scene
+from raychan.world.bundled import ship_names
 
 SHORT = ["--set", "run.duration_s=9", "--set", "programme.headings=[[0,0],[1,90]]"]
 
@@ -137,6 +138,21 @@ def test_a_folder_that_is_no_result_is_not_overwritten(tmp_path, capsys):
     assert "is not a folder of results" in capsys.readouterr().err
     assert (out / "ship.csv").read_text() == "mine"
     assert "scan.nc" in CONTENTS.signs
+
+
+def test_a_window_without_a_display_is_refused_before_the_ship_sails(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert invoke(["ship", "--view", "--out", str(tmp_path / "out")]) == 2
+    assert "there is no display" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_help_names_every_scene_that_comes_along(capsys):
+    assert invoke(["ship", "--help"]) == 0
+    said = capsys.readouterr().out
+    assert all(name in said for name in ship_names())
 
 
 def test_a_yacht_that_sinks_its_scanner_is_told_not_crashed(tmp_path):

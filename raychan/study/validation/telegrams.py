@@ -9,9 +9,9 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from raychan.hil.scans import ScanValues, decode_scan, encode_scan
 from raychan.hil.nmea import Attitude, Fix, gga, hdt, pashr
 from raychan.hil.pacing import line_time
+from raychan.hil.scans import ScanValues, decode_scan, encode_scan
 from raychan.hil.telegrams import TelegramReader, frame
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure
