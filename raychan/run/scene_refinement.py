@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
+from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
@@ -122,6 +123,8 @@ class SceneRefinement:
     model: Any
     tell: Callable[[str, float], None]
     stats: Stats
+    launches: list[list[Batch]] | None = None
+    """Where given, the routes of all launches are kept here."""
 
     def first(self) -> First | None:
         """Return the first launch; None where it brings more paths than can be held."""
@@ -140,17 +143,24 @@ class SceneRefinement:
         chosen = choose(paths, self.radar, self.settings, noise, self.model.tolerance_db)
         self.model = chosen.applied_to(self.model)
         keep = needed(paths, chosen)
+        if self.launches is not None:
+            self.launches[0] = counting(self.launches[0], keep)
         return First(launch, of_trajectories(paths, keep), source[keep], chosen)
 
     def _paths(self, batches: Iterator[tuple[Batch, Sources]], most: float = math.inf) -> tuple[Paths, Sources] | None:
         """Return the paths of batches of routes, and the source of each trajectory; None where there are too many."""
         parts, sources, count = [nothing(self.geometry.facets, self.radar)], [np.zeros(0, np.int64)], 0
+        kept: list[Batch] = []
         for batch, source in batches:
             count += len(source)
             if count > most:
                 return None
+            if self.launches is not None:
+                kept.append(batch)
             parts.append(paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier))
             sources.append(source)
+        if self.launches is not None:
+            self.launches.append(kept)
         return join(parts), np.concatenate(sources)
 
     def converged(self, first: First) -> Converged:
@@ -163,6 +173,8 @@ class SceneRefinement:
         steps, unreached, ended = 0, tuple[Unreached, ...](), ""
         if len(cells.place):
             steps, unreached, ended = self._refined(first.launch, held, response, cells)
+        if self.launches is not None:
+            self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
         now = held.now if steps else first.paths
         if steps:
             quiet = synthesize(now, radar)
@@ -214,6 +226,12 @@ class SceneRefinement:
             steps += 1
             ended = budget.ended(steps, self.stats, len(held))
         return steps, tuple(_unreached(cells, wanted)), ended
+
+
+def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
+    """Return batches of routes with those that `keep` (w,), over all of them, tells."""
+    ends = np.cumsum([0, *(len(b.kind) for b in batches)])
+    return [take(b, keep[i:j]) for b, i, j in zip(batches, ends, ends[1:], strict=False)]
 
 
 def _feeding(source: Sources, sums: Complexes, tolerance: float) -> tuple[Sources, Sources]:

@@ -58,9 +58,14 @@ class SourcedPaths:
         return sum(len(p.paths.length) for p in self._parts)
 
     @property
+    def counts(self) -> list[NDArray[np.bool_]]:
+        """Which trajectories (w,) of each launch count, in the order of the launches."""
+        return [p.state == _NOW for p in self._parts]
+
+    @property
     def now(self) -> Paths:
         """All paths, of the newest launch of each source."""
-        return join([of_trajectories(p.paths, p.state == _NOW) for p in self._parts])
+        return join([of_trajectories(p.paths, c) for p, c in zip(self._parts, self.counts, strict=True)])
 
     @property
     def doubtful(self) -> Paths:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,10 +112,10 @@ def _followed(
             if count + len(out.mirrors) > bounces or (wanted is not None and i not in wanted.outs):
                 continue
             twice = by_image & (not first or images.over(geometry, out))
-            for some, behind in ((own & ~twice, False), (own & twice, True)):
-                if not behind or geometry.has_layers:
-                    for routes in _returned(geometry, leg, out, tubes, some, first, behind, found):
-                        yield routes, depth, i
+            parts = [_returned(geometry, leg, out, tubes, own & ~twice, first, False, found)]
+            if geometry.has_layers:
+                parts.append(_returned(geometry, leg, out, tubes, own & twice, first, True, found))
+            yield from ((routes, depth, i) for routes in chain(*parts))
         if count >= bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth):
             return
         last = count + 1 >= bounces
