@@ -43,6 +43,8 @@ _SHALLOW = 0.02  # of a cell's power: of shallow tubes so much may stay as the f
 _DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
 _EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
+_SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unknown
+_LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
 _NAMED = 3  # cells that a line names
 
 
@@ -98,15 +100,38 @@ class First:
 @dataclass
 class _Cells:
     """Map cells that are or may become detections: `place` (c, 3), each range [m], rate [m/s] and amplitude; `level`
-    (c,), the sum of paths there; `change` (c, 2), by which shallow and deep tubes changed it last."""
+    (c,), the sum of paths there; `change` (c, 2), by which shallow and deep tubes changed it last, and `before` (c, 2)
+    the time before that (infinite: there was none)."""
 
     place: Floats
     level: Complexes
     change: Floats
+    before: Floats
+
+    @staticmethod
+    def of(place: Floats, level: Complexes) -> _Cells:
+        """Return cells that no launch has changed yet."""
+        return _Cells(place, level, np.zeros((len(place), 2)), np.full((len(place), 2), np.inf))
+
+    def changed(self, by: Complexes, wanted: Bools) -> None:
+        """Note changes (c, 2); wanted (c, 2) which were asked for, others being by the way."""
+        size = np.abs(by)
+        self.level += by.sum(axis=1)
+        self.before = np.where(wanted, np.where(self.change > 0.0, self.change, np.inf), self.before)
+        self.change = np.where(wanted, size, np.hypot(self.change, size))
+
+    @property
+    def slowness(self) -> Floats:
+        """By what factor (c, 2) the rest of a series of changes exceeds COVER times its last one, 1 to _SLOWEST.
+
+        Changes that shrink by q a step add up to q / (1 - q) times the last one.
+        """
+        q = np.minimum(self.change / self.before, 0.99)
+        return np.asarray(np.clip(q / (1.0 - q) / COVER, 1.0, _SLOWEST))
 
     def open(self, tolerance: float) -> Bools:
         """Return which classes of tubes (c, 2) must be refined for a tolerance (relative amplitude)."""
-        share = COVER * self.change / np.maximum(np.abs(self.level), 1e-300)[:, None]
+        share = COVER * self.slowness * self.change / np.maximum(np.abs(self.level), 1e-300)[:, None]
         over = np.hypot(share[:, 0], share[:, 1]) > tolerance
         largest = share >= share.max(axis=1, keepdims=True)
         return np.asarray(over[:, None] & ((share > _EITHER * tolerance) | largest) & (share > 0.0))
@@ -166,19 +191,17 @@ class SceneRefinement:
     def converged(self, first: First) -> Converged:
         """Return the paths of a scene, refined where cells of its map need it."""
         radar, window = replace(self.radar, noise=False), self.settings.range_window
-        quiet = synthesize(first.paths, radar)
+        rough = synthesize(first.paths, radar, tolerance=_LEVEL)
         held = SourcedPaths(first.paths, first.source)
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
-        cells = self._cells(quiet, response, first.paths)
+        cells = self._cells(rough, response, first.paths)
         steps, unreached, ended = 0, tuple[Unreached, ...](), ""
         if len(cells.place):
             steps, unreached, ended = self._refined(first.launch, held, response, cells)
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
         now = held.now if steps else first.paths
-        if steps:
-            quiet = synthesize(now, radar)
-        off = synthesize(held.doubtful, radar)
+        quiet, off = synthesize(now, radar), synthesize(held.doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
         return Converged(launched, others, self.model, first.chosen, steps, unreached, ended)
@@ -196,7 +219,7 @@ class SceneRefinement:
         fed = np.abs(level) ** 2 > _UNEXPLAINED * power
         place, level = place[fed], level[fed]
         place[:, 2] = np.abs(level)
-        return _Cells(place, level, np.zeros((len(place), 2)))
+        return _Cells.of(place, level)
 
     def _refined(
         self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: _Cells
@@ -220,11 +243,13 @@ class SceneRefinement:
                     new = self._paths(launch.again(rule.refinement, by, self.stats))
                     assert new is not None
                     changed += changes(response, *held.replace(*new, by), cells.place)
-            cells.level += changed.sum(axis=1)
-            cells.change = np.where(wanted, np.abs(changed), np.hypot(cells.change, np.abs(changed)))
+            cells.changed(changed, wanted)
             wanted = cells.open(tolerance)
             steps += 1
             ended = budget.ended(steps, self.stats, len(held))
+        for slow, classes in zip(cells.slowness, feeding, strict=True):
+            for factor, one in zip(slow, classes, strict=True):
+                held.doubt(one, float(factor))
         return steps, tuple(_unreached(cells, wanted)), ended
 
 
