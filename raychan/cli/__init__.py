@@ -68,7 +68,12 @@ def _version(wanted: bool) -> None:
 def _top(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
 ) -> None:
-    pass
+    from raychan.parallel import threads
+
+    try:
+        threads()
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 for command in (run, info, rcs, spectrogram, explain, view, validate):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import within
+from raychan.cli.options import Threads, within
 from raychan.cli.rcs_options import MOST_ANGLES, angles, can_be_polar, metres, writable
 from raychan.cli.rcs_output import csv_text, further_bounces, rows, table_of, uncertainties
 from raychan.world import limits
@@ -57,6 +57,7 @@ def rcs(
     max_bounces: Annotated[
         int, typer.Option(help="Most bounces along a path.", metavar="N", callback=within(limits.BOUNCES, True))
     ] = 3,
+    threads: Threads = None,
     unit: Annotated[str, typer.Option(help="Unit of the mesh file: m, cm, mm, inch, ft.")] = "m",
     up: Annotated[
         str | None, typer.Option(help="Axis of the file that points up; if not given, y for GLB and z for others.")

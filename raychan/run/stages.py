@@ -90,7 +90,8 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     Targets are steady here: only `simulate`, which knows their bodies, draws those that fluctuate.
     """
     SEED.check("seed", seed, whole=True)
-    return received(samples_of(paths, radar), paths, radar, seed)[0]
+    clean = samples_of(paths, radar)
+    return received(clean, paths, radar, seed, clean=clean)[0]
 
 
 def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler:

@@ -19,6 +19,7 @@ from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
 from raychan.world.build import body_of, material_of, scene_text
 from raychan.world.errors import SceneError, nearest
+from raychan.world.idle_keys import idle_keys
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
@@ -242,6 +243,7 @@ class Scene(Described):
     def warnings(self) -> list[str]:
         """Warnings: odd meshes, materials out of range, overlaps, bodies out of view, aliased targets."""
         said = [note for body in self.bodies for note in body.notes()]
+        said += idle_keys(self._given, self.materials, self.radar_table)
         used = {
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
         }

@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.frame import frame
+from bench.laser import laser
 from bench.measure import Row
 from bench.memory import memory
 from bench.rays import rays
@@ -28,7 +29,7 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, synthesis, phase_noise, scaling, frame, turbine, size, memory)
+    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, size, memory)
 }
 _ROOT = Path(__file__).parents[2]
 
