@@ -58,7 +58,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     It is refined where detections need it. A frame with bodies that turn, or with more paths than can be held, is
     launched twice instead, as a whole.
     """
-    check_demand(scene)
+    said = check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
     with clock.stage("geometry"):
         geometry, points = geometry_of(scene), scene.points(0.0)
@@ -67,8 +67,9 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     if not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)
         if channel is not None:
-            return channel
-    return _launched_twice(scene, geometry, points, model, clock)
+            return replace(channel, warnings=(*said, *channel.warnings))
+    channel = _launched_twice(scene, geometry, points, model, clock)
+    return replace(channel, warnings=(*said, *channel.warnings))
 
 
 def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel | None:

@@ -22,7 +22,6 @@ from raychan.run.realization import realized
 from raychan.run.received import notes, received
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
-from raychan.run.rules import check_demand
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.streams import Stage, stream
 from raychan.run.unmodelled import ledger
@@ -88,7 +87,6 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         stats=channel.stats | counts(known, tolerance),
         warnings=(
             *scene.warnings,
-            *check_demand(scene),
             *channel.launched.notes(),
             *channel.warnings,
             *heard,
@@ -105,7 +103,9 @@ def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, s
     turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
     others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
-    cube, said = received(quiet, paths, scene.radar, seed, others)
+    # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
+    clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
+    cube, said = received(quiet, paths, scene.radar, seed, others, clean)
     return cube, said + notes(scene.radar, launched.whole, turned is not None)
 
 

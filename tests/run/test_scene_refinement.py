@@ -39,17 +39,20 @@ def test_equal_runs_give_equal_bytes():
 def test_what_was_never_cut_is_in_the_error(monkeypatch):
     """Without any refinement the deep tubes' whole field is in doubt."""
     monkeypatch.setattr(scene_refinement.SceneRefinement, "_refined", lambda *_: (0, (), ""))
-    found = rc.simulate(scene_of(2))
-    bounced = [len(w.contributions[0].chain) > 1 and w.contributions[0].chain[0] != "ground" for w in found.provenance]
-    errors = np.where(found.detections.converged, found.detections.error_db, 99.0)
-    assert any(bounced) and (errors[bounced] > 3.0).all()
+    errors = []
+    for seed in range(6):
+        found = rc.simulate(scene_of(seed), tolerance_db=1.0)
+        met = [[b for b in w.contributions[0].chain if b != "ground"] for w in found.provenance if w.contributions]
+        stated = np.where(found.detections.converged, found.detections.error_db, 99.0)
+        errors += [e for e, bodies in zip(stated, met, strict=True) if len(bodies) > 1]
+    assert errors and min(errors) > 3.0
 
 
 @pytest.mark.parametrize(
     ("key", "value", "word"), [("max_rays", 1, "rays"), ("max_seconds", 0.0, "time"), ("max_memory_mb", 1.0, "memory")]
 )
 def test_a_budget_ends_refinement_and_is_told(key, value, word):
-    found = rc.simulate(scene_of(2, tolerance_db=0.01, **{key: value}))
+    found = rc.simulate(scene_of(2, tolerance_db=0.1, **{key: value}))
     assert found.stats["refinements"] == 1
     assert any(f"ended by the budget of {word} (model.{key})" in line for line in found.warnings)
 

@@ -83,7 +83,9 @@ def test_tracing_all_sources_again_by_the_same_rule_gives_the_same_samples(whole
         return synthesize(join([paths_of(b, facets, radar, radar.waveform.carrier) for b in batches]), radar).samples
 
     whole_before = samples([b for b in routes if (b.scatter >= 0).all()])
-    assert np.linalg.norm(samples(again) - whole_before) < 0.02 * np.linalg.norm(whole_before)
+    # What is weak is judged by what the whole launch had found in the end, so some tubes are cut less.
+    tolerance = 1.0 - 10.0 ** (-scene.model.tolerance_db / 20.0)
+    assert np.linalg.norm(samples(again) - whole_before) < tolerance * np.linalg.norm(whole_before)
 
 
 def test_uncut_deep_tubes_cost_fewer_rays(whole):
