@@ -122,6 +122,16 @@ def join(parts: list[Paths]) -> Paths:
     return dataclasses.replace(parts[0], **rows, trajectory=trajectory, trajectories=Trajectories(**trajectories))
 
 
+def of_trajectories(paths: Paths, keep: NDArray[np.bool_]) -> Paths:
+    """Return the paths of the trajectories (w,) to keep, in their order."""
+    rows, number = keep[paths.trajectory], np.cumsum(keep, dtype=np.int32) - 1
+    trajectories = Trajectories(
+        **{f.name: getattr(paths.trajectories, f.name)[keep] for f in dataclasses.fields(Trajectories)}
+    )
+    columns = {name: getattr(paths, name)[rows] for name in columns_of(paths)}
+    return dataclasses.replace(paths, **columns, trajectory=number[paths.trajectory[rows]], trajectories=trajectories)
+
+
 def strongest(paths: Paths, most: int) -> Paths:
     """Return the paths of the trajectories, `most` at most, that carry most power; in their order."""
     power = np.bincount(paths.trajectory, np.abs(paths.amplitude) ** 2, len(paths.trajectories.kind))
@@ -129,9 +139,4 @@ def strongest(paths: Paths, most: int) -> Paths:
         return paths
     keep = np.zeros(len(power), bool)
     keep[np.argsort(-power, kind="stable")[:most]] = True
-    rows, number = keep[paths.trajectory], np.cumsum(keep, dtype=np.int32) - 1
-    trajectories = Trajectories(
-        **{f.name: getattr(paths.trajectories, f.name)[keep] for f in dataclasses.fields(Trajectories)}
-    )
-    columns = {name: getattr(paths, name)[rows] for name in columns_of(paths)}
-    return dataclasses.replace(paths, **columns, trajectory=number[paths.trajectory[rows]], trajectories=trajectories)
+    return of_trajectories(paths, keep)

@@ -30,6 +30,14 @@ def layers(paths: Paths) -> NDArray[np.int64]:
     return np.asarray((paths.trajectories.kind == TRANSMIT).sum(axis=1))[paths.trajectory]
 
 
+def needed(paths: Paths, chosen: ModelChoice) -> NDArray[np.bool_]:
+    """Return which trajectories (w,) of paths the chosen mechanisms make."""
+    kind = paths.trajectories.kind
+    bounces, passed = ((kind > 0) & (kind != TRANSMIT)).sum(axis=1), (kind == TRANSMIT).sum(axis=1)
+    few = (bounces <= chosen.bounces) & (passed <= chosen.transmissions)
+    return np.asarray(few & (chosen.diffraction | ~(kind == DIFFRACT).any(axis=1)))
+
+
 def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> float:
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
     if not rows.any():

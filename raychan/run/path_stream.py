@@ -32,9 +32,14 @@ class Launched:
     sums: tuple[Any, Any] | None = None
     """Samples and profile response of all paths, where they are known already: always if `paths` are not all."""
 
+    known: Cube | None = None
+    """Samples of all paths, where only these are known already."""
+
     @cached_property
     def quiet(self) -> Cube:
         """The samples of all receivers and chirps, without noise."""
+        if self.known is not None:
+            return self.known
         if self.sums is None:
             return synthesize(self.paths, self.radar)
         return Cube(samples=self.sums[0].astype(np.complex64), noise_power=0.0)
@@ -61,7 +66,7 @@ class Launched:
         paths = self.paths
         trajectories = paths.trajectories.replace(vertices=(paths.trajectories.vertices + shift).astype(np.float32))
         there = paths.replace(trajectories=trajectories, tx=paths.tx + shift, rx=paths.rx + shift)
-        return replace(self, paths=there, sums=(self.quiet.samples, self.response))
+        return replace(self, paths=there, sums=(self.quiet.samples, self.response), known=None)
 
 
 class PathStream:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +59,15 @@ def fine_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
 def check_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
     """Return the prune rule of the launch that tells how wrong the fine one may be: coarser, on another lattice."""
     return _rule(radar, settings, model, _COARSER * model.tolerance_db, _JITTER)
+
+
+def step_rule(radar: Radar, settings: Any, model: Any, step: int, deep: bool = True) -> PruneRule:
+    """Return the prune rule of a launch half as coarse for each step, every other one on a lattice of its own.
+
+    Args: deep whether tubes are cut beyond their first surface.
+    """
+    rule = _rule(radar, settings, model, model.tolerance_db * 0.5**step, _JITTER * (step % 2))
+    return replace(rule, refinement=replace(rule.refinement, deep=deep))
 
 
 def _rule(radar: Radar, settings: Any, model: Any, tolerance_db: float, jitter: float) -> PruneRule:

@@ -12,7 +12,8 @@ import numpy as np
 from raychan.run.clock import Clock, Progress
 from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
-from raychan.run.simulate import Channel, channel_of, result_of
+from raychan.run.scene_channel import Channel, channel_of
+from raychan.run.simulate import result_of
 from raychan.run.storage import CONTENTS, columns_of, rows, save_result
 from raychan.world.geometry import geometry_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED

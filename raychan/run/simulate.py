@@ -1,70 +1,36 @@
-"""A run of a scene, stage by stage: geometry, two launches, samples, detections, and where each came from."""
+"""A run of a scene, stage by stage: its channel, samples, detections, and where each came from."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from raychan.parallel import run_pair
-from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
-from raychan.records import MIRROR, Cube, Detections, Facets, MapError, Points, RangeDoppler
+from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDoppler
 from raychan.run.clock import Clock, Progress
 from raychan.run.directions import beam_to
-from raychan.run.fluctuation import check
 from raychan.run.interferers import interference
 from raychan.run.labels import provenance
-from raychan.run.ledger import Entry, ModelChoice
-from raychan.run.mechanisms import choose
-from raychan.run.messages import counts, told, uncut
-from raychan.run.micro_doppler import retraced
-from raychan.run.path_stream import Launched, PathStream
+from raychan.run.ledger import Entry
+from raychan.run.messages import counts, told
+from raychan.run.path_stream import Launched
 from raychan.run.rate_spread import claimed, launch_share, motion, without
 from raychan.run.realization import realized
 from raychan.run.received import notes, received
-from raychan.run.receiver import detections_in, map_error, map_of, noise_of_beam, noise_of_cell, quiet_map
+from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
-from raychan.run.rules import asked, check_demand, check_rule, fine_rule
-from raychan.run.segments import Retraced, Traced
-from raychan.run.solver import Batch, solve_into
+from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.streams import Stage, stream
-from raychan.run.turning import carried_on, needed
 from raychan.run.unmodelled import ledger
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
-from raychan.tracing.settings import PruneRule
-from raychan.tracing.solver import Stats
-from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
 
 _BELOW = 0.3  # of the amplitude of a cell's noise, a dB of tolerance: what tubes that no launch cuts may bring
-
-
-@dataclass(frozen=True)
-class Channel:
-    """What the tracing of a scene gives: the same whatever the noise."""
-
-    geometry: Geometry
-    points: Points
-    launched: Launched
-    others: Launched
-    """The check launch, coarser and on another lattice: it tells how wrong the fine one may be."""
-    model: Any
-    """The scene's, with what was asked for and what mode = "auto" chose."""
-    chosen: ModelChoice | None
-    stats: dict[str, Any]
-    warnings: tuple[str, ...] = ()
-    turned: Retraced | None = None
-    """Samples of a frame that was traced more than once."""
-
-    @property
-    def quiet(self) -> Cube:
-        """The samples of the frame without noise, of steady targets and without clutter."""
-        return self.turned.cube if self.turned else self.launched.quiet
 
 
 def simulate(
@@ -84,60 +50,6 @@ def simulate(
     clock = Clock(progress)
     channel = channel_of(scene, tolerance_db, max_bounces, clock)
     return result_of(scene, channel, seed, clock)
-
-
-def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clock: Clock) -> Channel:
-    """Return the channel of a scene, from two launches; arguments and errors as those of `simulate`."""
-    check_demand(scene)
-    model, chosen = asked(scene.model, tolerance_db, max_bounces), None
-    radar, settings = scene.radar, scene.processing
-    with clock.stage("geometry"):
-        geometry, points = geometry_of(scene), scene.points(0.0)
-        beam_of(radar)
-    checked = check_rule(radar, settings, model)
-    launch = partial(_launch, geometry, points, radar, settings.range_window)
-
-    if model.mode == "auto":
-        # The check launch, with all mechanisms, tells which of them the fine one needs.
-        with clock.stage("check"):
-            others, more = launch(replace(checked, diffraction=True))
-            chosen = choose(others.paths, radar, settings, noise_of_beam(radar, settings), model.tolerance_db)
-            model = chosen.applied_to(model)
-    rule = fine_rule(radar, settings, model)
-    again = needed(scene, model.retrace, rule.refinement.max_edge)
-    routes: list[Batch] = []
-    with clock.stage("trace"):
-        fine = partial(launch, rule, progress=clock.tell, keep=routes.append if again else None)
-        if chosen:
-            launched, stats = fine()
-        else:
-            (launched, stats), (others, more) = run_pair(fine, lambda: launch(checked, heard=not again))
-    turned = None
-    if again:
-        check(scene, carried_on(scene, model.retrace))
-        with clock.stage("retrace"):
-            traced = Traced(launched.paths, tuple(routes))
-            turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
-    cost = {
-        "rays": stats.rays + more.rays + (turned.rays if turned else 0),
-        "tubes": stats.tubes,
-        "mirror_chains": stats.legs,
-        "tracings": len(turned.times) if turned else 1,
-        "tolerance_db": model.tolerance_db,
-    }
-    return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)
-
-
-def _launch(
-    geometry: Geometry, points: Points, radar: Radar, window: str, rule: PruneRule, heard: bool = False, **options: Any
-) -> tuple[Launched, Stats]:
-    """Return the paths of one launch; with `heard` their samples are made at once, beside another launch."""
-    stream = PathStream(radar, window)
-    stats = solve_into(stream.add, geometry, points, radar, radar.waveform.carrier, rule, **options)
-    launched = stream.done()
-    if heard:
-        _ = launched.quiet
-    return launched, stats
 
 
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
@@ -175,7 +87,6 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         stats=channel.stats | counts(known, tolerance),
         warnings=(
             *scene.warnings,
-            *check_demand(scene),
             *channel.launched.notes(),
             *channel.warnings,
             *heard,
@@ -192,7 +103,9 @@ def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, s
     turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
     others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
-    cube, said = received(quiet, paths, scene.radar, seed, others)
+    # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
+    clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
+    cube, said = received(quiet, paths, scene.radar, seed, others, clean)
     return cube, said + notes(scene.radar, launched.whole, turned is not None)
 
 

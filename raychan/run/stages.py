@@ -12,7 +12,9 @@ from raychan.records import Cube, Detections, Paths, RangeDoppler
 from raychan.run.received import received
 from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
+from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.solver import Batch
+from raychan.run.turning import needed
 from raychan.signal.baseband import synthesize as samples_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats, launch_routes
@@ -45,18 +47,23 @@ class SceneRoutes:
 def trace(
     scene: Scene, tolerance_db: float | None = None, max_bounces: int | None = None, check: bool = False
 ) -> SceneRoutes:
-    """Return the routes of a scene from its radar and back.
+    """Return the routes of a scene from its radar and back, refined where detections need it, as `simulate` does.
 
-    Args: tolerance_db [dB] and max_bounces override the scene's; check: those of the coarser launch on another lattice,
-    which `simulate` holds against the fine one to state its error.
-    With `model.mode = "auto"` all mechanisms of the scene are traced. Where bodies turn within a frame, `simulate`
-    traces several instants; these are the routes of its start.
+    Args: tolerance_db [dB] and max_bounces override the scene's; check: those of one launch, coarser and on another
+    lattice. Where bodies turn within a frame, `simulate` traces several instants; these are the routes of its start.
     Raises: ValueError on a tolerance or a number of bounces out of range.
     """
     model = asked(scene.model, tolerance_db, max_bounces)
-    rule = (check_rule if check else fine_rule)(scene.radar, scene.processing, model)
-    geometry, stats = geometry_of(scene), Stats()
-    batches = tuple(launch_routes(geometry, scene.points(0.0), rule, stats))
+    radar, settings, geometry, points = scene.radar, scene.processing, geometry_of(scene), scene.points(0.0)
+    rule = (check_rule if check else fine_rule)(radar, settings, model)
+    if not (check or needed(scene, model.retrace, rule.refinement.max_edge)):
+        stats, launches = Stats(), list[list[Batch]]()
+        refinement = SceneRefinement(geometry, points, radar, settings, model, lambda *_: None, stats, launches)
+        if (first := refinement.first()) is not None:
+            refinement.converged(first)
+            return SceneRoutes(geometry, rule, tuple(b for launch in launches for b in launch), stats)
+    stats = Stats()
+    batches = tuple(launch_routes(geometry, points, rule, stats))
     return SceneRoutes(geometry, rule, batches, stats)
 
 

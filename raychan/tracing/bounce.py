@@ -145,6 +145,8 @@ def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: 
     Args: mid (n,) facet that the centre ray meets after `ahead` (n,) [m], -1 for none.
     """
     geometry, out, found = step.geometry, step.out, step.found
+    if not step.rule.deep:
+        return np.zeros(len(tubes), bool)
     in_phase, _, length = _contribution_bounds(step, tubes)
     if step.last:
         # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.

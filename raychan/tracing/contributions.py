@@ -78,6 +78,12 @@ class Contributions:
         other._level = self._level.copy()
         return other
 
+    def frozen(self, budget: Budget) -> Contributions:
+        """Return the field found so far as what another launch, by the rule of its budget, starts from."""
+        other = Contributions(budget.rule, budget)
+        other._level = self._level.copy()
+        return other
+
     def _cell(self, length: Floats) -> NDArray[np.int64]:
         return np.asarray(np.maximum(length / self.rule.cell, 0.0), np.int64)
 

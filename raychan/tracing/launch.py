@@ -33,12 +33,19 @@ GAP_LEVELS = 1  # subdivisions of a hidden tube in search of a part that is seen
 
 
 def launch(
-    geometry: Geometry, leg: Leg, out: Leg, pieces: Bools, found: Contributions, more: bool, others: list[Leg]
+    geometry: Geometry,
+    leg: Leg,
+    out: Leg,
+    pieces: Bools,
+    found: Contributions,
+    more: bool,
+    others: list[Leg],
+    only: Bools | None = None,
 ) -> Iterator[Tubes]:
     """Yield, in batches, the tubes of first bounces that are seen over `leg`, fine enough for a return over `out`.
 
     Args: pieces (p,) which may carry a first bounce (those of the leg's own mirrors never do); found the field found so
-    far; more whether the tubes bounce again; others legs by which they may leave too.
+    far; more whether the tubes bounce again; others legs by which they may leave too; only (f,) facets to start on.
     """
     f = geometry.facets
     shape = f.vertices, f.normals, geometry.edge_curvature
@@ -46,6 +53,8 @@ def launch(
     allowed = pieces & (geometry.piece_role == SCATTERER)
     allowed[leg.pieces(geometry)] = False
     facet = seed_facets(geometry, leg, allowed)
+    if only is not None:
+        facet = facet[only[facet]]
     for part, bary in _bisect_for_phase(geometry, facet, shape, images, found, not more):
         part, bary = lit_parts(part, bary, *shape, geometry.both_sides, leg.image, leg.far)
         tubes = launch_tubes(geometry, leg, part, bary)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,16 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """What a further launch traces again: tubes that start on `facets` (f,), and of their routes those that scatter at
+    their bounce number `depth` and leave over one of `outs`, numbers of legs."""
+
+    facets: Bools
+    depth: int
+    outs: frozenset[int]
+
+
 def tube_routes(
     geometry: Geometry,
     leg: Leg,
@@ -35,23 +46,42 @@ def tube_routes(
     bounces: int,
     so_far: Contributions | None = None,
     first: Callable[[Tubes, Contributions], None] | None = None,
-    ins: list[Leg] | None = None,
 ) -> Iterator[Routes]:
     """Yield the routes of tubes launched over `leg`, one batch for each bounce and outgoing leg.
 
     Args: outs the outgoing legs, the direct one first; pieces (p,) that may carry the first bounce; bounces the most
     interactions, both legs counted; so_far contributions to prune against; first is given the tubes on their first
-    surface, whose own routes are then not yielded; ins all legs in, by default those out.
+    surface, whose own routes are then not yielded.
     """
-    direct = outs[0]
     found = so_far or Contributions(rule.for_depth(bounces))
-    more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone
-    images = _Images.of(geometry, outs if ins is None else ins, outs)
+    for routes, _, _ in numbered_routes(geometry, leg, (outs, outs), pieces, bounces, found, first):
+        yield routes
+
+
+def numbered_routes(
+    geometry: Geometry,
+    leg: Leg,
+    legs: tuple[list[Leg], list[Leg]],
+    pieces: Bools,
+    bounces: int,
+    found: Contributions,
+    first: Callable[[Tubes, Contributions], None] | None = None,
+    wanted: Wanted | None = None,
+) -> Iterator[tuple[Routes, int, int]]:
+    """Yield what `tube_routes` yields, with the number of the bounce at which the routes scatter, from 1 on, and that
+    of the leg over which they leave.
+
+    Args: legs in and out; wanted, if not all; else as for `tube_routes`.
+    """
+    ins, outs = legs
+    more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone and (wanted is None or wanted.depth > 1)
+    images = _Images.of(geometry, ins, outs)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
-    for tubes in launch(geometry, leg, direct, pieces, found, more, others):
+    only = None if wanted is None else wanted.facets
+    for tubes in launch(geometry, leg, outs[0], pieces, found, more, others, only):
         if first is not None:
             first(tubes, found)
-        yield from _followed(geometry, leg, outs, tubes, images, bounces, found, first is None)
+        yield from _followed(geometry, leg, outs, tubes, images, bounces, found, first is None, wanted)
 
 
 def _followed(
@@ -63,31 +93,36 @@ def _followed(
     bounces: int,
     found: Contributions,
     single: bool,
-) -> Iterator[Routes]:
-    """Yield the routes of tubes that stand on their first surface, and of all later bounces; without `single` those of
-    the first surface are left out."""
-    f, first = geometry.facets, True
+    wanted: Wanted | None,
+) -> Iterator[tuple[Routes, int, int]]:
+    """Yield the routes of tubes that stand on their first surface, and of all later bounces, numbered; without `single`
+    those of the first surface are left out."""
+    f, depth = geometry.facets, 1
     while len(tubes):
-        count = int(tubes.bounces[0])
+        first, count = depth == 1, int(tubes.bounces[0])
         # Mirrors such as the ground return by their exact foot points, not by tubes.
         own = f.role[f.body[tubes.facet]] != MIRROR
         by_image = images.returns(geometry, leg, tubes, first)
         # What returns by the leg that it came by counts first: the order of the others then does not matter.
-        every = sorted(outs, key=lambda out: out is not leg) if first else outs
-        for out in every if single or not first else []:
-            if count + len(out.mirrors) > bounces:
+        every = sorted(range(len(outs)), key=lambda i: outs[i] is not leg) if first else range(len(outs))
+        if (first and not single) or (wanted is not None and depth != wanted.depth):
+            every = []
+        for i in every:
+            out = outs[i]
+            if count + len(out.mirrors) > bounces or (wanted is not None and i not in wanted.outs):
                 continue
             twice = by_image & (not first or images.over(geometry, out))
-            yield from _returned(geometry, leg, out, tubes, own & ~twice, first, False, found)
+            parts = [_returned(geometry, leg, out, tubes, own & ~twice, first, False, found)]
             if geometry.has_layers:
-                yield from _returned(geometry, leg, out, tubes, own & twice, first, True, found)
-        if count >= bounces or geometry.convex_alone:
+                parts.append(_returned(geometry, leg, out, tubes, own & twice, first, True, found))
+            yield from ((routes, depth, i) for routes in chain(*parts))
+        if count >= bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth):
             return
         last = count + 1 >= bounces
         tubes = bounce(geometry, leg, outs[0], tubes, first, last, found)
         if first and len(tubes):
             tubes = tubes.take(~images.carry(geometry, tubes))
-        first = False
+        depth += 1
 
 
 def _returned(
@@ -147,6 +182,7 @@ def resolve_return_leg(
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
         matters = (ph.bound > found.prune_threshold(ph.length)) & (not found.budget.spent(geometry))
+        matters &= first or rule.deep
         # In a scene currents beyond the horizon are weak: their visibility is tested by their centres alone.
         tested = matters if which == LIT else matters & facing
         view = tube_visibility(geometry, out, tubes, tested, first, rule, level < GAP_LEVELS, facing_away=~facing)

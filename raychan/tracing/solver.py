@@ -9,18 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import MIRROR, REFLECT, TRANSMIT, DiffractedRoutes, Points, Routes
-from raychan.tracing.contributions import Contributions
+from raychan.tracing.contributions import Budget, Contributions
 from raychan.tracing.legs import Leg, legs_over, reachable
 from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
-from raychan.tracing.shooting import tube_routes
+from raychan.tracing.shooting import Wanted, numbered_routes
+from raychan.tracing.sources import EXACT, Sources, sources_of
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
+Batch = Routes | DiffractedRoutes
 
 # A launch beyond these limits cuts no more and says so.
 _TUBES = 10_000_000  # cut for phase: a quarter of a minute of one core; urban streets at 0.1 dB take a million
@@ -40,52 +42,111 @@ class Stats:
 
 def launch_routes(
     geometry: Geometry, points: Points, rule: PruneRule, stats: Stats, progress: Progress | None = None
-) -> Iterator[Routes | DiffractedRoutes]:
+) -> Iterator[Batch]:
     """Yield the routes of a scene from transmitter to receiver, batch by batch.
 
     Args: geometry, which serves many launches; points the targets given by their RCS; rule what may be left out; stats
     is filled; progress is told ("trace", share done).
     """
-    refined, bounces, before = rule.refinement, rule.bounces, geometry.rays
-    legs = legs_over(geometry, np.asarray(rule.position, float), bounces - 1, rule.beam)
-    outs = legs if rule.rx is None else legs_over(geometry, np.asarray(rule.rx, float), bounces - 1, rule.beam)
-    stats.legs = len(legs)
-    found = point_routes(geometry, points, legs, outs, bounces, refined.slots, refined.layers)
-    if found is not None:
-        yield found
-    if rule.diffraction and rule.rx is not None:
-        raise ValueError(
-            "diffraction is modelled for a receiver beside the transmitter only: model.diffraction = false"
-        )
-    if rule.diffraction:
-        over = diffracted_routes(geometry, points, legs[0].end, refined.wavenumber, refined.slots)
-        if over is not None:
-            yield over
-    if rule.rx is None:
-        found = _foot_points(geometry, legs, refined)
-    else:
-        found = _direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
-    if found is not None:
-        yield found
-    cuts = _CUTS + _CUTS_A_FACET * len(geometry.facets.vertices)
-    limited = replace(
-        refined.for_depth(bounces), max_tubes=min(refined.max_tubes, _TUBES), max_cuts=min(refined.max_cuts, cuts)
-    )
-    # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not matter.
-    direct = Contributions(limited)
-    for i, leg in enumerate(legs):
+    for routes, _ in Launch(geometry, points, rule).whole(stats, progress):
+        yield routes
+
+
+class Launch:
+    """The launches over one scene: the `whole`, and further ones of some of its tubes, cut finer.
+
+    Each route has a source (see `tracing.sources`).
+    """
+
+    def __init__(self, geometry: Geometry, points: Points, rule: PruneRule) -> None:
+        self.geometry, self.points, self.rule = geometry, points, rule
+        self.legs = legs_over(geometry, np.asarray(rule.position, float), rule.bounces - 1, rule.beam)
+        self.outs = self.legs
+        if rule.rx is not None:
+            self.outs = legs_over(geometry, np.asarray(rule.rx, float), rule.bounces - 1, rule.beam)
+        self._found: dict[int, Contributions] = {}
+
+    def whole(self, stats: Stats, progress: Progress | None = None) -> Iterator[tuple[Batch, Sources]]:
+        """Yield all routes, and their sources (n,), batch by batch."""
+        before = self.geometry.rays
+        for exact in self._exact():
+            yield exact, np.full(len(exact.kind), EXACT)
+        # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not
+        # matter.
+        direct = Contributions(self._limited(self.rule.refinement))
+        for i in range(len(self.legs)):
+            if progress:
+                progress("trace", i / len(self.legs))
+            self._found[i] = direct if i == 0 else direct.forked()
+            yield from self._over(i, self._found[i], stats)
+        self._finished(stats, before, direct.budget)
         if progress:
-            progress("trace", i / len(legs))
-        pieces = reachable(geometry, leg)
+            progress("trace", 1.0)
+
+    def again(
+        self, refinement: Refinement, launches: list[tuple[int, Wanted]], stats: Stats
+    ) -> Iterator[tuple[Batch, Sources]]:
+        """Yield the routes, and their sources (n,), of tubes traced again, cut by another refinement.
+
+        Args: launches numbers of legs in, and what is wanted there (see `tracing.sources`). What is too weak to be cut
+        is judged by what the whole launch found.
+        """
+        before, budget = self.geometry.rays, Budget(self._limited(refinement))
+        for i, wanted in launches:
+            yield from self._over(i, self._found[i].frozen(budget), stats, wanted)
+        self._finished(stats, before, budget)
+
+    def _over(
+        self, i: int, found: Contributions, stats: Stats, wanted: Wanted | None = None
+    ) -> Iterator[tuple[Routes, Sources]]:
+        leg, legs = self.legs[i], (self.legs, self.outs)
+        pieces = reachable(self.geometry, leg)
         if not pieces.any():
-            continue
-        so_far = direct if i == 0 else direct.forked()
-        for routes in tube_routes(geometry, leg, outs, pieces, refined, bounces, so_far, ins=legs):
+            return
+        numbered = numbered_routes(self.geometry, leg, legs, pieces, self.rule.bounces, found, wanted=wanted)
+        for routes, depth, out in numbered:
             stats.tubes += len(routes.kind)
-            yield routes
-    stats.rays, stats.uncut = geometry.rays - before, direct.budget.uncut
-    if progress:
-        progress("trace", 1.0)
+            yield routes, sources_of(routes, i, len(leg.mirrors), out, depth)
+
+    def _exact(self) -> Iterator[Batch]:
+        """Yield the routes that need no tubes: over points, wedges, the ground's foot points, and the direct ones."""
+        geometry, points, rule, refined = self.geometry, self.points, self.rule, self.rule.refinement
+        legs, outs = self.legs, self.outs
+        found: Batch | None = point_routes(geometry, points, legs, outs, rule.bounces, refined.slots, refined.layers)
+        if found is not None:
+            yield found
+        if rule.diffraction and rule.rx is not None:
+            raise ValueError(
+                "diffraction is modelled for a receiver beside the transmitter only: model.diffraction = false"
+            )
+        if rule.diffraction:
+            found = diffracted_routes(geometry, points, legs[0].end, refined.wavenumber, refined.slots)
+            if found is not None:
+                yield found
+        if rule.rx is None:
+            found = _foot_points(geometry, legs, refined)
+        else:
+            found = _direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
+        if found is not None:
+            yield found
+
+    def _limited(self, refined: Refinement) -> Refinement:
+        cuts = _CUTS + _CUTS_A_FACET * len(self.geometry.facets.vertices)
+        return replace(
+            refined.for_depth(self.rule.bounces),
+            max_tubes=min(refined.max_tubes, _TUBES),
+            max_cuts=min(refined.max_cuts, cuts),
+        )
+
+    def _finished(self, stats: Stats, before: int, budget: Budget) -> None:
+        stats.legs = len(self.legs)
+        stats.rays += self.geometry.rays - before
+        stats.uncut = _added(stats.uncut, budget.uncut)
+
+
+def _added(a: Ints, b: Ints) -> Ints:
+    n = max(len(a), len(b))
+    return np.pad(a, (0, n - len(a))) + np.pad(b, (0, n - len(b)))
 
 
 def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Routes | None:

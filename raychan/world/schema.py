@@ -17,6 +17,7 @@ from raychan.world.quantities import (
     Crease,
     Kelvin,
     Layers,
+    MemoryMb,
     Noise,
     Offsets,
     PadPair,
@@ -24,7 +25,9 @@ from raychan.world.quantities import (
     Place,
     Power,
     Ramp,
+    Rays,
     Rcs,
+    RunSeconds,
     Samples,
     Scale,
     Slots,
@@ -189,6 +192,12 @@ class Model(Table):
     max_bounces: Bounces = 3
     tolerance_db: Tolerance = 0.5
     max_transmissions: Layers = 4
+    max_rays: Literal["auto"] | Rays = "auto"
+    """Rays that a frame may cast to reach tolerance_db; auto: 2.5 times those of its first launch."""
+    max_seconds: RunSeconds | None = None
+    """Time after which refinement takes no further step."""
+    max_memory_mb: MemoryMb | None = None
+    """Memory of paths beyond which refinement takes no further step."""
     retrace: Literal["auto"] | Tracings = "auto"
     """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, and paths keep the
     range rates of the frame's start; more: all moving bodies are extrapolated between the tracings."""

@@ -164,10 +164,11 @@ _STOPPED = (
     _BESIDE
     + """
 import os, signal, sys
-import raychan.run.simulate, raychan.cli
+import raychan.run.scene_channel, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-raychan.run.simulate.solve_into = lambda *a, **k: launched(lambda: os.kill(os.getpid(), signal.SIGINT))
+raychan.run.scene_channel._refined = lambda *a: None
+raychan.run.scene_channel.solve_into = lambda *a, **k: launched(lambda: os.kill(os.getpid(), signal.SIGINT))
 sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
 """
 )
@@ -177,6 +178,21 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
     done = python(_STOPPED.format(scene=str(scene), out=str(tmp_path / "out")))
     assert (done.returncode, done.stdout) == (130, ""), done.stderr
     assert but_compiling(done.stderr) == "raychan: interrupted; nothing was written\n"
+    assert [p.name for p in tmp_path.iterdir()] == [scene.name]
+
+
+_STOPPED_IN_REFINEMENT = """
+import os, signal, sys
+import raychan.run.scene_refinement, raychan.cli
+signal.signal(signal.SIGINT, signal.default_int_handler)
+raychan.run.scene_refinement.changes = lambda *a: os.kill(os.getpid(), signal.SIGINT)
+sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
+"""
+
+
+def test_ctrl_c_within_refinement_ends_with_130_and_leaves_nothing(scene, tmp_path):
+    done = python(_STOPPED_IN_REFINEMENT.format(scene=str(scene), out=str(tmp_path / "out")))
+    assert (done.returncode, done.stdout) == (130, ""), done.stderr
     assert [p.name for p in tmp_path.iterdir()] == [scene.name]
 
 
@@ -198,11 +214,12 @@ _STOPPED_IN_C = (
     _BESIDE
     + """
 import ctypes, os, signal, time
-import raychan.run.simulate, raychan.cli
+import raychan.run.scene_channel, raychan.cli
 # A job in the background starts deaf to it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 stop = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))
-raychan.run.simulate.solve_into = lambda *a, **k: launched(lambda: (stop(), time.sleep(50)))
+raychan.run.scene_channel._refined = lambda *a: None
+raychan.run.scene_channel.solve_into = lambda *a, **k: launched(lambda: (stop(), time.sleep(50)))
 raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
 """
 )

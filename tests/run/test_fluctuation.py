@@ -6,7 +6,8 @@ from support.scene_texts import ISOTROPIC, upright, walker
 
 from raychan.run.clock import Clock
 from raychan.run.fluctuation import drawn, fluctuated, of_target
-from raychan.run.simulate import Channel, channel_of, result_of, simulate
+from raychan.run.scene_channel import Channel, channel_of
+from raychan.run.simulate import result_of, simulate
 from raychan.run.streams import Stage, stream
 from raychan.run.target_links import target_links
 from raychan.signal.baseband import synthesize

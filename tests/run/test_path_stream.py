@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.run import path_stream
+from raychan.run import path_stream, scene_channel
 from raychan.run.clock import Clock
 from raychan.run.path_stream import PathStream
 from raychan.run.rules import check_rule, fine_rule
-from raychan.run.simulate import channel_of, result_of
+from raychan.run.simulate import result_of
 from raychan.run.solver import solve_into
 
 RADAR = {"waveform": {"bandwidth_mhz": 500.0, "chirp_us": 30.0, "chirps": 32, "samples": 64}}
@@ -32,9 +32,10 @@ def streamed(of, channel, rule):
 
 
 @pytest.fixture
-def both():
+def both(monkeypatch):
     of = scene()
-    channel = channel_of(of, None, None, Clock(None))
+    monkeypatch.setattr(scene_channel, "_refined", lambda *_: None)  # as where there are too many paths to be held
+    channel = scene_channel.channel_of(of, None, None, Clock(None))
     rules = [rule(of.radar, of.processing, of.model) for rule in (fine_rule, check_rule)]
     launched, others = (streamed(of, channel, rule) for rule in rules)
     few = dataclasses.replace(channel, launched=launched, others=others)

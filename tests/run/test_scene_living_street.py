@@ -28,7 +28,8 @@ DETECTED = {t: (PUT[t]["range"], row["speed"]) for t, row in TABLE_13.items() if
 @pytest.fixture(scope="module", params=[1000, 4000])
 def run(request):
     scene = Scene.load(SCENE).override([f"radar.waveform.bandwidth_mhz={request.param}"])
-    return request.param, simulate(scene, seed=0)
+    # At the scene's own 1 dB ranges move by some millimetres, and hoop 1 stands on the bar.
+    return request.param, simulate(scene, seed=0, tolerance_db=0.5)
 
 
 def led_by(result, body):

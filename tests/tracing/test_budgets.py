@@ -17,7 +17,8 @@ from raychan.cli import app
 from raychan.run.clock import Clock
 from raychan.run.messages import uncut
 from raychan.run.rules import demand, fine_rule
-from raychan.run.simulate import channel_of, result_of
+from raychan.run.scene_channel import channel_of
+from raychan.run.simulate import result_of
 from raychan.run.single_body import facets_of
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.solver import Stats, launch_routes

@@ -1,0 +1,140 @@
+"""The channel of a scene: its paths from launches of tubes, and how wrong they may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from raychan.parallel import run_pair
+from raychan.radar.beam_table import beam_of
+from raychan.radar.radar import Radar
+from raychan.records import Cube, Points
+from raychan.run.clock import Clock
+from raychan.run.fluctuation import check
+from raychan.run.ledger import ModelChoice
+from raychan.run.mechanisms import choose
+from raychan.run.messages import uncut
+from raychan.run.micro_doppler import retraced
+from raychan.run.path_stream import Launched, PathStream
+from raychan.run.receiver import noise_of_beam
+from raychan.run.rules import asked, check_demand, check_rule, fine_rule
+from raychan.run.scene_refinement import SceneRefinement
+from raychan.run.segments import Retraced, Traced
+from raychan.run.solver import Batch, solve_into
+from raychan.run.turning import carried_on, needed
+from raychan.tracing.settings import PruneRule
+from raychan.tracing.solver import Stats
+from raychan.world.geometry import Geometry, geometry_of
+from raychan.world.scene import Scene
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What the tracing of a scene gives: the same whatever the noise."""
+
+    geometry: Geometry
+    points: Points
+    launched: Launched
+    others: Launched
+    """What the newest launches are held against, to tell how wrong they may be."""
+    model: Any
+    """The scene's, with what was asked for and what mode = "auto" chose."""
+    chosen: ModelChoice | None
+    stats: dict[str, Any]
+    warnings: tuple[str, ...] = ()
+    turned: Retraced | None = None
+    """Samples of a frame that was traced more than once."""
+
+    @property
+    def quiet(self) -> Cube:
+        """The samples of the frame without noise, of steady targets and without clutter."""
+        return self.turned.cube if self.turned else self.launched.quiet
+
+
+def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clock: Clock) -> Channel:
+    """Return the channel of a scene; arguments and errors as those of `simulate`.
+
+    It is refined where detections need it. A frame with bodies that turn, or with more paths than can be held, is
+    launched twice instead, as a whole.
+    """
+    said = check_demand(scene)
+    model = asked(scene.model, tolerance_db, max_bounces)
+    with clock.stage("geometry"):
+        geometry, points = geometry_of(scene), scene.points(0.0)
+        beam_of(scene.radar)
+    edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
+    if not needed(scene, model.retrace, edge):
+        channel = _refined(scene, geometry, points, model, clock)
+        if channel is not None:
+            return replace(channel, warnings=(*said, *channel.warnings))
+    channel = _launched_twice(scene, geometry, points, model, clock)
+    return replace(channel, warnings=(*said, *channel.warnings))
+
+
+def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel | None:
+    """Return the channel of a scene refined where detections need it; None where it has too many paths to be held."""
+    stats, radar = Stats(), scene.radar
+    refinement = SceneRefinement(geometry, points, radar, scene.processing, model, clock.tell, stats)
+    with clock.stage("trace"):
+        first = refinement.first()
+        if first is None:
+            return None
+        found = refinement.converged(first)
+    cost = _cost(stats, stats.rays, 1, found.model) | {"refinements": found.steps}
+    said = (*uncut(geometry, stats), *found.notes())
+    return Channel(geometry, points, found.launched, found.others, found.model, found.chosen, cost, said)
+
+
+def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel:
+    """Return the channel of a scene by a fine launch and a coarser one on another lattice, which tells its error."""
+    radar, settings, chosen = scene.radar, scene.processing, None
+    checked = check_rule(radar, settings, model)
+    launch = partial(_launch, geometry, points, radar, settings.range_window)
+
+    if model.mode == "auto":
+        # The check launch, with all mechanisms, tells which of them the fine one needs.
+        with clock.stage("check"):
+            others, more = launch(replace(checked, diffraction=True))
+            chosen = choose(others.paths, radar, settings, noise_of_beam(radar, settings), model.tolerance_db)
+            model = chosen.applied_to(model)
+    rule = fine_rule(radar, settings, model)
+    again = needed(scene, model.retrace, rule.refinement.max_edge)
+    routes: list[Batch] = []
+    with clock.stage("trace"):
+        fine = partial(launch, rule, progress=clock.tell, keep=routes.append if again else None)
+        if chosen:
+            launched, stats = fine()
+        else:
+            (launched, stats), (others, more) = run_pair(fine, lambda: launch(checked, heard=not again))
+    turned = None
+    if again:
+        check(scene, carried_on(scene, model.retrace))
+        with clock.stage("retrace"):
+            traced = Traced(launched.paths, tuple(routes))
+            turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
+    rays = stats.rays + more.rays + (turned.rays if turned else 0)
+    cost = _cost(stats, rays, len(turned.times) if turned else 1, model)
+    return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)
+
+
+def _cost(stats: Stats, rays: int, tracings: int, model: Any) -> dict[str, Any]:
+    return {
+        "rays": rays,
+        "tubes": stats.tubes,
+        "mirror_chains": stats.legs,
+        "tracings": tracings,
+        "tolerance_db": model.tolerance_db,
+    }
+
+
+def _launch(
+    geometry: Geometry, points: Points, radar: Radar, window: str, rule: PruneRule, heard: bool = False, **options: Any
+) -> tuple[Launched, Stats]:
+    """Return the paths of one launch; with `heard` their samples are made at once, beside another launch."""
+    stream = PathStream(radar, window)
+    stats = solve_into(stream.add, geometry, points, radar, radar.waveform.carrier, rule, **options)
+    launched = stream.done()
+    if heard:
+        _ = launched.quiet
+    return launched, stats

@@ -1,0 +1,285 @@
+"""A launch that converges: coarse first, then finer where detections need it.
+
+The first launch cuts tubes on their first surface for the tolerance, and deep tubes, those that bounced, not at all.
+The map of its paths tells which cells may become detections, and the sources of tubes that feed these. They are traced
+again, each time half as coarse, until the last change of a cell's level is within the tolerance, or a budget ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.error import COVER
+from raychan.channel.paths import join, nothing, of_trajectories, paths_of
+from raychan.columns import take
+from raychan.radar.radar import Radar
+from raychan.records import Cube, Paths, Points
+from raychan.run.ledger import ModelChoice
+from raychan.run.mechanisms import choose, needed
+from raychan.run.path_stream import MOST, Launched
+from raychan.run.point_spread import PointSpread
+from raychan.run.receiver import detections_in, map_of, noise_of_beam
+from raychan.run.refinement_budget import STEPS, Budget
+from raychan.run.rules import step_rule
+from raychan.run.sourced_paths import SourcedPaths, changes
+from raychan.run.streams import Stage, stream
+from raychan.signal.baseband import noisy, synthesize
+from raychan.tracing.solver import Batch, Launch, Stats
+from raychan.tracing.sources import EXACT, Sources, depth_of, launches
+from raychan.world.geometry import Geometry
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complexfloating]
+Bools = NDArray[np.bool_]
+
+_MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may bring above it
+_SHALLOW = 0.02  # of a cell's power: of shallow tubes so much may stay as the first launch has them, see `_feeding`
+_DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
+_EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
+_UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
+_SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unknown
+_LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
+_NAMED = 3  # cells that a line names
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """A cell that a budget left above the tolerance: range [m], rate [m/s], and whether it is `deep` tubes, those that
+    bounced, that change most."""
+
+    range: float
+    rate: float
+    deep: bool
+
+
+@dataclass(frozen=True)
+class Converged:
+    """What the launches brought: the paths of the newest; `others`, the same without the last change of each cell and
+    without deep tubes that were never cut: what they differ by is what may be wrong."""
+
+    launched: Launched
+    others: Launched
+    model: Any
+    chosen: ModelChoice | None
+    steps: int
+    unreached: tuple[Unreached, ...]
+    ended: str
+    """What ended the refinement before all cells were reached, '' where none was left."""
+
+    def notes(self) -> list[str]:
+        """Return a line on the cells that were not reached, and why."""
+        if not self.unreached:
+            return []
+        told = [
+            f"{u.range:.2f} m, {u.rate:+.2f} m/s ({'tubes that bounced' if u.deep else 'first surfaces'})"
+            for u in self.unreached[:_NAMED]
+        ]
+        more = f" and {len(self.unreached) - _NAMED} more" if len(self.unreached) > _NAMED else ""
+        return [
+            f"refined {self.steps} times, ended by {self.ended}: the level still changes by more than "
+            f"{self.model.tolerance_db:g} dB at {'; '.join(told)}{more}"
+        ]
+
+
+@dataclass(frozen=True)
+class First:
+    """The first launch: its paths, the source of each of their trajectories, and the mechanisms chosen by them."""
+
+    launch: Launch
+    paths: Paths
+    source: Sources
+    chosen: ModelChoice | None
+
+
+@dataclass
+class _Cells:
+    """Map cells that are or may become detections: `place` (c, 3), each range [m], rate [m/s] and amplitude; `level`
+    (c,), the sum of paths there; `change` (c, 2), by which shallow and deep tubes changed it last, and `before` (c, 2)
+    the time before that (infinite: there was none)."""
+
+    place: Floats
+    level: Complexes
+    change: Floats
+    before: Floats
+
+    @staticmethod
+    def of(place: Floats, level: Complexes) -> _Cells:
+        """Return cells that no launch has changed yet."""
+        return _Cells(place, level, np.zeros((len(place), 2)), np.full((len(place), 2), np.inf))
+
+    def changed(self, by: Complexes, wanted: Bools) -> None:
+        """Note changes (c, 2); wanted (c, 2) which were asked for, others being by the way."""
+        size = np.abs(by)
+        self.level += by.sum(axis=1)
+        self.before = np.where(wanted, np.where(self.change > 0.0, self.change, np.inf), self.before)
+        self.change = np.where(wanted, size, np.hypot(self.change, size))
+
+    @property
+    def slowness(self) -> Floats:
+        """By what factor (c, 2) the rest of a series of changes exceeds COVER times its last one, 1 to _SLOWEST.
+
+        Changes that shrink by q a step add up to q / (1 - q) times the last one.
+        """
+        q = np.minimum(self.change / self.before, 0.99)
+        return np.asarray(np.clip(q / (1.0 - q) / COVER, 1.0, _SLOWEST))
+
+    def open(self, tolerance: float) -> Bools:
+        """Return which classes of tubes (c, 2) must be refined for a tolerance (relative amplitude)."""
+        share = COVER * self.slowness * self.change / np.maximum(np.abs(self.level), 1e-300)[:, None]
+        over = np.hypot(share[:, 0], share[:, 1]) > tolerance
+        largest = share >= share.max(axis=1, keepdims=True)
+        return np.asarray(over[:, None] & ((share > _EITHER * tolerance) | largest) & (share > 0.0))
+
+
+@dataclass
+class SceneRefinement:
+    """The launches over one scene, for a radar and the settings of its processing."""
+
+    geometry: Geometry
+    points: Points
+    radar: Radar
+    settings: Any
+    model: Any
+    tell: Callable[[str, float], None]
+    stats: Stats
+    launches: list[list[Batch]] | None = None
+    """Where given, the routes of all launches are kept here."""
+
+    def first(self) -> First | None:
+        """Return the first launch; None where it brings more paths than can be held."""
+        auto = self.model.mode == "auto"
+        asked = self.model.model_copy(update={"diffraction": True}) if auto else self.model
+        launch = Launch(self.geometry, self.points, step_rule(self.radar, self.settings, asked, 0, deep=False))
+        batches = launch.whole(self.stats, lambda _, share: self.tell("trace", 0.5 * share))
+        found = self._paths(batches, MOST)
+        if found is None:
+            return None
+        paths, source = found
+        if not auto:
+            return First(launch, paths, source, None)
+        # The first launch, with all mechanisms, tells which of them are needed.
+        noise = noise_of_beam(self.radar, self.settings)
+        chosen = choose(paths, self.radar, self.settings, noise, self.model.tolerance_db)
+        self.model = chosen.applied_to(self.model)
+        keep = needed(paths, chosen)
+        if self.launches is not None:
+            self.launches[0] = counting(self.launches[0], keep)
+        return First(launch, of_trajectories(paths, keep), source[keep], chosen)
+
+    def _paths(self, batches: Iterator[tuple[Batch, Sources]], most: float = math.inf) -> tuple[Paths, Sources] | None:
+        """Return the paths of batches of routes, and the source of each trajectory; None where there are too many."""
+        parts, sources, count = [nothing(self.geometry.facets, self.radar)], [np.zeros(0, np.int64)], 0
+        kept: list[Batch] = []
+        for batch, source in batches:
+            count += len(source)
+            if count > most:
+                return None
+            if self.launches is not None:
+                kept.append(batch)
+            parts.append(paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier))
+            sources.append(source)
+        if self.launches is not None:
+            self.launches.append(kept)
+        return join(parts), np.concatenate(sources)
+
+    def converged(self, first: First) -> Converged:
+        """Return the paths of a scene, refined where cells of its map need it."""
+        radar, window = replace(self.radar, noise=False), self.settings.range_window
+        rough = synthesize(first.paths, radar, tolerance=_LEVEL)
+        held = SourcedPaths(first.paths, first.source)
+        response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
+        cells = self._cells(rough, response, first.paths)
+        steps, unreached, ended = 0, tuple[Unreached, ...](), ""
+        if len(cells.place):
+            steps, unreached, ended = self._refined(first.launch, held, response, cells)
+        if self.launches is not None:
+            self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
+        now = held.now if steps else first.paths
+        quiet, off = synthesize(now, radar), synthesize(held.doubtful, radar, tolerance=_LEVEL)
+        launched = Launched(now, len(now.length), radar, window, known=quiet)
+        others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
+        return Converged(launched, others, self.model, first.chosen, steps, unreached, ended)
+
+    def _cells(self, quiet: Cube, response: PointSpread, paths: Paths) -> _Cells:
+        """Return the cells of the map that are detections, or would be a little stronger."""
+        radar, settings = self.radar, self.settings
+        lower = replace(settings, pfa=math.sqrt(settings.pfa), min_snr_db=settings.min_snr_db - _MARGIN_DB)
+        rdmap = map_of(noisy(quiet, radar, stream(0, Stage.NOISE)), radar, settings)
+        at = np.unique(detections_in(rdmap, radar, lower).cell, axis=0)
+        place = np.stack([rdmap.range[at[:, 1]], rdmap.rate[at[:, 0]], np.zeros(len(at))], axis=1)
+        power = rdmap.power[at[:, 0], at[:, 1]] / radar.power
+        place[:, 2] = np.sqrt(power)
+        level = changes(response, paths, np.full(len(paths.trajectories.kind), EXACT), place).sum(axis=1)
+        fed = np.abs(level) ** 2 > _UNEXPLAINED * power
+        place, level = place[fed], level[fed]
+        place[:, 2] = np.abs(level)
+        return _Cells.of(place, level)
+
+    def _refined(
+        self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: _Cells
+    ) -> tuple[int, tuple[Unreached, ...], str]:
+        """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why."""
+        tolerance = 1.0 - 10.0 ** (-self.model.tolerance_db / 20.0)
+        own, sums = held.by_source(response, cells.place)
+        feeding = [_feeding(own, x, tolerance) for x in sums]
+        del sums
+        wanted = np.ones((len(cells.place), 2), bool)
+        budget, steps, ended = Budget(self.model, self.stats), 0, ""
+        while wanted.any() and not ended:
+            self.tell("trace", 0.5 + 0.5 * steps / STEPS)
+            changed = np.zeros((len(cells.place), 2), complex)
+            for deep in (0, 1):
+                some = [f[deep] for f, w in zip(feeding, wanted[:, deep], strict=True) if w]
+                if some and len(again := np.unique(np.concatenate(some))):
+                    # The first launch cut shallow tubes already: they are a step ahead.
+                    rule = step_rule(self.radar, self.settings, self.model, steps + 1 - deep)
+                    by = list(launches(again, len(self.geometry.facets.body)))
+                    new = self._paths(launch.again(rule.refinement, by, self.stats))
+                    assert new is not None
+                    changed += changes(response, *held.replace(*new, by), cells.place)
+            cells.changed(changed, wanted)
+            wanted = cells.open(tolerance)
+            steps += 1
+            ended = budget.ended(steps, self.stats, len(held))
+        for slow, classes in zip(cells.slowness, feeding, strict=True):
+            for factor, one in zip(slow, classes, strict=True):
+                held.doubt(one, float(factor))
+        return steps, tuple(_unreached(cells, wanted)), ended
+
+
+def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
+    """Return batches of routes with those that `keep` (w,), over all of them, tells."""
+    ends = np.cumsum([0, *(len(b.kind) for b in batches)])
+    return [take(b, keep[i:j]) for b, i, j in zip(batches, ends, ends[1:], strict=False)]
+
+
+def _feeding(source: Sources, sums: Complexes, tolerance: float) -> tuple[Sources, Sources]:
+    """Return the shallow and the deep sources that a cell's level depends on, of sums (s,) of its paths by source.
+
+    The weakest are left out: of the deep, as long as neither their sum nor their rms sum exceeds a share of the
+    tolerance; of the shallow, which the first launch has cut, as long as their rms sum is a small part of the level.
+    """
+    level, found = abs(sums.sum()), []
+    deep = depth_of(source) > 1
+    for mine, limit in ((~deep & (source != EXACT), math.sqrt(_SHALLOW)), (deep, _DEEP * tolerance)):
+        rows = np.flatnonzero(mine & (sums != 0.0))
+        rows = rows[np.argsort(np.abs(sums[rows]), kind="stable")]
+        small = np.sqrt(np.cumsum(np.abs(sums[rows]) ** 2)) <= limit * level
+        if limit < 1.0:
+            small &= np.abs(np.cumsum(sums[rows])) <= limit * level
+        keep = int(np.flatnonzero(small).max(initial=-1)) + 1
+        found.append(source[rows[keep:]])
+    return found[0], found[1]
+
+
+def _unreached(cells: _Cells, wanted: Bools) -> Iterator[Unreached]:
+    """Give the cells of which a class of tubes is still to be refined."""
+    for i in np.flatnonzero(wanted.any(axis=1)):
+        shallow, deep = cells.change[i]
+        yield Unreached(float(cells.place[i, 0]), float(cells.place[i, 1]), bool(deep > shallow))

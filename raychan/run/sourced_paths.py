@@ -1,0 +1,120 @@
+"""The paths of several launches over one scene, by the sources of their tubes: a finer launch replaces what it traces
+again, and what it replaced stays known, for the difference tells the error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.paths import join, of_trajectories
+from raychan.radar.dual_paths import scaled
+from raychan.records import Paths
+from raychan.run.point_spread import PointSpread
+from raychan.tracing.shooting import Wanted
+from raychan.tracing.sources import Sources, covered, depth_of
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complexfloating]
+
+DEEP = 2
+"""From this bounce on a tube is deep: the first launch does not cut it."""
+_SUMS = 1 << 21  # sums by cell and source held at once: bounds the memory
+_GONE, _BEFORE, _NOW = 0, 1, 2
+
+
+@dataclass
+class _Part:
+    """What one launch brought: paths, the source (w,) and the state (w,) of each trajectory; whether it cut deep tubes
+    (the first launch does not)."""
+
+    paths: Paths
+    source: Sources
+    state: NDArray[np.int8]
+    first: bool
+
+
+class SourcedPaths:
+    """The paths of a first launch, with the source (w,) of each trajectory, and of further ones that replace some."""
+
+    def __init__(self, paths: Paths, source: Sources) -> None:
+        self._parts = [_Part(paths, source, np.full(len(source), _NOW, np.int8), True)]
+        self._doubted = np.zeros(0, np.int64), np.zeros(0)
+
+    def replace(self, paths: Paths, source: Sources, launches: list[tuple[int, Wanted]]) -> tuple[Paths, Sources]:
+        """Replace what some launches traced again; return what this changes: the new paths and the old ones with their
+        sign turned, and the source (w,) of each trajectory."""
+        changed, sources = [paths], [source]
+        for part in self._parts:
+            hit = covered(part.source, launches)
+            old = hit & (part.state == _NOW)
+            changed.append(_negative(of_trajectories(part.paths, old)))
+            sources.append(part.source[old])
+            part.state[hit] = np.where(old[hit], _BEFORE, _GONE)
+        self._parts.append(_Part(paths, source, np.full(len(source), _NOW, np.int8), False))
+        return join(changed), np.concatenate(sources)
+
+    def doubt(self, source: Sources, factor: float) -> None:
+        """Count the last changes of sources (n,) times a factor; of several factors the largest counts."""
+        if factor > 1.0 and len(source):
+            every = np.concatenate([self._doubted[0], source])
+            own, at = np.unique(every, return_inverse=True)
+            factors = np.ones(len(own))
+            np.maximum.at(factors, at, np.concatenate([self._doubted[1], np.full(len(source), factor)]))
+            self._doubted = own, factors
+
+    def _factor(self, source: Sources) -> Floats:
+        own, factors = self._doubted
+        if not len(own):
+            return np.ones(len(source))
+        at = np.minimum(np.searchsorted(own, source), len(own) - 1)
+        return np.where(own[at] == source, factors[at], 1.0)
+
+    def __len__(self) -> int:
+        return sum(len(p.paths.length) for p in self._parts)
+
+    @property
+    def counts(self) -> list[NDArray[np.bool_]]:
+        """Which trajectories (w,) of each launch count, in the order of the launches."""
+        return [p.state == _NOW for p in self._parts]
+
+    @property
+    def now(self) -> Paths:
+        """All paths, of the newest launch of each source."""
+        return join([of_trajectories(p.paths, c) for p, c in zip(self._parts, self.counts, strict=True)])
+
+    @property
+    def doubtful(self) -> Paths:
+        """What the newest launches changed, times the factors of `doubt`, and the paths of deep tubes never cut."""
+        parts = []
+        for p in self._parts:
+            new = (p.state == _NOW) & (depth_of(p.source) >= DEEP if p.first else True)
+            for rows, sign in ((new, 1.0), (p.state == _BEFORE, -1.0)):
+                paths = of_trajectories(p.paths, rows)
+                parts.append(scaled(paths, sign * self._factor(p.source[rows])[paths.trajectory]))
+        return join(parts)
+
+    def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, list[Complexes]]:
+        """Return the sources (s,) of the first launch, and for each of the cells (c, 3) the sums (s,) of its paths
+        there."""
+        part = self._parts[0]
+        own, group = np.unique(part.source, return_inverse=True)
+        most, found = max(1, _SUMS // max(len(own), 1)), list[Complexes]()
+        for i in range(0, len(cells), most):
+            found.extend(_sums(response, part.paths, group, len(own), cells[i : i + most]))
+        return own, found
+
+
+def changes(response: PointSpread, paths: Paths, source: Sources, cells: Floats) -> Complexes:
+    """Return the sums (c, 2) in cells (c, 3) of paths, by the source (w,) of their trajectories: shallow, deep."""
+    return _sums(response, paths, (depth_of(source) >= DEEP).astype(np.int64), 2, cells)
+
+
+def _sums(response: PointSpread, paths: Paths, group: NDArray[np.int64], count: int, cells: Floats) -> Complexes:
+    rows = group[paths.trajectory]
+    return response.in_cells(rows, count, paths.amplitude, paths.delay, paths.range_rate, cells)[0]
+
+
+def _negative(paths: Paths) -> Paths:
+    return scaled(paths, np.full(len(paths.length), -1.0))

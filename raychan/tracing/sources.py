@@ -1,0 +1,69 @@
+"""Sources of tubes: numbers by which a further launch finds the tubes of earlier routes again, to cut them finer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.records import TRANSMIT, Routes
+from raychan.tracing.shooting import Wanted
+
+Ints = NDArray[np.signedinteger]
+Sources = NDArray[np.int64]
+
+EXACT = -1
+"""Source of routes that are not of tubes."""
+_LEG, _DEPTH, _FACET = 14, 4, 31  # bits of each of two legs, of the bounce, of the facet
+
+
+def sources_of(routes: Routes, leg: int, mirrors: int, out: int, depth: int) -> Sources:
+    """Return the source (n,) of each route of tubes: one number of the legs in and out, the bounce `depth` at which it
+    scatters, from 1 on, and the facet on which its tube starts.
+
+    Args: leg, out numbers of the legs; mirrors of the leg in.
+    """
+    surface = routes.kind != TRANSMIT
+    first = np.argmax(surface & (np.cumsum(surface, axis=1) == mirrors + 1), axis=1)
+    facet = routes.facet[np.arange(len(first)), first].astype(np.int64)
+    return np.asarray(((np.int64(leg) << _LEG | out) << _DEPTH | depth) << _FACET | facet)
+
+
+def depth_of(source: Sources) -> Ints:
+    """Return the bounce (n,) at which the tubes of each source scatter; 0 for exact routes."""
+    return np.where(source == EXACT, 0, (source >> _FACET) & ((1 << _DEPTH) - 1))
+
+
+def facet_of(source: Sources) -> Ints:
+    """Return the facet (n,) on which the tubes of each source start; -1 for exact routes."""
+    return np.where(source == EXACT, -1, source & ((1 << _FACET) - 1))
+
+
+def _legs_of(source: Sources) -> tuple[Ints, Ints]:
+    """Return the numbers of the legs (n,) in and out."""
+    return source >> (_LEG + _DEPTH + _FACET), (source >> (_DEPTH + _FACET)) & ((1 << _LEG) - 1)
+
+
+def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
+    """Give the launches that trace sources (n,) again: numbers of legs in, and what is wanted there, one depth each.
+
+    From each facet of a launch all its outgoing legs are traced: see `covered`.
+    """
+    own = source[source != EXACT]
+    (leg, out), depth = _legs_of(own), depth_of(own)
+    for i, d in np.unique(np.stack([leg, depth], axis=1), axis=0):
+        mine = (leg == i) & (depth == d)
+        wanted = np.zeros(facets, bool)
+        wanted[facet_of(own[mine])] = True
+        yield int(i), Wanted(wanted, int(d), frozenset(map(int, out[mine])))
+
+
+def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
+    """Tell which sources (n,) some launches trace again."""
+    found = np.zeros(len(source), bool)
+    (leg, out), depth, facet = _legs_of(source), depth_of(source), facet_of(source)
+    for i, wanted in by:
+        rows = np.flatnonzero((leg == i) & (depth == wanted.depth))
+        found[rows] |= wanted.facets[facet[rows]] & np.isin(out[rows], list(wanted.outs))
+    return found
