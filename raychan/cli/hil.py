@@ -31,7 +31,6 @@ _RATE = Limit(0.1, 50.0, "per second", "a satellite receiver tells its place 1 t
 _DURATION = Limit(0.0, 1e7, "s", "a run of months is a mistake", above=True)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _ORIGIN = "54.0,8.0"
-_EXTRA = "raychan hil needs pynmeagps and pyserial: pip install 'raychan[hil]'"
 _TRACK = (
     "utc", "t_s", "north_m", "east_m", "latitude_deg", "longitude_deg", "heading_deg", "roll_deg", "pitch_deg",
     "rudder_deg", "speed_mps",
@@ -132,12 +131,10 @@ def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: 
     """Return the channels on their ports, which `closing` closes. Raises: typer.BadParameter for a wrong port."""
     try:
         from raychan.hil.channel import Channel
-        from raychan.hil.ports import PortError, SerialPort, TerminalPort, without_extra
+        from raychan.hil.ports import PortError, SerialPort, TerminalPort
     except ModuleNotFoundError as error:  # fcntl, termios
         raise typer.BadParameter("raychan hil needs a system with pseudo-terminals, such as Linux") from error
 
-    if without_extra():
-        raise typer.BadParameter(_EXTRA)
     made = {}
     for name, device in names.items():
         speed = baud if name == "scanner" else nmea_baud

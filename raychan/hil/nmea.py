@@ -1,6 +1,6 @@
 """NMEA 0183 sentences of position (GGA, RMC), heading (HDT), attitude (PASHR, PTNTHTM) and rudder (RSA).
 
-Check sums and framing are by pynmeagps (extra `hil`), which is imported when used. Angles in degrees, time in UTC.
+Check sums and framing are by pynmeagps, which is imported when used. Angles in degrees, time in UTC.
 """
 
 from __future__ import annotations

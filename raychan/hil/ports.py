@@ -1,4 +1,4 @@
-"""Ends of serial lines: pseudo-terminals of our own, serial ports; the one place that imports pyserial (extra `hil`).
+"""Ends of serial lines: pseudo-terminals of our own, serial ports; the one place that imports pyserial.
 
 Nothing here waits: reading returns what is there, writing what fits.
 """
@@ -11,7 +11,6 @@ import select
 import struct
 import termios
 import tty
-from importlib.util import find_spec
 from typing import Any, NamedTuple, Protocol
 
 FIRST_RETRY, LAST_RETRY = 0.1, 2.0
@@ -49,11 +48,6 @@ class Port(Protocol):
     def set_baud(self, baud: int) -> None: ...  # noqa: D102
 
     def close(self) -> None: ...  # noqa: D102
-
-
-def without_extra() -> bool:
-    """Return whether a package of the extra `hil` is missing."""
-    return any(find_spec(name) is None for name in ("serial", "pynmeagps"))
 
 
 def open_port(name: str, baud: int, timeout: float = 1.0) -> Any:

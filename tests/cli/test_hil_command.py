@@ -258,12 +258,6 @@ def test_logged_poses_end_the_run_and_take_no_orders(tmp_path):
     assert json.loads((hil.out / "summary.json").read_text()) == numbers
 
 
-def test_without_the_extra_it_says_what_to_install(scene, capsys, monkeypatch):
-    monkeypatch.setattr("raychan.hil.ports.find_spec", lambda name: None)
-    assert invoke(["hil", scene]) == 2
-    assert "raychan[hil]" in capsys.readouterr().err
-
-
 def test_where_the_system_forbids_it_it_runs_as_an_ordinary_program(scene, capsys, monkeypatch):
     def refuse(*anything):
         raise PermissionError
