@@ -19,7 +19,7 @@ from raychan.run.interferers import interference
 from raychan.run.labels import provenance
 from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.mechanisms import choose
-from raychan.run.messages import counts, told, uncut
+from raychan.run.messages import counts, merged, told, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.rate_spread import claimed, launch_share, motion, without
@@ -92,7 +92,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     model, chosen = asked(scene.model, tolerance_db, max_bounces), None
     radar, settings = scene.radar, scene.processing
     with clock.stage("geometry"):
-        geometry, points = geometry_of(scene), scene.points(0.0)
+        geometry, points = geometry_of(scene, model.tolerance_db), scene.points(0.0)
         beam_of(radar)
     checked = check_rule(radar, settings, model)
     launch = partial(_launch, geometry, points, radar, settings.range_window)
@@ -125,7 +125,8 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         "tracings": len(turned.times) if turned else 1,
         "tolerance_db": model.tolerance_db,
     }
-    return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)
+    said = (*uncut(geometry, stats, more), *merged(geometry))
+    return Channel(geometry, points, launched, others, model, chosen, cost, said, turned)
 
 
 def _launch(
@@ -217,7 +218,11 @@ def _explained(
 def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:
     """Return how wrong the map may be: what the two launches differ by, and what no launch cuts."""
     below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(radar, settings)
-    turned = channel.turned
+    turned, simplified = channel.turned, channel.geometry.merged
+    if simplified:
+        # At each interaction the phase is off by this at most.
+        share = simplified.phase * channel.model.max_bounces
+        below = below + share**2 * quiet_map(channel.quiet.samples, radar, settings)
     if turned is None:
         return MapError(map_error(channel.quiet, channel.others.quiet, radar, settings).power + below)
     paths, others = channel.launched.paths, channel.others.paths

@@ -55,7 +55,7 @@ def trace(
     """
     model = asked(scene.model, tolerance_db, max_bounces)
     rule = (check_rule if check else fine_rule)(scene.radar, scene.processing, model)
-    geometry, stats = geometry_of(scene), Stats()
+    geometry, stats = geometry_of(scene, model.tolerance_db), Stats()
     batches = tuple(launch_routes(geometry, scene.points(0.0), rule, stats))
     return SceneRoutes(geometry, rule, batches, stats)
 
