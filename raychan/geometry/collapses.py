@@ -11,45 +11,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
+from raychan.geometry.half_edges import MOST, before, end_of, fan_of
 from raychan.geometry.patch_offsets import beyond, patch_offset
-from raychan.vectors import dot
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
-
-_MOST = 16  # facets around a vertex that may go: more are rare and slow (not measured)
-_SOFT = 1.0 - 1e-6  # cosine of corner normals across an edge from which it is smooth, as for `edge_folds`
 UPRIGHT = 0.9  # least cosine of a facet's plane normal to its corner normals: 26 deg; not measured
 SHAPE = 0.25  # least quality of new facets, 1 for equilateral ones, unless the old are worse; not measured
 # Of the limits, what a vertex that goes may be off its new facet: elsewhere on the facet the surface is off by more. It
 # trades facets that fail their check for facets left: at 0.25 an ellipsoid keeps 1.7 times as many (command not noted).
 _OWN = 0.5
-
-
-class Net(NamedTuple):
-    """A mesh that is being simplified: vertices v (k, 3) [m], normals n (3 m, 3) by corner of the original facets, and
-    by facet its vertices and corners (m, 3), -1 where it went; mate (3 m,) the half edge on the other side, -1 where
-    the smooth patch ends; half (k,) a half edge from each vertex; heir (m,) the facet in whose place one that went is
-    looked for; locked, gone (k,); reach (k,) [m] the longest edge that may come at each vertex."""
-
-    v: Floats
-    n: Floats
-    faces: Ints
-    corner: Ints
-    mate: Ints
-    half: Ints
-    heir: Ints
-    locked: Bools
-    gone: Bools
-    reach: Floats
-
-    def copied(self) -> Net:
-        """Return a net that can be changed by itself."""
-        return Net(self.v, self.n, *(x.copy() for x in self[2:]))
 
 
 class Limits(NamedTuple):
@@ -63,76 +34,20 @@ class Limits(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def mates(faces, n, part, fixed, count):  # type: ignore[no-untyped-def]
-    """Return the half edge (3 m,) on the other side of each, -1 where a smooth patch ends, and which vertices (count,)
-    lie inside one.
-
-    Args: faces (m, 3); n (m, 3, 3) corner normals; part (m,); fixed (m,) facets that stay as they are.
-    """
-    m = len(faces)
-    first = np.zeros(count + 1, np.int64)
-    for f in range(m):
-        for k in range(3):
-            first[faces[f, k] + 1] += 1
-    for a in range(count):
-        first[a + 1] += first[a]
-    fill, leaving = first[:-1].copy(), np.empty(3 * m, np.int32)
-    for h in range(3 * m):
-        a = faces[h // 3, h % 3]
-        leaving[fill[a]] = h
-        fill[a] += 1
-    mate, inside = np.full(3 * m, -1, np.int32), np.ones(count, np.bool_)
-    for h in range(3 * m):
-        f, k = h // 3, h % 3
-        a, b = faces[f, k], faces[f, (k + 1) % 3]
-        alike, found = 0, -1
-        for i in range(first[a], first[a + 1]):
-            g = leaving[i]
-            alike += faces[g // 3, (g % 3 + 1) % 3] == b
-        for i in range(first[b], first[b + 1]):
-            g = leaving[i]
-            if faces[g // 3, (g % 3 + 1) % 3] == a:
-                alike, found = alike + 1, g
-        if alike == 2 and found >= 0:
-            g, c = found // 3, found % 3
-            soft = dot(n[f, k], n[g, (c + 1) % 3]) > _SOFT and dot(n[f, (k + 1) % 3], n[g, c]) > _SOFT
-            if soft and part[f] == part[g] and not fixed[f] and not fixed[g]:
-                mate[h] = found
-        if mate[h] < 0:
-            inside[a], inside[b] = False, False
-    return mate, inside
-
-
-@njit(cache=True, nogil=True)
-def lock_pinched(net):  # type: ignore[no-untyped-def]
-    """Lock the vertices about which facets make no single closed fan; give each vertex a half edge."""
-    count = np.zeros(len(net.half), np.int64)
-    for f in range(len(net.faces)):
-        for k in range(3):
-            net.half[net.faces[f, k]] = 3 * f + k
-            count[net.faces[f, k]] += 1
-    fan = np.empty(_MOST, np.int32)
-    for a in range(len(net.half)):
-        if not net.locked[a]:
-            size = _fan(net, a, fan)
-            net.locked[a] = size == 0 or size != count[a]
-
-
-@njit(cache=True, nogil=True)
 def remove_vertices(net, limits, touched, turn, rows, slab):  # type: ignore[no-untyped-def]
     """Remove some vertices no two of which are neighbours, each to one of its three nearest; return how many.
 
-    Args: touched (k,) the last round in which each was beside one removed; turn the number of this round; rows
-    (r,) the vertices to try; slab (k,): only those go all of whose neighbours are in the same one, so that threads, each
-    with a slab of its own, never meet and their number does not change the result.
+    Args: touched (k,) the last round in which each was beside one removed; turn the number of this round; rows (r,) the
+    vertices to try; slab (k,): only those go all of whose neighbours are in the same one, so that threads, each with a
+    slab of its own, never meet and their number does not change the result.
     """
-    fan, order, own, count = np.empty(_MOST, np.int32), np.empty(_MOST), np.empty((2, 1, 3, 3)), 0
+    fan, order, own, count = np.empty(MOST, np.int32), np.empty(MOST), np.empty((2, 1, 3, 3)), 0
     for a in rows:
         if net.gone[a] or touched[a] == turn or net.reach[a] == 0.0:
             continue
-        m = _fan(net, a, fan)
+        m = fan_of(net, a, fan)
         for i in range(m):
-            b = _end(net, fan[i])
+            b = end_of(net, fan[i])
             order[i] = _squared(net.v[a], net.v[b])
             if slab[b] != slab[a]:
                 m = 0
@@ -142,7 +57,7 @@ def remove_vertices(net, limits, touched, turn, rows, slab):  # type: ignore[no-
             order[i] = np.inf
             if _allowed(net, a, fan, m, i, limits, own):
                 for j in range(m):
-                    touched[_end(net, fan[j])] = turn
+                    touched[end_of(net, fan[j])] = turn
                 _collapse(net, a, fan, m, i)
                 count += 1
                 break
@@ -150,37 +65,9 @@ def remove_vertices(net, limits, touched, turn, rows, slab):  # type: ignore[no-
 
 
 @njit(cache=True, forceinline=True)
-def _end(net, h):  # type: ignore[no-untyped-def]
-    """Return the vertex at which a half edge ends."""
-    return net.faces[h // 3, (h % 3 + 1) % 3]
-
-
-@njit(cache=True, forceinline=True)
-def _before(h):  # type: ignore[no-untyped-def]
-    """Return the half edge before this one in its facet."""
-    return h + 2 if h % 3 == 0 else h - 1
-
-
-@njit(cache=True, forceinline=True)
 def _squared(p, q):  # type: ignore[no-untyped-def]
     """Return the squared distance of two points."""
     return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
-
-
-@njit(cache=True, nogil=True)
-def _fan(net, a, out):  # type: ignore[no-untyped-def]
-    """Write the half edges that leave a vertex, in order, into out; return how many, 0 where they close no fan."""
-    start = net.half[a]
-    h, m = start, 0
-    while m < len(out):
-        out[m] = h
-        m += 1
-        h = net.mate[_before(h)]
-        if h < 0:
-            return 0
-        if h == start:
-            return m
-    return 0
 
 
 @njit(cache=True, nogil=True)
@@ -193,17 +80,17 @@ def _joined(net, a, b):  # type: ignore[no-untyped-def]
     start = net.half[a]
     h = start
     while True:
-        if _end(net, h) == b:
+        if end_of(net, h) == b:
             return True
-        h = net.mate[_before(h)]
+        h = net.mate[before(h)]
         if h < 0 or h == start:
             return h < 0
 
 
 @njit(cache=True, forceinline=True)
 def form(p, q, r, np_, nq, nr):  # type: ignore[no-untyped-def]
-    """Return the quality of a triangle, area over squared edges, 1 where equilateral, and the least cosine of its normal
-    to normals at its corners."""
+    """Return the quality of a triangle, area over squared edges, 1 where equilateral, and the least cosine of its
+    normal to normals at its corners."""
     x0, y0, z0 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     x1, y1, z1 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
     x, y, z = y0 * z1 - z0 * y1, z0 * x1 - x0 * z1, x0 * y1 - y0 * x1
@@ -228,9 +115,10 @@ def edge_allowed(net, a, b, na, nb, reach, limits):  # type: ignore[no-untyped-d
 
 @njit(cache=True, nogil=True)
 def _allowed(net, a, fan, m, i, limits, own):  # type: ignore[no-untyped-def]
-    """Tell whether vertex a, with m facets about it, may go to the end of its half edge i; own (2, 1, 3, 3) is written."""
+    """Tell whether vertex a, with m facets about it, may go to the end of its half edge i; own (2, 1, 3, 3) is
+    written."""
     v, n = own[0], own[1]
-    b = _end(net, fan[i])
+    b = end_of(net, fan[i])
     nb = net.n[net.corner[fan[i] // 3, (fan[i] % 3 + 1) % 3]]
     na = net.n[net.corner[fan[i] // 3, fan[i] % 3]]
     least, found = 1.0, False
@@ -270,7 +158,7 @@ def _worst(net, fan, m):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def _collapse(net, a, fan, m, i):  # type: ignore[no-untyped-def]
     """Move vertex a, with m facets about it, to the end of its half edge i: the two facets on that edge go."""
-    b, corner = _end(net, fan[i]), net.corner[fan[i] // 3, (fan[i] % 3 + 1) % 3]
+    b, corner = end_of(net, fan[i]), net.corner[fan[i] // 3, (fan[i] % 3 + 1) % 3]
     for step in range(1, m - 1):
         h = fan[(i + step) % m]
         net.faces[h // 3, h % 3], net.corner[h // 3, h % 3] = b, corner
@@ -278,7 +166,7 @@ def _collapse(net, a, fan, m, i):  # type: ignore[no-untyped-def]
         f = left // 3
         # Of a facet that goes the half edge to b, or from it, stays paired with that of its neighbour.
         outer = 3 * f + (left % 3 + 1) % 3
-        other = _before(left) if left == fan[i] else left
+        other = before(left) if left == fan[i] else left
         one, two = net.mate[outer], net.mate[other]
         if one >= 0:
             net.mate[one] = two

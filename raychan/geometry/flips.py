@@ -18,24 +18,28 @@ def flip_edges(net, limits, slab, mine):  # type: ignore[no-untyped-def]
     Args: slab (k,) part of the mesh of each vertex, as for `remove_vertices`; mine the part whose edges are flipped.
     """
     count = 0
-    for h in range(len(net.mate)):
-        f, k = h // 3, h % 3
-        a = net.faces[f, k]
-        if a < 0 or slab[a] != mine or net.mate[h] < h:
+    for f in range(len(net.faces)):
+        a, b, c = net.faces[f, 0], net.faces[f, 1], net.faces[f, 2]
+        if a < 0 or slab[a] != mine or slab[b] != mine or slab[c] != mine:
             continue
-        g, i = net.mate[h] // 3, net.mate[h] % 3
-        b, c, d = net.faces[f, (k + 1) % 3], net.faces[f, (k + 2) % 3], net.faces[g, (i + 2) % 3]
-        if slab[b] != mine or slab[c] != mine or slab[d] != mine or net.locked[c] or net.locked[d]:
-            continue
-        if _bends_wrongly(net, f, k, g, i) and _may_flip(net, f, k, g, i, limits):
-            _flip(net, f, k, g, i)
-            count += 1
+        for k in range(3):
+            other = net.mate[3 * f + k]
+            if other < 3 * f:
+                continue
+            g, i = other // 3, other % 3
+            c, d = net.faces[f, (k + 2) % 3], net.faces[g, (i + 2) % 3]
+            if slab[d] != mine or net.locked[c] or net.locked[d]:
+                continue
+            if _bends_wrongly(net, f, k, g, i) and _may_flip(net, f, k, g, i, limits):
+                _flip(net, f, k, g, i)
+                count += 1
+                break
     return count
 
 
 @njit(cache=True, forceinline=True)
 def _rise(net, f, i, g, j):  # type: ignore[no-untyped-def]
-    """Return eight times how far the surface lies over the chord from corner i of facet f to corner j of facet g [m]."""
+    """Return eight times how far the surface lies over the chord from corner i of facet f to corner j of g [m]."""
     p, q = net.v[net.faces[f, i]], net.v[net.faces[g, j]]
     a, b = net.n[net.corner[f, i]], net.n[net.corner[g, j]]
     return (q[0] - p[0]) * (b[0] - a[0]) + (q[1] - p[1]) * (b[1] - a[1]) + (q[2] - p[2]) * (b[2] - a[2])

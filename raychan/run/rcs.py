@@ -47,7 +47,7 @@ class Rcs:
     max_bounces is 1 and the body is not convex."""
 
     merged: str = ""
-    """What was merged of a finely tessellated mesh, '' for nothing: '327,680 facets merged into 7,956, deviation ...'."""
+    """What was merged of a finely tessellated mesh: '327,680 facets merged into 7,956, deviation 0.24 um'."""
 
     @property
     def converged(self) -> NDArray[np.bool_]:

@@ -21,8 +21,8 @@ from raychan.records import MIRROR, PEC, Facets
 from raychan.world.body import Body
 from raychan.world.inner_spheres import inner_spheres_of
 from raychan.world.ray_caster import RayCaster
-from raychan.world.schema import Model
 from raychan.world.scene_topology import SceneTopology, closed_pieces
+from raychan.world.schema import Model
 from raychan.world.simplified import Merged, traced_scene
 from raychan.world.static_geometry import StaticGeometry, columns, computed_once
 from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
@@ -259,10 +259,12 @@ class HasBodies(Protocol):
     def static_geometry(self) -> StaticGeometry | None: ...
     @property
     def _derived(self) -> dict[Any, Any]: ...
+
     bodies: tuple[Body, ...]
     frequency: float
     model: Model
     _static: dict[Any, Any]
+
     def facets(self) -> Facets: ...
 
 
@@ -270,7 +272,7 @@ def surface_at(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:
     """Return the geometry of a scene's bodies at time 0, for a tolerance [dB] (None: the scene's): finely tessellated
     smooth surfaces are simplified, unless the scene's model says otherwise."""
     of, merged = traced_scene(scene, tolerance_db)
-    return Geometry(of.facets(), of.topology, of.inner_spheres, of.static_geometry, merged=merged)
+    return Geometry(of.facets(), of.topology, of.inner_spheres, of.static_geometry, None, merged)
 
 
 def geometry_of(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:

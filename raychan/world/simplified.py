@@ -60,7 +60,8 @@ class Merged:
 
 @dataclass(frozen=True)
 class Traced:
-    """The mesh that is traced in place of another, and other surfaces it may stand for; merged None where it is itself."""
+    """The mesh that is traced in place of another, and other surfaces it may stand for; merged None where it is the
+    same."""
 
     mesh: Mesh
     alternatives: Alternatives
@@ -68,7 +69,7 @@ class Traced:
 
 
 def limits_of(wavenumber: float, tolerance_db: float, size: float) -> Limits:
-    """Return how far a simplified surface may be off for a tolerance [dB], by a wavenumber [rad/m] and size [m] of body.
+    """Return how far a simplified surface may be off for a tolerance [dB], a wavenumber [rad/m] and a size of body [m].
 
     A surface off by d changes the two-way phase by 2 k d, and an amplitude by that share of it at most: a tenth of the
     tolerance. A normal off by e moves the point at which a ray is reflected by e times the radius of curvature r at
@@ -85,8 +86,8 @@ def limits_of(wavenumber: float, tolerance_db: float, size: float) -> Limits:
 
 
 def traced_mesh(mesh: Mesh, wavenumber: float, tolerance_db: float) -> Simplified | None:
-    """Return the simplified mesh that is traced in place of a mesh, computed once for each tolerance [dB] and wavenumber
-    [rad/m]; None where the mesh itself is: where it has few facets, or no more than its shape asks for."""
+    """Return the simplified mesh that is traced in place of a mesh, computed once for each tolerance [dB] and
+    wavenumber [rad/m]; None where the mesh itself is: where it has few facets, or no more than its shape asks for."""
     return _kept(mesh, wavenumber, tolerance_db, None)
 
 

@@ -1,5 +1,5 @@
-"""Finely tessellated smooth surfaces are simplified, so that tracing costs what a body's shape asks for and not what its
-tessellation does.
+"""Finely tessellated smooth surfaces are simplified, so that tracing costs what a body's shape asks for and not what
+its tessellation does.
 
 Vertices inside smooth patches go as long as the curved facets (Nagata patches) through the rest stay near the curved
 facets of the whole mesh. Every vertex that goes, and the centre of every facet, is checked against them in place and
@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.collapses import Limits, Net, lock_pinched, mates, remove_vertices
+from raychan.geometry.collapses import Limits, remove_vertices
 from raychan.geometry.flips import flip_edges
+from raychan.geometry.half_edges import Net, lock_pinched, mates
 from raychan.geometry.patch_offsets import offsets
 from raychan.geometry.triangles import edge_curvatures
 from raychan.parallel import parallel_for
@@ -27,6 +28,10 @@ Bools = NDArray[np.bool_]
 _LONGEST = 0.3  # m: longest edge, that of the longest tubes (tracing.settings); a longer one saves nothing
 # Measured on a sphere, a torus and an ellipsoid of 160,000 to 330,000 facets at 0.05 to 0.5 dB (command not noted).
 _ROUNDS = 3  # between checks: more miss by more, fewer check more often; 5 leave up to 5 % more or fewer facets
+_MANY_ROUNDS = 5  # the same first, and where all points of the last check were nearer than
+_FAR = (
+    0.05  # of the limits: where all of the last check were nearer; edges double in five rounds, deviations grow by 16
+)
 _REDOS = 12  # of rounds that failed their check: where one fails once more, they are not taken
 _SHRINKS = 3  # of them, that allow shorter edges where a check failed; the others allow no new ones there
 _SHRINK = 0.4, 0.85  # least and largest factor on edges where a check failed
@@ -34,7 +39,7 @@ _ORDER = 3.0  # power of the edge with which curved facets deviate, at least (Na
 _ENOUGH = 0.9  # of the facets left by the rounds: with more, no others are tried
 _HALF = 0.5  # of the facets left at the end, or by the first rounds: with more it does not pay
 _SLABS = 4  # parts of the mesh that threads work on
-_FLIPS = 4  # passes of edge flips after them; not measured
+_FLIPS = 2  # passes of edge flips after them; not measured
 _BATCH = 8192  # facets whose centres are found at once: bounds memory
 
 
@@ -42,8 +47,8 @@ _BATCH = 8192  # facets whose centres are found at once: bounds memory
 class Simplified:
     """A simplified mesh.
 
-    Fields: mesh; corner (f, 3) from which corners 3 g + k of the whole mesh's facets g the facets' are; merged (f,) which
-    facets stand for several; deviation [m] largest distance of the whole mesh's curved surface from that of this one.
+    Fields: mesh; corner (f, 3) corners 3 g + k of facets g of the whole mesh that the facets have; merged (f,) which of
+    them stand for several; deviation [m] largest distance of the whole mesh's curved surface from that of this one.
     """
 
     mesh: Mesh
@@ -57,7 +62,7 @@ def simplify(mesh: Mesh, limits: Limits, fixed: Bools) -> Simplified | None:
 
     Args: fixed (f,) facets that stay as they are.
     """
-    net, rounds = _net(mesh, fixed), _Rounds(mesh, limits)
+    (net, height), rounds = _net(mesh, fixed), _Rounds(mesh, limits)
     check, deviation = _Check(net), 0.0
     live = len(mesh.faces)
     while True:
@@ -86,15 +91,23 @@ def simplify(mesh: Mesh, limits: Limits, fixed: Bools) -> Simplified | None:
         part_materials=mesh.part_materials,
     )
     # What is convex stays so, although facets may meet in grooves of micrometres.
-    coarse.__dict__["topology"] = replace(coarse.topology, convex=mesh.topology.convex)
+    coarse.__dict__["topology"] = replace(coarse.topology, convex=_convex(mesh, height))
     merged = (corner != 3 * rows[:, None] + np.arange(3)).any(axis=1)
     return Simplified(coarse, corner, merged, deviation)
 
 
-def _net(mesh: Mesh, fixed: Bools) -> Net:
-    """Return a mesh ready to be simplified: only vertices inside smooth patches, of facets not fixed, are not locked."""
+def _convex(mesh: Mesh, height: float) -> bool:
+    """Return whether a mesh is closed, of one piece and convex, as in `mesh_topology`, given by how far facets rise
+    over their neighbours' planes [m]: of k such pieces the vertices less half the facets are 2 k (Euler)."""
+    size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+    return height < 1e-9 * (1.0 + size) and 2 * len(mesh.vertices) - len(mesh.faces) == 4
+
+
+def _net(mesh: Mesh, fixed: Bools) -> tuple[Net, float]:
+    """Return a mesh ready to be simplified: only vertices inside smooth patches, of facets not fixed, are not locked;
+    and how far facets rise over their neighbours' planes [m]."""
     faces, count = np.array(mesh.faces, np.int32), len(mesh.vertices)
-    mate, inside = mates(faces, mesh.normals, mesh.part, fixed, count)
+    mate, inside, height = mates(mesh.vertices, faces, mesh.normals, mesh.part, fixed)
     n = len(faces)
     net = Net(
         v=mesh.vertices,
@@ -109,14 +122,14 @@ def _net(mesh: Mesh, fixed: Bools) -> Net:
         reach=np.full(count, _LONGEST),
     )
     lock_pinched(net)
-    return net
+    return net, float(height)
 
 
 class _Rounds:
     """Rounds of removals, numbered on, each on slabs of the mesh across another axis."""
 
     def __init__(self, mesh: Mesh, limits: Limits) -> None:
-        self.limits, self.turn = limits, 0
+        self.limits, self.turn, self.far = limits, 0, True
         self._touched = np.zeros(len(mesh.vertices), np.int32)
         self._slabs = []
         for place in mesh.vertices.T:
@@ -126,16 +139,18 @@ class _Rounds:
             self._slabs.append((slab, np.argsort(slab, kind="stable"), first))
 
     def checked(self, net: Net, check: _Check) -> tuple[Net, Ints, float] | None:
-        """Return the net after some rounds, the facet of each point of the check, and the deviation [m]; None where some
+        """Return the net after some rounds, the facet of each point of the check, and the deviation [m]; None where
         points stay off however often the rounds are done again. Edges that may come on the net are shortened."""
         for redo in range(_REDOS):
             now = net.copied()
-            for _ in range(_ROUNDS):
+            for _ in range(_MANY_ROUNDS if self.far else _ROUNDS):
                 self._remove(now)
             for _ in range(_FLIPS):
                 self._flip(now)
             facet, off, excess = check(now, self.limits)
-            if not excess.max(initial=0.0) > 1.0:
+            most = excess.max(initial=0.0)
+            if not most > 1.0:
+                self.far = most < _FAR
                 return now, facet, float(off.max(initial=0.0))
             if redo == 0 and np.count_nonzero(now.faces[:, 0] >= 0) > _HALF * len(now.faces):
                 # The first rounds of a mesh that is no finer than its shape asks for.
@@ -154,7 +169,6 @@ class _Rounds:
 
         parallel_for(_SLABS, some, 2)
 
-
     def _flip(self, net: Net) -> None:
         """Flip edges over which facets bend against the surface, in one pass."""
         self.turn += 1
@@ -168,8 +182,8 @@ class _Rounds:
 
 
 class _Check:
-    """Points of the whole mesh's curved surface, vertices that may go and the centres of facets, with its normals there;
-    facet (s,) of the simplified mesh on which each lies."""
+    """Points of the whole mesh's curved surface, vertices that may go and the centres of facets, with its normals
+    there; facet (s,) of the simplified mesh on which each lies."""
 
     def __init__(self, net: Net) -> None:
         n = net.n.reshape(-1, 3, 3)
@@ -178,7 +192,8 @@ class _Check:
             home[net.faces[:, k]] = np.arange(len(net.faces), dtype=np.int32)
             normal[net.faces[:, k]] = n[:, k]
         self.vertex = np.flatnonzero(~net.locked)
-        rows = np.flatnonzero(~net.locked[net.faces].all(axis=1)).astype(np.int32)
+        a, b, c = net.faces.T
+        rows = np.flatnonzero(~(net.locked[a] & net.locked[b] & net.locked[c])).astype(np.int32)
         self.facet = np.concatenate([home[self.vertex], rows])
         begin = len(self.vertex)
         self.place, self.normal = np.empty((len(self.facet), 3)), np.empty((len(self.facet), 3))
@@ -186,9 +201,9 @@ class _Check:
         for i in range(0, len(rows), _BATCH):
             some, at = rows[i : i + _BATCH], slice(begin + i, begin + i + _BATCH)
             v, corner_normals = net.v[net.faces[some]], n[some]
-            middle = corner_normals.sum(axis=1)
-            self.normal[at] = middle / np.linalg.norm(middle, axis=1, keepdims=True)
-            self.place[at] = v.mean(axis=1) - edge_curvatures(v, corner_normals)[0].sum(axis=1) / 9.0
+            middle, bend = _sum(corner_normals), _sum(edge_curvatures(v, corner_normals)[0])
+            self.normal[at] = middle / np.sqrt(np.einsum("ij,ij->i", middle, middle))[:, None]
+            self.place[at] = _sum(v) / 3.0 - bend / 9.0
 
     def __call__(self, net: Net, limits: Limits) -> tuple[Ints, Floats, Floats]:
         """Return the facet of each point, how far it is off [m], and how far off it is in place or normal over the
@@ -228,6 +243,11 @@ class _Check:
             np.minimum.at(net.reach, corners[:, k], reach)
         own = facet[: len(self.vertex)]
         net.reach[self.vertex] = np.minimum(net.reach[self.vertex], allowed[own])
+
+
+def _sum(corners: Floats) -> Floats:
+    """Return the sum (f, 3) of what facets (f, 3, 3) have at their corners."""
+    return np.asarray(corners[:, 0] + corners[:, 1] + corners[:, 2])
 
 
 def _followed(heir: Ints) -> Ints:
