@@ -29,11 +29,9 @@ _LONGEST = 0.3  # m: longest edge, that of the longest tubes (tracing.settings);
 # Measured on a sphere, a torus and an ellipsoid of 160,000 to 330,000 facets at 0.05 to 0.5 dB (command not noted).
 _ROUNDS = 3  # between checks: more miss by more, fewer check more often; 5 leave up to 5 % more or fewer facets
 _MANY_ROUNDS = 5  # the same first, and where all points of the last check were nearer than
-_FAR = (
-    0.05  # of the limits: where all of the last check were nearer; edges double in five rounds, deviations grow by 16
-)
-_REDOS = 12  # of rounds that failed their check: where one fails once more, they are not taken
-_SHRINKS = 3  # of them, that allow shorter edges where a check failed; the others allow no new ones there
+_FAR = 0.05  # of the limits: edges double in five rounds, and deviations grow by up to 16
+_REDOS = 16  # of rounds that failed their check: where one fails once more, they are not taken
+_SHRINKS = 10  # of them, that allow shorter edges where a check failed; the others allow no new ones there
 _SHRINK = 0.4, 0.85  # least and largest factor on edges where a check failed
 _ORDER = 3.0  # power of the edge with which curved facets deviate, at least (Nagata 2005)
 _ENOUGH = 0.9  # of the facets left by the rounds: with more, no others are tried
@@ -70,8 +68,6 @@ def simplify(mesh: Mesh, limits: Limits, fixed: Bools) -> Simplified | None:
         if found is None:
             break
         left = int(np.count_nonzero(found[0].faces[:, 0] >= 0))
-        if left > _HALF * len(mesh.faces):
-            return None
         net, check.facet, deviation = found
         if left > _ENOUGH * live:
             break
@@ -129,7 +125,7 @@ class _Rounds:
     """Rounds of removals, numbered on, each on slabs of the mesh across another axis."""
 
     def __init__(self, mesh: Mesh, limits: Limits) -> None:
-        self.limits, self.turn, self.far = limits, 0, True
+        self.limits, self.stage, self.turn, self.far = limits, 0, 0, True
         self._touched = np.zeros(len(mesh.vertices), np.int32)
         self._slabs = []
         for place in mesh.vertices.T:
@@ -141,27 +137,29 @@ class _Rounds:
     def checked(self, net: Net, check: _Check) -> tuple[Net, Ints, float] | None:
         """Return the net after some rounds, the facet of each point of the check, and the deviation [m]; None where
         points stay off however often the rounds are done again. Edges that may come on the net are shortened."""
+        self.stage += 1
         for redo in range(_REDOS):
             now = net.copied()
-            for _ in range(_MANY_ROUNDS if self.far else _ROUNDS):
-                self._remove(now)
-            for _ in range(_FLIPS):
-                self._flip(now)
+            # The same slabs in every redo, so that it differs only where edges were shortened.
+            for i in range(_MANY_ROUNDS if self.far else _ROUNDS):
+                self._remove(now, self.stage + i)
+            for i in range(_FLIPS):
+                self._flip(now, self.stage + i)
             facet, off, excess = check(now, self.limits)
             most = excess.max(initial=0.0)
             if not most > 1.0:
                 self.far = most < _FAR
                 return now, facet, float(off.max(initial=0.0))
-            if redo == 0 and np.count_nonzero(now.faces[:, 0] >= 0) > _HALF * len(now.faces):
-                # The first rounds of a mesh that is no finer than its shape asks for.
-                return None
+            if self.far:
+                self.far = False
+                continue
             check.shorten(net, now, facet, excess, redo < _SHRINKS)
         return None
 
-    def _remove(self, net: Net) -> None:
-        """Remove vertices, in one round."""
+    def _remove(self, net: Net, axis: int) -> None:
+        """Remove vertices in one round, by slabs across an axis."""
         self.turn += 1
-        slab, rows, first = self._slabs[self.turn % 3]
+        slab, rows, first = self._slabs[axis % 3]
 
         def some(slabs: slice) -> None:
             for i in range(slabs.start, slabs.stop):
@@ -169,10 +167,9 @@ class _Rounds:
 
         parallel_for(_SLABS, some, 2)
 
-    def _flip(self, net: Net) -> None:
-        """Flip edges over which facets bend against the surface, in one pass."""
-        self.turn += 1
-        slab = self._slabs[self.turn % 3][0]
+    def _flip(self, net: Net, axis: int) -> None:
+        """Flip edges over which facets bend against the surface in one pass, by slabs across an axis."""
+        slab = self._slabs[axis % 3][0]
 
         def some(slabs: slice) -> None:
             for i in range(slabs.start, slabs.stop):
