@@ -17,6 +17,7 @@ from raychan.units import C0
 from raychan.world.body import Body
 from raychan.world.creases import Alternatives, alternatives, uncertain_facets
 from raychan.world.mesh import Mesh
+from raychan.world.near_surfaces import near_surfaces
 from raychan.world.schema import Model
 from raychan.world.simplify import Simplified, simplify
 
@@ -29,6 +30,10 @@ _SHARE = 0.1  # of the tolerance, as amplitude: trades what the simplified surfa
 _COARSEST_DB = 1.0  # tubes are no coarser for a larger tolerance (tracing.settings)
 _TURN = 0.3  # rad: largest turn of the normal over a tube (tracing.settings)
 _SAGITTA = 0.125  # wavelengths that flat facets may lie under their curved ones: Rayleigh's criterion of smoothness
+# Of that sagitta, what flat facets must keep off other surfaces, at four points of each: flat facets that cross those of
+# another surface are found where they cross by less (shells of 0.3 to 2 mm; command not noted).
+_APART = 0.5
+_TRIES = 3  # of meshes with surfaces near each other; not measured
 _QUARTER = 0.25  # of turn times edge: the sagitta that it makes, at most
 
 
@@ -151,9 +156,23 @@ def _kept(mesh: Mesh, wavenumber: float, tolerance_db: float, fitted: Floats | N
         fixed = uncertain_facets(mesh)
         if fitted is not None:
             fixed = fixed | (_QUARTER * _moved(mesh, fitted) > limits.deviation)
-        mesh.memo[name] = simplify(mesh, limits, fixed)
+        mesh.memo[name] = _apart(mesh, limits, fixed)
     found: Simplified | None = mesh.memo[name]
     return found
+
+
+def _apart(mesh: Mesh, limits: Limits, fixed: Bools) -> Simplified | None:
+    """Return a simplified mesh whose flat facets keep off other surfaces: where one lies nearer to a facet than flat
+    facets may lie under their curved ones, its facets stay as they are."""
+    for _ in range(_TRIES):
+        found = simplify(mesh, limits, fixed)
+        if found is None:
+            return None
+        near = near_surfaces(found.mesh, _APART * limits.sag) & found.merged
+        if not near.any():
+            return found
+        fixed = fixed | near[found.home]
+    return None
 
 
 def _moved(mesh: Mesh, fitted: Floats) -> Floats:

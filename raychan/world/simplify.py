@@ -46,13 +46,15 @@ class Simplified:
     """A simplified mesh.
 
     Fields: mesh; corner (f, 3) corners 3 g + k of facets g of the whole mesh that the facets have; merged (f,) which of
-    them stand for several; deviation [m] largest distance of the whole mesh's curved surface from that of this one.
+    them stand for several; deviation [m] largest distance of the whole mesh's curved surface from that of this one;
+    home (n,) the facet on which the centre of each facet of the whole mesh lies.
     """
 
     mesh: Mesh
     corner: Ints
     merged: Bools
     deviation: float
+    home: Ints
 
 
 def simplify(mesh: Mesh, limits: Limits, fixed: Bools) -> Simplified | None:
@@ -89,7 +91,9 @@ def simplify(mesh: Mesh, limits: Limits, fixed: Bools) -> Simplified | None:
     # What is convex stays so, although facets may meet in grooves of micrometres.
     coarse.__dict__["topology"] = replace(coarse.topology, convex=_convex(mesh, height))
     merged = (corner != 3 * rows[:, None] + np.arange(3)).any(axis=1)
-    return Simplified(coarse, corner, merged, deviation)
+    number = np.zeros(len(mesh.faces), np.int32)
+    number[rows] = np.arange(len(rows))
+    return Simplified(coarse, corner, merged, deviation, number[check.home()])
 
 
 def _convex(mesh: Mesh, height: float) -> bool:
@@ -192,7 +196,7 @@ class _Check:
         a, b, c = net.faces.T
         rows = np.flatnonzero(~(net.locked[a] & net.locked[b] & net.locked[c])).astype(np.int32)
         self.facet = np.concatenate([home[self.vertex], rows])
-        begin = len(self.vertex)
+        self._rows, self._count, begin = rows, len(net.faces), len(self.vertex)
         self.place, self.normal = np.empty((len(self.facet), 3)), np.empty((len(self.facet), 3))
         self.place[:begin], self.normal[:begin] = net.v[self.vertex], normal[self.vertex]
         for i in range(0, len(rows), _BATCH):
@@ -218,6 +222,12 @@ class _Check:
 
         parallel_for(len(facet), some)
         return facet, off, np.maximum(off / limits.deviation, turned / limits.normal)
+
+    def home(self) -> Ints:
+        """Return the facet (n,) on which the centre of each facet of the whole mesh lies."""
+        out = np.arange(self._count, dtype=np.int32)
+        out[self._rows] = self.facet[len(self.vertex) :]
+        return out
 
     def shorten(self, net: Net, failed: Net, facet: Ints, excess: Floats, some: bool) -> None:
         """Shorten the edges that may come on a net where facets of what became of it failed.
