@@ -163,10 +163,10 @@ def _launched(case: Case, rules: list[Refinement], ring: float) -> _Launches:
 
 
 def _off_by_merging(geometry: Geometry, by_bounce: Complexes) -> float:
-    """Return the error [m] of an amplitude, given by bounces, due to facets that were merged: each bounce is off by
-    their phase at most."""
-    phase = geometry.merged.phase if geometry.merged else 0.0
-    return phase * float(np.arange(1, len(by_bounce) + 1) @ np.abs(by_bounce))
+    """Return the error [m] of an amplitude, given by bounces, due to facets that were merged."""
+    if geometry.merged is None:
+        return 0.0
+    return float(geometry.merged.share(np.arange(1, len(by_bounce) + 1)) @ np.abs(by_bounce))
 
 
 def refinements(

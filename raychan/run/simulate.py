@@ -220,8 +220,7 @@ def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:
     below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(radar, settings)
     turned, simplified = channel.turned, channel.geometry.merged
     if simplified:
-        # At each interaction the phase is off by this at most.
-        share = simplified.phase * channel.model.max_bounces
+        share = simplified.share(channel.model.max_bounces)
         below = below + share**2 * quiet_map(channel.quiet.samples, radar, settings)
     if turned is None:
         return MapError(map_error(channel.quiet, channel.others.quiet, radar, settings).power + below)

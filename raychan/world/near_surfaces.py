@@ -18,8 +18,8 @@ _FREQUENCY = 77e9  # Hz: any does, no wave is traced
 
 
 def near_surfaces(mesh: Mesh, distance: float) -> Bools:
-    """Return which facets (f,) have another surface of the mesh within a distance [m] over or under them, and those that
-    are this surface; tested at four points of each facet, across its plane."""
+    """Return which facets (f,) have another surface of the mesh within a distance [m] over or under them, or are it;
+    tested at four points of each facet, across its plane."""
     n = len(mesh.faces)
     caster = RayCaster(_facets(mesh))
     normal, _ = planes_of(mesh.corners)
