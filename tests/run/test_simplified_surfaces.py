@@ -78,3 +78,14 @@ def test_stages_and_run_trace_the_same_surface():
     routes = rc.trace(made, tolerance_db=1.0)
     assert len(routes.geometry.facets.body) == len(rc.trace(made, tolerance_db=1.0).geometry.facets.body)
     assert len(routes.geometry.facets.body) < 0.5 * 2 * 81_920
+
+
+def test_the_ledger_tells_what_smoothing_the_whole_mesh_changes_not_what_its_merged_facets_would():
+    body = rc.Body(name="ball", mesh=ball(6, known=False), position=(8.0, 0.3, 1.0))
+    entries = []
+    for simplify in (True, False):
+        made = scene(simplify, tolerance_db=1.0)
+        one = rc.Scene(bodies=[body], radar=made.radar_table, model=made.model)
+        entries.append(rc.simulate(one).ledger["tessellation"])
+    assert entries[0].how == entries[1].how
+    assert entries[0].level_db == pytest.approx(entries[1].level_db, abs=0.5)
