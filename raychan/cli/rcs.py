@@ -118,6 +118,7 @@ def rcs(
         from raychan.world.mesh_io import oddities
 
         show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
+    show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
     show.warn(further_bounces(found, max_bounces, tolerance))
     show.warn(uncertainties(mesh, found, tolerance))
     if files:
@@ -197,4 +198,6 @@ def _sweep(mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, A
             raise typer.BadParameter(str(error)) from error
         done += len(some)
         tell("rcs", done / len(az))
-    return Rcs(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Rcs)))
+    columns = {f.name: [getattr(p, f.name) for p in parts] for f in fields(Rcs)}
+    merged = columns.pop("merged")[0]
+    return Rcs(**{name: np.concatenate(found) for name, found in columns.items()}, merged=merged)

@@ -99,6 +99,11 @@ def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
     )
 
 
+def merged(geometry: Geometry) -> tuple[str, ...]:
+    """Return a line if facets were merged, with the deviation of the surface."""
+    return (f"smooth surfaces: {geometry.merged} (model.simplify)",) if geometry.merged else ()
+
+
 def notes(result: Result) -> list[str]:
     """Return the lines below a result's table; its warnings contain them too."""
     return noted(result.detections, float(result.stats.get("tolerance_db", math.inf)), result.ledger)

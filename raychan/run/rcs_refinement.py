@@ -149,7 +149,7 @@ def _launched(case: Case, rules: list[Refinement], ring: float) -> _Launches:
             first = value
         else:
             change = abs(value - before)
-            shared = curved * rule.phase * abs(value) + ring
+            shared = curved * rule.phase * abs(value) + ring + _off_by_merging(geometry, by_bounce)
             off = cover * (change + shared)
             spent = (case.rays - rays) * _GROWTH > max_rays
             # In a null of this polarisation nothing is left to find.
@@ -160,6 +160,13 @@ def _launched(case: Case, rules: list[Refinement], ring: float) -> _Launches:
                 break
         before = value
     return _Launches(first, value, off, by_bounce, s.sum(axis=0))
+
+
+def _off_by_merging(geometry: Geometry, by_bounce: Complexes) -> float:
+    """Return the error [m] of an amplitude, given by bounces, due to facets that were merged."""
+    if geometry.merged is None:
+        return 0.0
+    return float(geometry.merged.share(np.arange(1, len(by_bounce) + 1)) @ np.abs(by_bounce))
 
 
 def refinements(

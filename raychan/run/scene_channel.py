@@ -14,7 +14,7 @@ from raychan.run.clock import Clock
 from raychan.run.fluctuation import check
 from raychan.run.ledger import ModelChoice
 from raychan.run.mechanisms import choose
-from raychan.run.messages import uncut
+from raychan.run.messages import merged, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.receiver import noise_of_beam
@@ -61,8 +61,9 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     said = check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
     with clock.stage("geometry"):
-        geometry, points = geometry_of(scene), scene.points(0.0)
+        geometry, points = geometry_of(scene, model.tolerance_db), scene.points(0.0)
         beam_of(scene.radar)
+    said += merged(geometry)
     edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
     if not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)

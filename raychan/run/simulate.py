@@ -130,7 +130,10 @@ def _explained(
 def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:
     """Return how wrong the map may be: what the two launches differ by, and what no launch cuts."""
     below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(radar, settings)
-    turned = channel.turned
+    turned, simplified = channel.turned, channel.geometry.merged
+    if simplified:
+        share = simplified.share(channel.model.max_bounces)
+        below = below + share**2 * quiet_map(channel.quiet.samples, radar, settings)
     if turned is None:
         return MapError(map_error(channel.quiet, channel.others.quiet, radar, settings).power + below)
     paths, others = channel.launched.paths, channel.others.paths

@@ -177,7 +177,7 @@ def _tessellation(
     paths: Paths, geometry: Geometry, bodies: Collection[Body], radar: Radar, settings: Any, weakest: float
 ) -> Entry:
     """Return the entry of smoothed facets: the change of the strongest echo if they are flat."""
-    estimated = {b.name for b in bodies if b.geometry.crease_deg is not None}
+    estimated = {b.name: b.geometry for b in bodies if b.geometry.crease_deg is not None}
     if not estimated:
         return Entry(NOTHING, "exact", "no body has estimated normals")
     name, phase, changed = strongest_bend(paths, geometry, estimated, radar, settings)

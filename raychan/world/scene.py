@@ -95,7 +95,7 @@ class Scene(Described):
         # What `geometry_of` derives from the bodies at time 0, by class; shared by scenes with the same bodies.
         self._derived: dict[Any, Any] = {}
         # Cache of the static bodies' geometry, shared by this scene at all times.
-        self._static: dict[type, StaticGeometry | None] = {}
+        self._static: dict[Any, Any] = {}
         try:
             self._prepare()
         except SceneError as e:

@@ -208,6 +208,8 @@ class Model(Table):
     by Lambert's law; off: none."""
     diffraction: bool = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
+    simplify: bool = True
+    """Trace finely tessellated smooth surfaces by fewer facets, as near to them as tolerance_db asks for."""
 
 
 class BodyTable(Table):

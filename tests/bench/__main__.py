@@ -16,6 +16,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from bench.fine import fine
 from bench.frame import frame
 from bench.laser import laser
 from bench.measure import Row
@@ -30,7 +31,7 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, memory)
+    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, fine, memory)
 }
 _ROOT = Path(__file__).parents[2]
 
