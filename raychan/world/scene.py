@@ -182,13 +182,8 @@ class Scene(Described):
 
     def _prepare(self) -> None:
         """Check everything once: a scene that exists can be simulated."""
-        seen: set[str] = set()
+        checks.names_differ(self.bodies)
         for body in self.bodies:
-            if body.name in seen:
-                raise SceneError(
-                    "two bodies have this name", key=f"bodies.{body.name}", allowed="a different name for each"
-                )
-            seen.add(body.name)
             try:
                 self._chosen(body)
                 _ = body.motion, body.resolved_role, body.fluctuates
