@@ -34,6 +34,7 @@ _SHARE = 0.5  # of the memory that a run may take
 _MOST = 64e9  # bytes a run may take at most
 _LONG = 60.0  # s from which the time is announced
 _CGROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+_COARSE = 3.0  # times half the noise: a corner of three faces returns by six tubes, some 10 times the noise if detected
 _COARSER = 3.0  # times the tolerance: the check launch
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
@@ -61,13 +62,16 @@ def check_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
     return _rule(radar, settings, model, _COARSER * model.tolerance_db, _JITTER)
 
 
-def step_rule(radar: Radar, settings: Any, model: Any, step: int, deep: bool = True) -> PruneRule:
-    """Return the prune rule of a launch half as coarse for each step, every other one on a lattice of its own.
+def first_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
+    """Return the prune rule of the launch that tells what feeds detections: tubes that bounced are cut only where one
+    alone may bring about what a detection needs, or as much of what is found there."""
+    rule = step_rule(radar, settings, model, 0)
+    return replace(rule, refinement=replace(rule.refinement, coarse=_COARSE))
 
-    Args: deep whether tubes are cut beyond their first surface.
-    """
-    rule = _rule(radar, settings, model, model.tolerance_db * 0.5**step, _JITTER * (step % 2))
-    return replace(rule, refinement=replace(rule.refinement, deep=deep))
+
+def step_rule(radar: Radar, settings: Any, model: Any, step: int) -> PruneRule:
+    """Return the prune rule of a launch half as coarse for each step, every other one on a lattice of its own."""
+    return _rule(radar, settings, model, model.tolerance_db * 0.5**step, _JITTER * (step % 2))
 
 
 def _rule(radar: Radar, settings: Any, model: Any, tolerance_db: float, jitter: float) -> PruneRule:

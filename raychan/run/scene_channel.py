@@ -96,7 +96,7 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
     if model.mode == "auto":
         # The check launch, with all mechanisms, tells which of them the fine one needs.
         with clock.stage("check"):
-            others, more = launch(replace(checked, diffraction=True))
+            others, more = launch(replace(checked, diffraction=radar.rx_position is None))
             chosen = choose(others.paths, radar, settings, noise_of_beam(radar, settings), model.tolerance_db)
             model = chosen.applied_to(model)
     rule = fine_rule(radar, settings, model)

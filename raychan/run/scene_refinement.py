@@ -1,8 +1,9 @@
 """A launch that converges: coarse first, then finer where detections need it.
 
-The first launch cuts tubes on their first surface for the tolerance, and deep tubes, those that bounced, not at all.
-The map of its paths tells which cells may become detections, and the sources of tubes that feed these. They are traced
-again, each time half as coarse, until the last change of a cell's level is within the tolerance, or a budget ends.
+The first launch cuts tubes on their first surface for the tolerance, and deep tubes, those that bounced, only where
+one alone may make a detection. The map of its paths tells which cells may become detections, and the sources of tubes
+that feed these. They are traced again, each time half as coarse, until the last change of a cell's level is within the
+tolerance, or a budget ends.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.receiver import detections_in, map_of, noise_of_beam
 from raychan.run.refinement_budget import STEPS, Budget
-from raychan.run.rules import step_rule
+from raychan.run.rules import first_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, changes
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
@@ -120,8 +121,10 @@ class SceneRefinement:
     def first(self) -> First | None:
         """Return the first launch; None where it brings more paths than can be held."""
         auto = self.model.mode == "auto"
-        asked = self.model.model_copy(update={"diffraction": True}) if auto else self.model
-        launch = Launch(self.geometry, self.points, step_rule(self.radar, self.settings, asked, 0, deep=False))
+        # Diffraction is modelled for a receiver beside the transmitter only.
+        over = self.radar.rx_position is None or self.model.diffraction
+        asked = self.model.model_copy(update={"diffraction": over}) if auto else self.model
+        launch = Launch(self.geometry, self.points, first_rule(self.radar, self.settings, asked))
         batches = launch.whole(self.stats, lambda _, share: self.tell("trace", 0.5 * share))
         found = self._paths(batches, MOST)
         if found is None:

@@ -145,8 +145,6 @@ def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: 
     Args: mid (n,) facet that the centre ray meets after `ahead` (n,) [m], -1 for none.
     """
     geometry, out, found = step.geometry, step.out, step.found
-    if not step.rule.deep:
-        return np.zeros(len(tubes), bool)
     in_phase, _, length = _contribution_bounds(step, tubes)
     if step.last:
         # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.
@@ -155,9 +153,9 @@ def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: 
         planes = geometry.first, geometry.normal
         rays = tubes.points, directions, tubes.length
         phase_at_hits(*rays, mid, ahead, *planes, out.image, out.far, step.rule.wavenumber, span, length)
-        matters = in_phase > found.prune_threshold(length) * (1.0 + 0.5 * span)
+        matters = in_phase > found.deep_threshold(length) * (1.0 + 0.5 * span)
     else:
-        matters = in_phase > found.prune_threshold(length)
+        matters = in_phase > found.deep_threshold(length)
     return np.asarray(matters & (not found.budget.spent(geometry)))
 
 

@@ -181,8 +181,8 @@ def resolve_return_leg(
             left = found.that_count(OBLIQUE_SHARE * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
-        matters = (ph.bound > found.prune_threshold(ph.length)) & (not found.budget.spent(geometry))
-        matters &= first or rule.deep
+        least = found.prune_threshold(ph.length) if first else found.deep_threshold(ph.length)
+        matters = (ph.bound > least) & (not found.budget.spent(geometry))
         # In a scene currents beyond the horizon are weak: their visibility is tested by their centres alone.
         tested = matters if which == LIT else matters & facing
         view = tube_visibility(geometry, out, tubes, tested, first, rule, level < GAP_LEVELS, facing_away=~facing)

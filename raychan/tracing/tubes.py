@@ -40,7 +40,9 @@ class Refinement:
     `slots` of history; `layers` that a stretch may pass; `batch` of tubes launched at once, which bounds the memory
     (few scenes have more on one leg; not measured); budgets of a launch: `max_tubes` that subdivision for phase
     may make, `max_cuts` for visibility, `max_rays` (see `Contributions.affords`); `jitter` (0 to 0.5) moves cuts off
-    the middle, for a second lattice; `deep` whether tubes are cut beyond their first surface too.
+    the middle, for a second lattice; `coarse`
+    not 1: tubes that bounced are cut only where one alone may bring so many times the floor, and a good part of
+    what is found there.
     """
 
     wavenumber: float
@@ -58,7 +60,7 @@ class Refinement:
     max_cuts: float = np.inf
     max_rays: float = np.inf
     jitter: float = 0.0
-    deep: bool = True
+    coarse: float = 1.0
 
     def for_depth(self, bounces: int) -> Refinement:
         """Return the same rule with slots for so many bounces, and for layers on every stretch between them."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.boxes_and_balls import scene_of
+from support.boxes_and_balls import WAVEFORM, scene_of
 
 import raychan as rc
 from raychan.run import refinement_budget
@@ -106,3 +106,16 @@ def test_changes_that_do_not_shrink_count_as_the_rest_of_their_series(q, factor)
     for change in (0.1, 0.1 * q):
         cells.changed(np.array([[change, 0.0]]), wanted)
     assert cells.slowness[0, 0] == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize(("yaw", "side"), [(160.0, 0.2), (180.0, 0.12), (190.0, 0.3)])
+def test_a_corner_of_three_plates_is_found_and_of_the_closed_form(yaw, side):
+    """Two triangles a face: the first launch must cut their tubes, or none of the six orders of bounces is seen."""
+    corner = rc.Body("corner", shape="trihedral", params={"size": side}, position=(8, 0, 0.5), yaw_deg=yaw)
+    radar = {"waveform": WAVEFORM, "position": (0, 0, 0.6), "power_dbm": 20.0}
+    found = rc.simulate(rc.Scene(bodies=[corner], radar=radar), tolerance_db=1.0)
+    fine = rc.simulate(rc.Scene(bodies=[corner], radar=radar), tolerance_db=0.1)
+    assert len(found.detections.power) >= 1
+    rows, columns = found.detections.cell[0]
+    off = 10.0 * np.log10(found.rdmap.power[rows, columns] / fine.rdmap.power[rows, columns])
+    assert abs(off) <= max(float(found.detections.error_db[0]), 0.2)
