@@ -40,7 +40,8 @@ _COUNTS = 1e-3  # of the strongest bounce, -60 dB: one below it does not count
 _LEFT = 0.3  # of the tolerance: what the last changes of sources that are not traced again may add up to; not measured
 _HALF = 0.5  # of the tolerance: launches within it are refined no further for what the mesh leaves open; not measured
 _OVER = 2.0  # times the rays left: what a launch that was expected to cost less may cast; not measured
-_JITTER, _GOLDEN = 0.2, 0.5 * (math.sqrt(5.0) - 1.0)  # of an edge, at most; the golden ratio spreads lattices evenly
+_JITTER = 0.2  # of an edge: how far cuts may lie off its middle, for lattices of their own; not measured
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # spreads numbered lattices evenly
 _GROWTH = 2.6  # rays of the next rule over those of all before it, about
 
 

@@ -16,6 +16,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from bench.cross_section import cross_section
 from bench.frame import frame
 from bench.measure import Row
 from bench.memory import memory
@@ -28,7 +29,7 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, synthesis, phase_noise, scaling, frame, turbine, size, memory)
+    f.__name__: f for f in (rays, synthesis, phase_noise, scaling, frame, turbine, size, memory, cross_section)
 }
 _ROOT = Path(__file__).parents[2]
 
