@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.error import COVER
 from raychan.run.scattering import BySource
-from raychan.tracing.sources import Sources
+from raychan.tracing.sources import Sources, depth_of, facet_of
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -88,14 +88,21 @@ class SourceSums:
         Args: leave [m] by which all others may be off, in phase as they are and as if of unrelated phases; most tubes
         that the next launch may have.
         """
-        size, tubes = np.abs(self.doubt_of), self.next_tubes
+        # Both directions of a facet are refined together, so that an exchange of both ends changes nothing.
+        source = self.sums.source
+        _, pair = np.unique(depth_of(source) << 32 | facet_of(source), return_inverse=True)
+        power, tubes, real, imaginary = (
+            np.bincount(pair, x)
+            for x in (np.abs(self.doubt_of) ** 2, self.next_tubes, self.doubt_of.real, self.doubt_of.imag)
+        )
         # Those first that are most off for what they cost.
-        order = np.argsort(size**2 / tubes, kind="stable")
-        rest = np.maximum(np.abs(np.cumsum(self.doubt_of[order])), np.sqrt(np.cumsum(size[order] ** 2)))
+        order = np.argsort(power / tubes, kind="stable")
+        together = np.hypot(np.cumsum(real[order]), np.cumsum(imaginary[order]))
+        rest = np.maximum(together, np.sqrt(np.cumsum(power[order])))
         first = int(np.flatnonzero(rest <= leave).max(initial=-1)) + 1
         # Where no source stands out all are refined.
         best = order[first if first < len(order) else 0 :][::-1]
-        return best[np.cumsum(tubes[best]) <= most]
+        return np.flatnonzero(np.isin(pair, best[np.cumsum(tubes[best]) <= most]))
 
     def groups(self, rows: Ints) -> Iterator[tuple[int, int, Sources]]:
         """Give the sources of some rows by the rule and the number of their next launch."""
