@@ -28,7 +28,10 @@ MENU = (
         "Tutorials",
         tuple(f"tutorials/{name}.md" for name in TUTORIALS),
     ),
-    ("Look up", ("command_line.md", "scene_files.md", "gallery.md", "conventions.md", "hil.md", "glossary.md")),
+    (
+        "Look up",
+        ("command_line.md", "scene_files.md", "gallery.md", "conventions.md", "laser.md", "hil.md", "glossary.md"),
+    ),
     ("Trust", ("theory.md", "ship.md", "accuracy.md", "limits.md", "measurements.md")),
     ("Project", ("../CONTRIBUTING.md", "../CHANGELOG.md")),
 )

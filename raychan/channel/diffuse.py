@@ -44,14 +44,11 @@ def diffuse_paths(
     look = way / np.maximum(distance, 1e-9)[:, None]
     cosine = np.abs(np.einsum("ij,ij->i", look, normal[patches.facet]))
     material = facets.material[patches.facet] if len(patches.facet) else np.zeros(0, np.int32)
-    sigma, cross = np.zeros(len(cosine)), np.zeros(len(cosine))
+    sigma, cross = mean_sigma0(facets, material, cosine, frequency, laws), np.zeros(len(cosine))
     for row in np.unique(material):
         some, law = material == row, laws[row]
         if law is None:
-            sigma[some] = _lambert_of_roughness(facets, row, cosine[some], frequency)
             continue
-        # Back to the radar the scattered direction is 180 deg minus twice the incidence angle off the mirrored one.
-        sigma[some] = law.sigma0(cosine[some], cosine[some], 2.0 * cosine[some] ** 2 - 1.0)
         squares = np.floor(patches.point[some] / law.texture_m).astype(np.int64)
         sigma[some] *= texture(law.k_shape, squares, rng)
         cross[some] = 0.0 if law.cross_db is None else 10.0 ** (-0.1 * law.cross_db)
@@ -80,6 +77,25 @@ def diffuse_paths(
         tx=end,
         rx=end,
     )
+
+
+def mean_sigma0(
+    facets: Facets, material: NDArray[np.int32], cosine: Floats, frequency: float, laws: Sequence[Diffuse | None]
+) -> Floats:
+    """Return the mean sigma-nought (n,) [m^2/m^2] of surfaces back to a monostatic radar.
+
+    Args: material (n,) of each surface; cosine (n,) of its incidence angle; frequency [Hz]; laws of each material, None
+    for Lambert's law with the share that its roughness takes from the mirror.
+    """
+    sigma = np.zeros(len(cosine))
+    for row in np.unique(material):
+        some, law = material == row, laws[row]
+        if law is None:
+            sigma[some] = _lambert_of_roughness(facets, row, cosine[some], frequency)
+        else:
+            # Back to the radar the scattered wave is 180 deg minus twice the incidence angle off the mirrored one.
+            sigma[some] = law.sigma0(cosine[some], cosine[some], 2.0 * cosine[some] ** 2 - 1.0)
+    return sigma
 
 
 def _lambert_of_roughness(facets: Facets, row: int, cosine: Floats, frequency: float) -> Floats:

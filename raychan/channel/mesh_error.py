@@ -88,7 +88,8 @@ def mesh_error(geometry: Geometry, found: Alternatives, wavenumber: float) -> Me
     for normals in (found.creased, found.rounded):
         if normals is not None:
             certain &= (normals == facets.normals).all(axis=(1, 2))
-    sure = _halved(geometry, certain, wavenumber)
+    # Facets that were merged lie as near to the mesh's surface as was asked for, whatever a cubic one does.
+    sure = _halved(geometry, certain if found.checked is None else certain & ~found.checked, wavenumber)
     # Uncertain facets that are no regular tessellation have no smooth surface to come nearer to.
     rest = geometry.curved & ~certain & (False if found.regular is None else found.regular)
     unsure = _halved(geometry, rest, wavenumber) if sure is None and rest.any() else None

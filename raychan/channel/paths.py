@@ -31,7 +31,6 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
         lambda d: np.stack([np.asarray(f(d)) for f in rx_fields(radar)], axis=1),
         corners=True,
     )[:, :, 0]
-    away, look = departures(routes)
     speeds = ends_of(radar).tx_velocity, ends_of(radar).rx_velocity
     rate = rates(routes, facets, *speeds)
     corner = routes.lengths[:, :3]
@@ -39,16 +38,31 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     spans -= np.minimum(np.minimum(corner[:, 0], corner[:, 1]), corner[:, 2])
     long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
     whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
-    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
     received = {
         name: np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])
         for name, a in zip(("amplitude", "cross"), gains.swapaxes(0, 1), strict=False)
     }
-    return paths_record(radar)(
+    return over_routes(
+        routes,
+        facets,
+        radar,
         length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
         **received,
         length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, *speeds).ravel()]),
         trajectory=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
+    )
+
+
+def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDArray[Any]) -> Paths:
+    """Return the record of paths over routes for a radar that receives.
+
+    Args: columns of the paths: length, amplitude, cross where the radar has cross-polarised receivers, length_rate, and
+    trajectory, the number of each path's route.
+    """
+    away, look = departures(routes)
+    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
+    return paths_record(radar)(
+        **columns,
         trajectories=Trajectories(
             departure=away.astype(np.float32),
             arrival=look,

@@ -12,10 +12,12 @@ from types import FrameType
 import typer
 
 from raychan.cli.explain import explain
+from raychan.cli.hil import hil
 from raychan.cli.info import info
 from raychan.cli.options import help_of
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
+from raychan.cli.ship import ship
 from raychan.cli.show import Interrupted
 from raychan.cli.spectrogram import spectrogram
 from raychan.cli.study import study
@@ -68,10 +70,15 @@ def _version(wanted: bool) -> None:
 def _top(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
 ) -> None:
-    pass
+    from raychan.parallel import threads
+
+    try:
+        threads()
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
-for command in (run, info, rcs, spectrogram, explain, view, validate):
+for command in (run, info, rcs, spectrogram, explain, view, ship, hil, validate):
     app.command(help=help_of(command))(command)
 app.add_typer(study, name="study")
 

@@ -54,6 +54,29 @@ MaxBounces = Annotated[
         callback=within(limits.BOUNCES, True),
     ),
 ]
+
+
+def _use_threads(number: int | None) -> int | None:
+    """Set how many threads work, where the option is given."""
+    from raychan.parallel import set_threads
+
+    if number is not None:
+        try:
+            set_threads(number)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+    return number
+
+
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        help="Threads that work at most; if not given, RAYCHAN_THREADS, else one for each core. Results do not depend "
+        "on it.",
+        metavar="N",
+        callback=_use_threads,
+    ),
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option(

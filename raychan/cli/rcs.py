@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import within
+from raychan.cli.options import Threads, within
 from raychan.cli.rcs_options import MOST_ANGLES, angles, can_be_polar, metres, writable
 from raychan.cli.rcs_output import csv_text, further_bounces, rows, table_of, uncertainties
 from raychan.world import limits
@@ -57,6 +57,7 @@ def rcs(
     max_bounces: Annotated[
         int, typer.Option(help="Most bounces along a path.", metavar="N", callback=within(limits.BOUNCES, True))
     ] = 3,
+    threads: Threads = None,
     unit: Annotated[str, typer.Option(help="Unit of the mesh file: m, cm, mm, inch, ft.")] = "m",
     up: Annotated[
         str | None, typer.Option(help="Axis of the file that points up; if not given, y for GLB and z for others.")
@@ -117,6 +118,7 @@ def rcs(
         from raychan.world.mesh_io import oddities
 
         show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
+    show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
     show.warn(further_bounces(found, max_bounces, tolerance))
     show.warn(uncertainties(mesh, found, tolerance))
     if files:
@@ -196,4 +198,6 @@ def _sweep(mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, A
             raise typer.BadParameter(str(error)) from error
         done += len(some)
         tell("rcs", done / len(az))
-    return Rcs(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Rcs)))
+    columns = {f.name: [getattr(p, f.name) for p in parts] for f in fields(Rcs)}
+    merged = columns.pop("merged")[0]
+    return Rcs(**{name: np.concatenate(found) for name, found in columns.items()}, merged=merged)

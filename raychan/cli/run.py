@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, within
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def run(
     seed: Seed = 0,
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,
+    threads: Threads = None,
     set_: Changes = None,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no pictures.")] = False,
     frames: Annotated[

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, within
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def spectrogram(
     seed: Seed = 0,
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,
+    threads: Threads = None,
     set_: Changes = None,
 ) -> None:
     """Compute a spectrogram of a scene: walkers, cyclists, wheels and rotors show how their parts move.

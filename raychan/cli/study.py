@@ -1,4 +1,4 @@
-"""raychan study: error against effort, stability, and sweeps over scenes."""
+"""raychan study: error against effort, stability, sweeps over scenes, and a laser scanner on a deck."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import typer
 
 from raychan.cli import show
 from raychan.cli.options import help_of
+from raychan.cli.study_laser import laser
+from raychan.cli.study_sensitivity import sensitivity
 from raychan.cli.study_stability import stability
 from raychan.cli.study_sweep import sweep
 
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
 
 study = typer.Typer(
     no_args_is_help=True,
-    help="Studies: error against effort; checks where ray methods fail; one body in varied scenes.",
+    help="Studies: error against effort; checks where ray methods fail; one body in varied scenes; speckle or error; "
+    "a laser scanner.",
 )
 
 
@@ -78,7 +81,7 @@ def tradeoff(
     screen.print(f"figures and table: {out}", soft_wrap=True)
 
 
-for command in (tradeoff, stability, sweep):
+for command in (tradeoff, stability, sweep, sensitivity, laser):
     study.command(help=help_of(command))(command)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -42,6 +42,7 @@ def sweep(
     seed: Seed = 0,
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,
+    threads: Threads = None,
 ) -> None:
     """Follow one body through varied scenes: its hidden share, the bodies that hide it, and its detections.
 

@@ -62,6 +62,23 @@ def disturbance_covariance(ship: LinearShip, noise: Noise, dt: float) -> Array:
 
 
 @dataclass(frozen=True)
+class Disturbance:
+    """What white accelerations add to (v, p, r, phi, psi) over a time step: `root` (5, 5) of its covariance."""
+
+    root: Array
+
+    @classmethod
+    def of(cls, ship: LinearShip, noise: Noise, dt: float) -> Disturbance:
+        """Return the disturbance of a ship over steps of `dt` [s]."""
+        values, vectors = np.linalg.eigh(disturbance_covariance(ship, noise, dt))
+        return cls(root=vectors * np.sqrt(np.maximum(values, 0.0)))
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """Return one addition (5,) to the state."""
+        return np.asarray(self.root @ rng.standard_normal(5))
+
+
+@dataclass(frozen=True)
 class KalmanFilter:
     """The steady filter of a linear ship at one time step.
 

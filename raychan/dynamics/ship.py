@@ -6,6 +6,7 @@ are matrix exponentials: exact for a rudder that moves evenly over the step.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,6 +121,13 @@ def world_pose(state: Array) -> tuple[Array, Array, Array]:
     s = np.asarray(state, float)
     place = np.stack([s[..., X], -s[..., Y], np.zeros_like(s[..., X])], axis=-1)
     return place, np.asarray(-s[..., PSI]), np.asarray(s[..., PHI])
+
+
+def over_ground(state: Array) -> Array:
+    """Return the velocity (2,) [m/s] to north and east of a full state (10,)."""
+    u, psi = float(state[U]), float(state[PSI])
+    c, s, across = math.cos(psi), math.sin(psi), float(state[V]) * math.cos(float(state[PHI]))
+    return np.array([c * u - s * across, s * u + c * across])
 
 
 _PRINTED_A = (

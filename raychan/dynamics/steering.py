@@ -43,7 +43,10 @@ class SteeringGear:
 
 
 class Autopilot(Protocol):
-    """What orders a rudder angle [rad], of the state (5,) and the heading wanted [rad]."""
+    """What orders a rudder angle [rad], of the state (5,) and the heading wanted [rad], by a linear feedback."""
+
+    @property
+    def gain(self) -> Array: ...  # noqa: D102
 
     def order(self, state: Array, heading: float) -> float: ...  # noqa: D102
 
@@ -54,6 +57,11 @@ class PD:
 
     kp: float
     kd: float
+
+    @property
+    def gain(self) -> Array:
+        """The same as a feedback (5,) of (v, p, r, phi, psi)."""
+        return np.array([0.0, 0.0, self.kd, 0.0, self.kp])
 
     def order(self, state: Array, heading: float) -> float:
         """Return the rudder ordered [rad] of the state (v, p, r, phi, psi) and the heading wanted [rad]."""
@@ -128,10 +136,15 @@ def lqr(ship: LinearShip, weights: ArrayLike = (1.0, 1.0, 1.0, 1.0, 1.0), rudder
 
 @dataclass(frozen=True)
 class HeadingProgramme:
-    """Headings [rad] wanted from times [s] on: `times` (n,) growing from 0, `headings` (n,)."""
+    """Headings [rad] wanted from times [s] on: `times` (n,) growing from 0, `headings` (n,).
+
+    `rate` [rad/s]: at which the wanted heading goes from one to the next, by as many whole turns as they differ;
+    infinite: at once.
+    """
 
     times: Array
     headings: Array
+    rate: float = np.inf
 
     def __post_init__(self) -> None:
         n = len(np.atleast_1d(self.times))
@@ -139,10 +152,26 @@ class HeadingProgramme:
         object.__setattr__(self, "headings", frozen(self.headings, (n,), "headings"))
         if n == 0 or self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
             raise ValueError("times must begin at 0 s and grow")
+        if not self.rate > 0.0:
+            raise ValueError(f"rate is {self.rate} rad/s; it must be positive")
+        from_ = [float(self.headings[0])]  # the wanted heading at each of the times
+        for k in range(n - 1):
+            from_.append(self._after(from_[k], k, float(self.times[k + 1])))
+        object.__setattr__(self, "_from", from_)
+
+    def _after(self, start: float, leg: int, time: float) -> float:
+        """Return the wanted heading [rad] at a time [s] of a leg that begins at heading `start`."""
+        end = float(self.headings[leg])
+        if np.isinf(self.rate):
+            return end
+        reach = self.rate * (time - float(self.times[leg]))
+        return start + min(max(end - start, -reach), reach)
 
     def at(self, time: float, position: Array) -> tuple[float, HeadingProgramme]:
         """Return the heading wanted [rad] at a time [s], and the programme itself: it does not ask the position."""
-        return float(self.headings[np.searchsorted(self.times, time, side="right") - 1]), self
+        leg = int(np.searchsorted(self.times, time, side="right")) - 1
+        starts: list[float] = self._from  # type: ignore[attr-defined]
+        return self._after(starts[leg], leg, time), self
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
 from raychan.dynamics import container
 from raychan.dynamics.kalman import KalmanFilter, Noise
-from raychan.dynamics.ship import DELTA, OF_LINEAR, PHI, PSI, Array, ExactStep, U, V, X, Y
+from raychan.dynamics.ship import DELTA, OF_LINEAR, PSI, Array, ExactStep, X, Y, over_ground
 from raychan.dynamics.steering import Autopilot, SteeringGear
 
 
@@ -46,14 +46,8 @@ class LinearPlant:
         after = state.copy()
         after[DELTA] = self.gear.toward(float(state[DELTA]), order, self.dt)
         after[places] = self.step(state[places], float(state[DELTA]), float(after[DELTA]))
-        after[[X, Y]] += 0.5 * self.dt * (_over_ground(state) + _over_ground(after))
+        after[[X, Y]] += 0.5 * self.dt * (over_ground(state) + over_ground(after))
         return after
-
-
-def _over_ground(state: Array) -> Array:
-    c, s = np.cos(state[PSI]), np.sin(state[PSI])
-    across = state[V] * np.cos(state[PHI])
-    return np.array([c * state[U] - s * across, s * state[U] + c * across])
 
 
 @dataclass(frozen=True)
@@ -67,6 +61,12 @@ class ContainerPlant:
     def advance(self, state: Array, order: float) -> Array:
         """Return the full state (10,) one step on."""
         return container.advance(state, container.Orders(delta=order, n=self.shaft), self.dt, self.machinery)
+
+    def at_shaft(self, shaft: float) -> ContainerPlant:
+        """Return the plant at another shaft speed [rev/s]. Raises: ValueError where the model does not hold."""
+        if not 0.0 < shaft <= self.machinery.max_shaft:
+            raise ValueError(f"shaft speed {shaft} rev/s; allowed: above 0 and at most {self.machinery.max_shaft:.4g}")
+        return replace(self, shaft=shaft)
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+_MAY_MISS = ("cross_db", "k_shape")
 LAWS = ("constant", "gamma", "lambert", "lobe")
 
 
@@ -40,6 +42,10 @@ class Diffuse:
     def __post_init__(self) -> None:
         if self.law not in LAWS:
             raise ValueError(f"law = {self.law!r}: must be one of {', '.join(LAWS)}")
+        for name in ("level_db", "exponent", "cross_db", "k_shape", "texture_m"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not ((value is None and name in _MAY_MISS) or isinstance(value, Real)):
+                raise ValueError(f"{name} = {value!r}: a number is wanted")
         if not math.isfinite(self.level_db):
             raise ValueError(f"level_db = {self.level_db!r}: must be finite")
         if self.law in ("lambert", "lobe") and self.level_db > 0.0:

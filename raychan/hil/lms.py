@@ -1,102 +1,73 @@
-"""What an LMS221-like scanner says and answers: scans, status, type, configuration, modes and baud rates.
+"""What an LMS221-like scanner answers: modes, baud rates, variants, configuration, status, type, errors, restart.
 
-Byte offsets count from the command byte. They follow what drivers of LMS2xx scanners read; fields that no driver reads
-are 0.
+Byte offsets count from the command byte. They follow what drivers of LMS2xx scanners read: sicktoolbox
+(SickLMS2xx.cc), MRPT (CSickLaserSerial.cpp), ARIA (ArLMS2xx.cpp). Fields that none of them reads are 0.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from raychan.hil.telegrams import ACK, HOST_TO_SCANNER, NAK, Telegram, TelegramError, frame
-
-Floats = NDArray[np.float64]
+from raychan.hil.scans import DISTANCE_BITS, UNITS_M, ScanValues, encode_scan
+from raychan.hil.telegrams import ACK, HOST_TO_SCANNER, NAK, Telegram, frame
 
 BAUD_CODES = {0x42: 9600, 0x41: 19200, 0x40: 38400, 0x48: 500000}
-STREAM, ON_REQUEST = 0x24, 0x25
-UNITS_M = (0.01, 0.001)
-"""Length [m] of a count in unit 0 and in unit 1 (bits 14 and 15 of the number of beams)."""
-NO_ECHO = 0x1FFF
-"""Largest distance that 13 bits hold; stands for a beam without an echo."""
-MODE, POLL, STATUS, TYPE, CONFIGURATION = 0x20, 0x30, 0x31, 0x3A, 0x74
+INSTALLATION, STREAM, ON_REQUEST, SUBRANGE, TURNS = 0x00, 0x24, 0x25, 0x27, 0x2A
+"""Operating modes: configuration may be written; each scan is sent; scans are sent when asked for; some beams of each
+scan are sent; each turn of the mirror is sent for itself."""
+RESTART, MODE, POLL, STATUS, ERRORS, TYPE, VARIANT, CONFIGURATION, CONFIGURE = (
+    0x10, 0x20, 0x30, 0x31, 0x32, 0x3A, 0x3B, 0x74, 0x77,
+)  # fmt: skip
 ANSWER = 0x80
 """Is added to a command to name its answer."""
+RESTARTING, STARTED = 0x91, 0x90
+PASSWORD = b"SICK_LMS"
+NAME = b"LMS221;30206;V01.00"
+"""Type and version. A driver looks for `LMS221;30206`, the outdoor model that measures to 80 m."""
 STATUS_LENGTH = 152
-_COUNT = 0x3FFF
+STATUS_BYTE = 0x10
+"""Last byte of each answer, without an error. MRPT takes a change of the baud rate for failed where it is 0."""
+VARIANTS = {90: (25, 50, 100), 100: (25, 50, 100), 180: (25, 50, 100)}
+"""Fans [deg], and the steps [deg/100] that each allows. The real scanner has no 180 deg in steps of 0.25 deg."""
+_DIVIDED_HZ = 1e6
+_SET_LENGTH, _LEAST_SET = 34, 7
 
 
-@dataclass(frozen=True)
-class ScanValues:
-    """One scan as sent.
-
-    Fields: range_m (n,) [m], inf without an echo; fields (n,) bits 0 to 2: field A, field B, dazzle; unit 0 (cm) or
-    1 (mm); status byte.
-    """
-
-    range_m: Floats
-    fields: NDArray[np.uint8]
-    unit: int = 0
-    status: int = 0
-
-
-def encode_scan(scan: ScanValues) -> bytes:
-    """Return the payload B0 of a scan; distances are rounded to the unit, larger ones than 13 bits hold are no echo.
-
-    Raises: TelegramError for ranges that are negative or NaN, an unknown unit, fields beyond 3 bits, too many beams.
-    """
-    ranges, fields = np.asarray(scan.range_m, float), np.asarray(scan.fields)
-    if scan.unit not in (0, 1):
-        raise TelegramError(f"unit {scan.unit}; allowed: 0 (cm) or 1 (mm)")
-    if not (ranges >= 0.0).all():
-        raise TelegramError("a range is negative or NaN; a beam without an echo is inf")
-    if fields.shape != ranges.shape or (fields > 7).any() or (fields < 0).any():
-        raise TelegramError("fields: one of 0 to 7 for each beam")
-    if ranges.ndim != 1 or len(ranges) > _COUNT:
-        raise TelegramError(f"{ranges.shape} beams; allowed: a row of up to {_COUNT}")
-    counts = np.minimum(np.round(np.minimum(ranges, 100.0) / UNITS_M[scan.unit]), NO_ECHO).astype("<u2")
-    values = counts | fields.astype("<u2") << 13
-    head = bytes((POLL | ANSWER,)) + (len(ranges) | scan.unit << 14).to_bytes(2, "little")
-    return head + values.astype("<u2").tobytes() + bytes((scan.status,))
-
-
-def decode_scan(payload: bytes) -> ScanValues:
-    """Return the scan of a payload B0.
-
-    Raises: TelegramError for another command, a length that does not fit the number of beams, an unknown unit.
-    """
-    if len(payload) < 4 or payload[0] != POLL | ANSWER:
-        raise TelegramError("no scan: the payload does not begin with B0")
-    word = int.from_bytes(payload[1:3], "little")
-    count, unit = word & _COUNT, word >> 14
-    if unit > 1:
-        raise TelegramError(f"unit {unit}; allowed: 0 (cm) or 1 (mm)")
-    if len(payload) != 4 + 2 * count:
-        raise TelegramError(f"{count} beams take {4 + 2 * count} bytes, {len(payload)} are there")
-    values = np.frombuffer(payload, "<u2", count, 3)
-    counts = values & NO_ECHO
-    ranges = np.where(counts == NO_ECHO, np.inf, counts * UNITS_M[unit])
-    return ScanValues(ranges, (values >> 13).astype(np.uint8), unit, payload[-1])
+def refuse_variant(fan_deg: int, step_deg: float) -> bool:
+    """Return False: the variant stays as it is."""
+    return False
 
 
 @dataclass
 class Scanner:
     """The scanner's end of the line: keeps its mode and answers commands.
 
-    Fields: latest returns the last scan; angle_deg and step_deg of its fan; unit 0 (cm) or 1 (mm); streaming whether it
-    sends each scan unasked; baud of the line; refused telegrams that it answered with NAK.
+    Fields: latest returns the last scan, of which range and flags count; angle_deg and step_deg of its fan; unit 0 (cm)
+    or 1 (mm); baud of the line; refused telegrams that it answered with NAK; set_variant (fan [deg], step [deg]) tells
+    whether the fan changed so; mode of operation; starting whether STARTED is still to be sent after a restart.
     """
 
     latest: Callable[[], ScanValues]
     angle_deg: int = 180
     step_deg: float = 1.0
     unit: int = 0
-    streaming: bool = False
     baud: int = 9600
     refused: int = 0
+    set_variant: Callable[[int, float], bool] = refuse_variant
+    mode: int = ON_REQUEST
+    measuring_mode: int = 0
+    starting: bool = False
+    _set: bytearray = field(default_factory=lambda: bytearray(_SET_LENGTH))
+    _beams: tuple[int, int] = (0, 0)
+
+    def __post_init__(self) -> None:
+        self._start_baud = self.baud
+
+    @property
+    def streaming(self) -> bool:
+        """Whether it sends each scan unasked."""
+        return self.mode in (STREAM, SUBRANGE, TURNS)
 
     def answer(self, telegram: Telegram) -> bytes:
         """Return the bytes sent back: ACK and a telegram, or NAK for what is unknown; b"" if not addressed to it.
@@ -106,52 +77,111 @@ class Scanner:
         if telegram.address != HOST_TO_SCANNER:
             return b""
         command, rest = telegram.payload[0], telegram.payload[1:]
-        if command == MODE and len(rest) >= 1 and self._switch(rest[0]):
-            body = b"\x00"
-        elif command == POLL:
-            return bytes((ACK,)) + self.scan()
-        elif command == STATUS:
-            body = self._status()
-        elif command == TYPE:
-            body = b"LMS221;raychan;V01.00"
-        elif command == CONFIGURATION:
-            body = self._configuration()
-        else:
+        if command == POLL:
+            return bytes((ACK,)) + frame(encode_scan(self._stamped()))
+        if command == RESTART:
+            return bytes((ACK,)) + self._restart()
+        body = self._body(command, rest)
+        if body is None:
             return self.refuse()
-        return bytes((ACK,)) + frame(bytes((command | ANSWER,)) + body + b"\x00")
+        return bytes((ACK,)) + frame(bytes((command | ANSWER,)) + body + bytes((STATUS_BYTE,)))
 
     def refuse(self) -> bytes:
         """Return NAK, and count it: for a command that is unknown or came damaged."""
         self.refused += 1
         return bytes((NAK,))
 
-    def scan(self) -> bytes:
-        """Return the last scan as a telegram."""
-        return frame(encode_scan(self.latest()))
+    def started(self) -> bytes:
+        """Return the telegram that ends a restart."""
+        self.starting = False
+        return frame(bytes((STARTED,)) + NAME + bytes((STATUS_BYTE,)))
 
-    def _switch(self, mode: int) -> bool:
-        if mode in (STREAM, ON_REQUEST):
-            self.streaming = mode == STREAM
-        elif mode in BAUD_CODES:
+    def scan(self) -> bytes:
+        """Return the last scan as telegrams: one, or in mode TURNS one for each turn of the mirror."""
+        whole = self._stamped()
+        if self.mode == SUBRANGE:
+            first, last = self._beams
+            part = replace(whole, range_m=whole.range_m[first - 1 : last], fields=whole.fields[first - 1 : last])
+            return frame(encode_scan(replace(part, first=first)))
+        if self.mode != TURNS:
+            return frame(encode_scan(whole))
+        turns = round(1.0 / self.step_deg)
+        each = (
+            replace(whole, range_m=whole.range_m[k::turns], fields=whole.fields[k::turns], offset_deg=k * self.step_deg)
+            for k in range(turns)
+        )
+        return b"".join(frame(encode_scan(one)) for one in each)
+
+    def _stamped(self) -> ScanValues:
+        bits = DISTANCE_BITS[self.measuring_mode]
+        return replace(self.latest(), unit=self.unit, status=STATUS_BYTE, bits=bits)
+
+    def _body(self, command: int, rest: bytes) -> bytes | None:
+        """Return an answer between command and status byte; None for a command that is refused."""
+        if command == MODE and rest:
+            return self._switch(rest[0], rest[1:])
+        if command == VARIANT and len(rest) == 4:
+            return self._change_variant(int.from_bytes(rest[:2], "little"), int.from_bytes(rest[2:], "little"))
+        if command == CONFIGURE:
+            return self._configure(rest)
+        fixed = {STATUS: self._status, ERRORS: bytes, TYPE: lambda: NAME, CONFIGURATION: self._configuration}
+        return fixed[command]() if command in fixed else None
+
+    def _switch(self, mode: int, rest: bytes) -> bytes | None:
+        if mode in BAUD_CODES:
             self.baud = BAUD_CODES[mode]
-        else:
-            return False
-        return True
+            return b"\x00"
+        if mode == INSTALLATION and rest != PASSWORD:
+            return b"\x01"
+        if mode == SUBRANGE:
+            first, last = int.from_bytes(rest[:2], "little"), int.from_bytes(rest[2:4], "little")
+            if len(rest) != 4 or not 1 <= first <= last <= len(self.latest().range_m):
+                return None
+            self._beams = first, last
+        if mode not in (INSTALLATION, STREAM, ON_REQUEST, SUBRANGE, TURNS):
+            return None
+        self.mode = mode
+        return b"\x00"
+
+    def _change_variant(self, angle: int, step: int) -> bytes:
+        """Change the fan if it can be, and stop streaming, as the scanner does; return done or not, and the fan."""
+        known = step in VARIANTS.get(angle, ())
+        same = (angle, step) == (self.angle_deg, round(100.0 * self.step_deg))
+        done = known and (same or self.set_variant(angle, step / 100.0))
+        if done:
+            self.angle_deg, self.step_deg, self.mode = angle, step / 100.0, ON_REQUEST
+        return bytes((done,)) + self._fan()
+
+    def _fan(self) -> bytes:
+        return self.angle_deg.to_bytes(2, "little") + round(100.0 * self.step_deg).to_bytes(2, "little")
+
+    def _configure(self, rest: bytes) -> bytes | None:
+        """Take a configuration in installation mode; return done or not, and the configuration that holds."""
+        if not _LEAST_SET <= len(rest) <= _SET_LENGTH:
+            return None
+        done = self.mode == INSTALLATION and rest[5] in DISTANCE_BITS and rest[6] < len(UNITS_M)
+        if done:
+            self._set[: len(rest)] = rest
+            self.measuring_mode, self.unit = rest[5], rest[6]
+        return bytes((done,)) + self._configuration()
+
+    def _configuration(self) -> bytes:
+        self._set[5:7] = bytes((self.measuring_mode, self.unit))
+        return bytes(self._set)
+
+    def _restart(self) -> bytes:
+        """Go back to the baud rate and the mode of the start; what was configured stays."""
+        self.mode, self.baud, self.starting = ON_REQUEST, self._start_baud, True
+        return frame(bytes((RESTARTING, STATUS_BYTE)))
 
     def _status(self) -> bytes:
-        """Return the status between command and status byte."""
         p = bytearray(STATUS_LENGTH)
         p[1:8] = b"V01.00 "
-        p[8] = STREAM if self.streaming else ON_REQUEST
+        p[8] = self.mode
         p[67:69] = (75 * 60).to_bytes(2, "little")  # mirror [turns/min]
-        p[107:109] = self.angle_deg.to_bytes(2, "little")
-        p[109:111] = round(100.0 * self.step_deg).to_bytes(2, "little")
+        p[102] = self.measuring_mode
+        p[107:111] = self._fan()
+        p[116:118] = (0x8000 | int(_DIVIDED_HZ / self.baud) - 1).to_bytes(2, "little")
         p[122] = self.unit
         p[124:131] = b"V01.00 "
         return bytes(p[1:-1])
-
-    def _configuration(self) -> bytes:
-        """Return the configuration between command and status byte: offset 6 is the measuring mode, 7 the unit."""
-        p = bytearray(35)
-        p[7] = self.unit
-        return bytes(p[1:])

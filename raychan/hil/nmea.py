@@ -1,15 +1,16 @@
-"""NMEA 0183 sentences of position (GGA), heading (HDT) and attitude (PASHR, PTNTHTM).
+"""NMEA 0183 sentences of position (GGA, RMC), heading (HDT), attitude (PASHR, PTNTHTM) and rudder (RSA).
 
-Check sums and framing are by pynmeagps (extra `hil`), which is imported when used. Angles in degrees, time in UTC.
+Check sums and framing are by pynmeagps, which is imported when used. Angles in degrees, time in UTC.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from datetime import time
+from datetime import date, time
 
 _GPS_FIX, _GEOID_M = 1, "0.0"
+_KNOT = 1852.0 / 3600.0
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,25 @@ def gga(fix: Fix) -> bytes:
 
     Raises: ValueError for a position off the globe, NaN or infinity.
     """
-    ns, lat = ("S" if fix.latitude_deg < 0.0 else "N"), _minutes(fix.latitude_deg, 90.0, 2)
-    ew, lon = ("W" if fix.longitude_deg < 0.0 else "E"), _minutes(fix.longitude_deg, 180.0, 3)
+    ns, lat, ew, lon = _place(fix)
     height = f"{_finite(fix.height_m):.3f}"
     fields = [_clock(fix.at), lat, ns, lon, ew, str(_GPS_FIX), f"{fix.satellites:02d}", f"{_finite(fix.hdop):.1f}"]
     return _sentence("GP", "GGA", [*fields, height, "M", _GEOID_M, "M", "", ""])
+
+
+def rmc(fix: Fix, on: date, speed: float, course_deg: float) -> bytes:
+    """Return `$GPRMC`: the position of a fix with its date, speed [m/s] and course [deg] over ground.
+
+    Raises: ValueError as `gga`, and for a speed or course that is NaN or infinity.
+    """
+    ns, lat, ew, lon = _place(fix)
+    motion = [f"{_finite(speed) / _KNOT:.3f}", _heading(course_deg), f"{on:%d%m%y}"]
+    return _sentence("GP", "RMC", [_clock(fix.at), "A", lat, ns, lon, ew, *motion, "", "", "A"])
+
+
+def rsa(rudder_deg: float) -> bytes:
+    """Return `$AGRSA`, the angle of a single rudder [deg]."""
+    return _sentence("AG", "RSA", [f"{_finite(rudder_deg):.2f}", "A", "", "V"])
 
 
 def hdt(heading_deg: float, talker: str = "GP") -> bytes:
@@ -77,6 +92,13 @@ def _sentence(talker: str, name: str, fields: list[str]) -> bytes:
 
     content = ",".join([talker + name, *fields])
     return f"${content}*{calc_checksum(content)}\r\n".encode("ascii")
+
+
+def _place(fix: Fix) -> tuple[str, str, str, str]:
+    """Return hemisphere and angle, north or south and then east or west."""
+    ns, lat = ("S" if fix.latitude_deg < 0.0 else "N"), _minutes(fix.latitude_deg, 90.0, 2)
+    ew, lon = ("W" if fix.longitude_deg < 0.0 else "E"), _minutes(fix.longitude_deg, 180.0, 3)
+    return ns, lat, ew, lon
 
 
 def _clock(at: time) -> str:

@@ -6,12 +6,27 @@ Nothing here reads a clock: times [s] are arguments, of one monotonic clock.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field
 
 import numpy as np
 
 BITS_PER_BYTE = 10
 """One start bit, eight data bits, one stop bit."""
+
+
+_PRIORITY = 10
+"""Of SCHED_FIFO, whose threads run before all ordinary ones. Any does; those of the kernel have 50."""
+
+
+def run_first(first: bool = True) -> bool:
+    """Ask the system to run this thread before ordinary ones, or as one of them; return whether it goes first."""
+    try:
+        policy = os.SCHED_FIFO if first else os.SCHED_OTHER
+        os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY if first else 0))
+    except (AttributeError, OSError):
+        return False
+    return first
 
 
 def line_time(count: int, baud: int) -> float:
@@ -41,7 +56,11 @@ class Line:
             self.dropped += 1
             return None
         self.sent += 1
-        self.free_at = now + line_time(count, self.baud)
+        return self.reserve(now, count)
+
+    def reserve(self, now: float, count: int) -> float:
+        """Return when [s] the last of `count` bytes has left that wait until the line is free."""
+        self.free_at = max(now, self.free_at) + line_time(count, self.baud)
         return self.free_at
 
 
@@ -59,6 +78,37 @@ class Timing:
     jitter_p99: float
 
 
+class Lateness:
+    """How late things were, over a run of any length: of more than KEPT values every second is dropped, then every
+    second of the rest, so that what is kept spreads evenly over the run. `count` is of all."""
+
+    KEPT = 65_536
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._every = 1
+        self._values: list[float] = []
+
+    def note(self, seconds: float) -> None:
+        """Note a lateness [s]."""
+        if self.count % self._every == 0:
+            self._values.append(seconds)
+            if len(self._values) > self.KEPT:
+                del self._values[1::2]
+                self._every *= 2
+        self.count += 1
+
+    def timing(self, missed: int = 0) -> Timing:
+        """Return drift and jitter, zeros of no values. Args: missed ticks, which are only told."""
+        late = np.array(self._values)
+        if not len(late):
+            return Timing(0, missed, 0.0, 0.0)
+        tenth = max(1, len(late) // 10)
+        drift = float(np.median(late[-tenth:]) - np.median(late[:tenth]))
+        jitter = float(np.percentile(np.abs(late - np.median(late)), 99))
+        return Timing(self.count, missed, drift, jitter)
+
+
 @dataclass
 class Schedule:
     """Ticks at start + k period, counted from the start, so that no lateness adds up.
@@ -70,7 +120,7 @@ class Schedule:
     period: float
     missed: int = 0
     _next: int = 0
-    _late: list[float] = field(default_factory=list)
+    _late: Lateness = field(default_factory=Lateness)
 
     def __post_init__(self) -> None:
         if not (self.period > 0.0 and math.isfinite(self.period)):
@@ -83,18 +133,16 @@ class Schedule:
 
     def tick(self, now: float) -> int:
         """Note that the next tick is done at `now` [s]; return how many later ones are passed over, being overdue."""
-        self._late.append(now - self.due)
+        self._late.note(now - self.due)
         passed = max(0, math.floor((now - self.due) / self.period))
         self.missed += passed
         self._next += 1 + passed
         return passed
 
+    def change(self, start: float, period: float) -> None:
+        """Go on with ticks from another start [s] at another period [s]; what was noted stays."""
+        self.start, self.period, self._next = start, period, 0
+
     def timing(self) -> Timing:
         """Return how well the schedule was kept so far; zeros before the first tick."""
-        late = np.array(self._late)
-        if not len(late):
-            return Timing(0, self.missed, 0.0, 0.0)
-        tenth = max(1, len(late) // 10)
-        drift = float(np.median(late[-tenth:]) - np.median(late[:tenth]))
-        jitter = float(np.percentile(np.abs(late - np.median(late)), 99))
-        return Timing(len(late), self.missed, drift, jitter)
+        return self._late.timing(self.missed)

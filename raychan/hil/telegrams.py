@@ -80,10 +80,11 @@ class TelegramReader:
     After a damaged telegram the search goes on at the byte after its STX, so a good one that overlaps it is not lost.
     Counts: `damaged` telegrams whose length or CRC is wrong; `skipped` bytes that are of no telegram, those of damaged
     ones included; `acknowledged` and `refused` are bytes ACK and NAK between telegrams.
+    Args: longest payload [bytes] that is waited for.
     """
 
-    def __init__(self) -> None:
-        self._rest = b""
+    def __init__(self, longest: int = LONGEST) -> None:
+        self._rest, self._longest = b"", longest
         self.damaged = self.skipped = self.acknowledged = self.refused = 0
 
     @property
@@ -110,7 +111,7 @@ class TelegramReader:
                 continue
             length = int.from_bytes(data[at + 2 : at + 4], "little")
             short_head = len(data) - at < _HEAD
-            bad = not short_head and not 1 <= length <= LONGEST
+            bad = not short_head and not 1 <= length <= self._longest
             end = at + _HEAD + length + _TAIL
             if not bad and not final and (short_head or end > len(data)):
                 break

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import scipy.fft
 
+from raychan.parallel import threads
 from raychan.processing.range_doppler import range_doppler
 from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.radar.windows import window
@@ -31,7 +30,7 @@ def map_by_waveform(
     cells = int(pad[1]) * chirps if chirps > 1 else 1
     weight = (taper / taper.sum()).astype(np.float32)
     profiles = waveform.compressed(cube.samples) * weight[:, None]
-    rows = scipy.fft.ifft(profiles, cells, axis=1, norm="forward", workers=os.cpu_count() or 1)
+    rows = scipy.fft.ifft(profiles, cells, axis=1, norm="forward", workers=threads())
     spectrum = scipy.fft.fftshift(rows, axes=1).astype(np.complex64)
     # White noise in a cell of the profile: the power of the compression's answer to one sample.
     one = np.zeros((chirps, samples), np.complex64)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from raychan.parallel import threads
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.records import Cube, RangeDoppler
@@ -41,7 +40,7 @@ def range_doppler(
     # One chirp has one rate: padded, all rows would be equal.
     cells_r, cells_v = int(pad[0]) * samples, int(pad[1]) * chirps if chirps > 1 else 1
     image = 1.0 if waveform.complex_sampling else 2.0
-    workers = os.cpu_count() or 1
+    workers = threads()
 
     weight = (image * taper_v / taper_v.sum()).astype(np.float32)
     weighted = cube.samples * weight[:, None]

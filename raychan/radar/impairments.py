@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import math
+from dataclasses import dataclass
 from itertools import pairwise
+from numbers import Real
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,11 +16,24 @@ from raychan.units import undb, watt
 Floats = NDArray[np.float64]
 
 
-def _table(name: str, rows: ArrayLike, least: int) -> tuple[tuple[float, float], ...]:
+def finite(name: str, value: object) -> float:
+    """Return a number. Raises: ValueError that names the argument, for another type or a number not finite."""
+    if isinstance(value, bool) or not isinstance(value, SupportsFloat) or not math.isfinite(float(value)):
+        raise ValueError(f"{name} = {value!r}: must be finite, a number")
+    return float(value)
+
+
+def _table(name: str, rows: ArrayLike, least: int, pair: str) -> tuple[tuple[float, float], ...]:
     """Return pairs of finite numbers, the first of each rising."""
-    table = np.array(rows, np.float64)
+    wanted = f"{name}: at least {least} pair{'' if least == 1 else 's'} of finite numbers wanted, {pair}"
+    try:
+        table = np.array(rows, np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{wanted}; {rows!r} given") from None
+    if not table.size:
+        raise ValueError(f"{wanted}; none given")
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < least or not np.isfinite(table).all():
-        raise ValueError(f"{name}: at least {least} pairs of finite numbers wanted, {np.shape(rows)} given")
+        raise ValueError(f"{wanted}; {table.tolist()} given")
     if (np.diff(table[:, 0]) <= 0.0).any():
         raise ValueError(f"{name}: the first number must rise from row to row")
     return tuple((float(x), float(y)) for x, y in table)
@@ -35,7 +51,7 @@ class PhaseNoise:
     mask: tuple[tuple[float, float], ...]
 
     def __init__(self, mask: ArrayLike) -> None:
-        rows = _table("PhaseNoise.mask", mask, 1)
+        rows = _table("PhaseNoise.mask", mask, 1, "[offset Hz, level dBc/Hz]")
         if rows[0][0] <= 0.0:
             raise ValueError(f"PhaseNoise.mask: offset {rows[0][0]:g} Hz: must be positive")
         for (f0, low), (f1, high) in pairwise(rows):
@@ -77,7 +93,7 @@ class ChirpError:
     table: tuple[tuple[float, float], ...]
 
     def __init__(self, table: ArrayLike) -> None:
-        object.__setattr__(self, "table", _table("ChirpError.table", table, 2))
+        object.__setattr__(self, "table", _table("ChirpError.table", table, 2, "[time s, frequency error Hz]"))
 
     def frequency(self, time: ArrayLike) -> Floats:
         """Return the frequency error [Hz] at times [s] in the ramp."""
@@ -109,10 +125,10 @@ class Converter:
     full_scale_dbm: float
 
     def __post_init__(self) -> None:
-        if int(self.bits) != self.bits or not 1 <= self.bits <= 24:
+        whole = isinstance(self.bits, Real) and not isinstance(self.bits, bool) and float(self.bits).is_integer()
+        if not whole or not 1 <= self.bits <= 24:
             raise ValueError(f"Converter.bits = {self.bits!r}: a whole number from 1 to 24 wanted")
-        if not np.isfinite(self.full_scale_dbm):
-            raise ValueError(f"Converter.full_scale_dbm = {self.full_scale_dbm!r}: must be finite")
+        finite("Converter.full_scale_dbm", self.full_scale_dbm)
 
     @property
     def step(self) -> float:
@@ -134,7 +150,8 @@ class Impairments:
     """Imperfections of a receiver; none by default.
 
     Args: chirp_error; phase_noise; converter; iq_gain_db [dB] and iq_phase_deg [deg] of Q relative to I;
-    dc_offset_dbm [dBm], power of a constant in all samples, its phase 45 deg. Raises: ValueError for values not finite.
+    dc_offset_dbm [dBm], power of a constant in all samples, its phase 45 deg.
+    Raises: ValueError for values not finite, or of another type.
     """
 
     chirp_error: ChirpError | None = None
@@ -145,10 +162,14 @@ class Impairments:
     dc_offset_dbm: float | None = None
 
     def __post_init__(self) -> None:
-        for f in fields(self)[3:]:
-            value = getattr(self, f.name)
-            if value is not None and not np.isfinite(value):
-                raise ValueError(f"Impairments.{f.name} = {value!r}: must be finite")
+        for name, kind in (("chirp_error", ChirpError), ("phase_noise", PhaseNoise), ("converter", Converter)):
+            value = getattr(self, name)
+            if not (value is None or isinstance(value, kind)):
+                raise ValueError(f"Impairments.{name} = {value!r}: a {kind.__name__} is wanted, or None")
+        for name in ("iq_gain_db", "iq_phase_deg"):
+            finite(f"Impairments.{name}", getattr(self, name))
+        if self.dc_offset_dbm is not None:
+            finite("Impairments.dc_offset_dbm", self.dc_offset_dbm)
 
     @property
     def phase_errors(self) -> bool:

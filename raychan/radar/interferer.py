@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from raychan.radar.impairments import finite
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform
 
@@ -27,8 +28,9 @@ class Interferer:
     """The table of a scene file that it comes from, if any."""
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.start):
-            raise ValueError(f"Interferer.start = {self.start!r}: must be finite")
+        if not isinstance(self.radar, Radar):
+            raise ValueError(f"Interferer.radar = {self.radar!r}: a Radar is wanted")
+        finite("Interferer.start", self.start)
         if len(self.radar.tx_elements) > 1 or isinstance(self.radar.waveform, OwnWaveform):
             raise ValueError("Interferer.radar: one transmitter of linear ramps wanted")
 

@@ -113,6 +113,8 @@ class Radar:
                 raise ValueError(f"Radar.{name} = {given[name]!r}: must be finite")
         if noise_temperature_k < 0.0:
             raise ValueError(f"Radar.noise_temperature_k = {noise_temperature_k!r}: must be 0 or more")
+        if not isinstance(impairments, Impairments):
+            raise ValueError(f"Radar.impairments = {impairments!r}: an Impairments is wanted")
         if not (impairments.iq_balanced or waveform.complex_sampling):
             raise ValueError("Radar.impairments: I/Q imbalance needs I/Q sampling, and the waveform has real sampling")
         if impairments.chirp_error is not None and isinstance(waveform, OwnWaveform):

@@ -65,8 +65,9 @@ def _head(done: Validation) -> list[str]:
     tolerance = "each scene's own" if coarse is None else f"{coarse:g} dB"
     lines = [
         "# Validation", "",
-        "The tables and claims of a ray-tracing study of 77 GHz FMCW radar in urban traffic (C001 to C052), and the "
-        "claims of a published FMCW model (C059 to C074), compared with simulations by raychan. Written by "
+        "The tables and claims of a ray-tracing study of 77 GHz FMCW radar in urban traffic (C001 to C052), the claims "
+        "of a published FMCW model (C059 to C074), and those of a published ship simulation with a laser scanner (C081 "
+        "to C103), compared with simulations by raychan. Written by "
         "`raychan validate`; the scenes are in `scenes/`, the printed figures in `validation/`. "
         "The study's ranges and speeds are inputs of the scenes: their agreement tests the chain from the wave to the "
         "detection. Lateral positions and shapes of bodies are inferred. All scenes have one noise figure; nothing is "

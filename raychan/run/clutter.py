@@ -20,7 +20,7 @@ from raychan.world.geometry import Geometry
 _RANGE_CELLS = 0.5  # side of a patch in range cells: a share of sinc^2(0.25), 0.9 dB, is smeared (not measured)
 _RATE_CELLS = 0.5  # the same across, of what the radar's own motion spreads over a patch
 _WIDEST = math.radians(2.0)  # of a patch seen from a radar at rest
-_BEYOND = 1.0  # of the unambiguous range: what lies farther folds, and is weaker by the fourth power
+_BEYOND = 1.0  # of the unambiguous range: what lies farther folds, and is left out; the ledger says with what level
 
 
 def scatters_diffusely(facets: Facets, model: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.ends import paths_record, rx_fields
-from raychan.channel.transfer import departures, rates, transfer
+from raychan.channel.ends import rx_fields
+from raychan.channel.paths import over_routes
+from raychan.channel.transfer import rates, transfer
 from raychan.radar.interferer import Interferer
-from raychan.records import Paths, Trajectories
+from raychan.records import Paths
 from raychan.run.specular_paths import Chain, exact_routes
 from raychan.signal.interference import burst
 from raychan.tracing.legs import legs_over
@@ -45,23 +46,12 @@ def interferer_paths(scene: Scene, geometry: Geometry, interferer: Interferer) -
         lambda d: np.asarray(sender.tx_field(d))[:, None],
         lambda d: np.stack([np.asarray(f(d)) for f in ends], axis=1),
     )[:, :, 0]
-    away, look = departures(routes)
-    part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
-    return paths_record(victim)(
+    return over_routes(
+        routes,
+        facets,
+        victim,
         length=routes.length,
         length_rate=2.0 * rates(routes, facets, sender.velocity, victim.rx_motion),
         **dict(zip(("amplitude", "cross"), gains.T, strict=False)),
         trajectory=np.arange(len(gains), dtype=np.int32),
-        trajectories=Trajectories(
-            departure=away.astype(np.float32),
-            arrival=look,
-            body=routes.body,
-            part=np.where(routes.facet >= 0, part, -1).astype(np.int16),
-            kind=routes.kind,
-            vertices=routes.vertices.astype(np.float32),
-        ),
-        body_names=facets.body_names,
-        part_names=facets.part_names,
-        tx=routes.tx,
-        rx=routes.rx,
     )

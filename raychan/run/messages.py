@@ -36,9 +36,9 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
     if (~found.converged).any():
         verb = _verb(~found.converged)
         said.append(
-            f"{_of(~found.converged)} {verb} not converged ({_numbers(~found.converged)}): two launches differ there "
-            f"by about as much as they find, so the error is unknown; a smaller tolerance than {tolerance_db:g} dB "
-            "(--tolerance, model.tolerance_db) may help"
+            f"{_of(~found.converged)} {verb} not converged ({_numbers(~found.converged)}): the last two launches "
+            f"differ there by about as much as they find, so the error is unknown; more rays (model.max_rays) or a "
+            f"smaller tolerance than {tolerance_db:g} dB (--tolerance, model.tolerance_db) may help"
         )
     if found.folded.any():
         first = int(np.flatnonzero(found.folded)[0])
@@ -97,6 +97,11 @@ def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
         f"{body} are coarser than the tolerance asks for: too many are partly hidden or too large. Errors may exceed "
         "those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit",
     )
+
+
+def merged(geometry: Geometry) -> tuple[str, ...]:
+    """Return a line if facets were merged, with the deviation of the surface."""
+    return (f"smooth surfaces: {geometry.merged} (model.simplify)",) if geometry.merged else ()
 
 
 def notes(result: Result) -> list[str]:

@@ -162,7 +162,7 @@ class _Frame:
         now = self.scene.at(chirp * self.step)
         self.times.append(chirp * self.step)
         carrier = self.radar.waveform.carrier
-        geometry = surface_at(now) if known is None else geometry_of(now)
+        geometry = (surface_at if known is None else geometry_of)(now, self.model.tolerance_db)
         if known is None:
             found: list[Batch] = []
             parts: list[Paths] = []

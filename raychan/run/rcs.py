@@ -15,11 +15,11 @@ from raychan.run.single_body import facets_of, mesh_of
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.body import MeshLike
-from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
 from raychan.world.limits import BOUNCES, CREASE, FREQUENCY, LENGTH, TOLERANCE_DB
 from raychan.world.material import Material
 from raychan.world.point_in_body import refuse_within
+from raychan.world.simplified import traced_alone
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -46,6 +46,9 @@ class Rcs:
     nothing, as much as a coarse launch finds: an estimate that is not in error_db; 0 for a convex body, NaN where
     max_bounces is 1 and the body is not convex."""
 
+    merged: str = ""
+    """What was merged of a finely tessellated mesh: '327,680 facets merged into 7,956, deviation 0.24 um'."""
+
     @property
     def converged(self) -> NDArray[np.bool_]:
         """Whether the launches agree well enough for the stated error to be a figure."""
@@ -67,13 +70,15 @@ def rcs(
     rx_distance: float | None = None,
     max_rays: int = 1_000_000,
     crease_deg: float | None = None,
+    simplify: bool = True,
 ) -> Rcs:
     """Return the RCS and scattering matrix of a mesh, in the near or far field, monostatic or bistatic.
 
     Args: mesh trimesh, Mesh or file; frequency [Hz]; angles [deg] from the target to the radar in the target's frame,
     which broadcast; polarization receive then transmit (V theta-hat, H phi-hat); distance [m] from the origin, inf for
     plane waves; tolerance_db [dB] wanted; rx_* of the receiver, where it is elsewhere; max_rays an angle, about; folds
-    under crease_deg [deg] are smooth (None: 20, or as the Mesh was made), unless the mesh knows its normals.
+    under crease_deg [deg] are smooth (None: 20, or as the Mesh was made), unless the mesh knows its normals; simplify
+    finely tessellated smooth surfaces, as near to them as the tolerance asks for.
     A near-field value is that of the point target at the origin that returns as much: 4 pi D^4 |E_s|^2 for unit field
     at 1 m. Raises: ValueError for arguments out of range.
     Source: Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5.
@@ -89,9 +94,11 @@ def rcs(
     )
     if not all(np.isfinite(a).all() for a in angles):
         raise ValueError("angles must be finite numbers of degrees")
-    body = mesh_of(mesh, crease_deg)
-    geometry = Geometry(facets_of(body, material, frequency))
-    other = mesh_error(geometry, alternatives(body), 2.0 * np.pi * frequency / C0)
+    k = 2.0 * np.pi * frequency / C0
+    body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None)
+    topology = [body.mesh.topology] if body.merged else []
+    geometry = Geometry(facets_of(body.mesh, material, frequency), topology, merged=body.merged)
+    other = mesh_error(geometry, body.alternatives, k)
     row, col = _POLARIZATIONS[polarization.upper()]
     found = []
     for az, el, raz, rel in zip(*(a.ravel() for a in angles), strict=True):
@@ -101,10 +108,10 @@ def rcs(
             if not end.far:
                 refuse_within(geometry.facets.vertices, end.end, "radar")
         found.append(refined(Case(geometry, other, leg, out, frequency, max_bounces, tolerance_db, max_rays, row, col)))
-    return _collected(found, angles[0].shape)
+    return _collected(found, angles[0].shape, str(body.merged or ""))
 
 
-def _collected(found: list[Value], shape: tuple[int, ...]) -> Rcs:
+def _collected(found: list[Value], shape: tuple[int, ...], merged: str) -> Rcs:
     """Return the cross-sections of all angles in their shape."""
 
     def column(name: str, kind: type) -> Any:
@@ -117,6 +124,7 @@ def _collected(found: list[Value], shape: tuple[int, ...]) -> Rcs:
         bounces=column("bounces", np.int64),
         amplitude=np.array([one.matrix for one in found], complex).reshape(*shape, 2, 2),
         further_db=column("further_db", float),
+        merged=merged,
     )
 
 

@@ -173,7 +173,8 @@ def _off(case: Case, sums: SourceSums, rules: list[Refinement]) -> float:
     """Return how far [m] the sum may be off by the tubes of launches."""
     curved = _CURVED if case.geometry.curved.any() else 0.0
     coarsest = rules[int(sums.rule.min(initial=len(rules) - 1))].phase
-    return float(_cover(case) * (sums.doubt + curved * coarsest * abs(sums.value)))
+    merged = _off_by_merging(case.geometry, sums.sums.by_bounce(case.bounces)[:, case.row, case.col])
+    return float(_cover(case) * (sums.doubt + curved * coarsest * abs(sums.value) + merged))
 
 
 def _cover(case: Case) -> float:
@@ -202,6 +203,13 @@ def _whole(case: Case, launch: BodyLaunch, rules: list[Refinement]) -> tuple[Sou
             break
         before = found
     return sums, first, True
+
+
+def _off_by_merging(geometry: Geometry, by_bounce: Complexes) -> float:
+    """Return the error [m] of an amplitude, given by bounces, due to facets that were merged."""
+    if geometry.merged is None:
+        return 0.0
+    return float(geometry.merged.share(np.arange(1, len(by_bounce) + 1)) @ np.abs(by_bounce))
 
 
 def refinements(

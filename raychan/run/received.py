@@ -15,16 +15,23 @@ from raychan.signal.phase_error import faulty
 
 
 def received(
-    quiet: Cube, paths: Paths, radar: Radar, seed: int, interference: NDArray[np.complex128] | None = None
+    quiet: Cube,
+    paths: Paths,
+    radar: Radar,
+    seed: int,
+    interference: NDArray[np.complex128] | None = None,
+    clean: Cube | None = None,
 ) -> tuple[Cube, list[str]]:
     """Return what the radar's receiver records, and what a user should know of it.
 
     Args: quiet, the samples without noise or impairments; paths, of which they are the sum, as far as phase errors
-    apply to them; seed; interference, samples (a, c, s) that other radars add.
+    apply to them; seed; interference, samples (a, c, s) that other radars add; clean, the samples of `paths` without
+    impairments where they are known (`quiet` itself, where it has nothing else).
     """
     cube, said = quiet, []
     if radar.impairments.phase_errors:
-        errors = faulty(paths, radar, stream(seed, Stage.PHASE_NOISE)).samples - synthesize(paths, radar).samples
+        clean = clean or synthesize(paths, radar)
+        errors = faulty(paths, radar, stream(seed, Stage.PHASE_NOISE)).samples - clean.samples
         cube = Cube(samples=quiet.samples + errors, noise_power=0.0)
     if interference is not None:
         cube = Cube(samples=(cube.samples + interference).astype(np.complex64), noise_power=0.0)

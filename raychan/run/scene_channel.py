@@ -14,7 +14,7 @@ from raychan.run.clock import Clock
 from raychan.run.fluctuation import check
 from raychan.run.ledger import ModelChoice
 from raychan.run.mechanisms import choose
-from raychan.run.messages import uncut
+from raychan.run.messages import merged, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.receiver import noise_of_beam
@@ -58,17 +58,19 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     It is refined where detections need it. A frame with bodies that turn, or with more paths than can be held, is
     launched twice instead, as a whole.
     """
-    check_demand(scene)
+    said = check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
     with clock.stage("geometry"):
-        geometry, points = geometry_of(scene), scene.points(0.0)
+        geometry, points = geometry_of(scene, model.tolerance_db), scene.points(0.0)
         beam_of(scene.radar)
+    said += merged(geometry)
     edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
     if not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)
         if channel is not None:
-            return channel
-    return _launched_twice(scene, geometry, points, model, clock)
+            return replace(channel, warnings=(*said, *channel.warnings))
+    channel = _launched_twice(scene, geometry, points, model, clock)
+    return replace(channel, warnings=(*said, *channel.warnings))
 
 
 def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel | None:

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
 from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
+from raychan.run.map_cells import MapCells, feeding_sources
 from raychan.run.mechanisms import choose, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
@@ -28,10 +28,11 @@ from raychan.run.receiver import detections_in, map_of, noise_of_beam
 from raychan.run.refinement_budget import STEPS, Budget
 from raychan.run.rules import step_rule
 from raychan.run.sourced_paths import SourcedPaths, changes
+from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.solver import Batch, Launch, Stats
-from raychan.tracing.sources import EXACT, Sources, depth_of, launches
+from raychan.tracing.sources import EXACT, Sources, launches
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -39,10 +40,8 @@ Complexes = NDArray[np.complexfloating]
 Bools = NDArray[np.bool_]
 
 _MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may bring above it
-_SHALLOW = 0.02  # of a cell's power: of shallow tubes so much may stay as the first launch has them, see `_feeding`
-_DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
-_EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
+_LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
 _NAMED = 3  # cells that a line names
 
 
@@ -69,19 +68,28 @@ class Converged:
     unreached: tuple[Unreached, ...]
     ended: str
     """What ended the refinement before all cells were reached, '' where none was left."""
+    speckled: int = 0
+    """Cells that were refined to their speckle only."""
 
     def notes(self) -> list[str]:
-        """Return a line on the cells that were not reached, and why."""
+        """Return a line on the cells that are speckle, and one on those that were not reached, and why."""
+        said = []
+        if self.speckled:
+            said.append(
+                f"{self.speckled} cells of the map are speckle (model.speckle): displacing bodies by 0.05 deg and 1 mm "
+                f"moves them by more than {self.model.tolerance_db:g} dB, and they are refined to that only"
+            )
         if not self.unreached:
-            return []
+            return said
         told = [
             f"{u.range:.2f} m, {u.rate:+.2f} m/s ({'tubes that bounced' if u.deep else 'first surfaces'})"
             for u in self.unreached[:_NAMED]
         ]
         more = f" and {len(self.unreached) - _NAMED} more" if len(self.unreached) > _NAMED else ""
         return [
+            *said,
             f"refined {self.steps} times, ended by {self.ended}: the level still changes by more than "
-            f"{self.model.tolerance_db:g} dB at {'; '.join(told)}{more}"
+            f"{self.model.tolerance_db:g} dB at {'; '.join(told)}{more}",
         ]
 
 
@@ -93,23 +101,6 @@ class First:
     paths: Paths
     source: Sources
     chosen: ModelChoice | None
-
-
-@dataclass
-class _Cells:
-    """Map cells that are or may become detections: `place` (c, 3), each range [m], rate [m/s] and amplitude; `level`
-    (c,), the sum of paths there; `change` (c, 2), by which shallow and deep tubes changed it last."""
-
-    place: Floats
-    level: Complexes
-    change: Floats
-
-    def open(self, tolerance: float) -> Bools:
-        """Return which classes of tubes (c, 2) must be refined for a tolerance (relative amplitude)."""
-        share = COVER * self.change / np.maximum(np.abs(self.level), 1e-300)[:, None]
-        over = np.hypot(share[:, 0], share[:, 1]) > tolerance
-        largest = share >= share.max(axis=1, keepdims=True)
-        return np.asarray(over[:, None] & ((share > _EITHER * tolerance) | largest) & (share > 0.0))
 
 
 @dataclass
@@ -166,24 +157,26 @@ class SceneRefinement:
     def converged(self, first: First) -> Converged:
         """Return the paths of a scene, refined where cells of its map need it."""
         radar, window = replace(self.radar, noise=False), self.settings.range_window
-        quiet = synthesize(first.paths, radar)
+        rough = synthesize(first.paths, radar, tolerance=_LEVEL)
         held = SourcedPaths(first.paths, first.source)
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
-        cells = self._cells(quiet, response, first.paths)
-        steps, unreached, ended = 0, tuple[Unreached, ...](), ""
+        cells = self._cells(rough, response, first.paths)
+        steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", 0
+        if len(cells.place) and self.model.speckle:
+            speckled = cells.loosened(
+                spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.carrier)
+            )
         if len(cells.place):
             steps, unreached, ended = self._refined(first.launch, held, response, cells)
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
         now = held.now if steps else first.paths
-        if steps:
-            quiet = synthesize(now, radar)
-        off = synthesize(held.doubtful, radar)
+        quiet, off = synthesize(now, radar), synthesize(held.doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
-        return Converged(launched, others, self.model, first.chosen, steps, unreached, ended)
+        return Converged(launched, others, self.model, first.chosen, steps, unreached, ended, speckled)
 
-    def _cells(self, quiet: Cube, response: PointSpread, paths: Paths) -> _Cells:
+    def _cells(self, quiet: Cube, response: PointSpread, paths: Paths) -> MapCells:
         """Return the cells of the map that are detections, or would be a little stronger."""
         radar, settings = self.radar, self.settings
         lower = replace(settings, pfa=math.sqrt(settings.pfa), min_snr_db=settings.min_snr_db - _MARGIN_DB)
@@ -196,15 +189,14 @@ class SceneRefinement:
         fed = np.abs(level) ** 2 > _UNEXPLAINED * power
         place, level = place[fed], level[fed]
         place[:, 2] = np.abs(level)
-        return _Cells(place, level, np.zeros((len(place), 2)))
+        return MapCells.of(place, level, self.model.tolerance_db)
 
     def _refined(
-        self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: _Cells
+        self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells
     ) -> tuple[int, tuple[Unreached, ...], str]:
         """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why."""
-        tolerance = 1.0 - 10.0 ** (-self.model.tolerance_db / 20.0)
         own, sums = held.by_source(response, cells.place)
-        feeding = [_feeding(own, x, tolerance) for x in sums]
+        feeding = [feeding_sources(own, x, float(t)) for x, t in zip(sums, cells.tolerance, strict=True)]
         del sums
         wanted = np.ones((len(cells.place), 2), bool)
         budget, steps, ended = Budget(self.model, self.stats), 0, ""
@@ -220,11 +212,13 @@ class SceneRefinement:
                     new = self._paths(launch.again(rule.refinement, by, self.stats))
                     assert new is not None
                     changed += changes(response, *held.replace(*new, by), cells.place)
-            cells.level += changed.sum(axis=1)
-            cells.change = np.where(wanted, np.abs(changed), np.hypot(cells.change, np.abs(changed)))
-            wanted = cells.open(tolerance)
+            cells.changed(changed, wanted)
+            wanted = cells.open
             steps += 1
             ended = budget.ended(steps, self.stats, len(held))
+        for slow, classes in zip(cells.slowness, feeding, strict=True):
+            for factor, one in zip(slow, classes, strict=True):
+                held.doubt(one, float(factor))
         return steps, tuple(_unreached(cells, wanted)), ended
 
 
@@ -234,26 +228,7 @@ def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
     return [take(b, keep[i:j]) for b, i, j in zip(batches, ends, ends[1:], strict=False)]
 
 
-def _feeding(source: Sources, sums: Complexes, tolerance: float) -> tuple[Sources, Sources]:
-    """Return the shallow and the deep sources that a cell's level depends on, of sums (s,) of its paths by source.
-
-    The weakest are left out: of the deep, as long as neither their sum nor their rms sum exceeds a share of the
-    tolerance; of the shallow, which the first launch has cut, as long as their rms sum is a small part of the level.
-    """
-    level, found = abs(sums.sum()), []
-    deep = depth_of(source) > 1
-    for mine, limit in ((~deep & (source != EXACT), math.sqrt(_SHALLOW)), (deep, _DEEP * tolerance)):
-        rows = np.flatnonzero(mine & (sums != 0.0))
-        rows = rows[np.argsort(np.abs(sums[rows]), kind="stable")]
-        small = np.sqrt(np.cumsum(np.abs(sums[rows]) ** 2)) <= limit * level
-        if limit < 1.0:
-            small &= np.abs(np.cumsum(sums[rows])) <= limit * level
-        keep = int(np.flatnonzero(small).max(initial=-1)) + 1
-        found.append(source[rows[keep:]])
-    return found[0], found[1]
-
-
-def _unreached(cells: _Cells, wanted: Bools) -> Iterator[Unreached]:
+def _unreached(cells: MapCells, wanted: Bools) -> Iterator[Unreached]:
     """Give the cells of which a class of tubes is still to be refined."""
     for i in np.flatnonzero(wanted.any(axis=1)):
         shallow, deep = cells.change[i]

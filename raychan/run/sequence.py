@@ -99,7 +99,7 @@ def _shifted(channel: Channel, scene: Scene, time: float) -> Channel:
     stats = channel.stats | {"rays": 0, "tubes": 0}
     return replace(
         channel,
-        geometry=geometry_of(scene),
+        geometry=geometry_of(scene, channel.model.tolerance_db),
         points=points,
         launched=channel.launched.moved(shift),
         others=channel.others.moved(shift),

@@ -22,7 +22,6 @@ from raychan.run.realization import realized
 from raychan.run.received import notes, received
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
-from raychan.run.rules import check_demand
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.streams import Stage, stream
 from raychan.run.unmodelled import ledger
@@ -88,7 +87,6 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         stats=channel.stats | counts(known, tolerance),
         warnings=(
             *scene.warnings,
-            *check_demand(scene),
             *channel.launched.notes(),
             *channel.warnings,
             *heard,
@@ -105,7 +103,9 @@ def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, s
     turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
     others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
-    cube, said = received(quiet, paths, scene.radar, seed, others)
+    # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
+    clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
+    cube, said = received(quiet, paths, scene.radar, seed, others, clean)
     return cube, said + notes(scene.radar, launched.whole, turned is not None)
 
 
@@ -130,7 +130,10 @@ def _explained(
 def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:
     """Return how wrong the map may be: what the two launches differ by, and what no launch cuts."""
     below = (_BELOW * channel.model.tolerance_db) ** 2 * noise_of_cell(radar, settings)
-    turned = channel.turned
+    turned, simplified = channel.turned, channel.geometry.merged
+    if simplified:
+        share = simplified.share(channel.model.max_bounces)
+        below = below + share**2 * quiet_map(channel.quiet.samples, radar, settings)
     if turned is None:
         return MapError(map_error(channel.quiet, channel.others.quiet, radar, settings).power + below)
     paths, others = channel.launched.paths, channel.others.paths

@@ -40,6 +40,7 @@ class SourcedPaths:
 
     def __init__(self, paths: Paths, source: Sources) -> None:
         self._parts = [_Part(paths, source, np.full(len(source), _NOW, np.int8), True)]
+        self._doubted = np.zeros(0, np.int64), np.zeros(0)
 
     def replace(self, paths: Paths, source: Sources, launches: list[tuple[int, Wanted]]) -> tuple[Paths, Sources]:
         """Replace what some launches traced again; return what this changes: the new paths and the old ones with their
@@ -53,6 +54,22 @@ class SourcedPaths:
             part.state[hit] = np.where(old[hit], _BEFORE, _GONE)
         self._parts.append(_Part(paths, source, np.full(len(source), _NOW, np.int8), False))
         return join(changed), np.concatenate(sources)
+
+    def doubt(self, source: Sources, factor: float) -> None:
+        """Count the last changes of sources (n,) times a factor; of several factors the largest counts."""
+        if factor > 1.0 and len(source):
+            every = np.concatenate([self._doubted[0], source])
+            own, at = np.unique(every, return_inverse=True)
+            factors = np.ones(len(own))
+            np.maximum.at(factors, at, np.concatenate([self._doubted[1], np.full(len(source), factor)]))
+            self._doubted = own, factors
+
+    def _factor(self, source: Sources) -> Floats:
+        own, factors = self._doubted
+        if not len(own):
+            return np.ones(len(source))
+        at = np.minimum(np.searchsorted(own, source), len(own) - 1)
+        return np.where(own[at] == source, factors[at], 1.0)
 
     def __len__(self) -> int:
         return sum(len(p.paths.length) for p in self._parts)
@@ -69,11 +86,13 @@ class SourcedPaths:
 
     @property
     def doubtful(self) -> Paths:
-        """What the newest launches changed, and the paths of deep tubes that were never cut."""
+        """What the newest launches changed, times the factors of `doubt`, and the paths of deep tubes never cut."""
         parts = []
         for p in self._parts:
             new = (p.state == _NOW) & (depth_of(p.source) >= DEEP if p.first else True)
-            parts += [of_trajectories(p.paths, new), _negative(of_trajectories(p.paths, p.state == _BEFORE))]
+            for rows, sign in ((new, 1.0), (p.state == _BEFORE, -1.0)):
+                paths = of_trajectories(p.paths, rows)
+                parts.append(scaled(paths, sign * self._factor(p.source[rows])[paths.trajectory]))
         return join(parts)
 
     def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, list[Complexes]]:

@@ -54,7 +54,12 @@ def trace(
     Raises: ValueError on a tolerance or a number of bounces out of range.
     """
     model = asked(scene.model, tolerance_db, max_bounces)
-    radar, settings, geometry, points = scene.radar, scene.processing, geometry_of(scene), scene.points(0.0)
+    radar, settings, geometry, points = (
+        scene.radar,
+        scene.processing,
+        geometry_of(scene, model.tolerance_db),
+        scene.points(0.0),
+    )
     rule = (check_rule if check else fine_rule)(radar, settings, model)
     if not (check or needed(scene, model.retrace, rule.refinement.max_edge)):
         stats, launches = Stats(), list[list[Batch]]()
@@ -90,7 +95,8 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     Targets are steady here: only `simulate`, which knows their bodies, draws those that fluctuate.
     """
     SEED.check("seed", seed, whole=True)
-    return received(samples_of(paths, radar), paths, radar, seed)[0]
+    clean = samples_of(paths, radar)
+    return received(clean, paths, radar, seed, clean=clean)[0]
 
 
 def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler:

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from raychan.geometry.triangles import edge_curvatures
 from raychan.radar.radar import Radar
 from raychan.records import BLOCKER, Paths
 from raychan.run.mechanisms import peak
 from raychan.world.geometry import Geometry
+from raychan.world.mesh import Mesh
+
+Floats = NDArray[np.float64]
 
 _OPPOSED = 2.0  # of a field's amplitude: largest change by a phase, at pi
 
 
 def strongest_bend(
-    paths: Paths, geometry: Geometry, names: Collection[str], radar: Radar, settings: Any
+    paths: Paths, geometry: Geometry, meshes: Mapping[str, Mesh], radar: Radar, settings: Any
 ) -> tuple[str, float, float]:
-    """Return, among named bodies, the one whose strongest cell changes most if its smoothed facets are flat: its name,
-    the phase [rad] and the change [W]; '' where none is curved or returns an echo.
+    """Return, among bodies given by name with their whole meshes, the one whose strongest cell changes most if its
+    smoothed facets are flat: its name, the phase [rad] and the change [W]; '' where none is curved or returns an echo.
 
     A smooth facet deviates from the flat one by its sag, a quarter of the edge curvature, and the two-way phase by 2 k
     times that; the rms over the body's area is the relative error of the field of flat facets.
@@ -27,13 +32,26 @@ def strongest_bend(
     f, k = geometry.facets, 2.0 * np.pi / radar.waveform.wavelength
     found = ("", 0.0, 0.0)
     for body, name in enumerate(f.body_names):
-        rows = np.flatnonzero((f.body == body) & geometry.curved)
-        if name not in names or not len(rows) or f.role[body] == BLOCKER:
+        if name not in meshes or f.role[body] == BLOCKER:
             continue
-        sag = 0.25 * np.linalg.norm(geometry.edge_curvature[rows], axis=2)
-        phase = 2.0 * k * float(np.sqrt(np.average((sag**2).mean(axis=1), weights=geometry.area[rows])))
+        curvature, area = _curved(geometry, body, meshes[name])
+        if not len(area):
+            continue
+        sag = 0.25 * np.linalg.norm(curvature, axis=2)
+        phase = 2.0 * k * float(np.sqrt(np.average((sag**2).mean(axis=1), weights=area)))
         met = ((paths.trajectories.body == body) & (paths.trajectories.kind > 0)).any(axis=1)[paths.trajectory]
         changed = min(phase, _OPPOSED) ** 2 * peak(paths, met, radar, settings)
         if changed > found[2]:
             found = (name, phase, changed)
     return found
+
+
+def _curved(geometry: Geometry, body: int, mesh: Mesh) -> tuple[Floats, Floats]:
+    """Return the edge curvatures (n, 3, 3) [m] and areas (n,) [m^2] of a body's curved facets: those of its whole mesh,
+    also where fewer are traced."""
+    own = geometry.facets.body == body
+    if np.count_nonzero(own) == len(mesh.faces):
+        rows = np.flatnonzero(own & geometry.curved)
+        return geometry.edge_curvature[rows], geometry.area[rows]
+    curvature, curved = edge_curvatures(mesh.corners, mesh.normals)
+    return curvature[curved], mesh.areas[curved]

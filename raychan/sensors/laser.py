@@ -1,7 +1,7 @@
 """Laser scanner with a turning mirror: beams of a moving deck, nearest hits, range by reflectivity, range noise.
 
-A beam is one ray of no width: divergence and mixed pixels are not modelled. Sensor frame: x ahead, y left, z up; beam
-angles run from the right (negative) to the left.
+A beam is one ray of no width, or has a `sensors.spot`. Sensor frame: x ahead, y left, z up; beam angles run from
+the right (negative) to the left.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from raychan.columns import Record, column
 from raychan.poses import direction, rotation
+from raychan.sensors.sea import Waves, flat_sea_range, wavy_sea_range
+from raychan.sensors.spot import Spot
 from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
@@ -40,7 +42,9 @@ class Scanner:
     """An LMS221-like scanner.
 
     Fields: fan [deg]; step [deg]: 1, 0.5 or 0.25; mirror_hz turns of the mirror a second; max_range [m]; dark_range [m]
-    to a surface of 10 % reflectivity (assumed: the paper's Figure 9 is lost).
+    to a surface of 10 % reflectivity (assumed: the paper's Figure 9 is lost); spot of a beam, None for a ray of
+    no width; lambert: whether power falls with the cosine of the angle of incidence (Table 2 does not say); moving:
+    whether each beam leaves at its own time, or all at the scan's start, as the paper has it.
     A step of 1/m deg takes m turns of the mirror, each shifted by a step against the one before: 13.3, 26.7, 53.3 ms.
     Raises: ValueError for another step, or figures that are not above 0.
     """
@@ -50,6 +54,9 @@ class Scanner:
     mirror_hz: float = 75.0
     max_range: float = 80.0
     dark_range: float = 30.0
+    spot: Spot | None = None
+    lambert: bool = False
+    moving: bool = True
 
     def __post_init__(self) -> None:
         if self.step_deg not in (1.0, 0.5, 0.25):
@@ -76,7 +83,9 @@ class Scanner:
 
     @property
     def times(self) -> Floats:
-        """Time (n,) [s] of each beam from the start of the scan."""
+        """Time (n,) [s] of each beam from the start of the scan; 0 unless `moving`."""
+        if not self.moving:
+            return np.zeros(self.count)
         beam, turns = np.arange(self.count), round(1.0 / self.step_deg)
         return (beam % turns + beam * self.step_deg / 360.0) / self.mirror_hz
 
@@ -108,46 +117,103 @@ class LaserScan(Record):
     body: Ints = column("n", np.int32, doc="body, NO_BODY or SEA")
 
 
+@dataclass(frozen=True)
+class Targets:
+    """What beams may meet.
+
+    Fields: caster of bodies, or None; reflectivity (b,) of each body; sea_reflectivity, 0 for no sea; waves of the sea
+    about z = 0, None for a flat one.
+    Water mirrors: what comes back from the sea is foam's and ripples'. Its reflectivity is yours to give; with
+    `Scanner.lambert` it counts times the sine of the grazing angle.
+    """
+
+    caster: RayCaster | None
+    reflectivity: Floats
+    sea_reflectivity: float = 0.0
+    waves: Waves | None = None
+
+
 def beams(scanner: Scanner, poses: SensorPoses) -> Floats:
     """Return the unit directions (n, 3) of the beams in the world, each at the pose of its own time."""
+    return _beams(scanner, poses)[0]
+
+
+def _beams(scanner: Scanner, poses: SensorPoses) -> tuple[Floats, Floats]:
+    """Return the unit directions (n, 3) of the beams and of the mirror's axis."""
     # `rotation` of arrays (n,) has the beams last: (3, 3, n).
     each: Any = poses.yaw, poses.pitch, poses.roll
     turn = np.moveaxis(rotation(*each), -1, 0)
-    return np.ascontiguousarray(np.einsum("nij,nj->ni", turn, direction(scanner.angles)))
+    towards = np.einsum("nij,nj->ni", turn, direction(scanner.angles))
+    return np.ascontiguousarray(towards), np.ascontiguousarray(turn[:, :, 2])
 
 
-def flat_sea_range(origin: Floats, towards: Floats) -> Floats:
-    """Return the distance (n,) [m] from points (n, 3) along unit directions (n, 3) to the plane z = 0; inf from below
-    or looking up: height over the sine of the angle of depression."""
-    down = -towards[:, 2]
-    hits = (down > 0.0) & (origin[:, 2] > 0.0)
-    return np.divide(origin[:, 2], down, out=np.full(len(down), np.inf), where=hits)
+def first_hits(
+    scanner: Scanner, targets: Targets, origin: Floats, towards: Floats, time: Floats, together: int = 1
+) -> tuple[Floats, Ints, Floats]:
+    """Return what rays of no width meet first, seen or not.
+
+    Args: origin (n, 3) [m]; towards (n, 3) unit; time (n,) [s] of each on the sea's clock; together: so
+    many rows after each other are of one beam.
+    Returns: distance (n,) [m], inf for nothing (of waves: within max_range); body (n,), NO_BODY or SEA; how much it
+    reflects (n,), times the cosine of incidence with `lambert`.
+    """
+    n = len(towards)
+    distance, body, reflects = np.full(n, np.inf), np.full(n, NO_BODY, np.int32), np.zeros(n)
+    caster = targets.caster
+    if caster is not None:
+        facet, distance = caster.cast(origin, towards, np.full(n, -1, np.int32))
+        hit = facet >= 0
+        met = facet[hit]
+        body[hit] = caster.facets.body[met]
+        reflects[hit] = np.asarray(targets.reflectivity, float)[body[hit]]
+        if scanner.lambert:
+            reflects[hit] *= np.abs(np.einsum("ij,ij->i", towards[hit], caster.normal[met]))
+    if targets.sea_reflectivity > 0.0:
+        sea = (
+            flat_sea_range(origin, towards)
+            if targets.waves is None
+            else wavy_sea_range(targets.waves, origin, towards, time, np.minimum(distance, scanner.max_range), together)
+        )
+        nearer = sea < distance
+        distance, body = np.where(nearer, sea, distance), np.where(nearer, np.int32(SEA), body)
+        reflects[nearer] = targets.sea_reflectivity
+        if scanner.lambert:
+            normal = np.array([0.0, 0.0, 1.0])
+            if targets.waves is not None:
+                x, y, _ = (origin[nearer] + sea[nearer, None] * towards[nearer]).T
+                normal = targets.waves.normal(x, y, time[nearer])
+            reflects[nearer] *= -(normal * towards[nearer]).sum(axis=1)
+    return distance, body, reflects
 
 
 def scan(
-    scanner: Scanner, poses: SensorPoses, caster: RayCaster | None, reflectivity: Floats, sea_reflectivity: float = 0.0
+    scanner: Scanner,
+    poses: SensorPoses,
+    caster: RayCaster | None,
+    reflectivity: Floats,
+    sea_reflectivity: float = 0.0,
+    waves: Waves | None = None,
 ) -> LaserScan:
     """Return the nearest hit of each beam.
 
-    Args: poses at the scanner's `times`; caster: bodies, or None; reflectivity (b,) of each body; sea_reflectivity of
-    the plane z = 0, 0 for no sea.
+    Args: poses at the scanner's `times`; the rest as in `Targets`, the waves' time 0 being the scan's start
+    (`Waves.at`).
     A nearer surface hides what is behind it even where it is too dark to be seen itself.
     """
-    towards = beams(scanner, poses)
-    distance, body = np.full(len(towards), np.inf), np.full(len(towards), NO_BODY, np.int32)
-    limit = np.zeros(len(towards))
-    if caster is not None:
-        facet, distance = caster.cast(poses.position, towards, np.full(len(towards), -1, np.int32))
-        hit = facet >= 0
-        body[hit] = caster.facets.body[facet[hit]]
-        limit[hit] = scanner.range_limit(np.asarray(reflectivity, float)[body[hit]])
-    if sea_reflectivity > 0.0:
-        sea = flat_sea_range(poses.position, towards)
-        nearer = sea < distance
-        distance, body = np.where(nearer, sea, distance), np.where(nearer, np.int32(SEA), body)
-        limit[nearer] = scanner.range_limit(np.array(sea_reflectivity))
-    seen = distance <= limit
-    return LaserScan(range=np.where(seen, distance, np.inf), body=np.where(seen, body, np.int32(NO_BODY)))
+    targets, (towards, axis) = Targets(caster, reflectivity, sea_reflectivity, waves), _beams(scanner, poses)
+    spot = scanner.spot
+    if spot is None:
+        distance, body, reflects = first_hits(scanner, targets, poses.position, towards, scanner.times)
+        seen = distance <= scanner.range_limit(reflects)
+        return LaserScan(range=np.where(seen, distance, np.inf), body=np.where(seen, body, np.int32(NO_BODY)))
+    rays = spot.sub_rays(poses.position, towards, axis)
+    each = len(rays[0]) // len(towards)
+    distance, body, reflects = first_hits(scanner, targets, *rays, np.repeat(scanner.times, each), each)
+    # Power over the least that is detected: 1 where a surface is at its `range_limit`.
+    power = np.where(distance <= scanner.max_range, reflects / 0.1 * (scanner.dark_range / distance) ** 2, 0.0)
+    shape = len(towards), each
+    ranges, bodies = spot.report(distance.reshape(shape), body.reshape(shape), power.reshape(shape), NO_BODY)
+    return LaserScan(range=ranges, body=bodies)
 
 
 def noisy(ideal: LaserScan, deviation: float, rng: np.random.Generator) -> LaserScan:

@@ -6,13 +6,13 @@ second order in v / c, which at 30 m/s and 4 GHz bandwidth are at -78 dB.
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.parallel import threads
 from raychan.radar.array import Wavefronts, wavefronts
 from raychan.radar.dual_paths import DualPaths
 from raychan.radar.radar import Radar
@@ -144,13 +144,13 @@ def _direct(amplitude: Complexes, delay: Floats, delay_rate: Floats, wave: Wavef
 
 def _add_fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: list[tuple[Floats, Floats]]) -> None:
     """Write the samples of all pairs of elements, one grid after the other: of a long frame each may take gigabytes."""
-    threads = os.cpu_count() or 1
+    cores = threads()
     sums = samples if len(grids) == 1 else np.zeros(samples.shape, np.complex128)
     # One buffer for all grids: allocating so much again costs more than filling it.
     buffer = np.empty(max(grid.factors for grid, _ in grids), np.complex128)
-    with ThreadPoolExecutor(max_workers=threads) as pool:
+    with ThreadPoolExecutor(max_workers=cores) as pool:
         # At least as many receivers as cores: one core each. Else all cores work on one receiver. The sums are equal.
-        outer, inner = (pool.map, map) if len(elements) >= threads > 1 else (map, pool.map)
+        outer, inner = (pool.map, map) if len(elements) >= cores > 1 else (map, pool.map)
         while grids:
             grid, echoes = grids.pop()
             ready = grid.prepared(echoes, buffer)

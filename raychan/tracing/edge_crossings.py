@@ -199,7 +199,8 @@ def _longest(corners, source, k, far, plane, first_edge, edges, planes, side, wo
         if g < 0 or (r > 0 and g == plane[r - 1]) or first_edge[g + 1] - first_edge[g] > _MOST_EDGES:
             continue
         for e in range(first_edge[g], first_edge[g + 1]):
-            a, b = edges[e, 0], edges[e, 1]
+            a = edges[e, 0, 0], edges[e, 0, 1], edges[e, 0, 2]
+            b = edges[e, 1, 0], edges[e, 1, 1], edges[e, 1, 2]
             da, db = 0.0, 0.0
             for c in range(3):
                 da += (a[c] - corners[3, c]) * k[c]

@@ -168,7 +168,9 @@ def _longest_crossings(rows, rays, far, extent, planes, grid, centre, radius, ou
                         if (one > 0.0) == (other > 0.0) or tested[e] == i:
                             continue
                         tested[e] = i
-                        a, b = edges[e, 0], edges[e, 1]
+                        # As numbers: parts of an array would count references, which several threads wait for.
+                        a = edges[e, 0, 0], edges[e, 0, 1], edges[e, 0, 2]
+                        b = edges[e, 1, 0], edges[e, 1, 1], edges[e, 1, 2]
                         # The part beyond the mirror, and before the plane of landing.
                         da, db, ha, hb = -_TOUCHING, -_TOUCHING, -_TOUCHING, -_TOUCHING
                         for c in range(3):

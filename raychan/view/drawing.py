@@ -86,6 +86,8 @@ class Drawing:
     """Names and places to write them."""
     caption: str = ""
     """The chains of bodies of a cell, where only its rays are shown."""
+    observer: str = "radar"
+    """What stands at `radar`."""
 
     @property
     def note(self) -> str:
@@ -118,7 +120,7 @@ class Drawing:
             rays = tuple(Ray(points=held[f"r{i}"], **r) for i, r in enumerate(about["rays"]))
         targets = tuple((name, (x, y, z)) for name, (x, y, z) in about["targets"])
         radar, boresight = np.array(about["radar"]), np.array(about["boresight"])
-        return Drawing(about["title"], shapes, rays, radar, boresight, targets, about["caption"])
+        return Drawing(about["title"], shapes, rays, radar, boresight, targets, about["caption"], about["observer"])
 
 
 def draw(

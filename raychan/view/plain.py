@@ -47,7 +47,7 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
             axes.add_collection3d(lines)
             made.colorbar(lines, cax=made.add_axes((0.91, 0.2, 0.015, 0.6)), label="received power [dBm]")
         axes.plot(*drawing.radar[:, None], marker=">", ms=9, color="#d62728", ls="none", zorder=3)
-        axes.text(*drawing.radar, "  radar", fontsize=8, zorder=4)
+        axes.text(*drawing.radar, f"  {drawing.observer}", fontsize=8, zorder=4)
         for name, (x, y, z) in drawing.targets:
             axes.text(x, y, z + 0.3, name, fontsize=8, ha="center", zorder=4)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x [m]", ylabel="y [m]")

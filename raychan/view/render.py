@@ -58,7 +58,7 @@ def _plotter(drawing: Drawing, off_screen: bool) -> Any:
     tip = drawing.radar + scale * drawing.boresight
     cone = pv.Cone(center=tip, direction=-drawing.boresight, height=2 * scale, radius=scale, resolution=40)
     plotter.add_mesh(cone, color="#d62728")
-    names = [name for name, _ in drawing.targets] + ["radar"]
+    names = [name for name, _ in drawing.targets] + [drawing.observer]
     places = [(x, y, z + 1.5 * scale) for _, (x, y, z) in drawing.targets]
     places.append((drawing.radar[0], drawing.radar[1], drawing.radar[2] + 2.5 * scale))
     plotter.add_point_labels(

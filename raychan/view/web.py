@@ -25,6 +25,7 @@ def page(drawing: Drawing, path: str | Path) -> Path:
         "title": drawing.title,
         "note": drawing.note,
         "radar": drawing.radar.tolist(),
+        "observer": drawing.observer,
         "bounds": [low.tolist(), high.tolist()],
         "shapes": [
             {"name": s.name, "colour": s.colour, "opacity": s.opacity, "triangles": _packed(s.triangles)}

@@ -33,7 +33,8 @@ def scene_text(path: str | Path) -> tuple[str, Path]:
         # Some editors begin a text with a byte order mark.
         return file.read_text(encoding="utf-8-sig"), file
     except FileNotFoundError:
-        more = f", or {nearest(file.stem, bundled.names())}" if bundled.names() else ""
+        known = bundled.names() + bundled.ship_names()
+        more = f", or {nearest(file.stem, known)}" if known else ""
         raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
     except (OSError, UnicodeDecodeError) as e:
         reason = getattr(e, "strerror", None) or e

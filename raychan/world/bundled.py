@@ -16,7 +16,16 @@ def folder() -> Path | None:
 
 
 def names() -> list[str]:
-    """Return the names of the bundled scenes."""
+    """Return the names of the bundled scenes of a radar."""
+    return sorted(set(_all()) - set(ship_names()))
+
+
+def ship_names() -> list[str]:
+    """Return the names of the bundled scenes of a ship, which have tables of their own (`raychan ship`)."""
+    return [name for name in _all() if name.startswith("ship_")]
+
+
+def _all() -> list[str]:
     there = folder()
     return sorted(file.stem for file in there.glob("*.toml")) if there else []
 

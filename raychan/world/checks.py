@@ -19,6 +19,17 @@ from raychan.world.point_in_body import Place, in_plane_of, place_of
 from raychan.world.schema import RadarTable
 
 
+def names_differ(bodies: Iterable[Body]) -> None:
+    """Raise SceneError where two bodies have one name."""
+    seen: set[str] = set()
+    for body in bodies:
+        if body.name in seen:
+            raise SceneError(
+                "two bodies have this name", key=f"bodies.{body.name}", allowed="a different name for each"
+            )
+        seen.add(body.name)
+
+
 def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
     """Raise SceneError where the radar is inside a body, on its surface, or below a mirror."""
     if radar is None:

@@ -45,6 +45,8 @@ class Alternatives:
     regular: Bools | None = None
     """Facets (f,) of smooth patches that are a regular tessellation: finer ones come nearer to a smooth surface, which
     those of a convex hull of points do not. None where no fold is smooth."""
+    checked: Bools | None = None
+    """Facets (f,) whose curved surface was checked against that of a finer mesh; None where there is no finer one."""
 
 
 def alternatives(mesh: Mesh) -> Alternatives:
@@ -97,6 +99,17 @@ def uncertain_folds(mesh: Mesh, key: str) -> str:
         span = f"{low:.4g}" if high - low < 0.01 else f"{low:.4g} to {high:.4g}"
         said.append(f"{len(hard)} folds of {span} deg are taken for edges and may be a curved surface")
     return f"{'; '.join(said)}: {key} decides" if said else ""
+
+
+def uncertain_facets(mesh: Mesh) -> Bools:
+    """Return which facets (f,) are beside folds that were taken as smooth and may be edges, or as edges and may be
+    smooth: their surface is not known well enough to be simplified."""
+    found = np.zeros(len(mesh.faces), bool)
+    if mesh.crease_deg is not None:
+        pair, _, uncertain = _folds(mesh)
+        found[pair[uncertain] // 3] = True
+        found[_uncertain_edges(mesh)[0] // 3] = True
+    return found
 
 
 def _folds(mesh: Mesh) -> tuple[Ints, Floats, Bools]:

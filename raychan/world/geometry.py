@@ -18,9 +18,12 @@ from raychan.geometry.silhouettes import silhouette_edges
 from raychan.geometry.triangles import cluster_bounds, edge_curvatures, extents, half_edge_ends
 from raychan.parallel import cached
 from raychan.records import MIRROR, PEC, Facets
+from raychan.world.body import Body
 from raychan.world.inner_spheres import inner_spheres_of
 from raychan.world.ray_caster import RayCaster
 from raychan.world.scene_topology import SceneTopology, closed_pieces
+from raychan.world.schema import Model
+from raychan.world.simplified import Merged, traced_scene
 from raychan.world.static_geometry import StaticGeometry, columns, computed_once
 from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
 
@@ -38,7 +41,8 @@ class Geometry(RayCaster):
 
     Args: facets; topology of each body's facets, bodies one after the other; inner_spheres inside bodies, centre (k, 3)
     [m], radius (k,) [m], body (k,); both computed if not given; static what is kept of bodies that do not move;
-    finer_of a geometry of the same surface with coarser facets: bodies hide of themselves what they hide there.
+    finer_of a geometry of the same surface with coarser facets: bodies hide of themselves what they hide there; merged
+    what was merged of finer meshes.
     """
 
     def __init__(
@@ -48,10 +52,11 @@ class Geometry(RayCaster):
         inner_spheres: Spheres | None = None,
         static: StaticGeometry | None = None,
         finer_of: Geometry | None = None,
+        merged: Merged | None = None,
     ) -> None:
         super().__init__(facets, static)
         v, n, m = facets.vertices, facets.normals, facets.materials
-        self._static, self._inner_spheres = static, inner_spheres
+        self._static, self._inner_spheres, self.merged = static, inner_spheres, merged
         reflects_in_part = (m.kind != PEC) & (np.abs(m.eps) < _METAL)
         self.lossy = computed_once(static, "lossy", lambda: reflects_in_part[facets.material])
         self.material_columns = facets.material, (m.kind, m.eps, m.thickness, m.roughness)
@@ -254,17 +259,27 @@ class HasBodies(Protocol):
     def static_geometry(self) -> StaticGeometry | None: ...
     @property
     def _derived(self) -> dict[Any, Any]: ...
+
+    bodies: tuple[Body, ...]
+    frequency: float
+    model: Model
+    _static: dict[Any, Any]
+
     def facets(self) -> Facets: ...
 
 
-def surface_at(scene: HasBodies) -> Geometry:
-    """Return the geometry of a scene's bodies at time 0."""
-    return Geometry(scene.facets(), scene.topology, scene.inner_spheres, scene.static_geometry)
+def surface_at(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:
+    """Return the geometry of a scene's bodies at time 0, for a tolerance [dB] (None: the scene's): finely tessellated
+    smooth surfaces are simplified, unless the scene's model says otherwise."""
+    of, merged = traced_scene(scene, tolerance_db)
+    return Geometry(of.facets(), of.topology, of.inner_spheres, of.static_geometry, None, merged)
 
 
-def geometry_of(scene: HasBodies) -> Geometry:
-    """Return the geometry of a scene's bodies at time 0, built once and kept with the scene."""
-    if Geometry not in scene._derived:
-        scene._derived[Geometry] = surface_at(scene)
-    geometry: Geometry = scene._derived[Geometry]
+def geometry_of(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:
+    """Return the geometry of a scene's bodies at time 0 as `surface_at` does, built once and kept with the scene."""
+    merged = traced_scene(scene, tolerance_db)[1]
+    key = Geometry if merged is None else (Geometry, tolerance_db)
+    if key not in scene._derived:
+        scene._derived[key] = surface_at(scene, tolerance_db)
+    geometry: Geometry = scene._derived[key]
     return geometry

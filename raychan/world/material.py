@@ -44,6 +44,11 @@ class Material:
             if not (limit.allows(value) if value is not None else key == "thickness"):
                 raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=limit.allowed)
 
+        if not (self.diffuse is None or isinstance(self.diffuse, Diffuse)):
+            raise SceneError(
+                f"{self.diffuse!r} is not possible", key="diffuse", value=self.diffuse, allowed="a Diffuse, or None"
+            )
+
     @property
     def kind(self) -> MaterialKind:
         """What it is to a wave."""

@@ -40,7 +40,7 @@ class Motion:
     def rotation(self, time: float = 0.0) -> Array:
         """Return the matrix (3, 3) from body to world axes at a time [s]."""
         turned = rotation(self.heading(time), self.pitch, self.roll)
-        return turned @ _about(time * np.asarray(self.own_spin)) if any(self.own_spin) else turned
+        return turned @ about(time * np.asarray(self.own_spin)) if any(self.own_spin) else turned
 
     def spin(self, time: float = 0.0) -> Array:
         """Return the turn-rate vector (3,) [rad/s] about the origin, world axes, at a time [s]."""
@@ -92,7 +92,7 @@ class Motion:
         return self.velocity_of_origin(time) + np.cross(self.spin(time), arm)
 
 
-def _about(turn: Array) -> Array:
+def about(turn: Array) -> Array:
     """Return the matrix (3, 3) of a turn [rad] about the direction of a vector. Source: Rodrigues' formula."""
     angle = float(np.linalg.norm(turn))
     if angle == 0.0:

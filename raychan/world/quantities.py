@@ -148,3 +148,49 @@ TxOffsets = Annotated[
 Stagger = Annotated[list[Ramp], Field(min_length=2, max_length=16), _listed("2 to 16 times [us]")]
 CellPair = Annotated[tuple[Cells, Cells], _listed(f"2 whole numbers, each {limits.CELLS.allowed}")]
 PadPair = Annotated[tuple[Pad, Pad], _listed(f"2 whole numbers, each {limits.PAD.allowed}")]
+Voyage = Annotated[float, _REAL, _within(limits.VOYAGE_S)]
+ShipSpeed = Annotated[float, _REAL, _within(limits.SHIP_MPS)]
+Heading = Annotated[float, _REAL, _within(limits.HEADING_DEG)]
+Rudder = Annotated[float, _REAL, _within(limits.RUDDER_DEG)]
+RudderRate = Annotated[float, _REAL, _within(limits.RUDDER_DPS)]
+TurnRate = Annotated[float, _REAL, _within(limits.TURN_DPS)]
+Weight = Annotated[float, _REAL, _within(limits.WEIGHT)]
+LoopRate = Annotated[float, _REAL, _within(limits.LOOP_RATE)]
+Damping = Annotated[float, _REAL, _within(limits.DAMPING)]
+FeedbackGain = Annotated[float, _REAL, _within(limits.GAIN)]
+Spread = Annotated[float, _REAL, _within(limits.DEVIATION)]
+Strength = Annotated[float, _REAL, _within(limits.STRENGTH)]
+Reflectivity = Annotated[float, _REAL, _within(limits.REFLECTIVITY)]
+BeamRange = Annotated[float, _REAL, _within(limits.BEAM_RANGE)]
+WaveHeight = Annotated[float, _REAL, _within(limits.WAVE_HEIGHT_M)]
+WavePeriod = Annotated[float, _REAL, _within(limits.WAVE_PERIOD_S)]
+Peak = Annotated[float, _REAL, _within(limits.PEAK)]
+Divergence = Annotated[float, _REAL, _within(limits.DIVERGENCE_MRAD)]
+SpotWidth = Annotated[float, _REAL, _within(limits.SPOT_MM)]
+Rings = Annotated[int, _WHOLE, _whole(limits.RINGS)]
+Merge = Annotated[float, _REAL, _within(limits.MERGE_M)]
+ScanStep = Annotated[float, _REAL, _within(limits.SCAN_STEP_DEG)]
+Fan = Annotated[float, _REAL, _within(limits.FAN_DEG)]
+Mirror = Annotated[float, _REAL, _within(limits.MIRROR_HZ)]
+Horizontal = Annotated[
+    list[Annotated[float, _REAL, _within(limits.PLACE)]],
+    Field(min_length=2, max_length=2),
+    _listed(f"2 numbers, each {limits.PLACE.allowed}"),
+]
+WayPointList = Annotated[list[Horizontal], Field(min_length=2), _listed("2 or more way-points [x, y] in m")]
+Course = Annotated[
+    tuple[Annotated[float, _REAL, _within(limits.INSTANT_S)], Heading],
+    Field(strict=False),
+    _listed("[time in s, heading in deg], a pair of numbers"),
+]
+Courses = Annotated[list[Course], Field(min_length=1), _listed("1 or more pairs [time in s, heading in deg]")]
+Weights = Annotated[
+    list[Weight],
+    Field(min_length=5, max_length=5),
+    _listed("5 weights, of sway velocity, roll rate, yaw rate, roll and heading"),
+]
+Gains = Annotated[
+    list[FeedbackGain],
+    Field(min_length=5, max_length=5),
+    _listed("5 gains, of sway velocity, roll rate, yaw rate, roll and heading"),
+]

@@ -1,4 +1,4 @@
-"""Ray casting: triangle ids from Embree, everything else in float64 (see `world.triangle_groups`).
+"""Ray casting: triangle ids from Embree, everything else in float64 (see `geometry.intersect`).
 
 Embree answers in float32, whose spacing at 200 m is 15 um: 0.05 rad two-way at 77 GHz. So only the triangle's id is
 taken; the hit point is the float64 intersection with that triangle's plane. The world is shifted to the centre of the
@@ -14,32 +14,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.intersect import (
-    CastRays,
-    FacetShapes,
-    companions,
-    near_spheres,
-    offset_origins,
-    plane_distances,
-    resolve_hits,
-)
-from raychan.geometry.shadow_rays import ShadowSurfaces, ShadowTargets, resolve_shadow_rays
+from raychan.geometry.embree_packet import new_packet
+from raychan.geometry.intersect import EDGE, OFFSET, CastRays, FacetGroups, FacetShapes, plane_distances
+from raychan.geometry.shadow_rays import MetFacets, ShadowSurfaces, ShadowTargets, follow_rays
 from raychan.geometry.triangles import extents, planes_of
-from raychan.parallel import parallel_for
+from raychan.parallel import cached, parallel_for
 from raychan.records import LAYER, Facets
 from raychan.world.backed_layers import backed
 from raychan.world.static_geometry import StaticGeometry, columns, computed_once
-from raychan.world.triangle_groups import Group
+from raychan.world.triangle_groups import Group, facet_groups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 _MISS = np.int32(-1)
-_PARALLEL_FROM = 4096  # rays from which on a second thread pays; not measured
-_CHUNK = 1 << 16  # rays cast at once: bounds the memory
-_OFFSET = 2e-6  # of a coordinate: a few float32 spacings
-_EDGE = 0.15  # of the offset: what float32 may move a ray aside; not measured
-_TRIES = 8  # casts of a ray whose hit is its own facet or one that it runs along
+_PARALLEL_FROM = 2048  # rays from which on a second thread pays; not measured
+_NO_LIMIT, _NO_BODY, _NO_BOOL = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, bool)
+_NO_FACET, _NO_LAYERS = np.zeros(0, np.int32), np.zeros((0, 0), np.int32)
 # Of the size of a small scene, or of 1 m in a larger one:
 _TOUCH = 2e-5  # surfaces nearer than this lie on each other
 _NEAREST = 1e-6  # a hit closer than this is the surface the ray leaves
@@ -86,7 +77,7 @@ class RayCaster:
         v = self.facets.vertices
         upon = backed(v - self._centre, self.normal, self.area, self.is_layer, self.touch)
         if not upon.any():
-            return [Group(lambda: v, self.extents, None)]
+            return [Group(lambda: v, self.extents, np.arange(len(v), dtype=np.int32))]
         rest, thin = (np.flatnonzero(x).astype(np.int32) for x in (~upon, upon))
         return [
             Group(lambda: v[rest], self.extents, rest),
@@ -130,6 +121,38 @@ class RayCaster:
         found: Floats = plane_distances(facet, origin, direction, self.first, self.normal)
         return found
 
+    @cached
+    def _facet_groups(self) -> FacetGroups:
+        """The groups as compiled code reads them."""
+        return facet_groups(self._groups)
+
+    @cached
+    def _shapes(self) -> FacetShapes:
+        """The facets for rays."""
+        return FacetShapes(self.facets.vertices, self.first, self.normal, self._size, self._nearest)
+
+    @cached
+    def _surfaces(self) -> ShadowSurfaces:
+        """The facets for shadow rays."""
+        layer = self.is_layer if self._any_layer else _NO_BOOL
+        margin = EDGE * OFFSET * self._size
+        f = self.facets
+        return ShadowSurfaces(
+            f.vertices, self.normal, self.plane, self.smooth, np.asarray(f.body, np.int32), layer, self.touch, margin
+        )
+
+    def _follow(self, rays: CastRays, targets: ShadowTargets, met: MetFacets) -> None:
+        """Write what rays meet, on all threads; count them."""
+        fixed = self._facet_groups, self._shapes, self._surfaces
+        casts = []
+
+        def some(rows: slice) -> None:
+            part: list[Any] = [type(x)(*(column[rows] for column in x)) for x in (rays, targets, met)]  # type: ignore
+            casts.append(follow_rays(part[0], part[1], *fixed, new_packet(), part[2]))
+
+        parallel_for(len(rays.origin), some, _PARALLEL_FROM)
+        self._count(sum(casts))
+
     def cast(self, origin: Floats, direction: Floats, skip: Ints, start: Floats | None = None) -> tuple[Ints, Floats]:
         """Return the first facet (-1: none) hit by each ray and its distance [m].
 
@@ -140,51 +163,10 @@ class RayCaster:
         facet, distance = np.full(n, _MISS, np.int32), np.full(n, np.inf)
         if not len(self.first) or n == 0:
             return facet, distance
-        # Kernels are compiled for contiguous arrays only.
-        origin, direction = np.ascontiguousarray(origin), np.ascontiguousarray(direction)
-        begin = np.zeros(n) if start is None else np.ascontiguousarray(start, float)
-        casts = []
-        for group in self._groups:
-            _ = group.mesh.scene  # built before the threads start
-
-        def some(rows: slice) -> None:
-            for i in range(rows.start, rows.stop, _CHUNK):
-                at = slice(i, min(i + _CHUNK, rows.stop))
-                rays = CastRays(origin[at], direction[at], skip[at], begin[at])
-                casts.append(self._cast(self._groups[0], rays, facet[at], distance[at]))
-                for group in self._groups[1:]:
-                    self._cast_nearer(group, rays, facet[at], distance[at])
-
-        parallel_for(n, some, _PARALLEL_FROM)
-        # A ray and its two companions count as one, however many groups it is cast at.
-        self._count(sum(casts))
+        met = MetFacets(facet, distance, _NO_BOOL, _NO_LAYERS, _NO_FACET)
+        at_nothing = ShadowTargets(_NO_LIMIT, _NO_LIMIT, _NO_FACET, _NO_BODY)
+        self._follow(_rays(origin, direction, skip, start), at_nothing, met)
         return facet, distance
-
-    def _cast_nearer(self, group: Group, rays: CastRays, facet: Ints, distance: Floats) -> None:
-        """Write what rays meet of another group, where that is nearer."""
-        rows = near_spheres(rays.origin, rays.direction, distance, *group.spheres)
-        found, t = np.full(len(rows), _MISS, np.int32), np.full(len(rows), np.inf)
-        self._cast(group, CastRays(*(x[rows] for x in rays)), found, t)
-        # Of two in the same place the first counts, whichever group it is of.
-        tie = (t == distance[rows]) & (found < facet[rows]) & (group.behind == 0.0)
-        closer = (found >= 0) & ((t + group.behind < distance[rows]) | tie)
-        facet[rows[closer]], distance[rows[closer]] = found[closer], t[closer]
-
-    def _cast(self, group: Group, rays: CastRays, facet: Ints, distance: Floats) -> int:
-        """Write the facets and distances of a chunk of rays; return how many rays were cast."""
-        # Rays leave a few float32 spacings ahead; the float64 origin stays the true one.
-        ahead, offset = offset_origins(rays, group.centre, group.radius, _OFFSET, self._size)
-        near = group.to_frame(rays.origin, rays.direction)
-        todo, count = np.arange(len(rays.origin)), 0
-        shapes = FacetShapes(self.facets.vertices, self.first, self.normal)
-        limits = _EDGE, self._nearest
-        for attempt in range(_TRIES):
-            hit = group.run(*companions(todo, *near, ahead, offset, group.mesh.centre, attempt % 2 == 1))
-            count += len(todo)
-            todo = resolve_hits(todo, hit, rays, ahead, offset, shapes, limits, facet, distance)
-            if len(todo) == 0:
-                break
-        return count
 
     def walk(
         self,
@@ -208,27 +190,33 @@ class RayCaster:
         """
         n = len(origin)
         reached, blocker, passed = np.zeros(n, bool), np.full(n, _MISS), np.full((n, layers), _MISS)
-        todo, start = np.arange(n), np.zeros(n)
-        if self.hides_nothing:
+        if n and self.hides_nothing:
             # A facet that faces the ray's start is then seen from there; each such point still counts as a ray.
             towards = np.einsum("ij,ij->i", direction, self.normal[target]) < 0.0
             reached = towards & (target >= 0) & (skip < 0)
-            todo = np.flatnonzero(~reached)
-            self._count(n - len(todo))
-        f, none = self.facets, np.zeros(0, np.int64)
-        targets = ShadowTargets(limit, slack, target, none if inside is None else inside.astype(np.int64))
-        layer = self.is_layer if self._any_layer else np.zeros(0, bool)
-        margin = _EDGE * _OFFSET * self._size
-        surfaces = ShadowSurfaces(f.vertices, self.normal, self.plane, self.smooth, f.body, layer, self.touch, margin)
-        while len(todo):
-            rays: Any = origin, direction, skip, start
-            if len(todo) < n:
-                rays = tuple(x[todo] for x in rays)
-            facet, t = self.cast(*rays)
-            more = resolve_shadow_rays(todo, facet, t, *rays[:2], targets, surfaces, reached, passed, blocker)
-            todo = todo[more]
-            start[todo] = t[more] + self._nearest
+            self._count(int(np.count_nonzero(reached)))
+        if not len(self.first):
+            return np.ones(n, bool), passed, blocker
+        body = _NO_BODY if inside is None else np.ascontiguousarray(inside, np.int64)
+        targets = ShadowTargets(_floats(limit), _floats(slack), _int32(target), body)
+        met = MetFacets(_NO_FACET, _NO_LIMIT, reached, passed, blocker)
+        if n and not reached.all():
+            self._follow(_rays(origin, direction, skip, None), targets, met)
         return reached, passed, blocker
+
+
+def _floats(x: NDArray[Any]) -> Floats:
+    # Kernels are compiled for contiguous arrays only.
+    return np.ascontiguousarray(x, float)
+
+
+def _int32(x: NDArray[Any]) -> Ints:
+    return np.ascontiguousarray(x, np.int32)
+
+
+def _rays(origin: Floats, direction: Floats, skip: Ints, start: Floats | None) -> CastRays:
+    """Return rays as kernels read them."""
+    return CastRays(_floats(origin), _floats(direction), _int32(skip), _NO_LIMIT if start is None else _floats(start))
 
 
 def _extents(facets: Facets, static: StaticGeometry | None) -> Floats:

@@ -19,6 +19,7 @@ from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
 from raychan.world.build import body_of, material_of, scene_text
 from raychan.world.errors import SceneError, nearest
+from raychan.world.idle_keys import idle_keys
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
@@ -94,7 +95,7 @@ class Scene(Described):
         # What `geometry_of` derives from the bodies at time 0, by class; shared by scenes with the same bodies.
         self._derived: dict[Any, Any] = {}
         # Cache of the static bodies' geometry, shared by this scene at all times.
-        self._static: dict[type, StaticGeometry | None] = {}
+        self._static: dict[Any, Any] = {}
         try:
             self._prepare()
         except SceneError as e:
@@ -123,6 +124,8 @@ class Scene(Described):
     def _of(cls, data: Mapping[str, object], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
         """Return the scene of tables; bodies equal to those of the scene `like` are shared, with their meshes."""
         file = None if path is None else Path(path)
+        if "ship" in data:
+            raise SceneError("is a scene of a ship, not of a radar", file=file, key="ship", allowed="raychan ship")
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
         ghz = tables.scene.frequency_ghz
@@ -179,13 +182,8 @@ class Scene(Described):
 
     def _prepare(self) -> None:
         """Check everything once: a scene that exists can be simulated."""
-        seen: set[str] = set()
+        checks.names_differ(self.bodies)
         for body in self.bodies:
-            if body.name in seen:
-                raise SceneError(
-                    "two bodies have this name", key=f"bodies.{body.name}", allowed="a different name for each"
-                )
-            seen.add(body.name)
             try:
                 self._chosen(body)
                 _ = body.motion, body.resolved_role, body.fluctuates
@@ -242,6 +240,7 @@ class Scene(Described):
     def warnings(self) -> list[str]:
         """Warnings: odd meshes, materials out of range, overlaps, bodies out of view, aliased targets."""
         said = [note for body in self.bodies for note in body.notes()]
+        said += idle_keys(self._given, self.materials, self.radar_table)
         used = {
             m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
         }

@@ -192,6 +192,8 @@ class Model(Table):
     max_bounces: Bounces = 3
     tolerance_db: Tolerance = 0.5
     max_transmissions: Layers = 4
+    speckle: bool = False
+    """Levels that makers' tolerances of the bodies move by more than tolerance_db are refined to that only."""
     max_rays: Literal["auto"] | Rays = "auto"
     """Rays that a frame may cast to reach tolerance_db; auto: 2.5 times those of its first launch."""
     max_seconds: RunSeconds | None = None
@@ -206,6 +208,8 @@ class Model(Table):
     by Lambert's law; off: none."""
     diffraction: bool = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
+    simplify: bool = True
+    """Trace finely tessellated smooth surfaces by fewer facets, as near to them as tolerance_db asks for."""
 
 
 class BodyTable(Table):

@@ -22,6 +22,8 @@ _TYPES = {
     "bool_type": "true or false",
     "bool_parsing": "true or false",
     "list_type": "a list",
+    "too_short": "a list of at least {min_length}",
+    "too_long": "a list of at most {max_length}",
     "dict_type": "a table",
     "model_type": "a table",
     "model_attributes_type": "a table",

@@ -12,7 +12,7 @@ import numpy as np
 from raychan.em.atmosphere import Atmosphere
 from raychan.world.body import Body
 from raychan.world.checks import outside
-from raychan.world.errors import SceneError
+from raychan.world.errors import SceneError, shown
 from raychan.world.radar_mount import radar_of
 from raychan.world.schema import InterfererTable, RadarTable
 from raychan.world.schema_errors import checked
@@ -48,10 +48,15 @@ def attenuation_of(air: Atmosphere | None, frequency: float, radar: RadarTable |
 
 def interferers_of(given: Iterable[Any], folder: Path, file: Path | None) -> tuple[Interferer, ...]:
     """Return the interferers of objects or tables; SceneError for values that cannot be, or two of one name."""
+    from raychan.radar.interferer import Interferer
+
     found: list[Interferer] = []
     for one in given:
         if isinstance(one, InterfererTable | Mapping):
             one = _interferer(checked(InterfererTable, one, file), folder, file)
+        if not isinstance(one, Interferer):
+            wanted = "an Interferer or its table"
+            raise SceneError(f"{shown(one)} is not possible", file=file, key="interferers", value=one, allowed=wanted)
         if any(one.name == other.name for other in found):
             raise SceneError("two interferers of one name", file=file, key="interferers.name", value=one.name)
         found.append(one)

@@ -17,10 +17,13 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.cross_section import cross_section
+from bench.fine import fine
 from bench.frame import frame
+from bench.laser import laser
 from bench.measure import Row
 from bench.memory import memory
 from bench.rays import rays
+from bench.ship import ship
 from bench.size import size
 from bench.synthesis import phase_noise, scaling, synthesis
 from bench.turbine import turbine
@@ -29,7 +32,21 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, synthesis, phase_noise, scaling, frame, turbine, size, memory, cross_section)
+    f.__name__: f
+    for f in (
+        rays,
+        laser,
+        synthesis,
+        phase_noise,
+        scaling,
+        frame,
+        turbine,
+        ship,
+        size,
+        fine,
+        memory,
+        cross_section,
+    )  # fmt: skip
 }
 _ROOT = Path(__file__).parents[2]
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from pynmeagps import NMEAReader, calc_checksum
 
-from raychan.hil.lms import ScanValues, decode_scan, encode_scan
 from raychan.hil.nmea import Attitude, Fix, gga, hdt, pashr, ptnthtm
 from raychan.hil.pacing import Line, Schedule, Timing, line_time
 from raychan.hil.ports import open_port, pseudo_terminal
+from raychan.hil.scans import ScanValues, decode_scan, encode_scan
 from raychan.hil.telegrams import TelegramReader, frame
 
 AT = time(10, 11, 12, 340_000)

@@ -3,15 +3,8 @@
 import numpy as np
 import pytest
 
-from raychan.hil.lms import (
-    BAUD_CODES,
-    NO_ECHO,
-    UNITS_M,
-    Scanner,
-    ScanValues,
-    decode_scan,
-    encode_scan,
-)
+from raychan.hil.lms import BAUD_CODES, Scanner
+from raychan.hil.scans import NO_ECHO, UNITS_M, ScanValues, decode_scan, encode_scan
 from raychan.hil.telegrams import (
     ACK,
     HOST_TO_SCANNER,

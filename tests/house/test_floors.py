@@ -18,7 +18,8 @@ STOREYS = (
     ("world", "dynamics"),
     ("tracing", "channel", "signal", "processing", "sensors"),
     ("run",),
-    ("hil", "study"),
+    ("hil",),
+    ("study",),
     ("report",),
     ("view",),
     ("cli",),
@@ -27,7 +28,7 @@ STOREYS = (
 """From the ground up; rooms of one storey do not import each other."""
 FLOOR = {room: floor for floor, rooms in enumerate(STOREYS) for room in rooms}
 HOME = {
-    "embreex": "world/triangle_groups.py",
+    "embreex": "world/embree_library.py",
     "pyvista": "view/render.py",
     "matplotlib": "report/canvas.py",
     "serial": "hil/ports.py",
@@ -105,7 +106,6 @@ LONG: dict[str, str] = {
     "signal/nufft:add_transposed": "in blocks; splitting a fast-math loop may change its last digits",
     "signal/nufft:interpolate": "in blocks of chirps; as above",
     "tracing/silhouette_crossings:_longest_crossings": "one loop: helpers that take arrays made it 2.7 times slower",
-    "geometry/intersect:resolve_hits": "as above",
 }
 """Functions that may be longer or deeper, each with its reason."""
 

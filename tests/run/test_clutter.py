@@ -143,3 +143,26 @@ def test_patches_are_finer_for_a_fast_radar():
     still, moving = (scene(None, velocity=(v, 0.0, 0.0)).radar for v in (0.0, 90.0))
     assert patch_size(moving).angle < patch_size(still).angle
     assert 90.0 * patch_size(moving).angle <= 0.5 * WAVE.rate_resolution + 1e-12
+
+
+def level_told(made, near):
+    """Return the ledger's level of diffuse scattering, and that of the closed form in the cell at a range [m]."""
+    result = rc.simulate(made, max_bounces=1)
+    r = near + 0.5 * WAVE.range_resolution
+    ring = 2.0 * np.pi * r * WAVE.range_resolution
+    power = made.radar.power * (C0 / FREQUENCY) ** 2 / (4.0 * np.pi) ** 3 * 10**-2.0 * ring / r**4
+    entry = result.ledger["diffuse scattering"]
+    return entry, 10.0 * np.log10(power / result.detections.power.min())
+
+
+def test_the_ledger_states_the_level_of_clutter_that_is_not_modelled_and_of_what_lies_beyond_the_unambiguous_range():
+    sign = rc.Body(name="sign", shape="sphere", params={"radius": 0.2}, position=(9, 2, 1.5), rcs_dbsm=30.0)
+    made = scene(Diffuse("constant", -20.0), [sign])
+    off = rc.Scene(made.bodies, radar=made.radar, model={"diffuse": "off"})
+    left, asked = level_told(off, HEIGHT)
+    assert left.kind == "estimate" and "beyond" not in left.how
+    assert left.level_db == pytest.approx(asked, abs=0.7)
+    reach = WAVE.unambiguous_range
+    beyond, asked = level_told(made, reach)
+    assert f"beyond the unambiguous range of {reach:.4g} m" in beyond.how
+    assert beyond.level_db == pytest.approx(asked, abs=0.7)

@@ -5,6 +5,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from support.degraded_scenes import EVERYTHING
 
 import raychan as rc
 from raychan.em.diffuse import Diffuse
@@ -38,65 +39,6 @@ def road(law=None):
 
 def other(place, wave=WAVE, locked=True, **given):
     return Interferer(rc.Radar(wave, place, yaw_deg=180.0, **given), 4e-8, locked, "other")
-
-
-EVERYTHING = """
-[radar]
-position = [0.0, 0.0, 1.0]
-power_dbm = 20.0
-noise_figure_db = 10.0
-noise_temperature_k = 150.0
-elements_mm = [{receivers}]
-tx_elements_mm = [[0.0, -7.787, 0.0], [0.0, 7.787, 0.0]]
-multiplexing = "tdm"
-[radar.waveform]
-bandwidth_mhz = 300.0
-chirp_us = 20.0
-repetition_us = 25.0
-chirps = 64
-samples = 128
-[radar.impairments]
-phase_noise_hz_dbc = [[1e4, -75.0], [1e6, -95.0]]
-adc_bits = 12
-adc_full_scale_dbm = -40.0
-[atmosphere]
-rain_mmh = 20.0
-[[interferers]]
-name = "oncoming"
-position = [45.0, -6.0, 0.8]
-yaw_deg = 180.0
-power_dbm = 12.0
-start_us = 1.0
-[interferers.waveform]
-bandwidth_mhz = 700.0
-chirp_us = 30.0
-repetition_us = 37.0
-chirps = 40
-[materials.tarmac]
-eps_r = 5.0
-sigma = 0.5
-[materials.tarmac.diffuse]
-law = "gamma"
-level_db = -18.0
-[[bodies]]
-name = "road"
-shape = "ground"
-material = "tarmac"
-[[bodies]]
-name = "post"
-shape = "sphere"
-params = {{ radius = 0.2 }}
-position = [18.0, 6.0, 1.0]
-rcs_dbsm = 25.0
-[[bodies]]
-name = "walker"
-shape = "sphere"
-params = {{ radius = 0.2 }}
-position = [10.0, -2.0, 1.0]
-rcs_dbsm = 0.0
-swerling = 1
-velocity_mps = [1.5, 0.0, 0.0]
-""".format(receivers=", ".join(f"[0.0, {1.9467 * (k - 3.5):.4f}, 0.0]" for k in range(8)))
 
 
 def test_phase_noise_converter_rain_interferer_clutter_and_a_fluctuating_target_in_one_run_of_a_2_x_8_array():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.degraded_scenes import AIR, BAD, OTHER, SCENE
 
 import raychan as rc
 from raychan.cli.info_impairments import impairment_rows
@@ -15,58 +16,6 @@ from raychan.run.streams import Stage, stream
 from raychan.units import db
 from raychan.world.errors import SceneError
 from raychan.world.geometry import Geometry
-
-SCENE = """
-[radar]
-position = [0.0, 0.0, 0.5]
-power_dbm = 12.0
-noise_temperature_k = 40.0
-[radar.waveform]
-bandwidth_mhz = 500.0
-chirp_us = 20.0
-repetition_us = 25.0
-chirps = 32
-samples = 256
-[processing]
-min_snr_db = 12.0
-[[bodies]]
-name = "target"
-shape = "sphere"
-params = { radius = 0.3 }
-position = [30.0, 2.0, 0.5]
-rcs_dbsm = 10.0
-[[bodies]]
-name = "road"
-shape = "ground"
-"""
-BAD = """
-[radar.impairments]
-chirp_error_us_khz = [[0.0, 0.0], [20.0, 30.0]]
-phase_noise_hz_dbc = [[1e4, -80.0], [1e6, -95.0]]
-adc_bits = 10
-adc_full_scale_dbm = -50.0
-iq_gain_db = 0.2
-iq_phase_deg = 1.0
-dc_offset_dbm = -90.0
-"""
-AIR = """
-[atmosphere]
-rain_mmh = 50.0
-"""
-OTHER = """
-[[interferers]]
-name = "truck"
-position = [40.0, -2.0, 0.6]
-yaw_deg = 180.0
-power_dbm = 12.0
-start_us = 0.05
-[interferers.waveform]
-bandwidth_mhz = 500.0
-chirp_us = 20.0
-repetition_us = 25.0
-chirps = 32
-"""
-
 
 REAL = SCENE.replace("samples = 256", "samples = 256\niq = false")
 HIGH = SCENE.replace("[radar.waveform]", "[radar.waveform]\ncarrier_ghz = 300.0")

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 import trimesh
+from support.moving_frames import energy_db, every_chirp
 
 import raychan as rc
 from raychan.processing.range_doppler import range_doppler
-from raychan.radar.beam_table import beam_of
 from raychan.records import Cube
 from raychan.run.micro_doppler import retraced
 from raychan.run.sequence import frames
 from raychan.run.simulate import simulate
-from raychan.run.solver import solve
 from raychan.run.turning import bend, needed
 from raychan.signal.baseband import synthesize
-from raychan.tracing.settings import PruneRule, refinement
 from raychan.units import C0
 
 WAVE = {"bandwidth_mhz": 300.0, "chirp_us": 30.0, "chirps": 64, "samples": 64}
@@ -40,24 +36,6 @@ def scene(rpm=200.0, *more, model=None, **radar):
     turning = rc.Body(name="rotor", mesh=rotor(), position=(10, 0, 2), yaw_deg=60.0, spin_dps=(6.0 * rpm, 0, 0))
     given = {"position": [0, 0, 1.5], "noise": False, "antenna": {"kind": "isotropic"}, "waveform": WAVE} | radar
     return rc.Scene(bodies=[turning, *more], radar=given, model={"max_bounces": 2} | (model or {}))
-
-
-def every_chirp(scene):
-    """Return the truth, slow and obvious: the scene moved to each chirp, traced, and one ramp synthesised."""
-    wave = scene.radar.waveform
-    rule = refinement(wave.carrier, scene.model.tolerance_db, 0.0, scene.model.max_transmissions)
-    rows = []
-    for m in range(wave.n_chirps):
-        now = scene.at(m * wave.repetition)
-        paths, _ = solve(now.facets(), now.points(), now.radar, wave.carrier, rule, scene.model.max_bounces)
-        one = dataclasses.replace(now.radar, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
-        rows.append(synthesize(paths, one).samples)
-    radar = scene.radar
-    return np.concatenate(rows, axis=1), PruneRule(radar.position, beam_of(radar), rule, scene.model.max_bounces)
-
-
-def energy_db(part, whole):
-    return 10.0 * np.log10((np.abs(part) ** 2).sum() / (np.abs(whole) ** 2).sum())
 
 
 def power(samples, wave):

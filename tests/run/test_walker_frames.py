@@ -4,16 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from support.moving_frames import energy_db, every_chirp
 
 import raychan as rc
-from raychan.radar.beam_table import beam_of
 from raychan.run import micro_doppler
 from raychan.run.micro_doppler import retraced, stretches
 from raychan.run.rules import fine_rule
-from raychan.run.solver import solve
 from raychan.run.turning import bend, needed
-from raychan.signal.baseband import synthesize
-from raychan.tracing.settings import PruneRule, refinement
 
 WAVE = {"bandwidth_mhz": 150.0, "chirp_us": 30.0, "repetition_us": 500.0, "chirps": 24, "samples": 16}
 RADAR = {"position": [0, 0, 1.0], "noise": False, "antenna": {"kind": "isotropic"}, "waveform": WAVE}
@@ -22,23 +19,6 @@ RADAR = {"position": [0, 0, 1.0], "noise": False, "antenna": {"kind": "isotropic
 def scene(shape: str, wave: dict[str, float] = WAVE, **params: float) -> rc.Scene:
     who = rc.Body(name="who", shape=shape, position=(8.0, 0.5, 0.0), yaw_deg=165.0, params={"max_sag": 3e-3, **params})
     return rc.Scene(bodies=[who], radar={**RADAR, "waveform": wave}, model={"max_bounces": 1, "tolerance_db": 1.0})
-
-
-def every_chirp(given: rc.Scene) -> tuple[np.ndarray, PruneRule]:
-    """Return the truth, slow and obvious: the scene moved to each chirp, traced, and one ramp synthesised."""
-    wave, radar = given.radar.waveform, given.radar
-    rule = refinement(wave.carrier, given.model.tolerance_db, 0.0, given.model.max_transmissions)
-    rows = []
-    for m in range(wave.n_chirps):
-        now = given.at(m * wave.repetition)
-        paths, _ = solve(now.facets(), now.points(), now.radar, wave.carrier, rule, given.model.max_bounces)
-        one = dataclasses.replace(now.radar, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
-        rows.append(synthesize(paths, one).samples)
-    return np.concatenate(rows, axis=1), PruneRule(radar.position, beam_of(radar), rule, given.model.max_bounces)
-
-
-def energy_db(part: np.ndarray, whole: np.ndarray) -> float:
-    return float(10.0 * np.log10((np.abs(part) ** 2).sum() / (np.abs(whole) ** 2).sum()))
 
 
 @pytest.mark.parametrize("shape", ["walker", "cyclist"])

@@ -17,6 +17,7 @@ from support.scene_texts import PLATE
 
 import raychan as rc
 from raychan.cli import invoke
+from raychan.run.ship_scene import read_ship_scene
 from raychan.world import bundled
 
 
@@ -27,7 +28,10 @@ def elsewhere(tmp_path, monkeypatch):
 
 
 def test_every_scene_that_comes_along_is_found_by_name_from_anywhere(elsewhere):
-    assert bundled.names() == sorted(f.stem for f in (ROOT / "scenes").glob("*.toml"))
+    every = sorted(f.stem for f in (ROOT / "scenes").glob("*.toml"))
+    assert sorted(bundled.names() + bundled.ship_names()) == every
+    for name in bundled.ship_names():
+        assert read_ship_scene(name).title == read_ship_scene(ROOT / "scenes" / f"{name}.toml").title
     for name in bundled.names():
         assert rc.Scene.load(name).title == rc.Scene.load(ROOT / "scenes" / f"{name}.toml").title
 

@@ -11,7 +11,10 @@ from pathlib import Path
 import raychan.study.validation.detections
 import raychan.study.validation.formulas
 import raychan.study.validation.parameters
-import raychan.study.validation.reflectors  # noqa: F401
+import raychan.study.validation.reflectors
+import raychan.study.validation.scanner
+import raychan.study.validation.ship
+import raychan.study.validation.telegrams  # noqa: F401
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.data import Figure, Item, Study, load
 from raychan.study.validation.judge import Check, cover, judge

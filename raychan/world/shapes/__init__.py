@@ -12,6 +12,7 @@ from raychan.world.mesh import Mesh
 from raychan.world.shapes.basic import box, cylinder, dihedral, ground, plate, sphere, trihedral
 from raychan.world.shapes.cyclist import Cyclist
 from raychan.world.shapes.pedestrian import pedestrian
+from raychan.world.shapes.prism import prism
 from raychan.world.shapes.skeleton import Skeleton, at_once
 from raychan.world.shapes.street import bench, bike_rack, guard_rail, lamp_post, trash_bin, wall
 from raychan.world.shapes.truck import truck
@@ -19,7 +20,7 @@ from raychan.world.shapes.vehicle import car, suv, van
 from raychan.world.shapes.walker import Walker
 
 _ALL = (
-    plate, sphere, cylinder, box, dihedral, trihedral, ground, car, suv, van, truck, pedestrian,
+    plate, sphere, cylinder, box, prism, dihedral, trihedral, ground, car, suv, van, truck, pedestrian,
     lamp_post, guard_rail, wall, bench, trash_bin, bike_rack,
 )  # fmt: skip
 SKELETONS: dict[str, Callable[..., Skeleton]] = {"walker": Walker, "cyclist": Cyclist}

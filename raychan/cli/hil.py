@@ -1,0 +1,253 @@
+"""raychan hil: a ship's scanner and instruments on serial lines, in real time."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from raychan.cli import show
+from raychan.cli.options import Changes, SceneFile, within
+from raychan.world.limits import Limit
+
+if TYPE_CHECKING:
+    from raychan.hil.channel import Channel
+    from raychan.hil.geodesy import Origin
+    from raychan.hil.instruments import Instruments, Reading
+    from raychan.hil.ports import Port
+
+_BAUDS = (9600, 19200, 38400, 500000)
+_NMEA_BAUD = Limit(4800, 500_000, "bit/s", "NMEA 0183 runs at 4800, its fast form at 38400")
+_RATE = Limit(0.1, 50.0, "per second", "a satellite receiver tells its place 1 to 20 times a second")
+_DURATION = Limit(0.0, 1e7, "s", "a run of months is a mistake", above=True)
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_ORIGIN = "54.0,8.0"
+_TRACK = (
+    "utc", "t_s", "north_m", "east_m", "latitude_deg", "longitude_deg", "heading_deg", "roll_deg", "pitch_deg",
+    "rudder_deg", "speed_mps",
+)  # fmt: skip
+
+Device = Annotated[str | None, typer.Option(help="Serial port; if not given, a pseudo-terminal.", metavar="PORT")]
+
+
+def _origin(text: str) -> Origin:
+    """Return an origin of 'latitude,longitude'. Raises: typer.BadParameter."""
+    from raychan.hil.geodesy import Origin
+
+    try:
+        latitude, longitude = (float(part) for part in str(text).split(","))
+        return Origin(latitude, longitude)
+    except ValueError as error:
+        raise typer.BadParameter(f"'{text}': latitude and longitude in degrees, such as {_ORIGIN} ({error})") from None
+
+
+def _baud(value: int) -> int:
+    if value not in _BAUDS:
+        raise typer.BadParameter(f"{value}; allowed: {', '.join(map(str, _BAUDS))}")
+    return value
+
+
+def hil(
+    scene: SceneFile = Path("ship_turn"),
+    scanner: Device = None,
+    position: Device = None,
+    heading: Device = None,
+    attitude: Device = None,
+    baud: Annotated[
+        int, typer.Option(help="Rate of the scanner's line at the start, in bit/s.", metavar="N", callback=_baud)
+    ] = 38400,
+    nmea_baud: Annotated[
+        int, typer.Option(help="Rate of the other lines, in bit/s.", metavar="N", callback=within(_NMEA_BAUD, True))
+    ] = 38400,
+    rate: Annotated[
+        float, typer.Option(help="Sentences of each kind a second.", metavar="N", callback=within(_RATE))
+    ] = 10.0,
+    origin: Annotated[
+        str, typer.Option(help="Latitude and longitude of the scene's origin in degrees.", metavar="LAT,LON")
+    ] = _ORIGIN,
+    duration: Annotated[
+        float | None,
+        typer.Option(help="Seconds to run; if not given, until Ctrl-C.", metavar="S", callback=within(_DURATION)),
+    ] = None,
+    stream: Annotated[bool, typer.Option("--stream", help="Send scans from the start, before a host asks.")] = False,
+    realtime: Annotated[
+        bool,
+        typer.Option(
+            "--realtime/--no-realtime", help="Run before other programs (SCHED_FIFO), where the system allows it."
+        ),
+    ] = True,
+    ports: Annotated[bool, typer.Option("--ports", help="Print the names of the ports as JSON, then run.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Directory for summary.json and track.csv.", metavar="DIR")
+    ] = None,
+    set_: Changes = None,
+) -> None:
+    """Run a ship in real time: scanner telegrams, position, heading and attitude on four serial lines; orders for
+    rudder and shaft come back.
+
+    Without SCENE: ship_turn. Ctrl-C or SIGTERM ends the run in order, with exit code 0.
+    """
+    place = _origin(origin)
+    names = {"scanner": scanner, "position": position, "heading": heading, "attitude": attitude}
+    with ExitStack() as closing:
+        channels = _channels(names, baud, nmea_baud, closing)
+        numbers = _run(_Wishes(scene, set_ or [], place, rate, duration, stream, realtime, ports, out), channels)
+    from raychan.hil.summary import one_line, warnings
+
+    if out is not None:
+        from raychan.run.output_files import write_together
+
+        write_together({out / "summary.json": json.dumps(numbers, indent=2).encode()})
+    show.warn(warnings(numbers))
+    print(one_line(numbers), flush=True)
+    if numbers["failed"]:
+        from raychan.world.errors import SceneError
+
+        raise SceneError(numbers["ended"])
+
+
+class _Wishes(NamedTuple):
+    scene: Path
+    changes: list[str]
+    origin: Origin
+    rate: float
+    duration: float | None
+    stream: bool
+    realtime: bool
+    ports: bool
+    out: Path | None
+
+
+def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: ExitStack) -> dict[str, Channel]:
+    """Return the channels on their ports, which `closing` closes. Raises: typer.BadParameter for a wrong port."""
+    try:
+        from raychan.hil.channel import Channel
+        from raychan.hil.ports import PortError, SerialPort, TerminalPort
+    except ModuleNotFoundError as error:  # fcntl, termios
+        raise typer.BadParameter("raychan hil needs a system with pseudo-terminals, such as Linux") from error
+
+    made = {}
+    for name, device in names.items():
+        speed = baud if name == "scanner" else nmea_baud
+        try:
+            port: Port = TerminalPort() if device is None else SerialPort(device, speed)
+        except PortError as error:
+            raise typer.BadParameter(f"--{name}: {error}") from error
+        closing.callback(port.close)
+        made[name] = Channel(name, port, speed)
+    return made
+
+
+def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
+    """Run and return the numbers of the run."""
+    from raychan.hil.instruments import ScannedShip
+    from raychan.hil.lms import STREAM
+    from raychan.hil.session import Session
+    from raychan.hil.summary import summary
+    from raychan.run.ship_scene import read_ship_scene
+
+    loaded = read_ship_scene(wishes.scene, wishes.changes)
+    show.warn(loaded.bodies.warnings)
+    with show.progress(kernels="ship"):
+        session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate)
+    if wishes.stream:
+        session.scanner.mode = STREAM
+    # Threads that are started while this one goes first do so too: none waits for the interpreter behind others.
+    with _stops() as stopped, _first(wishes.realtime) as session.first, _track(wishes.out) as session.tell:
+        _say({name: channel.port.name for name, channel in channels.items()}, wishes.ports)
+        session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)
+    return summary(session)
+
+
+def _say(names: dict[str, str], as_json: bool) -> None:
+    text = json.dumps(names) if as_json else "  ".join(f"{name} {port}" for name, port in names.items())
+    print(text, flush=True)
+
+
+@contextmanager
+def _first(wanted: bool) -> Iterator[bool]:
+    """Yield whether this thread runs before ordinary ones, as long as this lasts."""
+    from raychan.hil.pacing import run_first
+
+    try:
+        yield wanted and run_first()
+    finally:
+        if wanted:
+            run_first(False)
+
+
+@contextmanager
+def _stops() -> Iterator[Callable[[], bool]]:
+    """Yield whether SIGINT or SIGTERM has come; they end the run, not the process."""
+    asked: list[int] = []
+    before = {number: signal.signal(number, lambda n, frame: asked.append(n)) for number in _SIGNALS}
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _track(out: Path | None) -> Iterator[Callable[[Instruments, Reading], None]]:
+    """Yield a function that writes each reading into track.csv, where there is a directory. Raises: StoreError."""
+    from raychan.run.output_files import StoreError
+
+    if out is None:
+        yield lambda instruments, at: None
+        return
+    name = out / "track.csv"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        file = name.open("w", newline="")
+    except OSError as error:
+        raise StoreError(f"{out}: cannot write: {error.strerror or error}") from error
+    rows = csv.writer(file)
+    lost: list[str] = []  # why the file ends early: a full disk does not end the run
+    waiting: SimpleQueue[tuple[Instruments, Reading] | None] = SimpleQueue()
+
+    def write() -> None:
+        _try(lambda: rows.writerow(_TRACK), lost)
+        while (one := waiting.get()) is not None:
+            if not lost:
+                _try(lambda one=one: rows.writerow(_row(*one)), lost)  # type: ignore[misc]
+
+    # A disk may keep a writer waiting for longer than a scan takes.
+    writer = Thread(target=write, daemon=True)
+    writer.start()
+    try:
+        yield lambda instruments, at: waiting.put((instruments, at))
+    finally:
+        waiting.put(None)
+        writer.join()
+        _try(file.close, lost)
+        show.warn(f"{name}: not whole: {why}" for why in lost[:1])
+
+
+def _try(write: Callable[[], object], lost: list[str]) -> None:
+    """Write, and note why not where it cannot be."""
+    try:
+        write()
+    except OSError as error:
+        lost.append(error.strerror or str(error))
+
+
+def _row(instruments: Instruments, at: Reading) -> list[str]:
+    """Return a reading as a row of track.csv."""
+    angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
+    where = (at.time, at.north, at.east)
+    return [
+        instruments.utc(at).isoformat(timespec="milliseconds"),
+        *(f"{v:.4f}" for v in where),
+        *(f"{a:.9f}" for a in instruments.place(at)),
+        *(f"{v:.4f}" for v in (*angles, at.speed)),
+    ]

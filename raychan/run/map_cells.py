@@ -1,0 +1,95 @@
+"""Map cells that are or may become detections: their levels, what launches changed of these, and what feeds them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.error import COVER
+from raychan.tracing.sources import EXACT, Sources, depth_of
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complexfloating]
+Bools = NDArray[np.bool_]
+
+_SHALLOW = (
+    0.02  # of a cell's power: of shallow tubes so much may stay as the first launch has them, see `feeding_sources`
+)
+_DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
+_EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
+_SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unknown
+
+
+@dataclass
+class MapCells:
+    """Map cells that are or may become detections: `place` (c, 3), each range [m], rate [m/s] and amplitude; `level`
+    (c,), the sum of paths there; `change` (c, 2), by which shallow and deep tubes changed it last, and `before` (c, 2)
+    the time before that (infinite: there was none)."""
+
+    place: Floats
+    level: Complexes
+    change: Floats
+    before: Floats
+    tolerance: Floats
+    """Relative amplitude (c,) by which the level may be wrong."""
+
+    @staticmethod
+    def of(place: Floats, level: Complexes, tolerance_db: float) -> MapCells:
+        """Return cells that no launch has changed yet."""
+        n = len(place)
+        tolerance = np.full(n, 1.0 - 10.0 ** (-tolerance_db / 20.0))
+        return MapCells(place, level, np.zeros((n, 2)), np.full((n, 2), np.inf), tolerance)
+
+    def changed(self, by: Complexes, wanted: Bools) -> None:
+        """Note changes (c, 2); wanted (c, 2) which were asked for, others being by the way."""
+        size = np.abs(by)
+        self.level += by.sum(axis=1)
+        self.before = np.where(wanted, np.where(self.change > 0.0, self.change, np.inf), self.before)
+        self.change = np.where(wanted, size, np.hypot(self.change, size))
+
+    def loosened(self, spread_db: Floats) -> int:
+        """Let levels be wrong by what displaced bodies move them, (c,) [dB], where that is more; return how many."""
+        speckle = 1.0 - 10.0 ** (-spread_db / 20.0)
+        count = int((speckle > self.tolerance).sum())
+        self.tolerance = np.maximum(self.tolerance, speckle)
+        return count
+
+    @property
+    def slowness(self) -> Floats:
+        """By what factor (c, 2) the rest of a series of changes exceeds COVER times its last one, 1 to _SLOWEST.
+
+        Changes that shrink by q a step add up to q / (1 - q) times the last one.
+        """
+        q = np.minimum(self.change / self.before, 0.99)
+        return np.asarray(np.clip(q / (1.0 - q) / COVER, 1.0, _SLOWEST))
+
+    @property
+    def open(self) -> Bools:
+        """Which classes of tubes (c, 2) must be refined."""
+        tolerance = self.tolerance[:, None]
+        share = COVER * self.slowness * self.change / np.maximum(np.abs(self.level), 1e-300)[:, None]
+        over = np.hypot(share[:, 0], share[:, 1]) > self.tolerance
+        largest = share >= share.max(axis=1, keepdims=True)
+        return np.asarray(over[:, None] & ((share > _EITHER * tolerance) | largest) & (share > 0.0))
+
+
+def feeding_sources(source: Sources, sums: Complexes, tolerance: float) -> tuple[Sources, Sources]:
+    """Return the shallow and the deep sources that a cell's level depends on, of sums (s,) of its paths by source.
+
+    The weakest are left out: of the deep, as long as neither their sum nor their rms sum exceeds a share of the
+    tolerance; of the shallow, which the first launch has cut, as long as their rms sum is a small part of the level.
+    """
+    level, found = abs(sums.sum()), []
+    deep = depth_of(source) > 1
+    for mine, limit in ((~deep & (source != EXACT), math.sqrt(_SHALLOW)), (deep, _DEEP * tolerance)):
+        rows = np.flatnonzero(mine & (sums != 0.0))
+        rows = rows[np.argsort(np.abs(sums[rows]), kind="stable")]
+        small = np.sqrt(np.cumsum(np.abs(sums[rows]) ** 2)) <= limit * level
+        if limit < 1.0:
+            small &= np.abs(np.cumsum(sums[rows])) <= limit * level
+        keep = int(np.flatnonzero(small).max(initial=-1)) + 1
+        found.append(source[rows[keep:]])
+    return found[0], found[1]

@@ -1,0 +1,108 @@
+"""Refinement where detections need it: levels lie within the stated error of much finer runs; budgets end it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.boxes_and_balls import scene_of
+
+import raychan as rc
+from raychan.run import refinement_budget
+from raychan.run.map_cells import MapCells, feeding_sources
+from raychan.run.rules import step_rule
+from raychan.run.scene_refinement import SceneRefinement
+from raychan.run.sourced_paths import SourcedPaths
+from raychan.tracing.solver import Stats
+from raychan.tracing.sources import depth_of, launches
+from raychan.world.geometry import geometry_of
+
+
+def fine(of, monkeypatch):
+    """Return the result of a run that may cast eight times the rays, to 0.2 dB."""
+    monkeypatch.setattr(refinement_budget, "_RAYS", 12.0)
+    return rc.simulate(of, tolerance_db=0.2)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_levels_lie_within_the_stated_error_of_a_much_finer_run(seed, monkeypatch):
+    of = scene_of(seed)
+    found = rc.simulate(of)
+    truth = fine(of, monkeypatch)
+    rows, columns = found.detections.cell.T
+    off = np.abs(10.0 * np.log10(found.rdmap.power[rows, columns] / truth.rdmap.power[rows, columns]))
+    known = found.detections.converged
+    assert len(off) >= 3 and known.any()
+    assert (off[known] <= found.detections.error_db[known]).mean() >= 0.75
+    assert (off[known] <= found.detections.error_db[known] + 0.5).all()
+
+
+def test_equal_runs_give_equal_bytes():
+    a, b = rc.simulate(scene_of(4)), rc.simulate(scene_of(4))
+    assert np.array_equal(a.cube.samples, b.cube.samples)
+    assert np.array_equal(a.detections.error_db, b.detections.error_db)
+
+
+def test_what_was_never_cut_is_in_doubt():
+    """The first launch does not cut tubes that bounced: until they are traced again all of their field is in doubt."""
+    of = scene_of(2)
+    refinement = SceneRefinement(
+        geometry_of(of), of.points(0.0), of.radar, of.processing, of.model, lambda *_: None, Stats()
+    )
+    first = refinement.first()
+    deep = depth_of(first.source)[first.paths.trajectory] > 1
+    assert deep.any()
+    held = SourcedPaths(first.paths, first.source)
+    assert np.sort(np.abs(held.doubtful.amplitude)) == pytest.approx(np.sort(np.abs(first.paths.amplitude[deep])))
+    by = list(launches(np.unique(first.source[depth_of(first.source) > 1]), len(refinement.geometry.facets.body)))
+    rule = step_rule(of.radar, of.processing, of.model, 0)
+    paths, source = refinement._paths(first.launch.again(rule.refinement, by, Stats()))
+    change, _ = held.replace(paths, source, by)
+    assert held.doubtful.amplitude.sum() == pytest.approx(change.amplitude.sum())
+    assert len(held.now.amplitude) == len(paths.amplitude) + np.count_nonzero(~deep)
+
+
+def test_speckle_stops_refinement_at_what_a_millimetre_changes():
+    wanted, loose = (rc.simulate(scene_of(1, tolerance_db=0.05, speckle=x)) for x in (False, True))
+    assert loose.stats["rays"] < wanted.stats["rays"]
+    assert any("speckle (model.speckle)" in line for line in loose.warnings)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "word"), [("max_rays", 1, "rays"), ("max_seconds", 0.0, "time"), ("max_memory_mb", 1.0, "memory")]
+)
+def test_a_budget_ends_refinement_and_is_told(key, value, word):
+    found = rc.simulate(scene_of(2, tolerance_db=0.1, **({"max_rays": 10**9} | {key: value})))
+    assert found.stats["refinements"] == 1
+    assert any(f"ended by the budget of {word} (model.{key})" in line for line in found.warnings)
+
+
+def test_more_rays_state_smaller_errors():
+    few, many = (rc.simulate(scene_of(1, tolerance_db=0.05, max_rays=n)) for n in (1, 2_000_000))
+    assert many.stats["rays"] > few.stats["rays"]
+    worst = [float(np.nanmax(np.where(r.detections.converged, r.detections.error_db, 20.0))) for r in (few, many)]
+    assert worst[1] < worst[0]
+
+
+def test_sources_left_out_bring_less_than_their_share():
+    rng = np.random.default_rng(5)
+    depth = rng.integers(1, 3, 400)
+    source = (depth.astype(np.int64) << 31) | np.arange(400)
+    sums = rng.normal(size=400) * 10.0 ** rng.uniform(-4, 0, 400) * np.exp(2j * np.pi * rng.uniform(size=400))
+    shallow, deep = feeding_sources(source, sums, 0.06)
+    level = abs(sums.sum())
+    left = ~np.isin(source, deep) & (depth == 2)
+    assert 0 < left.sum() < (depth == 2).sum()
+    assert np.sqrt((np.abs(sums[left]) ** 2).sum()) <= 0.3 * 0.06 * level
+    assert abs(sums[left].sum()) <= 0.3 * 0.06 * level
+    left = ~np.isin(source, shallow) & (depth == 1)
+    assert np.sqrt((np.abs(sums[left]) ** 2).sum()) <= np.sqrt(0.02) * level
+    assert (np.sort(np.abs(sums[left]))[-1] <= np.abs(sums[np.isin(source, shallow)])).all()
+
+
+@pytest.mark.parametrize(("q", "factor"), [(0.3, 1.0), (0.64, 1.0), (0.75, 3.0 / 1.8), (1.2, 3.0)])
+def test_changes_that_do_not_shrink_count_as_the_rest_of_their_series(q, factor):
+    cells = MapCells.of(np.array([[10.0, 0.0, 1.0]]), np.array([1.0 + 0j]), 0.5)
+    wanted = np.ones((1, 2), bool)
+    for change in (0.1, 0.1 * q):
+        cells.changed(np.array([[change, 0.0]]), wanted)
+    assert cells.slowness[0, 0] == pytest.approx(factor, rel=0.02)

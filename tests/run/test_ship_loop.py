@@ -1,0 +1,140 @@
+"""The closed loop of ship and scanner: poses of a rolling deck, orders, time, and equal seeds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from raychan.dynamics import ship
+from raychan.dynamics.steering import HeadingProgramme, StateFeedback, SteeringGear
+from raychan.dynamics.voyage import LinearPlant, sail
+from raychan.run.ship_loop import ShipLoop
+from raychan.run.ship_scene import ship_scene
+from raychan.sensors.laser import NO_BODY, SEA
+
+EAST = {"headings": [[0.0, 90.0]]}
+BOX = {"name": "box", "shape": "box", "params": {"length": 4.0, "width": 4.0, "height": 20.0}}
+
+
+def frames(tables, count):
+    loop = ShipLoop(ship_scene(tables))
+    return [loop.step_scan() for _ in range(count)]
+
+
+def test_the_loop_sails_as_the_ship_alone_does():
+    tables = {"steering": {"gain": ship.PRINTED_GAIN.tolist(), "max_rudder_deg": 10.0}, "programme": EAST}
+    found = frames(tables, 1500)
+    start = np.zeros(10)
+    start[ship.U] = ship.CORRECTED.speed
+    plant = LinearPlant(ship.exact_step(ship.CORRECTED, 1 / 75), SteeringGear(np.radians(10.0), np.radians(5.0)))
+    course = HeadingProgramme(np.zeros(1), np.array([np.pi / 2]))
+    track = sail(plant, start, StateFeedback(ship.PRINTED_GAIN), course, 1500 / 75)
+    assert [f.heading for f in found] == pytest.approx(track.state[:1500, ship.PSI], abs=1e-12)
+    assert [f.x for f in found] == pytest.approx(track.state[:1500, ship.X], abs=1e-9)
+    assert [f.y for f in found] == pytest.approx(-track.state[:1500, ship.Y], abs=1e-9)
+    assert [f.time for f in found] == pytest.approx(np.arange(1500) / 75, abs=1e-12)
+
+
+@pytest.mark.parametrize("model", ["corrected", "container", "yacht"])
+def test_equal_seeds_give_equal_bytes_and_others_do_not(model):
+    tables = {"ship": {"model": model}, "steering": {"controller": "lqg"}, "sea": {"reflectivity": 0.5}}
+    tables |= {"scanner": {"noise_m": 0.1, "pitch_deg": 10.0}}
+    first, again = frames(tables, 40), frames(tables, 40)
+    other = frames(tables | {"run": {"seed": 1}}, 40)
+    assert [f.scan.range.tobytes() for f in first] == [f.scan.range.tobytes() for f in again]
+    assert [f.heading for f in first] == [f.heading for f in again]
+    assert first[-1].heading != other[-1].heading
+    assert np.isfinite(first[-1].scan.range).any()
+
+
+def test_orders_take_the_helm_and_give_it_back():
+    loop = ShipLoop(ship_scene({"ship": {"model": "yacht"}}))
+    loop.order(rudder=np.radians(20.0), shaft=10.0)
+    for _ in range(600):
+        frame = loop.step_scan()
+    assert frame.rudder == pytest.approx(np.radians(20.0)) and frame.yaw_rate > 0.05
+    assert frame.shaft == 10.0
+    loop.order()
+    for _ in range(3000):
+        frame = loop.step_scan()
+    assert np.cos(frame.heading) == pytest.approx(1.0, abs=1e-4)
+    assert frame.shaft == pytest.approx(loop.scene.bridge.plant.shaft)
+
+
+def test_an_order_that_a_ship_does_not_take_is_told():
+    linear = ShipLoop(ship_scene({}))
+    with pytest.raises(ValueError, match="keeps its speed"):
+        linear.order(shaft=1.0)
+    assert not linear.takes_shaft
+    yacht = ShipLoop(ship_scene({"ship": {"model": "yacht"}}))
+    with pytest.raises(ValueError, match="allowed: 0 to 30"):
+        yacht.order(shaft=99.0)
+    with pytest.raises(ValueError, match="finite"):
+        yacht.order(rudder=float("nan"))
+
+
+def test_a_body_abeam_is_met_at_its_distance_from_the_scanner_not_from_the_ship():
+    body = BOX | {"position": [10.0, 30.0, 0.0]}
+    tables = {"scanner": {"position": [10.0, 0.0, 5.0]}, "bodies": [body]}
+    (frame,) = frames(tables, 1)
+    # To port is the last beam, at +90 deg; the box's near side is 28 m away. It moves on by 10.3 m/s x 6.7 ms.
+    assert frame.scan.range[-1] == pytest.approx(28.0, abs=1e-6)
+    assert frame.scan.body[-1] == 0 and frame.scan.body[0] == NO_BODY
+
+
+def test_a_heeled_deck_meets_the_sea_on_one_side_and_the_sky_on_the_other():
+    scene = ship_scene({"ship": {"model": "yacht"}, "sea": {"reflectivity": 1.0}})
+    loop = ShipLoop(scene)
+    loop.order(rudder=np.radians(30.0))
+    for _ in range(900):
+        frame = loop.step_scan()
+    assert frame.roll < np.radians(-5.0)  # a turn to starboard heels to port
+    angle = scene.scanner.angles
+    met = frame.scan.body == SEA
+    assert met[angle > np.radians(60.0)].all() and not met[angle < 0.0].any()
+    roll = -frame.beams.roll[met]
+    assert frame.scan.range[met] == pytest.approx(5.0 * np.cos(roll) / (np.sin(roll) * np.sin(angle[met])), rel=1e-9)
+
+
+def test_beams_leave_from_where_the_ship_is_at_their_own_time():
+    for step, turns in ((1.0, 1), (0.25, 4)):
+        tables = {"ship": {"model": "yacht"}, "scanner": {"step_deg": step}}
+        first, second = frames(tables, 2)
+        times = ship_scene(tables).scanner.times
+        along = first.x + first.speed * times
+        assert first.beams.position[:, 0] == pytest.approx(along, abs=1e-9)
+        assert second.time == pytest.approx(turns / 75)
+        (still,) = frames({**tables, "scanner": {"step_deg": step, "motion": False}}, 1)
+        assert (still.beams.position[:, 0] == still.x).all()
+
+
+def test_a_body_that_moves_is_met_where_it_is_then():
+    body = BOX | {"position": [30.0, 0.0, 0.0], "velocity_mps": [-3.0, 0.0, 0.0]}
+    found = frames({"ship": {"model": "yacht"}, "scanner": {"motion": False}, "bodies": [body]}, 76)
+    ahead = [f.scan.range[90] for f in found]
+    assert ahead[0] == pytest.approx(28.0, abs=1e-6)
+    assert ahead[-1] == pytest.approx(28.0 - 3.0 - found[-1].x, abs=1e-4)
+
+
+def test_beams_of_the_stiff_printed_ship_roll_as_it_does_within_a_step():
+    gain = {"steering": {"gain": ship.PRINTED_GAIN.tolist()}}
+    start = np.zeros(10)
+    start[ship.U], start[ship.PHI] = ship.CORRECTED.speed, 0.1
+    scene = ship_scene({**gain, "scanner": {"step_deg": 0.25}})
+    loop = ShipLoop(replace(scene, bridge=replace(scene.bridge, start=start)))
+    frame = loop.step_scan()
+    # Four steps of 1/75 s; the exact roll with the rudder amidships, which hardly rolls this ship.
+    times = scene.scanner.times
+    exact = [float((expm(ship.CORRECTED.a * t) @ [0.0, 0.0, 0.0, 0.1, 0.0])[3]) for t in times]
+    assert frame.beams.roll == pytest.approx(exact, abs=0.1 * 3e-5)
+    assert np.ptp(exact) > 0.03
+
+
+def test_a_container_ship_whose_propeller_brakes_slows_down_and_sails_on():
+    loop = ShipLoop(ship_scene({"ship": {"model": "container"}, "scanner": {"mirror_hz": 5.0}}))
+    loop.order(rudder=np.radians(5.0), shaft=0.1)
+    speeds = [loop.step_scan().speed for _ in range(3000)]
+    assert (np.diff(speeds[50:]) < 0.0).all() and 0.1 < speeds[-1] < 4.0
+    with pytest.raises(ValueError, match="allowed: above 0"):
+        loop.order(shaft=0.0)

@@ -1,0 +1,92 @@
+"""Logged poses in place of a model: what the log says is where the ship is, and a log that cannot be is told."""
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.run.ship_loop import ShipLoop
+from raychan.run.ship_replay import read_poses
+from raychan.run.ship_scene import ship_scene
+from raychan.sensors.laser import SEA
+
+HEAD = "t_s,x_m,y_m,heading_deg,roll_deg\n"
+
+
+def replay(tmp_path, text, **scanner):
+    file = tmp_path / "poses.csv"
+    file.write_text(text)
+    tables = {"replay": {"file": str(file)}, "sea": {"reflectivity": 1.0}, "scanner": scanner}
+    return ShipLoop(ship_scene(tables))
+
+
+def rolled(tmp_path, roll, **scanner):
+    """Return the first frame of a ship that lies still, rolled by an angle [deg]."""
+    return replay(tmp_path, f"{HEAD}0,0,0,0,{roll}\n1,0,0,0,{roll}\n", **scanner).step_scan()
+
+
+def test_a_scanner_5_m_up_meets_the_sea_28_8_m_abeam_at_10_deg_of_roll_on_one_side_only(tmp_path):
+    frame = rolled(tmp_path, -10.0, position=[0.0, 0.0, 5.0 / np.cos(np.radians(10.0))])
+    assert frame.scan.range[-1] == pytest.approx(5.0 / np.sin(np.radians(10.0)), abs=1e-9)
+    assert frame.scan.range[-1] == pytest.approx(28.8, abs=0.1)
+    angle = np.arange(-90, 91)
+    assert ((frame.scan.body == SEA) == (np.sin(np.radians(angle)) > 5.0 / 80.0 / np.sin(np.radians(10.0)))).all()
+
+
+def test_pitch_and_height_of_a_log_count(tmp_path):
+    text = "t_s,x_m,y_m,heading_deg,roll_deg,pitch_deg,z_m\n0,0,0,0,0,10,1\n1,0,0,0,0,10,1\n"
+    frame = replay(tmp_path, text, position=[0.0, 0.0, 5.0]).step_scan()
+    height = 1.0 + 5.0 * np.cos(np.radians(10.0))
+    assert frame.pitch == pytest.approx(np.radians(10.0)) and frame.z == 1.0
+    assert frame.scan.range[90] == pytest.approx(height / np.sin(np.radians(10.0)), abs=1e-9)
+
+
+def test_the_ship_is_where_the_log_has_it_and_turns_over_north_the_short_way(tmp_path):
+    loop = replay(tmp_path, HEAD + "10,0,0,350,0\n11,8,-6,10,4\n12,16,-12,30,0\n")
+    frames = [loop.step_scan() for _ in range(loop.scans)]
+    assert loop.done and len(frames) == 150
+    t = np.array([f.time for f in frames])
+    assert [f.x for f in frames] == pytest.approx(8.0 * t) and [f.y for f in frames] == pytest.approx(-6.0 * t)
+    assert np.degrees([f.heading for f in frames]) == pytest.approx((350.0 + 20.0 * t) % 360.0)
+    assert np.degrees([f.roll for f in frames]) == pytest.approx(np.interp(t, [0, 1, 2], [0, 4, 0]))
+    assert [f.speed for f in frames] == pytest.approx(np.full(150, 10.0))
+    assert np.degrees(frames[3].yaw_rate) == pytest.approx(20.0)
+    assert np.degrees(frames[3].roll_rate) == pytest.approx(4.0)
+    with pytest.raises(ValueError, match="the logged poses end at 2 s"):
+        loop.step_scan()
+    with pytest.raises(ValueError, match="logged poses take no orders"):
+        loop.order(rudder=0.1)
+
+
+WRONG = {
+    "": "poses.csv: is empty; allowed: columns t_s, x_m",
+    HEAD: "poses.csv: too few rows",
+    f"{HEAD}0,0,0,0,0\n": "too few rows",
+    f"{HEAD}0,0,0,0,0\n1,0,0,0,0\n0.5,0,0,0,0\n": r"poses.csv:4: t_s = 0.5 after 1: time does not grow",
+    f"{HEAD}0,0,0,0,0\n0,0,0,0,0\n": r"poses.csv:3: t_s = 0 after 0: time does not grow",
+    f"{HEAD}0,0,0,0,0\n5,0,0,0,0\n": r"poses.csv:3: t_s = 5 after 0: a gap of 5 s; allowed: at most 1 s",
+    f"{HEAD}0,0,0,nan,0\n1,0,0,0,0\n": r"poses.csv:2: heading_deg = 'nan'; allowed: a finite number",
+    f"{HEAD}0,0,0,0,0\n\n1,0,inf,0,0\n": r"poses.csv:4: y_m = 'inf'",
+    f"{HEAD}0,0,0,0,x\n1,0,0,0,0\n": r"poses.csv:2: roll_deg = 'x'",
+    f"{HEAD}0,0,0,0\n1,0,0,0,0\n": r"poses.csv:2: roll_deg is missing",
+    "t_s,x_m,y_m,roll_deg\n0,0,0,0\n": r"poses.csv:1: column heading_deg is missing",
+    "t_s,x_m,y_m,headingdeg,roll_deg\n0,0,0,0,0\n": "did you mean 'headingdeg'",
+    "t_s,x_m,x_m,y_m,heading_deg,roll_deg\n": "two columns have one name",
+    "\x00\x00\n": "column t_s is missing|no CSV",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_log_that_cannot_be_is_told_with_line_and_value(text, tmp_path):
+    file = tmp_path / "poses.csv"
+    file.write_text(text)
+    with pytest.raises(rc.SceneError, match=WRONG[text]):
+        read_poses(file, 1.0)
+
+
+def test_a_log_that_is_no_text_is_told(tmp_path):
+    file = tmp_path / "poses.csv"
+    file.write_bytes(b"\xff\xfe\x00\x81")
+    with pytest.raises(rc.SceneError, match="cannot be read"):
+        read_poses(file, 1.0)
+    with pytest.raises(rc.SceneError, match="cannot be read"):
+        read_poses(tmp_path, 1.0)

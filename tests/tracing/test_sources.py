@@ -1,0 +1,97 @@
+"""Sources of tubes: a launch of some sources again brings the routes of the whole launch that have them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from support.boxes_and_balls import scene_of
+
+import raychan as rc
+from raychan.channel.paths import join, paths_of
+from raychan.run.rules import fine_rule
+from raychan.signal.baseband import synthesize
+from raychan.tracing.solver import Launch, Stats
+from raychan.tracing.sources import EXACT, covered, depth_of, facet_of, launches
+from raychan.world.geometry import geometry_of
+
+
+@pytest.fixture(scope="module")
+def whole():
+    scene = scene_of(2)
+    rule = fine_rule(scene.radar, scene.processing, scene.model)
+    launch = Launch(geometry_of(scene), scene.points(0.0), rule)
+    routes, sources = zip(*launch.whole(Stats()), strict=True)
+    return scene, launch, routes, np.concatenate(sources)
+
+
+def surfaces(routes):
+    """Return bounce and first facet of each route, one route after the other."""
+    found = []
+    for batch in routes:
+        for i in range(len(batch.kind)):
+            if batch.scatter[i] < 0:
+                found.append((0, -1))
+                continue
+            met = [s for s in range(batch.scatter[i] + 1) if batch.kind[i, s] != rc.InteractionType.TRANSMIT]
+            found.append((met, batch.facet[i]))
+    return found
+
+
+def test_depth_and_facet_are_those_that_the_interactions_tell(whole):
+    _, launch, routes, sources = whole
+    depths, facets, row = depth_of(sources), facet_of(sources), 0
+    legs = sources >> 49
+    for met, facet in surfaces(routes):
+        if sources[row] == EXACT:
+            assert (depths[row], facets[row]) == (0, -1)
+        else:
+            mirrors = len(launch.legs[int(legs[row])].mirrors)
+            assert depths[row] == len(met) - mirrors
+            assert facets[row] == facet[met[mirrors]]
+        row += 1
+    assert row == len(sources)
+    assert {1, 2} <= set(depths.tolist())
+
+
+def test_covered_tells_what_a_slow_search_tells(whole):
+    *_, sources = whole
+    rng = np.random.default_rng(3)
+    own = np.unique(sources[sources != EXACT])
+    some = rng.choice(own, 20, replace=False)
+    by = list(launches(some, 1 << 20))
+    wanted = set()
+    for leg, one in by:
+        wanted |= {(leg, one.depth, out, int(f)) for out in one.outs for f in np.flatnonzero(one.facets)}
+    slow = [
+        s != EXACT and (s >> 49, s >> 31 & 15, s >> 35 & 16383, s & 0x7FFFFFFF) in wanted for s in map(int, sources)
+    ]
+    assert covered(sources, by).tolist() == slow
+    assert covered(some, by).all()
+
+
+def test_tracing_all_sources_again_by_the_same_rule_gives_the_same_samples(whole):
+    scene, launch, routes, sources = whole
+    by = list(launches(np.unique(sources), len(launch.geometry.facets.body)))
+    stats = Stats()
+    again = [batch for batch, _ in launch.again(launch.rule.refinement, by, stats)]
+    assert stats.rays > 0
+
+    def samples(batches):
+        facets, radar = launch.geometry.facets, scene.radar
+        return synthesize(join([paths_of(b, facets, radar, radar.waveform.carrier) for b in batches]), radar).samples
+
+    whole_before = samples([b for b in routes if (b.scatter >= 0).all()])
+    # What is weak is judged by what the whole launch had found in the end, so some tubes are cut less.
+    tolerance = 1.0 - 10.0 ** (-scene.model.tolerance_db / 20.0)
+    assert np.linalg.norm(samples(again) - whole_before) < tolerance * np.linalg.norm(whole_before)
+
+
+def test_uncut_deep_tubes_cost_fewer_rays(whole):
+    _, launch, *_ = whole
+    rough = dataclasses.replace(launch.rule, refinement=dataclasses.replace(launch.rule.refinement, deep=False))
+    stats, fine = Stats(), Stats()
+    list(Launch(launch.geometry, launch.points, rough).whole(stats))
+    list(Launch(launch.geometry, launch.points, launch.rule).whole(fine))
+    assert stats.rays < 0.9 * fine.rays

@@ -1,0 +1,62 @@
+"""Keys without effect are told, and only those that are set to another value than their default."""
+
+import pytest
+from support.scene_texts import PLATE
+
+import raychan as rc
+
+
+def idle(scene):
+    made = rc.Scene.from_text(scene) if isinstance(scene, str) else scene
+    return [line for line in made.warnings if "no effect" in line]
+
+
+def test_a_scene_of_keys_that_count_is_silent():
+    assert idle(PLATE) == []
+    assert idle(PLATE.replace("[radar]", "[radar]\nnoise_figure_db = 9.0")) == []
+    assert idle(PLATE.replace("[radar]", "[radar]\nnoise = false\nnoise_figure_db = 15.0")) == []
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (
+            "[radar]\nnoise = false\nnoise_figure_db = 9.0\nnoise_temperature_k = 40.0",
+            "radar: noise_figure_db and noise_temperature_k have no effect with noise = false",
+        ),
+        ("[radar]\nnoise = false\nnoise_figure_db = 9.0", "radar: noise_figure_db has no effect with noise = false"),
+        (
+            "[materials.steel]\npec = true\nsigma = 1e6\n[radar]",
+            "materials.steel: sigma has no effect with pec = true",
+        ),
+        (
+            '[materials.tar]\ndiffuse = { law = "gamma", level_db = -9.0, exponent = 8, texture_m = 2.0 }\n[radar]',
+            "materials.tar.diffuse: exponent has no effect with law = 'gamma'",
+        ),
+        (
+            '[materials.tar]\ndiffuse = { law = "lobe", level_db = -9.0, exponent = 8, texture_m = 2.0 }\n[radar]',
+            "materials.tar.diffuse: texture_m has no effect without k_shape",
+        ),
+    ],
+)
+def test_keys_of_radar_and_materials_without_effect_are_told(keys, said):
+    assert said in idle(PLATE.replace("[radar]", keys))
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("rcs_point = [0.0, 0.0, 0.0]", "bodies.sign: rcs_point has no effect without rcs_dbsm"),
+        ('unit = "mm"\nscale = 2.0', "bodies.sign: unit and scale have no effect with shape = 'plate'"),
+    ],
+)
+def test_keys_of_bodies_without_effect_are_told(key, said):
+    assert idle(PLATE + key) == [said]
+    assert idle(PLATE) == []
+
+
+def test_objects_from_python_are_told_alike():
+    wave = rc.Waveform(77e9, 500e6, 20e-6)
+    quiet = rc.Scene(radar=rc.Radar(wave, noise=False, noise_figure_db=9.0))
+    assert idle(quiet) == ["radar: noise_figure_db has no effect with noise = false"]
+    assert idle(rc.Scene(radar=rc.Radar(wave, noise=False))) == []
