@@ -41,11 +41,16 @@ class SourcedPaths:
     def __init__(self, paths: Paths, source: Sources) -> None:
         self._parts = [_Part(paths, source, np.full(len(source), _NOW, np.int8), True)]
         self._doubted = np.zeros(0, np.int64), np.zeros(0)
+        self._moved = np.zeros(2)
 
     def replace(self, paths: Paths, source: Sources, launches: list[tuple[int, Wanted]]) -> tuple[Paths, Sources]:
         """Replace what some launches traced again; return what this changes: the new paths and the old ones with their
         sign turned, and the source (w,) of each trajectory."""
         changed, sources = [paths], [source]
+        first, own = self._parts[0], covered(self._parts[0].source, launches) & (self._parts[0].state == _NOW)
+        shallow = own & (depth_of(first.source) < DEEP)
+        if shallow.any():
+            self._moved += _powers(first, shallow, paths, source)
         for part in self._parts:
             hit = covered(part.source, launches)
             old = hit & (part.state == _NOW)
@@ -86,14 +91,23 @@ class SourcedPaths:
 
     @property
     def doubtful(self) -> Paths:
-        """What the newest launches changed, times the factors of `doubt`, and the paths of deep tubes never cut."""
-        parts = []
+        """What the newest launches changed, times the factors of `doubt`; the paths of deep tubes never traced again;
+        and of other tubes never traced again the share that those traced again changed by, in unrelated phases."""
+        parts = [self._untouched()]
         for p in self._parts:
             new = (p.state == _NOW) & (depth_of(p.source) >= DEEP if p.first else True)
             for rows, sign in ((new, 1.0), (p.state == _BEFORE, -1.0)):
                 paths = of_trajectories(p.paths, rows)
                 parts.append(scaled(paths, sign * self._factor(p.source[rows])[paths.trajectory]))
         return join(parts)
+
+    def _untouched(self) -> Paths:
+        first = self._parts[0]
+        rows = (first.state == _NOW) & (depth_of(first.source) == 1)
+        paths = of_trajectories(first.paths, rows)
+        share = np.sqrt(self._moved[1] / self._moved[0]) if self._moved[0] > 0.0 else 0.0
+        turn = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, int(rows.sum()))
+        return scaled(paths, share * np.exp(1j * turn)[paths.trajectory])
 
     def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, list[Complexes]]:
         """Return the sources (s,) of the first launch, and for each of the cells (c, 3) the sums (s,) of its paths
@@ -104,6 +118,25 @@ class SourcedPaths:
         for i in range(0, len(cells), most):
             found.extend(_sums(response, part.paths, group, len(own), cells[i : i + most]))
         return own, found
+
+
+def _powers(first: _Part, rows: NDArray[np.bool_], paths: Paths, source: Sources) -> Floats:
+    """Return the power of the sources of some trajectories (w,) of a launch, and that by which new paths change it."""
+    old, new = (
+        (p, s[p.trajectory]) for p, s in ((of_trajectories(first.paths, rows), first.source[rows]), (paths, source))
+    )
+    own = np.unique(old[1])
+    sums = [_by(own, s, p.amplitude) for p, s in (old, new)]
+    return np.array([(np.abs(sums[0]) ** 2).sum(), (np.abs(sums[1] - sums[0]) ** 2).sum()])
+
+
+def _by(own: Sources, source: Sources, amplitude: Complexes) -> Complexes:
+    """Return the sums (s,) of amplitudes (n,) by sources `own` (s,)."""
+    at = np.minimum(np.searchsorted(own, source), len(own) - 1)
+    hit = own[at] == source
+    return np.bincount(at[hit], amplitude.real[hit], len(own)) + 1j * np.bincount(
+        at[hit], amplitude.imag[hit], len(own)
+    )
 
 
 def changes(response: PointSpread, paths: Paths, source: Sources, cells: Floats) -> Complexes:

@@ -15,6 +15,8 @@ def shown(value):
     """Return a default as a scene file writes it."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(shown, value))}]"
     return f'"{value}"' if isinstance(value, str) else f"{value:g}"
 
 

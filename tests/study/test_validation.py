@@ -12,7 +12,7 @@ from support.study_tables import figures
 from support.study_tables import table as of_study
 
 from raychan.run.result import MULTIPATH
-from raychan.study.validation.bench import Bench
+from raychan.study.validation.bench import Bench, over, peak_snr
 from raychan.study.validation.data import HERE, Figure, Known, load
 from raychan.study.validation.formulas import both_ways, link_snr
 from raychan.study.validation.judge import AGREES, DIFFERS, UNTESTABLE, Check, cover, judge, shown, verdict
@@ -249,9 +249,15 @@ def test_the_direct_path_alone_gives_the_link_budget(bench):
 
 
 def test_the_level_of_a_thing_that_is_detected_is_its_detection(bench):
+    """Its own paths and those over other targets too add in voltage: to no more than the sum of both, and noise."""
+    result = bench.run("street")
     for target in ("car_1", "car_3", "pedestrian_4"):
-        row = bench.found("street", target)
-        assert bench.level("street", target) == pytest.approx(bench.run("street").detections.snr[row], abs=1.0)
+        row, given, at = bench.found("street", target), bench.target(target), bench.expected_range(target)
+        others = ~over(result, given.parts, given.over) & (np.abs(result.paths.range - at) < 2.0)
+        rest = 10.0 ** (peak_snr(result, others, at, 0.5) / 20.0)
+        own, seen = (10.0 ** (x / 20.0) for x in (bench.level("street", target), result.detections.snr[row]))
+        assert abs(seen - own) <= rest + 1.5
+        assert rest < own
 
 
 @pytest.mark.parametrize("run", ["street", "street_array", "occluded_array"])
