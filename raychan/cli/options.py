@@ -86,6 +86,15 @@ Changes = Annotated[
     ),
 ]
 
+ShipChanges = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Override a key of the scene file, such as ship.speed_mps=8; may be repeated.",
+        metavar="KEY=VALUE",
+    ),
+]
+
 
 def help_of(command: Callable[..., None]) -> str:
     """Return a command's docstring with one line a paragraph: typer would keep the line ends of the source."""

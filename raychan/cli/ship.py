@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, within
+from raychan.cli.options import ShipChanges, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def ship(
             help="Seed of all noise, in place of the scene's own.", metavar="N", callback=within(limits.SEED, True)
         ),
     ] = None,
-    set_: Changes = None,
+    set_: ShipChanges = None,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no pictures.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show track and echoes in a window at the end.")] = False,
 ) -> None:
@@ -62,7 +62,7 @@ def ship(
     ):
         raise typer.BadParameter("there is no display; scene.png holds the picture", param_hint="--view")
     loaded = read_ship_scene(scene, [*(set_ or []), *([] if seed is None else [f"run.seed={seed}"])])
-    show.warn(loaded.bodies.warnings)
+    show.warn(loaded.warnings)
     with staging(out, CONTENTS) as stage, show.progress(kernels="ship") as tell:
         log, found = sail_into(loaded, stage, tell)
         if not no_pictures:
