@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import ShipChanges, within
+from raychan.cli.options import ShipChanges, ShipSceneFile, within
 from raychan.world.limits import Limit
 
 if TYPE_CHECKING:
@@ -60,14 +60,7 @@ def _baud(value: int) -> int:
 
 
 def hil(
-    scene: Annotated[
-        Path,
-        typer.Argument(
-            help="A ship's scene file (TOML), or the name of one that comes along, such as ship_avoid.",
-            metavar="SCENE",
-            show_default=False,
-        ),
-    ] = Path("ship_turn"),
+    scene: ShipSceneFile = Path("ship_turn"),
     scanner: Device = None,
     position: Device = None,
     heading: Device = None,
@@ -255,11 +248,14 @@ def _try(write: Callable[[], object], lost: list[str]) -> None:
 
 def _row(instruments: Instruments, at: Reading) -> list[str]:
     """Return a reading as a row of track.csv."""
-    angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
+    from raychan.run.ship_files import rounded_heading
+
+    heading, *angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
     where = (at.time, at.north, at.east)
     return [
         instruments.utc(at).isoformat(timespec="milliseconds"),
         *(f"{v:.4f}" for v in where),
         *(f"{a:.9f}" for a in instruments.place(at)),
+        rounded_heading(heading, ".4f"),
         *(f"{v:.4f}" for v in (*angles, at.speed)),
     ]

@@ -86,6 +86,8 @@ Changes = Annotated[
     ),
 ]
 
+_SHIP = "A ship's scene file (TOML), or the name of a bundled one, such as ship_avoid."
+ShipSceneFile = Annotated[Path, typer.Argument(help=_SHIP, metavar="SCENE", show_default=False)]
 ShipChanges = Annotated[
     list[str] | None,
     typer.Option(

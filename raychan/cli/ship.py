@@ -95,6 +95,8 @@ def _pictures(scene: ShipScene, log: ShipLog, stage: Path, tell: Any) -> list[st
 
 
 def _tell(found: dict[str, Any]) -> None:
+    from raychan.run.ship_files import rounded_heading
+
     screen = show.console()
     rows = [
         (name, f"{count:,}", f"{found['nearest_m'].get(name, float('nan')):.2f}".replace("nan", ""))
@@ -106,7 +108,8 @@ def _tell(found: dict[str, Any]) -> None:
     scans = f"{found['scans']:,} scans of {found['beams']} beams over {found['duration_s']:.1f} s"
     speed = f"{found['seconds']:.1f} s, {found['real_time_factor']:.0f} times real time"
     screen.print(f"{scans} in {speed}; seed {found['seed']}", soft_wrap=True)
-    screen.print(
-        f"roll {roll['least']:+.1f} to {roll['most']:+.1f} deg; at the end heading {end['heading_deg']:.1f} deg",
-        soft_wrap=True,
-    )
+    heading = rounded_heading(end["heading_deg"], ".1f")
+    rolled = f"roll {roll['least']:+.1f} to {roll['most']:+.1f} deg"
+    screen.print(f"{rolled}; at the end heading {heading} deg", soft_wrap=True)
+    if found["log_start_s"] is not None:
+        screen.print(f"0 s is the log's {found['log_start_s']:.15g} s", soft_wrap=True)
