@@ -62,7 +62,7 @@ def ship(
     ):
         raise typer.BadParameter("there is no display; scene.png holds the picture", param_hint="--view")
     loaded = read_ship_scene(scene, [*(set_ or []), *([] if seed is None else [f"run.seed={seed}"])])
-    show.warn(loaded.warnings)
+    show.warn(loaded.warnings + loaded.ends_early)
     with staging(out, CONTENTS) as stage, show.progress(kernels="ship") as tell:
         log, found = sail_into(loaded, stage, tell)
         if not no_pictures:

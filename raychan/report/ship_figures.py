@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import PALETTE, figure, save, style
+from raychan.report.canvas import PALETTE, Placer, figure, save, style
 from raychan.run.ship_files import COLUMNS, ShipLog
 from raychan.run.ship_scene import ShipScene
 from raychan.sensors.laser import NO_BODY, SEA
@@ -144,11 +144,11 @@ def track_picture(scene: ShipScene, log: ShipLog, path: str | Path) -> Path:
             )
         axes.plot(east, north, color="black", lw=1.2, zorder=4, label="track")
         _arrows(axes, log, east, north)
-        _mark_small(axes, scene)
         axes.annotate("start", (east[0], north[0]), xytext=(6, -3), textcoords="offset points", fontsize=8)
         axes.set(xlabel="east [m]", ylabel="north [m]", title=scene.title or "Track", aspect="equal")
         axes.grid(alpha=0.3)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=3.0)
+        _mark_small(axes, scene, east, north)
         return save(made, path)
 
 
@@ -165,7 +165,7 @@ def _arrows(axes: Any, log: ShipLog, east: Floats, north: Floats) -> None:
         )  # fmt: skip
 
 
-def _mark_small(axes: Any, scene: ShipScene) -> None:
+def _mark_small(axes: Any, scene: ShipScene, east: Floats, north: Floats) -> None:
     """Mark the bodies that are too small to be seen from above, and name them where they are few."""
     span = max(abs(high - low) for low, high in (axes.get_xlim(), axes.get_ylim()))
     facets, small = scene.bodies.facets(), dict[str, Floats]()
@@ -174,7 +174,10 @@ def _mark_small(axes: Any, scene: ShipScene) -> None:
         if np.ptp(corners[:, :2], axis=0).max() < _SMALL * span:
             # The limbs of a walker are marked once.
             small.setdefault(name.split(".")[0], 0.5 * (corners.min(axis=0) + corners.max(axis=0)))
+    place = Placer(axes)
+    place.prepare()
+    place.avoid(east, north, 2.0)
     for name, (x, y, _) in small.items():
         axes.plot([-y], [x], "o", ms=9, mfc="none", mec="black", mew=0.8, zorder=6)
         if len(small) <= _NAMED:
-            axes.annotate(_short(name), (-y, x), xytext=(7, 5), textcoords="offset points", fontsize=7, zorder=6)
+            place.label(-y, x, _short(name), fontsize=7, zorder=6)

@@ -55,11 +55,16 @@ class ShipScene:
         said = list(self.bodies.warnings)
         if height <= 0.0 and self.tables.sea is not None:
             said.append(f"the scanner is {-height:g} m below the water line and meets no sea (scanner.position)")
-        wanted = self.tables.run.duration_s
-        if self.poses is not None and self.poses.duration < wanted:
-            last = f"the log ends after {self.poses.duration:g} s, before run.duration_s = {wanted:g}"
-            said.append(f"{last}: the voyage ends with it")
         return said
+
+    @property
+    def ends_early(self) -> list[str]:
+        """Return a line where the logged poses end before the duration of the scene."""
+        wanted = self.tables.run.duration_s
+        if self.poses is None or self.poses.duration >= wanted:
+            return []
+        last = f"the log ends after {self.poses.duration:g} s, before run.duration_s = {wanted:g}"
+        return [f"{last}: the voyage ends with it"]
 
     @property
     def duration(self) -> float:

@@ -100,4 +100,4 @@ def test_a_log_in_unix_time_counts_from_its_first_row_and_says_when_that_was(tmp
     assert frames[0].time == 0.0 and len(frames) == 75
     assert [f.x for f in frames] == pytest.approx([8.0 * f.time for f in frames], abs=1e-9)
     assert loop.scene.poses.start == 1700000000.5
-    assert any("the log ends after 1 s, before run.duration_s = 60" in line for line in loop.scene.warnings)
+    assert "the log ends after 1 s, before run.duration_s = 60" in loop.scene.ends_early[0]
