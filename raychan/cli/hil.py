@@ -7,7 +7,7 @@ import json
 import math
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Thread
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, SceneFile, within
+from raychan.cli.options import ShipChanges, ShipSceneFile, within
 from raychan.world.limits import Limit
 
 if TYPE_CHECKING:
@@ -45,9 +45,12 @@ def _origin(text: str) -> Origin:
 
     try:
         latitude, longitude = (float(part) for part in str(text).split(","))
+    except ValueError:
+        raise typer.BadParameter(f"'{text}': two numbers, latitude and longitude in degrees, as {_ORIGIN}") from None
+    try:
         return Origin(latitude, longitude)
     except ValueError as error:
-        raise typer.BadParameter(f"'{text}': latitude and longitude in degrees, such as {_ORIGIN} ({error})") from None
+        raise typer.BadParameter(f"'{text}': {error}") from None
 
 
 def _baud(value: int) -> int:
@@ -57,7 +60,7 @@ def _baud(value: int) -> int:
 
 
 def hil(
-    scene: SceneFile = Path("ship_turn"),
+    scene: ShipSceneFile = Path("ship_turn"),
     scanner: Device = None,
     position: Device = None,
     heading: Device = None,
@@ -89,12 +92,12 @@ def hil(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Directory for summary.json and track.csv.", metavar="DIR")
     ] = None,
-    set_: Changes = None,
+    set_: ShipChanges = None,
 ) -> None:
     """Run a ship in real time: scanner telegrams, position, heading and attitude on four serial lines; orders for
     rudder and shaft come back.
 
-    Without SCENE: ship_turn. Ctrl-C or SIGTERM ends the run in order, with exit code 0.
+    Without SCENE: ship_turn. Once the ports are named, Ctrl-C or SIGTERM ends the run in order, with exit code 0.
     """
     place = _origin(origin)
     names = {"scanner": scanner, "position": position, "heading": heading, "attitude": attitude}
@@ -108,7 +111,7 @@ def hil(
 
         write_together({out / "summary.json": json.dumps(numbers, indent=2).encode()})
     show.warn(warnings(numbers))
-    print(one_line(numbers), flush=True)
+    _say(one_line(numbers))
     if numbers["failed"]:
         from raychan.world.errors import SceneError
 
@@ -156,21 +159,23 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
     from raychan.run.ship_scene import read_ship_scene
 
     loaded = read_ship_scene(wishes.scene, wishes.changes)
-    show.warn(loaded.bodies.warnings)
+    show.warn(loaded.warnings)
     with show.progress(kernels="ship"):
         session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate)
     if wishes.stream:
         session.scanner.mode = STREAM
     # Threads that are started while this one goes first do so too: none waits for the interpreter behind others.
     with _stops() as stopped, _first(wishes.realtime) as session.first, _track(wishes.out) as session.tell:
-        _say({name: channel.port.name for name, channel in channels.items()}, wishes.ports)
+        names = {name: channel.port.name for name, channel in channels.items()}
+        _say(json.dumps(names) if wishes.ports else "  ".join(f"{name} {port}" for name, port in names.items()))
         session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)
     return summary(session)
 
 
-def _say(names: dict[str, str], as_json: bool) -> None:
-    text = json.dumps(names) if as_json else "  ".join(f"{name} {port}" for name, port in names.items())
-    print(text, flush=True)
+def _say(text: str) -> None:
+    """Print a line at once. A program that read the ports' names and closed the pipe does not end the run."""
+    with suppress(BrokenPipeError):
+        print(text, flush=True)
 
 
 @contextmanager
@@ -243,11 +248,14 @@ def _try(write: Callable[[], object], lost: list[str]) -> None:
 
 def _row(instruments: Instruments, at: Reading) -> list[str]:
     """Return a reading as a row of track.csv."""
-    angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
+    from raychan.run.ship_files import rounded_heading
+
+    heading, *angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
     where = (at.time, at.north, at.east)
     return [
         instruments.utc(at).isoformat(timespec="milliseconds"),
         *(f"{v:.4f}" for v in where),
         *(f"{a:.9f}" for a in instruments.place(at)),
+        rounded_heading(heading, ".4f"),
         *(f"{v:.4f}" for v in (*angles, at.speed)),
     ]

@@ -86,6 +86,17 @@ Changes = Annotated[
     ),
 ]
 
+_SHIP = "A ship's scene file (TOML), or the name of a bundled one, such as ship_avoid."
+ShipSceneFile = Annotated[Path, typer.Argument(help=_SHIP, metavar="SCENE", show_default=False)]
+ShipChanges = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Override a key of the scene file, such as ship.speed_mps=8; may be repeated.",
+        metavar="KEY=VALUE",
+    ),
+]
+
 
 def help_of(command: Callable[..., None]) -> str:
     """Return a command's docstring with one line a paragraph: typer would keep the line ends of the source."""

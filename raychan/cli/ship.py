@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, within
+from raychan.cli.options import ShipChanges, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def ship(
             help="Seed of all noise, in place of the scene's own.", metavar="N", callback=within(limits.SEED, True)
         ),
     ] = None,
-    set_: Changes = None,
+    set_: ShipChanges = None,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no pictures.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show track and echoes in a window at the end.")] = False,
 ) -> None:
@@ -62,7 +62,7 @@ def ship(
     ):
         raise typer.BadParameter("there is no display; scene.png holds the picture", param_hint="--view")
     loaded = read_ship_scene(scene, [*(set_ or []), *([] if seed is None else [f"run.seed={seed}"])])
-    show.warn(loaded.bodies.warnings)
+    show.warn(loaded.warnings + loaded.ends_early)
     with staging(out, CONTENTS) as stage, show.progress(kernels="ship") as tell:
         log, found = sail_into(loaded, stage, tell)
         if not no_pictures:
@@ -95,6 +95,8 @@ def _pictures(scene: ShipScene, log: ShipLog, stage: Path, tell: Any) -> list[st
 
 
 def _tell(found: dict[str, Any]) -> None:
+    from raychan.run.ship_files import rounded_heading
+
     screen = show.console()
     rows = [
         (name, f"{count:,}", f"{found['nearest_m'].get(name, float('nan')):.2f}".replace("nan", ""))
@@ -106,7 +108,8 @@ def _tell(found: dict[str, Any]) -> None:
     scans = f"{found['scans']:,} scans of {found['beams']} beams over {found['duration_s']:.1f} s"
     speed = f"{found['seconds']:.1f} s, {found['real_time_factor']:.0f} times real time"
     screen.print(f"{scans} in {speed}; seed {found['seed']}", soft_wrap=True)
-    screen.print(
-        f"roll {roll['least']:+.1f} to {roll['most']:+.1f} deg; at the end heading {end['heading_deg']:.1f} deg",
-        soft_wrap=True,
-    )
+    heading = rounded_heading(end["heading_deg"], ".1f")
+    rolled = f"roll {roll['least']:+.1f} to {roll['most']:+.1f} deg"
+    screen.print(f"{rolled}; at the end heading {heading} deg", soft_wrap=True)
+    if found["log_start_s"] is not None:
+        screen.print(f"0 s is the log's {found['log_start_s']:.15g} s", soft_wrap=True)

@@ -128,6 +128,8 @@ class Scanner:
         return fixed[command]() if command in fixed else None
 
     def _switch(self, mode: int, rest: bytes) -> bytes | None:
+        if rest and mode not in (INSTALLATION, SUBRANGE):
+            return None
         if mode in BAUD_CODES:
             self.baud = BAUD_CODES[mode]
             return b"\x00"

@@ -5,6 +5,7 @@ Nothing here waits: reading returns what is there, writing what fits.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import select
@@ -17,6 +18,16 @@ FIRST_RETRY, LAST_RETRY = 0.1, 2.0
 """Wait [s] before a lost serial port is opened again; it doubles from the first to the last. Trades how soon a port
 comes back against opening one that is not there; not measured."""
 _CHUNK = 4096
+_WHY: dict[int | None, str] = {
+    errno.ENOENT: "is not there",
+    errno.ENODEV: "is not there",
+    errno.ENXIO: "is not there",
+    errno.EBUSY: "is taken by another program",
+    errno.EWOULDBLOCK: "is taken by another program, or by another line of this one",
+    errno.EACCES: "may not be opened by this user",
+    errno.ENOTTY: "is no serial port",
+    errno.EISDIR: "is no serial port",
+}
 
 
 class PortError(Exception):
@@ -175,7 +186,7 @@ class SerialPort:
         try:
             self._port: Any = open_port(name, baud, 0.0)
         except (OSError, ValueError) as error:
-            raise PortError(_without_name(name, error)) from error
+            raise PortError(_in_words(name, error)) from error
 
     @property
     def reconnects(self) -> int:
@@ -251,7 +262,10 @@ class SerialPort:
                 return
 
 
-def _without_name(name: str, error: Exception) -> str:
-    """Return what went wrong with a port, named once."""
-    text = str(error)
-    return text if name in text else f"{name}: {text}"
+def _in_words(name: str, error: Exception) -> str:
+    """Return what went wrong with a port; pyserial keeps the system's error number where there is one."""
+    number = getattr(error, "errno", None)
+    if number is None and "configure port" in str(error):
+        number = errno.ENOTTY
+    why = _WHY.get(number) or str(error).replace(name, "").strip(" :")
+    return f"{name} {why}" if number in _WHY else f"{name}: {why}"

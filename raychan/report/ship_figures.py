@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import PALETTE, figure, save, style
+from raychan.report.canvas import PALETTE, Placer, figure, save, style
 from raychan.run.ship_files import COLUMNS, ShipLog
 from raychan.run.ship_scene import ShipScene
 from raychan.sensors.laser import NO_BODY, SEA
@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 SEA_COLOUR = "#66b2d6"
 _GREY = "#f2f2f2"
 _NAMED = 12  # bodies that a legend lists
+_LETTERS = 24  # of a name in a legend
+_SMALL = 0.01  # of a track's picture: a body below is marked
 _ARROWS = 8  # arrows of the heading along a track
 
 
@@ -64,9 +66,14 @@ def _what(scene: ShipScene, log: ShipLog, axes: Any, extent: Any) -> None:
     axes.imshow(image.swapaxes(0, 1), origin="lower", aspect="auto", extent=extent, interpolation="nearest")
     axes.set(ylabel="beam [deg]")
     for b in found[:_NAMED]:
-        axes.plot([], [], "s", ms=8, color=shades[b], label=names[b])
+        axes.plot([], [], "s", ms=8, color=shades[b], label=_short(names[b]))
     if found:
-        axes.legend(loc="lower right", ncols=2, frameon=True, framealpha=0.9, edgecolor="none")
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _short(name: str) -> str:
+    """Return a body's name as a legend has room for it."""
+    return name if len(name) <= _LETTERS else f"{name[: _LETTERS - 3]}..."
 
 
 def _rgb(colour: str) -> Floats:
@@ -85,7 +92,7 @@ def _motion(log: ShipLog, axes: Any) -> None:
     roll.set_ylabel("roll [deg]", color=PALETTE[2])
     roll.spines["right"].set_visible(True)
     lines = [*axes.get_lines(), *roll.get_lines()]
-    axes.legend(lines, [str(line.get_label()) for line in lines], loc="upper left", ncols=3)
+    axes.legend(lines, [str(line.get_label()) for line in lines], loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
 
 
 def _unbroken(heading: Floats) -> Floats:
@@ -104,7 +111,7 @@ def motion_picture(scene: ShipScene, log: ShipLog, path: str | Path) -> Path:
             if name == "heading_deg":
                 values = _unbroken(values)
                 axes.plot(time, _unbroken(log.wanted), color="#aaaaaa", ls="--", lw=1.0, label="wanted")
-                axes.legend(["wanted"], loc="lower right")
+                axes.legend(["wanted"], loc="lower right", bbox_to_anchor=(1.0, 1.0))
             axes.plot(time, values, color=PALETTE[k], lw=1.2)
             axes.set_ylabel(label)
             axes.grid(alpha=0.3)
@@ -131,7 +138,7 @@ def track_picture(scene: ShipScene, log: ShipLog, path: str | Path) -> Path:
         for b in found:
             mine = log.hits[log.hit_body == b]
             size, layer = (1.2, 2) if b == SEA else (4.0, 3)
-            label = names[b] if len(found) <= _NAMED else None
+            label = _short(names[b]) if len(found) <= _NAMED else None
             axes.plot(
                 -mine[:, 1], mine[:, 0], ".", ms=size, color=shades[b], rasterized=True, zorder=layer, label=label
             )
@@ -141,6 +148,7 @@ def track_picture(scene: ShipScene, log: ShipLog, path: str | Path) -> Path:
         axes.set(xlabel="east [m]", ylabel="north [m]", title=scene.title or "Track", aspect="equal")
         axes.grid(alpha=0.3)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=3.0)
+        _mark_small(axes, scene, east, north)
         return save(made, path)
 
 
@@ -153,5 +161,23 @@ def _arrows(axes: Any, log: ShipLog, east: Floats, north: Floats) -> None:
         tip = 0.05 * span * np.array([np.sin(heading), np.cos(heading)])
         axes.annotate(
             "", (east[k] + tip[0], north[k] + tip[1]), (east[k], north[k]), zorder=5,
-            arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 1.2},
+            arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
+
+
+def _mark_small(axes: Any, scene: ShipScene, east: Floats, north: Floats) -> None:
+    """Mark the bodies that are too small to be seen from above, and name them where they are few."""
+    span = max(abs(high - low) for low, high in (axes.get_xlim(), axes.get_ylim()))
+    facets, small = scene.bodies.facets(), dict[str, Floats]()
+    for b, name in enumerate(scene.names):
+        corners = facets.vertices[facets.body == b].reshape(-1, 3)
+        if np.ptp(corners[:, :2], axis=0).max() < _SMALL * span:
+            # The limbs of a walker are marked once.
+            small.setdefault(name.split(".")[0], 0.5 * (corners.min(axis=0) + corners.max(axis=0)))
+    place = Placer(axes)
+    place.prepare()
+    place.avoid(east, north, 2.0)
+    for name, (x, y, _) in small.items():
+        axes.plot([-y], [x], "o", ms=9, mfc="none", mec="black", mew=0.8, zorder=6)
+        if len(small) <= _NAMED:
+            place.label(-y, x, _short(name), fontsize=7, zorder=6)

@@ -26,9 +26,17 @@ Floats = NDArray[np.float64]
 COLUMNS = ("t_s", "x_m", "y_m", "heading_deg", "roll_deg", "rudder_deg", "speed_mps")
 PICTURES = ("scan.png", "track.png", "motion.png", "scene.png")
 CONTENTS = Contents(("ship.csv", "scan.nc", "summary.json", *PICTURES), signs=("scan.nc",))
+_MOST_SCANS = 10_000_000  # a day at 75 Hz has 6.5 million; of 181 beams 14 GB before packing
 _BLOCK = 512  # scans written at once: 0.7 MB of 181 beams (not measured)
 _LOGGED = 4000  # scans that pictures draw; a picture is 1600 pixels wide
+_HEADING = COLUMNS.index("heading_deg")
 _AXES = "x to north, y to west, z up; heading clockwise from x; roll positive with starboard down"
+
+
+def rounded_heading(degrees: float, form: str) -> str:
+    """Return a heading [deg] in a format, below 360 also where it rounds up to it."""
+    text = f"{degrees:{form}}"
+    return f"{0.0:{form}}" if float(text) >= 360.0 else text
 
 
 @dataclass(frozen=True)
@@ -88,6 +96,8 @@ class Voyage:
             "comment": _AXES, "seed": self._scene.tables.run.seed, "versions": json.dumps(versions()),
             "bodies": json.dumps(self._scene.names),
         })  # fmt: skip
+        if self._scene.poses is not None:
+            file.attrs["log_start_s"] = self._scene.poses.start
         file.dimensions = {"time": self._scans, "beam": n}
         coordinates = {
             "angle_deg": ("degree", "angle of the beam on the scanner, to port positive", np.degrees(scanner.angles)),
@@ -117,7 +127,9 @@ class Voyage:
         """Take the next frame."""
         angles = np.degrees([frame.heading, frame.roll, frame.rudder]).tolist()
         row = [frame.time, frame.x, frame.y, *angles, frame.speed]
-        self._rows.writerow([f"{value:.9g}" for value in row])
+        texts = [f"{value:.9g}" for value in row]
+        texts[_HEADING] = rounded_heading(row[_HEADING], ".9g")
+        self._rows.writerow(texts)
         met = frame.scan
         self._ranges.append(met.range)
         self._bodies.append(met.body)
@@ -163,6 +175,7 @@ class Voyage:
             "model": "replay" if t.replay is not None else t.ship.model,
             "controller": None if t.replay is not None else t.steering.controller,
             "seed": t.run.seed,
+            "log_start_s": None if self._scene.poses is None else self._scene.poses.start,
             "duration_s": lasted,
             "scans": self._k,
             "beams": self._scene.scanner.count,
@@ -189,8 +202,13 @@ def sail_into(scene: ShipScene, folder: Path, tell: Callable[[str, float], None]
     """Run a scene's loop over its duration and write ship.csv, scan.nc and summary.json into a folder.
 
     Args: tell (stage, share done) shows progress. Returns: the log for pictures, and the summary.
+    Raises: SceneError for a voyage of too many scans.
     """
     loop = ShipLoop(scene)
+    if loop.scans > _MOST_SCANS:
+        allowed = f"at most {_MOST_SCANS:,} scans, here {_MOST_SCANS * scene.scanner.duration:g} s"
+        problem, asked = f"{loop.scans:,} scans", scene.tables.run.duration_s
+        raise SceneError(problem, file=scene.path, key="run.duration_s", value=asked, allowed=allowed)
     with Voyage(scene, folder, loop.scans) as files:
         for k in range(loop.scans):
             files.add(_next(loop))

@@ -8,13 +8,13 @@ import numpy as np
 
 from raychan.dynamics.ship import DELTA, PHI, PSI, Array, N, P, R, U, V
 from raychan.poses import rotation
+from raychan.run.ship_bodies import ShipBodies
 from raychan.run.ship_bridge import Steered, hermite, pose_and_rates
 from raychan.run.ship_scene import ShipScene
 from raychan.run.ship_schema import WavesTable
 from raychan.sensors.laser import NO_BODY, LaserScan, Scanner, SensorPoses, noisy, scan
 from raychan.sensors.laser import beams as directions
 from raychan.sensors.sea import SeaState, Waves, waves
-from raychan.world.ray_caster import RayCaster
 
 _FULL = 2.0 * np.pi
 
@@ -94,8 +94,7 @@ class ShipLoop:
         self._arm = mount.position
         angles = np.radians([mount.yaw_deg, mount.pitch_deg, mount.roll_deg])
         self._turned = rotation(*angles) if angles.any() else None
-        self._moving = any(body.moves for body in scene.bodies.bodies)
-        self._caster = self._caster_at(0.0)
+        self._bodies = ShipBodies(scene.bodies, scanner.moving)
 
     @property
     def now(self) -> float:
@@ -145,10 +144,8 @@ class ShipLoop:
         start, state, moving = self.now, self.state, self._steered
         poses = self._replayed() if moving is None else self._sailed(moving)
         beams = self._mounted(poses)
-        if self._moving:
-            self._caster = self._caster_at(start)
         swell = None if self._waves is None else self._waves.at(start)
-        ideal = scan(self.scene.scanner, beams, self._caster, self.scene.reflectivity, self._sea, swell)
+        ideal = scan(self.scene.scanner, beams, self._bodies.at(start), self.scene.reflectivity, self._sea, swell)
         deviation = self.scene.tables.scanner.noise_m
         met = noisy(ideal, deviation, self._ranges) if deviation > 0.0 else ideal
         if moving is not None and moving.lookout is not None:
@@ -206,7 +203,3 @@ class ShipLoop:
             yaw = np.where(upright, np.arctan2(-m[0, 1], m[1, 1]), np.arctan2(m[1, 0], m[0, 0]))
             pitch, roll = np.arctan2(-m[2, 0], level), np.where(upright, 0.0, np.arctan2(m[2, 1], m[2, 2]))
         return SensorPoses(position=place, yaw=yaw, pitch=pitch, roll=roll)
-
-    def _caster_at(self, time: float) -> RayCaster | None:
-        bodies = self.scene.bodies.at(time)
-        return RayCaster(bodies.facets(), bodies.static_geometry) if bodies.bodies else None

@@ -15,14 +15,17 @@ COLUMNS = ("t_s", "x_m", "y_m", "heading_deg", "roll_deg")
 """Columns that a pose file must have."""
 OPTIONAL = ("pitch_deg", "z_m")
 """Columns that it may have; others are ignored."""
+_LATEST, _LARGEST = 1e11, 1e9  # s, which Unix times may be; m and deg
 
 
 @dataclass(frozen=True)
 class PoseFile:
-    """Logged poses: `time` (n,) [s] from 0 on, `pose` (n, 6) x, y, z [m], yaw, pitch, roll [rad] in the world."""
+    """Logged poses: `time` (n,) [s] from 0 on, `pose` (n, 6) x, y, z [m], yaw, pitch, roll [rad] in the world; `start`
+    [s] the log's own time of its first row."""
 
     time: Array
     pose: Array
+    start: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -50,10 +53,13 @@ def read_poses(file: Path, max_gap: float) -> PoseFile:
 
     Raises: SceneError with the line and the value: a missing column, no number, time running backwards, a gap.
     """
-    rows, columns = _rows(file)
+    rows, columns, width = _rows(file)
     lines, values = [], []
     for line, row in rows:
         lines.append(line)
+        if len(row) > width:
+            problem = f"{len(row)} fields in a file of {width} columns"
+            raise SceneError(problem, file=file, line=line, value=row, allowed="one field in each column")
         values.append([_number(file, line, name, row[at]) if at < len(row) else _short(file, line, name)
                        for name, at in columns.items()])  # fmt: skip
     if len(values) < 2:
@@ -63,20 +69,22 @@ def read_poses(file: Path, max_gap: float) -> PoseFile:
     for k in range(1, len(time)):
         step = time[k] - time[k - 1]
         if step <= 0.0:
-            problem = f"t_s = {time[k]:g} after {time[k - 1]:g}: time does not grow"
+            problem = f"t_s = {time[k]:.15g} after {time[k - 1]:.15g}: time does not grow"
             raise SceneError(problem, file=file, line=lines[k], value=time[k], allowed="times that grow")
         if step > max_gap:
-            problem = f"t_s = {time[k]:g} after {time[k - 1]:g}: a gap of {step:g} s"
+            problem = f"t_s = {time[k]:.15g} after {time[k - 1]:.15g}: a gap of {step:g} s"
             allowed = f"at most {max_gap:g} s; a longer one with replay.max_gap_s"
             raise SceneError(problem, file=file, line=lines[k], value=step, allowed=allowed)
     none = np.zeros(len(time))
     heading, pitch, roll = (np.radians(table.get(k, none)) for k in ("heading_deg", "pitch_deg", "roll_deg"))
     place = table["x_m"], table["y_m"], table.get("z_m", none)
-    return PoseFile(time=time - time[0], pose=np.stack([*place, -np.unwrap(heading), pitch, roll], axis=1))
+    pose = np.stack([*place, -np.unwrap(heading), pitch, roll], axis=1)
+    return PoseFile(time=time - time[0], pose=pose, start=float(time[0]))
 
 
-def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], dict[str, int]]:
-    """Return the rows of a pose file with their lines, and where each column of a pose stands."""
+def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], dict[str, int], int]:
+    """Return the rows of a pose file with their lines, where each column of a pose stands, and how many columns the
+    file has."""
     try:
         text = file.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -99,7 +107,7 @@ def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], dict[str, int]]:
             raise SceneError(f"column {name} is missing", file=file, line=rows[0][0], value=heads, allowed=allowed)
     if len(set(heads)) < len(heads):
         raise SceneError("two columns have one name", file=file, line=rows[0][0], value=heads, allowed="each name once")
-    return rows[1:], {name: heads.index(name) for name in (*COLUMNS, *OPTIONAL) if name in heads}
+    return rows[1:], {name: heads.index(name) for name in (*COLUMNS, *OPTIONAL) if name in heads}, len(heads)
 
 
 def _number(file: Path, line: int, column: str, text: str) -> float:
@@ -107,8 +115,10 @@ def _number(file: Path, line: int, column: str, text: str) -> float:
         value = float(text)
     except ValueError:
         value = float("nan")
-    if not abs(value) <= 1e9:
-        raise SceneError(f"{column} = {shown(text)}", file=file, line=line, value=text, allowed="a finite number")
+    most = _LATEST if column == "t_s" else _LARGEST
+    if not abs(value) <= most:
+        allowed = f"a finite number from {-most:g} to {most:g}"
+        raise SceneError(f"{column} = {shown(text)}", file=file, line=line, value=text, allowed=allowed)
     return value
 
 

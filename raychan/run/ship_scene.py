@@ -14,7 +14,7 @@ from raychan.run.ship_replay import PoseFile, read_poses
 from raychan.run.ship_schema import ScannerTable, ShipBodyTable, ShipFile, SpotTable
 from raychan.sensors.laser import REFLECTIVITY, Scanner
 from raychan.sensors.spot import Echo, Spot
-from raychan.world import overrides
+from raychan.world import bundled, overrides
 from raychan.world.body import Body
 from raychan.world.build import scene_text
 from raychan.world.errors import SceneError, nearest
@@ -48,6 +48,25 @@ class ShipScene:
         return [body.name for body in self.bodies.bodies]
 
     @property
+    def warnings(self) -> list[str]:
+        """Return lines on what is likely a mistake."""
+        deck = 0.0 if self.poses is None else float(self.poses.pose[:, 2].min())
+        height = deck + self.tables.scanner.position[2]
+        said = list(self.bodies.warnings)
+        if height <= 0.0 and self.tables.sea is not None:
+            said.append(f"the scanner is {-height:g} m below the water line and meets no sea (scanner.position)")
+        return said
+
+    @property
+    def ends_early(self) -> list[str]:
+        """Return a line where the logged poses end before the duration of the scene."""
+        wanted = self.tables.run.duration_s
+        if self.poses is None or self.poses.duration >= wanted:
+            return []
+        last = f"the log ends after {self.poses.duration:g} s, before run.duration_s = {wanted:g}"
+        return [f"{last}: the voyage ends with it"]
+
+    @property
     def duration(self) -> float:
         """How long [s] the voyage is: as the scene says, and no longer than the logged poses."""
         wanted = self.tables.run.duration_s
@@ -60,7 +79,7 @@ def read_ship_scene(name_or_path: str | Path, changes: Sequence[str] = ()) -> Sh
     Args: changes of keys, each written 'dotted.key=value'.
     Raises: SceneError where file, syntax, key or value is wrong.
     """
-    text, file = scene_text(name_or_path)
+    text, file = scene_text(name_or_path, bundled.ship_names())
     data = overrides.parsed(text, file)
     text += "".join(f"\n# changed: {c}" for c in changes)
     return ship_scene(overrides.changed(data, changes, file), file, text)

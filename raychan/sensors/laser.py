@@ -6,7 +6,8 @@ the right (negative) to the left.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -118,19 +119,47 @@ class LaserScan(Record):
 
 
 @dataclass(frozen=True)
+class MovingBodies:
+    """Bodies that share one velocity: a beam is cast at them in the frame that moves with them.
+
+    Fields: caster of them where they stand `age` [s] before the start of the scan; velocity (3,) [m/s]; numbers (b,)
+    of the caster's bodies in the scan.
+    """
+
+    caster: RayCaster
+    velocity: Floats
+    numbers: Ints
+    age: float = 0.0
+
+    def later(self, age: float) -> MovingBodies:
+        """Return the same bodies for a scan that starts at an age [s]."""
+        return replace(self, age=age)
+
+
+@dataclass(frozen=True)
 class Targets:
     """What beams may meet.
 
-    Fields: caster of bodies, or None; reflectivity (b,) of each body; sea_reflectivity, 0 for no sea; waves of the sea
-    about z = 0, None for a flat one.
+    Fields: caster of bodies that stand still, groups of bodies that move, or None; reflectivity (b,) of each body;
+    sea_reflectivity, 0 for no sea; waves of the sea about z = 0, None for a flat one.
     Water mirrors: what comes back from the sea is foam's and ripples'. Its reflectivity is yours to give; with
     `Scanner.lambert` it counts times the sine of the grazing angle.
     """
 
-    caster: RayCaster | None
+    caster: RayCaster | Sequence[MovingBodies] | None
     reflectivity: Floats
     sea_reflectivity: float = 0.0
     waves: Waves | None = None
+
+    @property
+    def groups(self) -> Sequence[MovingBodies]:
+        """The bodies in groups of one velocity."""
+        if self.caster is None:
+            return ()
+        if isinstance(self.caster, RayCaster):
+            numbers = np.arange(len(self.caster.facets.role), dtype=np.int32)
+            return (MovingBodies(self.caster, np.zeros(3), numbers),)
+        return self.caster
 
 
 def beams(scanner: Scanner, poses: SensorPoses) -> Floats:
@@ -159,12 +188,14 @@ def first_hits(
     """
     n = len(towards)
     distance, body, reflects = np.full(n, np.inf), np.full(n, NO_BODY, np.int32), np.zeros(n)
-    caster = targets.caster
-    if caster is not None:
-        facet, distance = caster.cast(origin, towards, np.full(n, -1, np.int32))
-        hit = facet >= 0
+    for group in targets.groups:
+        caster, velocity = group.caster, group.velocity
+        start = origin - (group.age + time)[:, None] * velocity if velocity.any() else origin
+        facet, along = caster.cast(start, towards, np.full(n, -1, np.int32))
+        hit = (facet >= 0) & (along < distance)
         met = facet[hit]
-        body[hit] = caster.facets.body[met]
+        distance = np.where(hit, along, distance)
+        body[hit] = group.numbers[caster.facets.body[met]]
         reflects[hit] = np.asarray(targets.reflectivity, float)[body[hit]]
         if scanner.lambert:
             reflects[hit] *= np.abs(np.einsum("ij,ij->i", towards[hit], caster.normal[met]))
@@ -189,7 +220,7 @@ def first_hits(
 def scan(
     scanner: Scanner,
     poses: SensorPoses,
-    caster: RayCaster | None,
+    caster: RayCaster | Sequence[MovingBodies] | None,
     reflectivity: Floats,
     sea_reflectivity: float = 0.0,
     waves: Waves | None = None,

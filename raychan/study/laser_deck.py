@@ -77,6 +77,7 @@ def slopes(deck: Deck) -> Floats:
     normal = np.tile([0.0, 0.0, 1.0], (len(met), 1))
     caster = deck.targets.caster
     if caster is not None:
+        assert isinstance(caster, RayCaster)  # bodies of a deck stand still
         facet, _ = caster.cast(origin, towards, np.full(len(met), -1, np.int32))
         normal[body >= 0] = caster.normal[facet[body >= 0]]
     _, pitch, yaw = deck.pose[:3]

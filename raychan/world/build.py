@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from raychan.em.diffuse import Diffuse
@@ -18,9 +19,10 @@ _FORM = ("shape", "params", "mesh", "unit", "up", "forward", "scale", "crease_de
 _LARGEST = 16 << 20  # bytes of a scene file; 10,000 bodies take 2 MB
 
 
-def scene_text(path: str | Path) -> tuple[str, Path]:
+def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
     """Return the text of a scene file, or of the scene of that name that comes with raychan, and the file.
 
+    Args: known names that a message proposes; none: those of all bundled scenes.
     Raises: SceneError where there is none, or where it cannot be read.
     """
     file = bundled.found(path)
@@ -33,7 +35,7 @@ def scene_text(path: str | Path) -> tuple[str, Path]:
         # Some editors begin a text with a byte order mark.
         return file.read_text(encoding="utf-8-sig"), file
     except FileNotFoundError:
-        known = bundled.names() + bundled.ship_names()
+        known = known or bundled.names() + bundled.ship_names()
         more = f", or {nearest(file.stem, known)}" if known else ""
         raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
     except (OSError, UnicodeDecodeError) as e:

@@ -55,6 +55,9 @@ def load(
         return from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
     except SceneError as e:
         raise e.at(file=file) from None
+    except IndexError as e:
+        problem = "cannot be read as a mesh: a face names a vertex that the file does not hold"
+        raise SceneError(f"{problem} ({e})", file=file, allowed="a valid " + file.suffix) from e
     except Exception as e:  # trimesh's readers raise whatever their parsers do
         raise SceneError(f"cannot be read as a mesh ({e})", file=file, allowed="a valid " + file.suffix) from e
 

@@ -48,7 +48,7 @@ def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -
         key, found, value = change.partition("=")
         words = key.strip().split(".")
         if not found or not all(words):
-            raise SceneError(f"'{change}' is no change", file=file, key=key, allowed="key=value, as radar.power_dbm=10")
+            raise SceneError(f"'{change}' is no change", file=file, key=key, allowed="dotted.key=value")
         at: Any = out
         for i, word in enumerate(words[:-1]):
             at = _step(at, word, ".".join(words[: i + 1]), file)

@@ -202,18 +202,18 @@ def scene(tmp_path):
 def test_a_port_that_is_not_there_is_said_with_code_2(scene, capsys):
     assert invoke(["hil", scene, "--position", "/dev/no_such_port"]) == 2
     said = capsys.readouterr().err
-    assert "--position" in said and "/dev/no_such_port" in said and "Traceback" not in said
+    assert "--position" in said and "/dev/no_such_port is not there" in said and "Traceback" not in said
 
 
 def test_a_port_that_is_taken_and_a_file_are_said_with_code_2(scene, tmp_path, capsys):
     ours, theirs = os.openpty()
     name = os.ttyname(theirs)
     assert invoke(["hil", scene, "--scanner", name, "--heading", name]) == 2
-    assert "--heading" in capsys.readouterr().err
+    assert f"--heading: {name} is taken by another program" in capsys.readouterr().err
     file = tmp_path / "file"
     file.write_text("")
     assert invoke(["hil", scene, "--heading", str(file)]) == 2
-    assert str(file) in capsys.readouterr().err
+    assert f"{file} is no serial port" in capsys.readouterr().err
     os.close(ours)
     os.close(theirs)
 
@@ -224,6 +224,7 @@ def test_a_port_that_is_taken_and_a_file_are_said_with_code_2(scene, tmp_path, c
         (["--baud", "4800"], "9600"),
         (["--origin", "north"], "latitude"),
         (["--origin", "91,0"], "latitude"),
+        (["--origin", "5"], "two numbers"),
         (["--rate", "0"], "rate"),
         (["--duration", "-1"], "duration"),
         (["--out", "/dev/null/x"], "/dev/null/x"),
@@ -265,3 +266,17 @@ def test_where_the_system_forbids_it_it_runs_as_an_ordinary_program(scene, capsy
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     assert invoke(["hil", scene, "--duration", "0.3"]) == 0
     assert "ordinary in turn" in capsys.readouterr().out
+
+
+def test_a_program_that_read_the_ports_and_closed_the_pipe_does_not_end_the_run(tmp_path):
+    with Hil(tmp_path, "--duration", "0.5") as hil:
+        hil.process.stdout.close()
+        trouble = hil.process.stderr.read()
+        assert hil.process.wait(60) == 0 and "Traceback" not in trouble
+    assert json.loads((hil.out / "summary.json").read_text())["ended"] == "duration"
+
+
+def test_an_unknown_scene_is_answered_with_ships_only(capsys):
+    assert invoke(["hil", "nowhere"]) == 2
+    said = capsys.readouterr().err
+    assert "ship_turn" in said and "urban" not in said

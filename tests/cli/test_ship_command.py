@@ -10,7 +10,7 @@ from PIL import Image
 
 from raychan.cli import invoke
 from raychan.run import ship_files
-from raychan.run.ship_files import CONTENTS
+from raychan.run.ship_files import CONTENTS, rounded_heading
 from raychan.run.ship_loop import ShipLoop
 from raychan.run.ship_scene import read_ship_scene
 from raychan.world.bundled import ship_names
@@ -84,7 +84,8 @@ def test_its_own_csv_can_be_replayed_and_gives_the_same_scans(tmp_path):
     assert both.sum() > 10000 and (both == (held[0][:-1] > 0.0)).mean() > 0.999
     # Between two rows a log's roll moves evenly, the loop's by a cubic: 6e-4 of 5 deg apart in this sea.
     assert np.median(np.abs(held[0][:-1][both] / held[1][both] - 1.0)) < 2e-4
-    assert json.loads((two / "summary.json").read_text())["model"] == "replay"
+    told = json.loads((two / "summary.json").read_text())
+    assert told["model"] == "replay" and told["log_start_s"] == 0.0
 
 
 def test_ctrl_c_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
@@ -119,6 +120,10 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
                 "OUT",
             ],
             "the ship cannot sail on after",
+        ),
+        (
+            ["ship", "--set", "run.duration_s=1e5", "--set", "scanner.mirror_hz=1e4", "--out", "OUT"],
+            "1,000,000,000 scans",
         ),
         (["ship", "--set", "run.duration_s=0.001", "--out", "OUT"], "run.duration_s"),
     ],
@@ -155,9 +160,15 @@ def test_the_help_names_every_scene_that_comes_along(capsys):
     assert all(name in said for name in ship_names())
 
 
-def test_a_yacht_that_sinks_its_scanner_is_told_not_crashed(tmp_path):
+def test_a_heading_that_rounds_up_to_360_is_0():
+    assert rounded_heading(359.96, ".1f") == "0.0" and rounded_heading(359.94, ".1f") == "359.9"
+    assert rounded_heading(360.0 - 1e-9, ".9g") == "0"
+
+
+def test_a_yacht_that_sinks_its_scanner_is_told_not_crashed(tmp_path, capsys):
     # A scanner below the water line meets nothing of the sea from below.
     out = tmp_path / "out"
     changes = [*SHORT, "--set", "scanner.position=[0,0,-2]"]
     assert invoke(["ship", "ship_trial", *changes, "--out", str(out), "--no-pictures"]) == 0
     assert json.loads((out / "summary.json").read_text())["echoes"]["sea"] == 0
+    assert "2 m below the water line" in capsys.readouterr().err

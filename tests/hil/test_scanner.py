@@ -149,3 +149,9 @@ def test_a_distance_has_the_bits_of_its_measuring_mode(mode, bits):
     assert found.range_m.tolist() == [pytest.approx((none - 1) * 0.001), np.inf]
     with pytest.raises(TelegramError, match="fields"):
         encode_scan(ScanValues(np.ones(1), np.array([1 << (16 - bits)], int), bits=bits))
+
+
+@pytest.mark.parametrize("payload", ["20 42 00", "20 24 00", "20 25 01", "20 2A 00", "20 27 01 00 05 00 00"])
+def test_a_mode_with_a_byte_too_many_is_refused_and_changes_nothing(scanner, payload):
+    assert ask(scanner, payload) is None
+    assert (scanner.baud, scanner.mode) == (9600, ON_REQUEST)

@@ -138,3 +138,31 @@ def test_a_container_ship_whose_propeller_brakes_slows_down_and_sails_on():
     assert (np.diff(speeds[50:]) < 0.0).all() and 0.1 < speeds[-1] < 4.0
     with pytest.raises(ValueError, match="allowed: above 0"):
         loop.order(shaft=0.0)
+
+
+WALL = {"name": "wall", "shape": "box", "params": {"length": 2.0, "width": 60.0, "height": 10.0}, "reflectivity": 1.0}
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-9])
+def test_each_beam_meets_a_moving_wall_where_it_is_at_the_beams_own_time(turn, tmp_path):
+    # A body that turns is posed anew for each scan, one that does not is shifted: both must move within the scan.
+    (tmp_path / "still.csv").write_text("t_s,x_m,y_m,heading_deg,roll_deg\n0,0,0,0,0\n1,0,0,0,0\n")
+    wall = WALL | {"position": [50.0, 0.0, 0.0], "velocity_mps": [-20.0, 3.0, 0.0], "turn_rate_dps": turn}
+    post = BOX | {"name": "post", "position": [20.0, 10.0, 0.0], "reflectivity": 1.0}
+    tables = {
+        "replay": {"file": str(tmp_path / "still.csv")},
+        "scanner": {"step_deg": 0.25, "dark_range_m": 200.0},
+        "bodies": [wall, post],
+    }
+    scanner = ship_scene(tables).scanner
+    angle, found = scanner.angles, frames(tables, 15)
+    for frame in (found[0], found[14]):
+        times = frame.time + scanner.times
+        expected = (49.0 - 20.0 * times) / np.cos(angle)
+        hit = frame.scan.body == 0
+        assert hit.sum() > 150 and (frame.scan.body == 1).sum() > 20, "and a body that stands still before it"
+        assert frame.scan.range[hit] == pytest.approx(expected[hit], abs=1e-6)
+    still = frames(tables | {"scanner": tables["scanner"] | {"motion": False}}, 15)[14]
+    hit = still.scan.body == 0
+    frozen = (49.0 - 20.0 * still.time) / np.cos(angle)
+    assert still.scan.range[hit] == pytest.approx(frozen[hit], abs=1e-6)

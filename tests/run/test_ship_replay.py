@@ -67,6 +67,8 @@ WRONG = {
     f"{HEAD}0,0,0,nan,0\n1,0,0,0,0\n": r"poses.csv:2: heading_deg = 'nan'; allowed: a finite number",
     f"{HEAD}0,0,0,0,0\n\n1,0,inf,0,0\n": r"poses.csv:4: y_m = 'inf'",
     f"{HEAD}0,0,0,0,x\n1,0,0,0,0\n": r"poses.csv:2: roll_deg = 'x'",
+    f"{HEAD}0,0,0,0,0\n1,0,0,0,0,7\n": r"poses.csv:3: 6 fields in a file of 5 columns",
+    f"{HEAD}2e11,0,0,0,0\n1,0,0,0,0\n": r"t_s = '2e11'; allowed: a finite number from -1e\+11 to 1e\+11",
     f"{HEAD}0,0,0,0\n1,0,0,0,0\n": r"poses.csv:2: roll_deg is missing",
     "t_s,x_m,y_m,roll_deg\n0,0,0,0\n": r"poses.csv:1: column heading_deg is missing",
     "t_s,x_m,y_m,headingdeg,roll_deg\n0,0,0,0,0\n": "did you mean 'headingdeg'",
@@ -90,3 +92,12 @@ def test_a_log_that_is_no_text_is_told(tmp_path):
         read_poses(file, 1.0)
     with pytest.raises(rc.SceneError, match="cannot be read"):
         read_poses(tmp_path, 1.0)
+
+
+def test_a_log_in_unix_time_counts_from_its_first_row_and_says_when_that_was(tmp_path):
+    loop = replay(tmp_path, HEAD + "1700000000.5,0,0,0,0\n1700000001.5,8,0,0,0\n")
+    frames = [loop.step_scan() for _ in range(loop.scans)]
+    assert frames[0].time == 0.0 and len(frames) == 75
+    assert [f.x for f in frames] == pytest.approx([8.0 * f.time for f in frames], abs=1e-9)
+    assert loop.scene.poses.start == 1700000000.5
+    assert "the log ends after 1 s, before run.duration_s = 60" in loop.scene.ends_early[0]
