@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +14,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating]
 Bools = NDArray[np.bool_]
 
-_SHALLOW = (
-    0.02  # of a cell's power: of shallow tubes so much may stay as the first launch has them, see `feeding_sources`
-)
+_SHALLOW = 0.5  # of the tolerance, as an amplitude: so much shallow tubes may bring that are not traced again
 _DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
 _EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
 _SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unknown
@@ -84,11 +81,11 @@ def feeding_sources(source: Sources, sums: Complexes, tolerance: float) -> tuple
     """
     level, found = abs(sums.sum()), []
     deep = depth_of(source) > 1
-    for mine, limit in ((~deep & (source != EXACT), math.sqrt(_SHALLOW)), (deep, _DEEP * tolerance)):
+    for mine, limit in ((~deep & (source != EXACT), _SHALLOW * tolerance), (deep, _DEEP * tolerance)):
         rows = np.flatnonzero(mine & (sums != 0.0))
         rows = rows[np.argsort(np.abs(sums[rows]), kind="stable")]
         small = np.sqrt(np.cumsum(np.abs(sums[rows]) ** 2)) <= limit * level
-        if limit < 1.0:
+        if mine is deep:
             small &= np.abs(np.cumsum(sums[rows])) <= limit * level
         keep = int(np.flatnonzero(small).max(initial=-1)) + 1
         found.append(source[rows[keep:]])

@@ -9,7 +9,7 @@ from raychan.tracing.solver import Stats
 
 STEPS = 6
 """Launches, each half as coarse as the one before."""
-_RAYS = 1.5  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
+_RAYS = 2.5  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
 _GROWTH = 2.0  # rays and seconds of a step over those of the one before, about
 _BYTES = 400.0  # a path
 

@@ -103,7 +103,7 @@ class SourcedPaths:
 
     def _untouched(self) -> Paths:
         first = self._parts[0]
-        rows = (first.state == _NOW) & (depth_of(first.source) == 1)
+        rows = (first.state == _NOW) & (depth_of(first.source) == 1) & (self._moved[1] > 0.0)
         paths = of_trajectories(first.paths, rows)
         share = np.sqrt(self._moved[1] / self._moved[0]) if self._moved[0] > 0.0 else 0.0
         turn = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, int(rows.sum()))
