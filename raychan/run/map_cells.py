@@ -17,6 +17,10 @@ Bools = NDArray[np.bool_]
 _SHALLOW = 0.5  # of the tolerance, as an amplitude: so much shallow tubes may bring that are not traced again
 _DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
 _EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
+_UNKNOWN = (
+    0.757  # factor by which a change shrinks a step where there was one only: COVER, chosen for launches a factor
+)
+# 3 apart, covers errors that fall with the size to the power of 0.40 or faster; 2^-0.40 for steps of a factor 2
 _SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unknown
 
 
@@ -58,9 +62,9 @@ class MapCells:
     def slowness(self) -> Floats:
         """By what factor (c, 2) the rest of a series of changes exceeds COVER times its last one, 1 to _SLOWEST.
 
-        Changes that shrink by q a step add up to q / (1 - q) times the last one.
+        Changes that shrink by q a step add up to q / (1 - q) times the last one; of a single change q is not known.
         """
-        q = np.minimum(self.change / self.before, 0.99)
+        q = np.where(np.isinf(self.before), _UNKNOWN, np.minimum(self.change / self.before, 0.99))
         return np.asarray(np.clip(q / (1.0 - q) / COVER, 1.0, _SLOWEST))
 
     @property

@@ -46,7 +46,7 @@ ALL: dict[str, Benchmark] = {
         fine,
         memory,
         cross_section,
-    )  # fmt: skip
+    )
 }
 _ROOT = Path(__file__).parents[2]
 
@@ -101,9 +101,16 @@ def _table(name: str, about: str, rows: list[Row]) -> Table:
         bar = r.bar and f"{r.bar} {'met' if r.met else 'MISSED'}"
         spread = "" if r.spread is None else f"{r.spread[0]:.3g} {r.spread[1]:.3g}"
         made.add_row(
-            r.group, r.name, _number(r.seconds), r.reference, _number(r.reference_seconds), _number(r.ratio), spread,
-            bar, ", ".join(f"{k} {_brief(v)}" for k, v in r.more.items()),
-        )  # fmt: skip
+            r.group,
+            r.name,
+            _number(r.seconds),
+            r.reference,
+            _number(r.reference_seconds),
+            _number(r.ratio),
+            spread,
+            bar,
+            ", ".join(f"{k} {_brief(v)}" for k, v in r.more.items()),
+        )
     return made
 
 
