@@ -17,10 +17,9 @@ Bools = NDArray[np.bool_]
 _SHALLOW = 0.5  # of the tolerance, as an amplitude: so much shallow tubes may bring that are not traced again
 _DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
 _EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
-_UNKNOWN = (
-    0.757  # factor by which a change shrinks a step where there was one only: COVER, chosen for launches a factor
-)
-# 3 apart, covers errors that fall with the size to the power of 0.40 or faster; 2^-0.40 for steps of a factor 2
+_UNKNOWN = 0.757
+"""Factor by which changes are taken to shrink a step where there was one only. COVER, chosen for launches a factor 3
+apart, covers errors that fall with the size to the power of 0.40 or faster; for steps of a factor 2 that is 2^-0.40."""
 _SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unknown
 
 
