@@ -16,7 +16,6 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from bench.cross_section import cross_section
 from bench.fine import fine
 from bench.frame import frame
 from bench.laser import laser
@@ -32,21 +31,7 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f
-    for f in (
-        rays,
-        laser,
-        synthesis,
-        phase_noise,
-        scaling,
-        frame,
-        turbine,
-        ship,
-        size,
-        fine,
-        memory,
-        cross_section,
-    )
+    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, fine, memory)
 }
 _ROOT = Path(__file__).parents[2]
 
