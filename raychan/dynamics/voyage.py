@@ -28,6 +28,15 @@ class Programme(Protocol):
     def at(self, time: float, position: Array) -> tuple[float, Programme]: ...  # noqa: D102
 
 
+def steered(step: ExactStep, gear: SteeringGear, state: Array, order: float) -> Array:
+    """Return the full state (10,) one exact step on in rudder, sway, roll and yaw; the rest of it as it was."""
+    places = list(OF_LINEAR)
+    after = state.copy()
+    after[DELTA] = gear.toward(float(state[DELTA]), order, step.dt)
+    after[places] = step(state[places], float(state[DELTA]), float(after[DELTA]))
+    return after
+
+
 @dataclass(frozen=True)
 class LinearPlant:
     """A linear ship at constant surge speed, carried by exact steps; the rudder moves evenly within a step."""
@@ -42,10 +51,7 @@ class LinearPlant:
 
     def advance(self, state: Array, order: float) -> Array:
         """Return the full state (10,) one step on; the track by the mean of the velocities at both ends."""
-        places = list(OF_LINEAR)
-        after = state.copy()
-        after[DELTA] = self.gear.toward(float(state[DELTA]), order, self.dt)
-        after[places] = self.step(state[places], float(state[DELTA]), float(after[DELTA]))
+        after = steered(self.step, self.gear, state, order)
         after[[X, Y]] += 0.5 * self.dt * (over_ground(state) + over_ground(after))
         return after
 

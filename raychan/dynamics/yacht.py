@@ -11,9 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from raychan.dynamics.ship import (
-    DELTA,
     KNOT,
-    OF_LINEAR,
     PSI,
     Array,
     ExactStep,
@@ -26,6 +24,7 @@ from raychan.dynamics.ship import (
     over_ground,
 )
 from raychan.dynamics.steering import SteeringGear
+from raychan.dynamics.voyage import steered
 
 LENGTH, MASS, POWER, TOP_SPEED = 11.0, 3000.0, 2 * 250 * 745.7, 35.0 * KNOT
 """Length [m], mass [kg], power [W], top speed [m/s]: as the ship paper prints them."""
@@ -92,10 +91,7 @@ class YachtPlant:
 
     def advance(self, state: Array, order: float) -> Array:
         """Return the full state (10,) one step on."""
-        places = list(OF_LINEAR)
-        after = state.copy()
-        after[DELTA] = self.gear.toward(float(state[DELTA]), order, self.dt)
-        after[places] = self.step(state[places], float(state[DELTA]), float(after[DELTA]))
+        after = steered(self.step, self.gear, state, order)
         held = self.shaft / TOP_SHAFT * TOP_SPEED
         after[U] = held + (state[U] - held) * np.exp(-self.dt / self.lag)
         after[N] = self.shaft

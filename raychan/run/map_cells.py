@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.error import COVER
+from raychan.run.sourced_paths import DEEP
 from raychan.tracing.sources import EXACT, Sources, depth_of
 
 Floats = NDArray[np.float64]
@@ -80,10 +81,10 @@ def feeding_sources(source: Sources, sums: Complexes, tolerance: float) -> tuple
     """Return the shallow and the deep sources that a cell's level depends on, of sums (s,) of its paths by source.
 
     The weakest are left out: of the deep, as long as neither their sum nor their rms sum exceeds a share of the
-    tolerance; of the shallow, which the first launch has cut, as long as their rms sum is a small part of the level.
+    tolerance; of the shallow, which the first launch has cut, as long as their rms sum does not.
     """
     level, found = abs(sums.sum()), []
-    deep = depth_of(source) > 1
+    deep = depth_of(source) >= DEEP
     for mine, limit in ((~deep & (source != EXACT), _SHALLOW * tolerance), (deep, _DEEP * tolerance)):
         rows = np.flatnonzero(mine & (sums != 0.0))
         rows = rows[np.argsort(np.abs(sums[rows]), kind="stable")]

@@ -59,7 +59,7 @@ class Unreached:
 @dataclass(frozen=True)
 class Converged:
     """What the launches brought: the paths of the newest; `others`, the same without the last change of each cell and
-    without deep tubes that were never cut: what they differ by is what may be wrong."""
+    without deep tubes that were not traced again: what they differ by is what may be wrong."""
 
     launched: Launched
     others: Launched

@@ -19,15 +19,15 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating]
 
 DEEP = 2
-"""From this bounce on a tube is deep: the first launch does not cut it."""
+"""From this bounce on a tube is deep: the first launch cuts it only where it alone may make a detection."""
 _SUMS = 1 << 21  # sums by cell and source held at once: bounds the memory
 _GONE, _BEFORE, _NOW = 0, 1, 2
 
 
 @dataclass
 class _Part:
-    """What one launch brought: paths, the source (w,) and the state (w,) of each trajectory; whether it cut deep tubes
-    (the first launch does not)."""
+    """What one launch brought: paths, the source (w,) and the state (w,) of each trajectory; whether it is the
+    first launch, which cuts few deep tubes."""
 
     paths: Paths
     source: Sources
@@ -47,13 +47,12 @@ class SourcedPaths:
         """Replace what some launches traced again; return what this changes: the new paths and the old ones with their
         sign turned, and the source (w,) of each trajectory."""
         changed, sources = [paths], [source]
-        first, own = self._parts[0], covered(self._parts[0].source, launches) & (self._parts[0].state == _NOW)
-        shallow = own & (depth_of(first.source) < DEEP)
-        if shallow.any():
-            self._moved += _powers(first, shallow, paths, source)
         for part in self._parts:
             hit = covered(part.source, launches)
             old = hit & (part.state == _NOW)
+            shallow = old & (depth_of(part.source) < DEEP)
+            if part.first and shallow.any():
+                self._moved += _powers(part, shallow, paths, source)
             changed.append(_negative(of_trajectories(part.paths, old)))
             sources.append(part.source[old])
             part.state[hit] = np.where(old[hit], _BEFORE, _GONE)
