@@ -32,8 +32,10 @@ from raychan.run.sourced_paths import SourcedPaths, changes
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
+from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Batch, Launch, Stats
 from raychan.tracing.sources import EXACT, Sources, launches
+from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -125,7 +127,7 @@ class SceneRefinement:
         over = self.radar.rx_position is None or self.model.diffraction
         asked = self.model.model_copy(update={"diffraction": over}) if auto else self.model
         launch = Launch(self.geometry, self.points, first_rule(self.radar, self.settings, asked))
-        batches = launch.whole(self.stats, lambda _, share: self.tell("trace", 0.5 * share))
+        batches = launch.whole(self.stats, self._carried, lambda _, share: self.tell("trace", 0.5 * share))
         found = self._paths(batches, MOST)
         if found is None:
             return None
@@ -141,17 +143,24 @@ class SceneRefinement:
             self.launches[0] = counting(self.launches[0], keep)
         return First(launch, of_trajectories(paths, keep), source[keep], chosen)
 
-    def _paths(self, batches: Iterator[tuple[Batch, Sources]], most: float = math.inf) -> tuple[Paths, Sources] | None:
-        """Return the paths of batches of routes, and the source of each trajectory; None where there are too many."""
+    def _carried(self, batch: Batch) -> tuple[Batch | None, Paths]:
+        """Return a batch of routes, where they are kept, and their paths."""
+        paths = paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier)
+        return (None if self.launches is None else batch), paths
+
+    def _paths(
+        self, batches: Iterator[tuple[tuple[Batch | None, Paths], Sources]], most: float = math.inf
+    ) -> tuple[Paths, Sources] | None:
+        """Return the paths of a launch, and the source of each trajectory; None where there are too many."""
         parts, sources, count = [nothing(self.geometry.facets, self.radar)], [np.zeros(0, np.int64)], 0
         kept: list[Batch] = []
-        for batch, source in batches:
+        for (batch, paths), source in batches:
             count += len(source)
             if count > most:
                 return None
-            if self.launches is not None:
+            if batch is not None:
                 kept.append(batch)
-            parts.append(paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier))
+            parts.append(paths)
             sources.append(source)
         if self.launches is not None:
             self.launches.append(kept)
@@ -205,16 +214,18 @@ class SceneRefinement:
         budget, steps, ended = Budget(self.model, self.stats), 0, ""
         while wanted.any() and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
-            changed = np.zeros((len(cells.place), 2), complex)
-            for deep in (0, 1):
+            jobs: list[tuple[Refinement, int, Wanted]] = []
+            # Deep tubes, of which a launch takes longest, first.
+            for deep in (1, 0):
                 some = [f[deep] for f, w in zip(feeding, wanted[:, deep], strict=True) if w]
                 if some and len(again := np.unique(np.concatenate(some))):
                     # The first launch cut shallow tubes already: they are a step ahead.
                     rule = step_rule(self.radar, self.settings, self.model, steps + 1 - deep)
-                    by = list(launches(again, len(self.geometry.facets.body)))
-                    new = self._paths(launch.again(rule.refinement, by, self.stats))
-                    assert new is not None
-                    changed += changes(response, *held.replace(*new, by), cells.place)
+                    by = launches(again, len(self.geometry.facets.body))
+                    jobs += [(rule.refinement, i, what) for i, what in by]
+            new = self._paths(launch.again(jobs, self.stats, self._carried))
+            assert new is not None
+            changed = changes(response, *held.replace(*new, [(i, what) for _, i, what in jobs]), cells.place)
             cells.changed(changed, wanted)
             wanted = cells.open
             steps += 1

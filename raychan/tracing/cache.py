@@ -19,18 +19,16 @@ class TracingCache:
     """
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()
-        self._single: dict[str, Any] = {}
-        self._newest: dict[str, dict[Hashable, Any]] = {}
-        self._by_leg: dict[str, WeakKeyDictionary[Any, Any]] = {}
+        self._lock = threading.Lock()
+        self._single: dict[Hashable, _Entry] = {}
+        self._newest: dict[str, dict[Hashable, _Entry]] = {}
+        self._by_leg: dict[str, WeakKeyDictionary[Any, _Entry]] = {}
 
     def single(self, name: str, build: Callable[[], T]) -> T:
         """Return what `build` makes, made at the first call for this name."""
         with self._lock:
-            if name not in self._single:
-                self._single[name] = build()
-            found: T = self._single[name]
-        return found
+            entry = self._single.setdefault(name, _Entry())
+        return entry.made(build)
 
     def newest(self, name: str, key: Hashable, most: int, build: Callable[[], T]) -> T:
         """Return what `build` makes for a key; of each name the `most` newest are kept."""
@@ -39,17 +37,30 @@ class TracingCache:
             if key not in known:
                 if len(known) >= most:
                     del known[next(iter(known))]
-                known[key] = build()
-            found: T = known[key]
-        return found
+                known[key] = _Entry()
+            entry = known[key]
+        return entry.made(build)
 
     def by_leg(self, name: str, leg: Any, build: Callable[[], T]) -> T:
         """Return what `build` makes for a leg, kept as long as the leg is."""
         with self._lock:
-            known = self._by_leg.setdefault(name, WeakKeyDictionary())
-            if leg not in known:
-                known[leg] = build()
-            found: T = known[leg]
+            entry = self._by_leg.setdefault(name, WeakKeyDictionary()).setdefault(leg, _Entry())
+        return entry.made(build)
+
+
+class _Entry:
+    """What one thread makes while others that want the same wait; others go on."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._found: Any = None
+        self._known = False
+
+    def made(self, build: Callable[[], T]) -> T:
+        with self._lock:
+            if not self._known:
+                self._found, self._known = build(), True
+            found: T = self._found
         return found
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,6 +55,23 @@ class Budget:
             self._rays = geometry.rays
         return self._cuts > self.rule.max_cuts or geometry.rays - self._rays > self.rule.max_rays
 
+    def part(self, geometry: Geometry, share: float) -> Budget:
+        """Return a budget of its own with a share of what is left, for tubes that are traced beside others."""
+        cast = geometry.rays - self._rays if self._rays >= 0 else 0
+        left = replace(
+            self.rule,
+            max_tubes=int(max(share * (self.rule.max_tubes - self._tubes), 0)),
+            max_cuts=max(share * (self.rule.max_cuts - self._cuts), 0.0),
+            max_rays=max(share * (self.rule.max_rays - cast), 0.0),
+        )
+        return Budget(left)
+
+    def take_back(self, part: Budget) -> None:
+        """Count what a part was spent for."""
+        self._tubes, self._cuts = self._tubes + part._tubes, self._cuts + part._cuts
+        n = max(len(self.uncut), len(part.uncut))
+        self.uncut = np.pad(self.uncut, (0, n - len(self.uncut))) + np.pad(part.uncut, (0, n - len(part.uncut)))
+
     def _within(self, geometry: Geometry, facet: Ints, wanted: Bools, spent: bool) -> Bools:
         if not spent or not wanted.any():
             return wanted
@@ -73,11 +93,19 @@ class Contributions:
         self.budget = budget or Budget(rule)
         self._level = np.zeros(1)
 
-    def forked(self) -> Contributions:
-        """Return a copy that starts from the field found so far and goes on by itself, within the same budget."""
-        other = Contributions(self.rule, self.budget)
+    def forked(self, geometry: Geometry, share: float) -> Contributions:
+        """Return a copy that starts from the field found so far and goes on by itself, with a share of the budget."""
+        other = Contributions(self.rule, self.budget.part(geometry, share))
         other._level = self._level.copy()
         return other
+
+    def joined(self, others: Iterable[Contributions]) -> None:
+        """Add what copies found, and take their budgets back."""
+        for other in others:
+            n = max(len(self._level), len(other._level))
+            level = (np.pad(x._level, (0, n - len(x._level))) for x in (self, other))
+            self._level = np.maximum(*level)
+            self.budget.take_back(other.budget)
 
     def frozen(self, budget: Budget) -> Contributions:
         """Return the field found so far as what another launch, by the rule of its budget, starts from."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ from raychan.tracing.launch import GAP_LEVELS, OBLIQUE_SHARE, launch
 from raychan.tracing.legs import Leg, View, reachable
 from raychan.tracing.radiation import FACING, LIT, OBLIQUE, Phases, phases_of, radiating
 from raychan.tracing.routes import leg_of_arrival, routes_of
+from raychan.tracing.shared_work import all_of
 from raychan.tracing.subdivide import bisect, subdivide
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.tracing.visibility import BISECT, CLIP, KEEP, choose_actions, tube_visibility
@@ -25,6 +28,9 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
+T = TypeVar("T")
+
+_SHARES = 8  # parts of what is left of a budget that each outgoing leg gets; not measured
 
 
 @dataclass(frozen=True)
@@ -54,8 +60,7 @@ def tube_routes(
     surface, whose own routes are then not yielded.
     """
     found = so_far or Contributions(rule.for_depth(bounces))
-    for routes, _, _ in numbered_routes(geometry, leg, (outs, outs), pieces, bounces, found, first):
-        yield routes
+    yield from numbered_routes(geometry, leg, (outs, outs), pieces, bounces, found, lambda routes, *_: routes, first)
 
 
 def numbered_routes(
@@ -65,11 +70,12 @@ def numbered_routes(
     pieces: Bools,
     bounces: int,
     found: Contributions,
+    each: Callable[[Routes, int, int], T],
     first: Callable[[Tubes, Contributions], None] | None = None,
     wanted: Wanted | None = None,
-) -> Iterator[tuple[Routes, int, int]]:
-    """Yield what `tube_routes` yields, with the number of the bounce at which the routes scatter, from 1 on, and that
-    of the leg over which they leave.
+) -> Iterator[T]:
+    """Yield what `each` makes of the routes that `tube_routes` yields, of the number of the bounce at which they
+    scatter, from 1 on, and of that of the leg over which they leave; it is called by any thread.
 
     Args: legs in and out; wanted, if not all; else as for `tube_routes`.
     """
@@ -81,48 +87,78 @@ def numbered_routes(
     for tubes in launch(geometry, leg, outs[0], pieces, found, more, others, only):
         if first is not None:
             first(tubes, found)
-        yield from _followed(geometry, leg, outs, tubes, images, bounces, found, first is None, wanted)
+        wave = _Wave(geometry, leg, outs, images, bounces, each, wanted)
+        yield from wave.followed(tubes, found, first is None)
 
 
-def _followed(
-    geometry: Geometry,
-    leg: Leg,
-    outs: list[Leg],
-    tubes: Tubes,
-    images: _Images,
-    bounces: int,
-    found: Contributions,
-    single: bool,
-    wanted: Wanted | None,
-) -> Iterator[tuple[Routes, int, int]]:
-    """Yield the routes of tubes that stand on their first surface, and of all later bounces, numbered; without `single`
-    those of the first surface are left out."""
-    f, depth = geometry.facets, 1
-    while len(tubes):
-        first, count = depth == 1, int(tubes.bounces[0])
-        # Mirrors such as the ground return by their exact foot points, not by tubes.
-        own = f.role[f.body[tubes.facet]] != MIRROR
-        by_image = images.returns(geometry, leg, tubes, first)
-        # What returns by the leg that it came by counts first: the order of the others then does not matter.
-        every = sorted(range(len(outs)), key=lambda i: outs[i] is not leg) if first else range(len(outs))
-        if (first and not single) or (wanted is not None and depth != wanted.depth):
-            every = []
-        for i in every:
-            out = outs[i]
-            if count + len(out.mirrors) > bounces or (wanted is not None and i not in wanted.outs):
-                continue
-            twice = by_image & (not first or images.over(geometry, out))
-            parts = [_returned(geometry, leg, out, tubes, own & ~twice, first, False, found)]
-            if geometry.has_layers:
-                parts.append(_returned(geometry, leg, out, tubes, own & twice, first, True, found))
-            yield from ((routes, depth, i) for routes in chain(*parts))
-        if count >= bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth):
-            return
-        last = count + 1 >= bounces
-        tubes = bounce(geometry, leg, outs[0], tubes, first, last, found)
-        if first and len(tubes):
-            tubes = tubes.take(~images.carry(geometry, tubes))
-        depth += 1
+@dataclass(frozen=True)
+class _Wave(Generic[T]):
+    """Tubes of one leg in, on their way from surface to surface."""
+
+    geometry: Geometry
+    leg: Leg
+    outs: list[Leg]
+    images: _Images
+    bounces: int
+    each: Callable[[Routes, int, int], T]
+    wanted: Wanted | None
+
+    def followed(self, tubes: Tubes, found: Contributions, single: bool) -> Iterator[T]:
+        """Yield what is made of the routes of tubes that stand on their first surface, and of all later bounces;
+        without `single` those of the first surface are left out."""
+        geometry, wanted, depth = self.geometry, self.wanted, 1
+        while len(tubes):
+            first, count = depth == 1, int(tubes.bounces[0])
+            outs = [i for i in range(len(self.outs)) if count + len(self.outs[i].mirrors) <= self.bounces]
+            if wanted is not None:
+                outs = [i for i in outs if i in wanted.outs and depth == wanted.depth]
+            if first and not single:
+                outs = []
+            ends = count >= self.bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth)
+            # Mirrors such as the ground return by their exact foot points, not by tubes.
+            scatters = geometry.facets.role[geometry.facets.body[tubes.facet]] != MIRROR
+            left = partial(self._left, tubes, scatters, self.images.returns(geometry, self.leg, tubes, first), depth)
+            # What returns by the leg that it came by counts first, and the others against that.
+            same = [i for i in outs if first and self.outs[i] is self.leg]
+            for i in same:
+                yield from left(i, found)
+            tasks, parts = [], list[Contributions]()
+            for i in (i for i in outs if i not in same):
+                parts.append(found.forked(geometry, 1.0 / min(len(outs), _SHARES)))
+                tasks.append(partial(left, i, parts[-1]))
+            landed: list[Tubes] = []
+            if not ends:
+                parts.append(found.forked(geometry, 0.5))
+                tasks.insert(0, partial(self._bounced, tubes, count, depth, parts[-1], landed))
+            for made in all_of(geometry, tasks):
+                yield from made
+            found.joined(parts)
+            if ends:
+                return
+            tubes, depth = landed[0], depth + 1
+
+    def _left(
+        self, tubes: Tubes, scatters: Bools, by_image: Bools, depth: int, i: int, found: Contributions
+    ) -> list[T]:
+        """Return what is made of the routes over leg out i of tubes on their surface number `depth`.
+
+        Args: scatters (n,) which return by tubes; by_image (n,) which legs over mirrors carry.
+        """
+        leg, out, first = self.leg, self.outs[i], depth == 1
+        twice = by_image & (not first or self.images.over(self.geometry, out))
+        parts = [_returned(self.geometry, leg, out, tubes, scatters & ~twice, first, False, found)]
+        if self.geometry.has_layers:
+            parts.append(_returned(self.geometry, leg, out, tubes, scatters & twice, first, True, found))
+        return [self.each(routes, depth, i) for routes in chain(*parts)]
+
+    def _bounced(self, tubes: Tubes, count: int, depth: int, found: Contributions, landed: list[Tubes]) -> list[T]:
+        """Put tubes after their next reflection into `landed`."""
+        last = count + 1 >= self.bounces
+        after = bounce(self.geometry, self.leg, self.outs[0], tubes, depth == 1, last, found)
+        if depth == 1 and len(after):
+            after = after.take(~self.images.carry(self.geometry, after))
+        landed.append(after)
+        return []
 
 
 def _returned(

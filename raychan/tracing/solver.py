@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from raychan.tracing.legs import Leg, legs_over, reachable
 from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
+from raychan.tracing.shared_work import all_of
 from raychan.tracing.shooting import Wanted, numbered_routes
 from raychan.tracing.sources import EXACT, Sources, sources_of
 from raychan.tracing.tubes import Refinement
@@ -23,10 +26,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 Batch = Routes | DiffractedRoutes
+T = TypeVar("T")
 
 # A launch beyond these limits cuts no more and says so.
 _TUBES = 10_000_000  # cut for phase: a quarter of a minute of one core; urban streets at 0.1 dB take a million
 _CUTS, _CUTS_A_FACET = 40_000, 4  # cuts for visibility; urban streets at 0.1 dB take 13,000
+_SHARES = 16  # parts of what the direct leg leaves of a budget that each other leg gets; not measured
+_GROUP = 12  # legs traced at once at most, and their facets in all: bounds the memory; not measured
+_HELD = 1 << 21
 
 
 @dataclass
@@ -48,7 +55,7 @@ def launch_routes(
     Args: geometry, which serves many launches; points the targets given by their RCS; rule what may be left out; stats
     is filled; progress is told ("trace", share done).
     """
-    for routes, _ in Launch(geometry, points, rule).whole(stats, progress):
+    for routes, _ in Launch(geometry, points, rule).whole(stats, lambda routes: routes, progress):
         yield routes
 
 
@@ -66,47 +73,78 @@ class Launch:
             self.outs = legs_over(geometry, np.asarray(rule.rx, float), rule.bounces - 1, rule.beam)
         self._found: dict[int, Contributions] = {}
 
-    def whole(self, stats: Stats, progress: Progress | None = None) -> Iterator[tuple[Batch, Sources]]:
-        """Yield all routes, and their sources (n,), batch by batch."""
+    def whole(
+        self, stats: Stats, each: Callable[[Batch], T], progress: Progress | None = None
+    ) -> Iterator[tuple[T, Sources]]:
+        """Yield what `each`, called by any thread, makes of all routes, and their sources (n,), batch by batch."""
         before = self.geometry.rays
         for exact in self._exact():
-            yield exact, np.full(len(exact.kind), EXACT)
+            yield each(exact), np.full(len(exact.kind), EXACT)
         # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not
         # matter.
-        direct = Contributions(self._limited(self.rule.refinement))
-        for i in range(len(self.legs)):
+        direct = self._found[0] = Contributions(self._limited(self.rule.refinement))
+        yield from self._over(0, direct, stats, each)
+        for group in self._groups(range(1, len(self.legs))):
             if progress:
-                progress("trace", i / len(self.legs))
-            self._found[i] = direct if i == 0 else direct.forked()
-            yield from self._over(i, self._found[i], stats)
-        self._finished(stats, before, direct.budget)
+                progress("trace", group[0] / len(self.legs))
+            for i in group:
+                self._found[i] = direct.forked(self.geometry, 1.0 / _SHARES)
+            yield from self._together([(i, self._found[i], None) for i in group], stats, each)
+            for i in group:
+                direct.budget.take_back(self._found[i].budget)
+        self._finished(stats, before, [direct.budget])
         if progress:
             progress("trace", 1.0)
 
     def again(
-        self, refinement: Refinement, launches: list[tuple[int, Wanted]], stats: Stats
-    ) -> Iterator[tuple[Batch, Sources]]:
-        """Yield the routes, and their sources (n,), of tubes traced again, cut by another refinement.
+        self, wanted: list[tuple[Refinement, int, Wanted]], stats: Stats, each: Callable[[Batch], T]
+    ) -> Iterator[tuple[T, Sources]]:
+        """Yield what `each`, called by any thread, makes of the routes of tubes traced again, and their sources (n,).
 
-        Args: launches numbers of legs in, and what is wanted there (see `tracing.sources`). What is too weak to be cut
-        is judged by what the whole launch found.
+        Args: wanted refinements by which tubes are cut, numbers of legs in, and what is wanted there (see
+        `tracing.sources`). What is too weak to be cut is judged by what the whole launch found.
         """
-        before, budget = self.geometry.rays, Budget(self._limited(refinement))
-        for i, wanted in launches:
-            yield from self._over(i, self._found[i].frozen(budget), stats, wanted)
-        self._finished(stats, before, budget)
+        before, budgets = self.geometry.rays, list[Budget]()
+        for group in self._groups(range(len(wanted))):
+            jobs: list[tuple[int, Contributions, Wanted | None]] = []
+            for refinement, i, what in (wanted[j] for j in group):
+                budgets.append(Budget(self._limited(refinement)))
+                jobs.append((i, self._found[i].frozen(budgets[-1]), what))
+            yield from self._together(jobs, stats, each)
+        self._finished(stats, before, budgets)
+
+    def _groups(self, jobs: range) -> Iterator[range]:
+        """Give numbers of jobs in groups that are done at once: their routes are held."""
+        size = max(1, min(_GROUP, _HELD // max(len(self.geometry.facets.body), 1)))
+        return (jobs[i : i + size] for i in range(0, len(jobs), size))
+
+    def _together(
+        self, jobs: list[tuple[int, Contributions, Wanted | None]], stats: Stats, each: Callable[[Batch], T]
+    ) -> Iterator[tuple[T, Sources]]:
+        own = [Stats() for _ in jobs]
+        tasks = [
+            partial(lambda *a: list(self._over(*a)), i, f, s, each, w) for (i, f, w), s in zip(jobs, own, strict=True)
+        ]
+        for made in all_of(self.geometry, tasks):
+            yield from made
+        stats.tubes += sum(s.tubes for s in own)
 
     def _over(
-        self, i: int, found: Contributions, stats: Stats, wanted: Wanted | None = None
-    ) -> Iterator[tuple[Routes, Sources]]:
+        self, i: int, found: Contributions, stats: Stats, each: Callable[[Batch], T], wanted: Wanted | None = None
+    ) -> Iterator[tuple[T, Sources]]:
         leg, legs = self.legs[i], (self.legs, self.outs)
         pieces = reachable(self.geometry, leg)
         if not pieces.any():
             return
-        numbered = numbered_routes(self.geometry, leg, legs, pieces, self.rule.bounces, found, wanted=wanted)
-        for routes, depth, out in numbered:
-            stats.tubes += len(routes.kind)
-            yield routes, sources_of(routes, i, len(leg.mirrors), out, depth)
+
+        def made(routes: Routes, depth: int, out: int) -> tuple[int, T, Sources]:
+            return len(routes.kind), each(routes), sources_of(routes, i, len(leg.mirrors), out, depth)
+
+        for tubes, *one in numbered_routes(
+            self.geometry, leg, legs, pieces, self.rule.bounces, found, made, wanted=wanted
+        ):
+            stats.tubes += tubes
+            yield one[0], one[1]
 
     def _exact(self) -> Iterator[Batch]:
         """Yield the routes that need no tubes: over points, wedges, the ground's foot points, and the direct ones."""
@@ -138,10 +176,11 @@ class Launch:
             max_cuts=min(refined.max_cuts, cuts),
         )
 
-    def _finished(self, stats: Stats, before: int, budget: Budget) -> None:
+    def _finished(self, stats: Stats, before: int, budgets: list[Budget]) -> None:
         stats.legs = len(self.legs)
         stats.rays += self.geometry.rays - before
-        stats.uncut = _added(stats.uncut, budget.uncut)
+        for budget in budgets:
+            stats.uncut = _added(stats.uncut, budget.uncut)
 
 
 def _added(a: Ints, b: Ints) -> Ints:

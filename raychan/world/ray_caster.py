@@ -113,7 +113,8 @@ class RayCaster:
         """Count tubes that a budget kept from being subdivided."""
         self._uncut[0] += tubes
 
-    def _count(self, rays: int) -> None:
+    def count_rays(self, rays: int) -> None:
+        """Count rays as cast by this thread."""
         self._counts.rays = self.rays + rays
 
     def distance(self, facet: Ints, origin: Floats, direction: Floats) -> Floats:
@@ -151,7 +152,7 @@ class RayCaster:
             casts.append(follow_rays(part[0], part[1], *fixed, new_packet(), part[2]))
 
         parallel_for(len(rays.origin), some, _PARALLEL_FROM)
-        self._count(sum(casts))
+        self.count_rays(sum(casts))
 
     def cast(self, origin: Floats, direction: Floats, skip: Ints, start: Floats | None = None) -> tuple[Ints, Floats]:
         """Return the first facet (-1: none) hit by each ray and its distance [m].
@@ -194,7 +195,7 @@ class RayCaster:
             # A facet that faces the ray's start is then seen from there; each such point still counts as a ray.
             towards = np.einsum("ij,ij->i", direction, self.normal[target]) < 0.0
             reached = towards & (target >= 0) & (skip < 0)
-            self._count(int(np.count_nonzero(reached)))
+            self.count_rays(int(np.count_nonzero(reached)))
         if not len(self.first):
             return np.ones(n, bool), passed, blocker
         body = _NO_BODY if inside is None else np.ascontiguousarray(inside, np.int64)

@@ -55,7 +55,9 @@ def test_what_was_never_cut_is_in_doubt():
     assert np.sort(np.abs(held.doubtful.amplitude)) == pytest.approx(np.sort(np.abs(first.paths.amplitude[deep])))
     by = list(launches(np.unique(first.source[depth_of(first.source) > 1]), len(refinement.geometry.facets.body)))
     rule = step_rule(of.radar, of.processing, of.model, 0)
-    paths, source = refinement._paths(first.launch.again(rule.refinement, by, Stats()))
+    paths, source = refinement._paths(
+        first.launch.again([(rule.refinement, *one) for one in by], Stats(), refinement._carried)
+    )
     change, _ = held.replace(paths, source, by)
     assert held.doubtful.amplitude.sum() == pytest.approx(change.amplitude.sum())
     assert len(held.now.amplitude) == len(paths.amplitude) + np.count_nonzero(~deep)

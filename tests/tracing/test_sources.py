@@ -22,7 +22,7 @@ def whole():
     scene = scene_of(2)
     rule = fine_rule(scene.radar, scene.processing, scene.model)
     launch = Launch(geometry_of(scene), scene.points(0.0), rule)
-    routes, sources = zip(*launch.whole(Stats()), strict=True)
+    routes, sources = zip(*launch.whole(Stats(), lambda routes: routes), strict=True)
     return scene, launch, routes, np.concatenate(sources)
 
 
@@ -75,7 +75,9 @@ def test_tracing_all_sources_again_by_the_same_rule_gives_the_same_samples(whole
     scene, launch, routes, sources = whole
     by = list(launches(np.unique(sources), len(launch.geometry.facets.body)))
     stats = Stats()
-    again = [batch for batch, _ in launch.again(launch.rule.refinement, by, stats)]
+    again = [
+        batch for batch, _ in launch.again([(launch.rule.refinement, *one) for one in by], stats, lambda routes: routes)
+    ]
     assert stats.rays > 0
 
     def samples(batches):
@@ -92,6 +94,6 @@ def test_uncut_deep_tubes_cost_fewer_rays(whole):
     _, launch, *_ = whole
     rough = dataclasses.replace(launch.rule, refinement=dataclasses.replace(launch.rule.refinement, coarse=1e9))
     stats, fine = Stats(), Stats()
-    list(Launch(launch.geometry, launch.points, rough).whole(stats))
-    list(Launch(launch.geometry, launch.points, launch.rule).whole(fine))
+    list(Launch(launch.geometry, launch.points, rough).whole(stats, lambda routes: routes))
+    list(Launch(launch.geometry, launch.points, launch.rule).whole(fine, lambda routes: routes))
     assert stats.rays < 0.9 * fine.rays
