@@ -50,16 +50,18 @@ class Record(Described):
         value.flags.writeable = False
         return value
 
-    def rebuilt(self, **columns: NDArray[Any]) -> Self:
-        """Return a copy with other columns of the same form, frozen but not checked: the caller answers for them.
+    def rebuilt(self, **columns: Any) -> Self:
+        """Return a copy with other columns or fields of the same form, frozen but not checked: the caller answers for
+        them.
 
         Checking a record of 1e6 rows, of which few change, takes longer than the change.
         """
         out = copy(self)
         for name, value in columns.items():
-            frozen = value.view()
-            frozen.flags.writeable = False
-            object.__setattr__(out, name, frozen)
+            if isinstance(value, np.ndarray):
+                value = value.view()
+                value.flags.writeable = False
+            object.__setattr__(out, name, value)
         return out
 
     def replace(self, **changes: object) -> Self:

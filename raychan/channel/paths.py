@@ -4,6 +4,7 @@ its three corners."""
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -99,37 +100,59 @@ def nothing(facets: Facets, radar: RadarEnds) -> Paths:
     )
 
 
-def join(parts: list[Paths]) -> Paths:
-    """Return all paths of several sets as one record, chains as long as the longest."""
-    if len(parts) == 1:
-        return parts[0]
-    begin = np.cumsum([0] + [len(p.trajectories.kind) for p in parts[:-1]])
-    slots = max(p.trajectories.kind.shape[1] for p in parts)
-    empty = {"body": -1, "part": -1, "kind": 0, "vertices": parts[0].rx}
-    trajectories: dict[str, Any] = {}
+def join(parts: Sequence[Paths], keep: Sequence[NDArray[np.bool_]] | None = None) -> Paths:
+    """Return all paths of several sets as one record, chains as long as the longest; with `keep`, masks (w,) of each
+    set's trajectories, only the paths of those."""
+    if keep is None:
+        if len(parts) == 1:
+            return parts[0]
+        rows = [np.arange(len(p.trajectories.kind)) for p in parts]
+    else:
+        rows = [np.flatnonzero(k) for k in keep]
+    some: list[Any] = [slice(None)] * len(parts)
+    if keep is not None:
+        some = [np.flatnonzero(k[p.trajectory]) for p, k in zip(parts, keep, strict=True)]
+    begin, number = np.cumsum([0, *map(len, rows)]), list[NDArray[np.int32]]()
+    for i, p in enumerate(parts):
+        new = p.trajectory if keep is None else (np.cumsum(keep[i], dtype=np.int32) - 1)[p.trajectory[some[i]]]
+        number.append(new + np.int32(begin[i]))
+    columns = {
+        name: np.concatenate([getattr(p, name)[r] for p, r in zip(parts, some, strict=True)])
+        for name in columns_of(parts[0])
+    }
+    return parts[0].rebuilt(
+        **columns,
+        trajectory=np.concatenate(number),
+        trajectories=_joined([p.trajectories for p in parts], rows, parts[0].rx),
+    )
+
+
+def _joined(parts: list[Trajectories], rows: list[NDArray[np.intp]], rx: Floats) -> Trajectories:
+    """Return some rows of several sets of trajectories as one set; unused slots repeat the receiver rx (3,) [m]."""
+    slots, begin = max(p.kind.shape[1] for p in parts), np.cumsum([0, *map(len, rows)])
+    empty: dict[str, Any] = {"body": -1, "part": -1, "kind": 0, "vertices": rx}
+    columns = {}
     for f in dataclasses.fields(Trajectories):
-        held = [getattr(p.trajectories, f.name) for p in parts]
-        if f.name in empty:
-            out = np.empty((sum(map(len, held)), slots, *held[0].shape[2:]), held[0].dtype)
-            for first, some in zip(begin, held, strict=True):
-                out[first : first + len(some), : some.shape[1]] = some
-                out[first : first + len(some), some.shape[1] :] = empty[f.name]
-            trajectories[f.name] = out
-        else:
-            trajectories[f.name] = np.concatenate(held)
-    rows: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in columns_of(parts[0])}
-    trajectory = np.concatenate([p.trajectory + np.int32(first) for p, first in zip(parts, begin, strict=True)])
-    return dataclasses.replace(parts[0], **rows, trajectory=trajectory, trajectories=Trajectories(**trajectories))
+        held = [getattr(p, f.name) for p in parts]
+        wide = (slots,) if f.name in empty else ()
+        out = np.empty((begin[-1], *wide, *held[0].shape[1 + len(wide) :]), held[0].dtype)
+        for i, one in enumerate(held):
+            place = out[begin[i] : begin[i + 1]]
+            if len(one) == len(place) and one.shape[1:] == place.shape[1:]:
+                place[:] = one
+            elif one.shape[1:] == place.shape[1:]:
+                # With mode "clip" numpy writes straight to `out`; all numbers are in range.
+                one.take(rows[i], axis=0, out=place, mode="clip")
+            else:
+                place[:, : one.shape[1]] = one[rows[i]]
+                place[:, one.shape[1] :] = empty[f.name]
+        columns[f.name] = out
+    return parts[0].rebuilt(**columns)
 
 
 def of_trajectories(paths: Paths, keep: NDArray[np.bool_]) -> Paths:
     """Return the paths of the trajectories (w,) to keep, in their order."""
-    rows, number = keep[paths.trajectory], np.cumsum(keep, dtype=np.int32) - 1
-    trajectories = Trajectories(
-        **{f.name: getattr(paths.trajectories, f.name)[keep] for f in dataclasses.fields(Trajectories)}
-    )
-    columns = {name: getattr(paths, name)[rows] for name in columns_of(paths)}
-    return dataclasses.replace(paths, **columns, trajectory=number[paths.trajectory[rows]], trajectories=trajectories)
+    return paths if keep.all() else join([paths], [keep])
 
 
 def strongest(paths: Paths, most: int) -> Paths:

@@ -31,4 +31,4 @@ def columns_of(paths: Paths) -> tuple[str, ...]:
 
 def scaled(paths: Paths, factor: NDArray[Any]) -> Paths:
     """Return paths with their amplitudes, of both polarisations, times a factor (n,)."""
-    return paths.replace(**{name: getattr(paths, name) * factor for name in amplitudes_of(paths)})
+    return paths.rebuilt(**{name: getattr(paths, name) * factor for name in amplitudes_of(paths)})

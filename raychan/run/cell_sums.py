@@ -105,9 +105,10 @@ def _apart(cells, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sums_in_cells(  # type: ignore[no-untyped-def]
-    group, amplitude, delay, rate, cells, least, beyond, total, size, strongest, ramp, sizes, across, along
+    group, amplitude, delay, rate, cells, least, beyond, total, size, strongest, most, ramp, sizes, across, along
 ):
-    """Write the `cell_sums` (c, ...) of the contributions of echoes (n,) to several cells (c, 2).
+    """Write the `cell_sums` (c, ...) of the contributions of echoes (n,) to several cells (c, 2), and the power `most`
+    (c, g) of the strongest.
 
     Args: least (c,) contribution that counts; beyond (s,) and (2, m) upper bounds of the range and rate responses by
     cells from the peak; else as for `cell_waves` and `cell_sums`.
@@ -116,8 +117,7 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
     _, slope, _, _, middle, repetition, resolution, light = ramp
     over_ranges, over_rates = beyond
     per_rate = 2.0 * middle / light * chirps * repetition
-    most = np.full(strongest.shape, -1.0)
-    total[:], size[:], strongest[:] = 0.0, 0.0, -1
+    total[:], size[:], strongest[:], most[:] = 0.0, 0.0, -1, -1.0
     for i in range(delay.size):
         at_range, turn = _stands(delay[i], rate[i], ramp)
         turn *= amplitude[i]

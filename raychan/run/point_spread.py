@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,7 +21,38 @@ Sums = tuple[Complexes, Floats, NDArray[np.int64]]
 
 _FINE = 64  # points of the tabulated window response per resolution cell (not measured)
 _LEAST = 1e-3  # of a cell's amplitude: largest sum of the paths left out (speed against error; not measured)
+_PART = 1 << 15  # paths summed at once by one thread; not measured
+_FEW = 1 << 14  # sums, of cells and groups, up to which paths are summed in parts; not measured
 _STEP = 0.25  # range cells that a path may move within one part of the frame (speed against error; not measured)
+
+
+@dataclass
+class _Sums:
+    """Sums over paths in map cells by groups: `total` (c, g), `size` (c, 4, g), number (c, g) and power (c, g) of the
+    strongest path."""
+
+    total: Complexes
+    size: Floats
+    strongest: NDArray[np.int64]
+    most: Floats
+
+    @staticmethod
+    def of(cells: int, groups: int) -> _Sums:
+        """Return room for the sums."""
+        shape = cells, groups
+        return _Sums(np.empty(shape, complex), np.empty((cells, 4, groups)), np.empty(shape, np.int64), np.empty(shape))
+
+    @property
+    def columns(self) -> tuple[NDArray[Any], ...]:
+        return self.total, self.size, self.strongest, self.most
+
+    def add(self, other: _Sums, first: int) -> None:
+        """Add the sums over other paths, which are numbered from `first` on."""
+        self.total += other.total
+        self.size += other.size
+        better = other.most > self.most
+        self.strongest = np.where(better, other.strongest + first, self.strongest)
+        self.most = np.maximum(self.most, other.most)
 
 
 class PointSpread:
@@ -89,21 +121,31 @@ class PointSpread:
     def _images_in_cells(
         self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
     ) -> Sums:
-        shape = len(cells), count
-        total, size, strongest = np.empty(shape, complex), np.empty((shape[0], 4, count)), np.empty(shape, np.int64)
         least = _LEAST * cells[:, 2] / max(len(rate), 1)
         tables = self._tables(rate)
         in_range = np.abs(self._range_tables).max(axis=1)
         beyond = _beyond(in_range), np.stack([_beyond(x) for x in np.abs(tables[3][0]).sum(axis=0).T])
+        # Few sums are made by parts of the paths; many, which do not fit a processor's cache, by parts of the cells.
+        parts = -(-len(rate) // _PART) if len(cells) * count <= _FEW else 1
+        sums = [_Sums.of(len(cells), count) for _ in range(max(parts, 1))]
 
-        def some(at: slice) -> None:
-            sums_in_cells(
-                group, amplitude, delay, rate, cells[at], least[at], beyond, total[at], size[at], strongest[at],
-                *tables,
-            )  # fmt: skip
+        def by_paths(at: slice) -> None:
+            for i in range(len(sums))[at]:
+                part = slice(i * _PART, (i + 1) * _PART)
+                paths = group[part], amplitude[part], delay[part], rate[part]
+                sums_in_cells(*paths, cells, least, beyond, *sums[i].columns, *tables)
 
-        parallel_for(len(cells), some, least=2)
-        return total, size, strongest
+        def by_cells(at: slice) -> None:
+            some = (x[at] for x in sums[0].columns)
+            sums_in_cells(group, amplitude, delay, rate, cells[at], least[at], beyond, *some, *tables)
+
+        if len(sums) > 1:
+            parallel_for(len(sums), by_paths, least=2)
+        else:
+            parallel_for(len(cells), by_cells, least=2)
+        for i, one in enumerate(sums[1:], 1):
+            sums[0].add(one, i * _PART)
+        return sums[0].total, sums[0].size, sums[0].strongest
 
     def _tables(self, rate: Floats) -> tuple[Any, ...]:
         """Return ramp, sizes and tables for `cell_waves`, for as many parts of the frame as the fastest path needs."""

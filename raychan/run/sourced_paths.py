@@ -4,6 +4,7 @@ again, and what it replaced stays known, for the difference tells the error."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,11 @@ class _Part:
     state: NDArray[np.int8]
     first: bool
 
+    @property
+    def bare(self) -> Paths:
+        """The paths without the way that they go."""
+        return _bare(self.paths)
+
 
 class SourcedPaths:
     """The paths of a first launch, with the source (w,) of each trajectory, and of further ones that replace some."""
@@ -46,14 +52,14 @@ class SourcedPaths:
     def replace(self, paths: Paths, source: Sources, launches: list[tuple[int, Wanted]]) -> tuple[Paths, Sources]:
         """Replace what some launches traced again; return what this changes: the new paths and the old ones with their
         sign turned, and the source (w,) of each trajectory."""
-        changed, sources = [paths], [source]
+        changed, sources = [_bare(paths)], [source]
         for part in self._parts:
             hit = covered(part.source, launches)
             old = hit & (part.state == _NOW)
             shallow = old & (depth_of(part.source) < DEEP)
             if part.first and shallow.any():
                 self._moved += _powers(part, shallow, paths, source)
-            changed.append(_negative(of_trajectories(part.paths, old)))
+            changed.append(_negative(of_trajectories(part.bare, old)))
             sources.append(part.source[old])
             part.state[hit] = np.where(old[hit], _BEFORE, _GONE)
         self._parts.append(_Part(paths, source, np.full(len(source), _NOW, np.int8), False))
@@ -86,27 +92,36 @@ class SourcedPaths:
     @property
     def now(self) -> Paths:
         """All paths, of the newest launch of each source."""
-        return join([of_trajectories(p.paths, c) for p, c in zip(self._parts, self.counts, strict=True)])
+        return join([p.paths for p in self._parts], self.counts)
 
     @property
     def doubtful(self) -> Paths:
         """What the newest launches changed, times the factors of `doubt`; the paths of deep tubes never traced again;
         and of other tubes never traced again the share that those traced again changed by, in unrelated phases."""
-        parts = [self._untouched()]
+        parts, keep = [self._parts[0].paths], [self._untouched]
+        factor: list[NDArray[Any]] = [self._share]
         for p in self._parts:
             new = (p.state == _NOW) & (depth_of(p.source) >= DEEP if p.first else True)
+            doubts = self._factor(p.source)
             for rows, sign in ((new, 1.0), (p.state == _BEFORE, -1.0)):
-                paths = of_trajectories(p.paths, rows)
-                parts.append(scaled(paths, sign * self._factor(p.source[rows])[paths.trajectory]))
-        return join(parts)
+                parts.append(p.paths)
+                keep.append(rows)
+                factor.append(sign * doubts)
+        every = join(parts, keep)
+        return scaled(every, np.concatenate([f[k] for f, k in zip(factor, keep, strict=True)])[every.trajectory])
 
-    def _untouched(self) -> Paths:
+    @property
+    def _untouched(self) -> NDArray[np.bool_]:
+        """Which trajectories (w,) of the first launch are of tubes that it cut, and that were not traced again."""
         first = self._parts[0]
-        rows = (first.state == _NOW) & (depth_of(first.source) == 1) & (self._moved[1] > 0.0)
-        paths = of_trajectories(first.paths, rows)
+        return np.asarray((first.state == _NOW) & (depth_of(first.source) == 1) & (self._moved[1] > 0.0))
+
+    @property
+    def _share(self) -> Complexes:
+        """The share (w,) of them by which those traced again changed, in unrelated phases."""
+        turn = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, len(self._parts[0].source))
         share = np.sqrt(self._moved[1] / self._moved[0]) if self._moved[0] > 0.0 else 0.0
-        turn = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, int(rows.sum()))
-        return scaled(paths, share * np.exp(1j * turn)[paths.trajectory])
+        return np.asarray(share * np.exp(1j * turn))
 
     def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, list[Complexes]]:
         """Return the sources (s,) of the first launch, and for each of the cells (c, 3) the sums (s,) of its paths
@@ -146,6 +161,13 @@ def changes(response: PointSpread, paths: Paths, source: Sources, cells: Floats)
 def _sums(response: PointSpread, paths: Paths, group: NDArray[np.int64], count: int, cells: Floats) -> Complexes:
     rows = group[paths.trajectory]
     return response.in_cells(rows, count, paths.amplitude, paths.delay, paths.range_rate, cells)[0]
+
+
+def _bare(paths: Paths) -> Paths:
+    """Return paths without the way that they go."""
+    way = paths.trajectories
+    none = {name: getattr(way, name)[:, :0] for name in ("body", "part", "kind", "vertices")}
+    return paths.rebuilt(trajectories=way.rebuilt(**none))
 
 
 def _negative(paths: Paths) -> Paths:

@@ -7,6 +7,7 @@ on several surfaces, or through which an edge runs, is subdivided (bisected, or 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from raychan.tracing.resolve_hits import (
     resolve_hits,
     tubes_at_hits,
 )
+from raychan.tracing.shared_work import all_of
 from raychan.tracing.silhouette_crossings import silhouette_crossings_of
 from raychan.tracing.subdivide import subdivide
 from raychan.tracing.tubes import CENTRE, Refinement, Tubes, slices
@@ -43,6 +45,7 @@ Rows = NDArray[np.signedinteger]
 _SAME_PATCH_COSINE = 0.98  # of the normals of one smooth patch over a tube; trades cuts for accuracy, not measured
 _BUDGET_SHARE = 0.1  # of a cut for visibility: what a cut between bounces takes of the budget; not measured
 _PARALLEL_FROM = 2000  # tubes from which on a second thread pays; not measured
+_PART = 4096  # tubes that one thread follows at once; not measured
 _PAST_LAYER = 1e-6  # m behind a layer from which on hits count
 
 
@@ -86,20 +89,27 @@ def bounce(
     whether `tubes` stand on their first surface, or land on their last; found the field found so far, by which tubes
     are subdivided or pruned.
     """
-    step = _Bounce(geometry, leg, out, first, last, found)
-    rule = found.rule
-    landed: list[Tubes] = []
-    has_room = tubes.slots < rule.slots - 2
+    has_room = tubes.slots < found.rule.slots - 2
     tubes = tubes if has_room.all() else tubes.take(has_room)
-    n = len(tubes)
-    flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, rule.layers), -1, np.int32), np.zeros((2, n), np.int8))
+    parts = [tubes.take(rows) for rows in np.array_split(np.arange(len(tubes)), max(1, len(tubes) // _PART))]
+    budgets = [found.forked(geometry, len(part) / max(len(tubes), 1)) for part in parts]
+    steps = [_Bounce(geometry, leg, out, first, last, own) for own in budgets]
+    flown = all_of(geometry, [partial(_flown, step, part) for step, part in zip(steps, parts, strict=True)])
+    found.joined(budgets)
+    landed = [some for part, _ in flown for some in part]
+    if not landed:
+        return tubes.take(np.zeros(len(tubes), bool))
+    in_phase, bound, length = np.concatenate([some for _, weights in flown for some in weights], axis=1)
+    return Tubes.join(landed, found.that_count(bound if last else in_phase, length))
+
+
+def _flown(step: _Bounce, tubes: Tubes) -> tuple[list[Tubes], list[Floats]]:
+    """Return the tubes where they land, and what they could contribute from there."""
+    n, layers, landed = len(tubes), step.rule.layers, list[Tubes]()
+    flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, layers), -1, np.int32), np.zeros((2, n), np.int8))
     while len(flight.tubes):
         flight = _cast_and_subdivide(step, flight, landed)
-    if not landed:
-        return tubes.take(np.zeros(n, bool))
-    weights = [_contribution_bounds(step, t) for t in landed]
-    in_phase, bound, length = np.concatenate(weights, axis=1)
-    return Tubes.join(landed, found.that_count(bound if last else in_phase, length))
+    return landed, [_contribution_bounds(step, t) for t in landed]
 
 
 def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> _Flight:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from typing import Generic, TypeVar
@@ -41,6 +41,14 @@ class Wanted:
     facets: Bools
     depth: int
     outs: frozenset[int]
+
+    def parts(self, most: int) -> Iterator[Wanted]:
+        """Give parts of what is wanted, of about `most` first facets each."""
+        rows = np.flatnonzero(self.facets)
+        for some in np.array_split(rows, max(1, round(len(rows) / most))):
+            facets = np.zeros_like(self.facets)
+            facets[some] = True
+            yield replace(self, facets=facets)
 
 
 def tube_routes(

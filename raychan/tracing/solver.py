@@ -34,6 +34,7 @@ _CUTS, _CUTS_A_FACET = 40_000, 4  # cuts for visibility; urban streets at 0.1 dB
 _SHARES = 16  # parts of what the direct leg leaves of a budget that each other leg gets; not measured
 _GROUP = 12  # legs traced at once at most, and their facets in all: bounds the memory; not measured
 _HELD = 1 << 21
+_PART = 1024  # first facets from which tubes are traced again at once; not measured
 
 
 @dataclass
@@ -105,9 +106,10 @@ class Launch:
         `tracing.sources`). What is too weak to be cut is judged by what the whole launch found.
         """
         before, budgets = self.geometry.rays, list[Budget]()
-        for group in self._groups(range(len(wanted))):
+        parts = [(refinement, i, part) for refinement, i, what in wanted for part in what.parts(_PART)]
+        for group in self._groups(range(len(parts))):
             jobs: list[tuple[int, Contributions, Wanted | None]] = []
-            for refinement, i, what in (wanted[j] for j in group):
+            for refinement, i, what in (parts[j] for j in group):
                 budgets.append(Budget(self._limited(refinement)))
                 jobs.append((i, self._found[i].frozen(budgets[-1]), what))
             yield from self._together(jobs, stats, each)
