@@ -16,8 +16,13 @@ from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
 from raychan.radar.dual_paths import columns_of
 from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Trajectories
+from raychan.units import C0
 
 Floats = NDArray[np.float64]
+
+_SMALL = 1e-3
+"""Of the noise in a map cell: by so much the samples may be off for each footprint that is long in range but is one
+path all the same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
 
 
 def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float) -> Paths:
@@ -38,7 +43,12 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     spans = np.maximum(np.maximum(corner[:, 0], corner[:, 1]), corner[:, 2])
     spans -= np.minimum(np.minimum(corner[:, 0], corner[:, 1]), corner[:, 2])
     long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
-    whole, rows = np.flatnonzero(~long), np.flatnonzero(long)
+    rows = np.flatnonzero(long)
+    corner_rate = 2.0 * corner_rates(routes, rows, facets, *speeds)
+    apart = np.abs(corner[rows] - routes.length[rows, None]), np.abs(corner_rate - 2.0 * rate[rows, None])
+    split = _tells(radar, np.abs(gains[rows]).max(axis=1), *apart)
+    long[rows[~split]] = False
+    whole, rows, corner_rate = np.flatnonzero(~long), rows[split], corner_rate[split]
     received = {
         name: np.concatenate([a[whole].sum(axis=1), a[rows].ravel()])
         for name, a in zip(("amplitude", "cross"), gains.swapaxes(0, 1), strict=False)
@@ -49,9 +59,25 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
         radar,
         length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
         **received,
-        length_rate=2.0 * np.concatenate([rate[whole], corner_rates(routes, rows, facets, *speeds).ravel()]),
+        length_rate=np.concatenate([2.0 * rate[whole], corner_rate.ravel()]),
         trajectory=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
     )
+
+
+def _tells(radar: RadarEnds, size: Floats, length: Floats, rate: Floats) -> NDArray[np.bool_]:
+    """Tell of which footprints (r,) the corners need delays and rates of their own: what one of each, that of the
+    centre, does to the samples is more than a small part of the noise.
+
+    Args: size (r, 3) of the corners' amplitudes; by how much their length [m] and its rate [m/s] (r, 3) differ from
+    those of the centre.
+    """
+    if not getattr(radar, "noise", False):
+        return np.ones(len(size), bool)
+    sensor: Any = radar
+    wave = sensor.waveform
+    noise = np.sqrt(sensor.noise_power / sensor.power / (wave.n_chirps * wave.n_samples))
+    turn = np.pi * (wave.bandwidth * length + wave.carrier * wave.frame_duration * rate) / C0
+    return np.asarray((size * np.minimum(turn, 2.0)).sum(axis=1) > _SMALL * noise)
 
 
 def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDArray[Any]) -> Paths:

@@ -114,24 +114,32 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
     cells from the peak; else as for `cell_waves` and `cell_sums`.
     """
     samples, chirps, _ = sizes
-    _, slope, _, _, middle, repetition, resolution, light = ramp
+    _, slope, centre, _, middle, repetition, resolution, light = ramp
     over_ranges, over_rates = beyond
     per_rate = 2.0 * middle / light * chirps * repetition
     total[:], size[:], strongest[:], most[:] = 0.0, 0.0, -1, -1.0
+    count = np.zeros(total.shape[1])
     for i in range(delay.size):
-        at_range, turn = _stands(delay[i], rate[i], ramp)
-        turn *= amplitude[i]
-        moved, weight = abs(rate[i]) * repetition / resolution, abs(amplitude[i])
+        count[group[i]] += 1.0
+        at_range, moved = 0.5 * light * delay[i] + rate[i] * centre, abs(rate[i]) * repetition / resolution
+        weight, largest, turn = abs(amplitude[i]), over_rates[0, 0] + moved * over_rates[1, 0], 0j
         for c in range(len(cells)):
-            size[c, 0, group[i]] += 1.0
             off = rate[i] - cells[c, 1]
             near = _apart(abs(at_range - cells[c, 0] + off * middle / slope) / resolution, samples)
-            near, slow = max(near - 0.5 * moved * chirps, 0.0), _apart(abs(off) * per_rate, chirps)
+            near = max(near - 0.5 * moved * chirps, 0.0)
+            # Most are too far in range alone.
+            if weight * over_ranges[int(near)] * largest < least[c]:
+                continue
+            slow = _apart(abs(off) * per_rate, chirps)
             held, late = over_rates[0, int(slow)], over_rates[1, int(slow)]
             if weight * over_ranges[int(near)] * (held + moved * late) < least[c]:
                 continue
+            if turn == 0j:
+                turn = amplitude[i] * _stands(delay[i], rate[i], ramp)[1]
             wave = turn * _answer(at_range, rate[i], cells[c, 0], cells[c, 1], ramp, sizes, across, along)
             _count(c, group[i], i, wave, at_range, rate[i], total, size, strongest, most)
+    for c in range(len(cells)):
+        size[c, 0] = count
 
 
 @njit(cache=True, nogil=True)

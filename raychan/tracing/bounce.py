@@ -45,7 +45,7 @@ Rows = NDArray[np.signedinteger]
 _SAME_PATCH_COSINE = 0.98  # of the normals of one smooth patch over a tube; trades cuts for accuracy, not measured
 _BUDGET_SHARE = 0.1  # of a cut for visibility: what a cut between bounces takes of the budget; not measured
 _PARALLEL_FROM = 2000  # tubes from which on a second thread pays; not measured
-_PART = 4096  # tubes that one thread follows at once; not measured
+_PART = 16384  # tubes that one thread follows at once; not measured
 _PAST_LAYER = 1e-6  # m behind a layer from which on hits count
 
 

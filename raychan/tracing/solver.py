@@ -34,7 +34,7 @@ _CUTS, _CUTS_A_FACET = 40_000, 4  # cuts for visibility; urban streets at 0.1 dB
 _SHARES = 16  # parts of what the direct leg leaves of a budget that each other leg gets; not measured
 _GROUP = 12  # legs traced at once at most, and their facets in all: bounds the memory; not measured
 _HELD = 1 << 21
-_PART = 1024  # first facets from which tubes are traced again at once; not measured
+_PART = 4096  # first facets from which tubes are traced again at once; not measured
 
 
 @dataclass
