@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -10,7 +10,6 @@ from raychan.world.quantities import (
     Angle,
     BeamRange,
     Courses,
-    Crease,
     Damping,
     Divergence,
     Fan,
@@ -27,14 +26,11 @@ from raychan.world.quantities import (
     Rings,
     Rudder,
     RudderRate,
-    Scale,
     ScanStep,
     ShipSpeed,
-    Speed,
     SpotWidth,
     Spread,
     Strength,
-    Turn,
     TurnRate,
     Voyage,
     WaveHeight,
@@ -43,6 +39,7 @@ from raychan.world.quantities import (
     Weight,
     Weights,
 )
+from raychan.world.schema import PlacedBodyTable
 from raychan.world.schema_base import Table
 
 
@@ -186,33 +183,14 @@ class SeaTable(Table):
     waves: WavesTable | None = None
 
 
-class ShipBodyTable(Table):
-    """Table [[bodies]] of a ship's scene."""
+class ShipBodyTable(PlacedBodyTable):
+    """Table [[bodies]] of a ship's scene; a material is a name of the reflectivity table."""
 
-    name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^.\s\p{C}]+$")]
-    shape: str | None = None
-    params: dict[str, Any] = {}
-    mesh: str | None = None
-    unit: str = "m"
-    up: str | None = None
-    forward: str | None = None
-    scale: Scale = 1.0
-    crease_deg: Crease = 20.0
-    material: str | None = None
-    """A name of the reflectivity table."""
     reflectivity: Reflectivity | None = None
     """In place of a material; default 0.5."""
-    position: Place = [0.0, 0.0, 0.0]
-    yaw_deg: Angle = 0.0
-    pitch_deg: Angle = 0.0
-    roll_deg: Angle = 0.0
-    velocity_mps: Speed = [0.0, 0.0, 0.0]
-    turn_rate_dps: Turn = 0.0
 
     @model_validator(mode="after")
-    def _one_of(self) -> ShipBodyTable:
-        if (self.shape is None) == (self.mesh is None):
-            raise ValueError("either shape or mesh")
+    def _material_or_reflectivity(self) -> ShipBodyTable:
         if self.material is not None and self.reflectivity is not None:
             raise ValueError("either material or reflectivity")
         return self

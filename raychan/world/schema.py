@@ -212,8 +212,8 @@ class Model(Table):
     """Trace finely tessellated smooth surfaces by fewer facets, as near to them as tolerance_db asks for."""
 
 
-class BodyTable(Table):
-    """Table [[bodies]]."""
+class PlacedBodyTable(Table):
+    """What tables of bodies have in every kind of scene: a shape or a mesh, its place and how it moves."""
 
     name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^.\s\p{C}]+$")]
     shape: str | None = None
@@ -226,14 +226,25 @@ class BodyTable(Table):
     scale: Scale = 1.0
     crease_deg: Crease = 20.0
     material: str | None = None
-    materials: dict[str, str] = {}
-    """By part; names may hold * and ?."""
     position: Place = [0.0, 0.0, 0.0]
     yaw_deg: Angle = 0.0
     pitch_deg: Angle = 0.0
     roll_deg: Angle = 0.0
     velocity_mps: Speed = [0.0, 0.0, 0.0]
     turn_rate_dps: Turn = 0.0
+
+    @model_validator(mode="after")
+    def _shape_or_mesh(self) -> PlacedBodyTable:
+        if (self.shape is None) == (self.mesh is None):
+            raise ValueError("either shape or mesh")
+        return self
+
+
+class BodyTable(PlacedBodyTable):
+    """Table [[bodies]]."""
+
+    materials: dict[str, str] = {}
+    """By part; names may hold * and ?."""
     spin_dps: Spin = [0.0, 0.0, 0.0]
     """About the body's own axes through its origin, as a wheel spins."""
     rcs_dbsm: Rcs | Bearings | None = None
@@ -245,9 +256,7 @@ class BodyTable(Table):
     role: Literal["scatterer", "mirror", "blocker"] | None = None
 
     @model_validator(mode="after")
-    def _one_of(self) -> BodyTable:
-        if (self.shape is None) == (self.mesh is None):
-            raise ValueError("either shape or mesh")
+    def _fluctuates(self) -> BodyTable:
         if self.swerling and self.rcs_dbsm is None:
             raise ValueError("rcs_dbsm with swerling: only a given RCS fluctuates")
         return self
