@@ -16,6 +16,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from bench.before import before
 from bench.fine import fine
 from bench.frame import frame
 from bench.laser import laser
@@ -25,14 +26,14 @@ from bench.rays import rays
 from bench.ship import ship
 from bench.size import size
 from bench.synthesis import phase_noise, scaling, synthesis
+from bench.threads import threads
 from bench.turbine import turbine
 from raychan.run.output_files import write_whole
 from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
-ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, fine, memory)
-}
+_GROUPS = rays, laser, synthesis, phase_noise, scaling, frame, threads, before, turbine, ship, size, fine, memory
+ALL: dict[str, Benchmark] = {f.__name__: f for f in _GROUPS}
 _ROOT = Path(__file__).parents[2]
 
 

@@ -1,0 +1,66 @@
+"""Threads: whole frames on two against one, and what of a frame is done outside every loop that threads share."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+
+import raychan as rc
+from bench.measure import Row, barred, paired, seconds
+from raychan import parallel
+
+_BAR, _SERIAL = 1.0 / 1.85, 0.1
+
+
+def threads(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
+    """Run the urban street and the living street at 0.5 dB on one thread and on two, in turn."""
+    for name in ("urban", "living_street"):
+        scene, tolerance = rc.Scene.load(scenes / f"{name}.toml"), 3.0 if quick else 0.5
+        rc.simulate(scene, tolerance_db=tolerance)
+
+        def run(count: int, scene: rc.Scene = scene, tolerance: float = tolerance) -> float:
+            parallel.set_threads(count)
+            try:
+                return seconds(lambda: rc.simulate(scene, tolerance_db=tolerance))
+            finally:
+                parallel.set_threads(None)
+
+        row = paired(
+            "threads", f"{name}, {tolerance:g} dB, two threads", [(run(2), run(1)) for _ in range(repeats)], "one"
+        )
+        yield barred(row, f"<= {_BAR:.2f}", row.ratio <= _BAR)
+        with _shared() as spent:
+            whole = run(1)
+        share = 1.0 - spent[0] / whole
+        row = Row("threads", f"{name}: outside shared loops", whole - spent[0], "whole frame", whole, share)
+        yield barred(row, f"<= {_SERIAL:g}", share <= _SERIAL)
+
+
+@contextmanager
+def _shared() -> Iterator[list[float]]:
+    """Give the seconds that the calling thread spends in `parallel_for`, calls within calls counted once."""
+    real, caller, spent, inside = parallel.parallel_for, threading.get_ident(), [0.0], [False]
+
+    def timed(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
+        # Loops too short for a second thread are not shared.
+        if inside[0] or n < least or threading.get_ident() != caller:
+            return real(n, work, least)
+        inside[0], start = True, perf_counter()
+        try:
+            return real(n, work, least)
+        finally:
+            inside[0] = False
+            spent[0] += perf_counter() - start
+
+    modules = [m for m in list(sys.modules.values()) if getattr(m, "parallel_for", None) is real]
+    for module in modules:
+        module.parallel_for = timed  # type: ignore[attr-defined]
+    try:
+        yield spent
+    finally:
+        for module in modules:
+            module.parallel_for = real  # type: ignore[attr-defined]
