@@ -25,8 +25,14 @@ _SMALL = 1e-3
 path all the same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
 
 
-def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float) -> Paths:
-    """Return what routes carry for a radar at a frequency [Hz]; a footprint long in range becomes three paths."""
+def paths_of(
+    routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float, noise: float = 0.0
+) -> Paths:
+    """Return what routes carry for a radar at a frequency [Hz]; a footprint long in range becomes three paths.
+
+    Args: noise amplitude of a path as strong as the noise in a map cell: footprints stay one path where it hides the
+    difference; then the radar has a waveform.
+    """
     if isinstance(routes, DiffractedRoutes):
         return diffracted_paths(routes, facets, radar, frequency)
     gains = transfer(
@@ -46,7 +52,7 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     rows = np.flatnonzero(long)
     corner_rate = 2.0 * corner_rates(routes, rows, facets, *speeds)
     apart = np.abs(corner[rows] - routes.length[rows, None]), np.abs(corner_rate - 2.0 * rate[rows, None])
-    split = _tells(radar, np.abs(gains[rows]).max(axis=1), *apart)
+    split = _tells(radar, noise, np.abs(gains[rows]).max(axis=1), *apart)
     long[rows[~split]] = False
     whole, rows, corner_rate = np.flatnonzero(~long), rows[split], corner_rate[split]
     received = {
@@ -64,18 +70,16 @@ def paths_of(routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds
     )
 
 
-def _tells(radar: RadarEnds, size: Floats, length: Floats, rate: Floats) -> NDArray[np.bool_]:
+def _tells(radar: Any, noise: float, size: Floats, length: Floats, rate: Floats) -> NDArray[np.bool_]:
     """Tell of which footprints (r,) the corners need delays and rates of their own: what one of each, that of the
     centre, does to the samples is more than a small part of the noise.
 
-    Args: size (r, 3) of the corners' amplitudes; by how much their length [m] and its rate [m/s] (r, 3) differ from
-    those of the centre.
+    Args: noise and size (r, 3) of the corners as amplitudes; by how much their length [m] and its rate [m/s] (r, 3)
+    differ from those of the centre.
     """
-    if not getattr(radar, "noise", False):
+    if noise == 0.0:
         return np.ones(len(size), bool)
-    sensor: Any = radar
-    wave = sensor.waveform
-    noise = np.sqrt(sensor.noise_power / sensor.power / (wave.n_chirps * wave.n_samples))
+    wave = radar.waveform
     turn = np.pi * (wave.bandwidth * length + wave.carrier * wave.frame_duration * rate) / C0
     return np.asarray((size * np.minimum(turn, 2.0)).sum(axis=1) > _SMALL * noise)
 

@@ -106,8 +106,7 @@ def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
     azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
     look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
     ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
-    amplitude = np.sqrt(noise_of_beam(radar, settings) / radar.power)
-    return float(amplitude * 4.0 * np.pi / radar.waveform.wavelength / np.prod(list(ends)))
+    return float(noise_amplitude(radar, settings) * 4.0 * np.pi / radar.waveform.wavelength / np.prod(list(ends)))
 
 
 def noise_of_cell(radar: Radar, settings: Any) -> float:
@@ -123,6 +122,11 @@ def noise_of_cell(radar: Radar, settings: Any) -> float:
 def noise_of_beam(radar: Radar, settings: Any) -> float:
     """Return the thermal noise [W] of what the detector looks at: a beam in a cell, or the cell; 0 without noise."""
     return noise_of_cell(radar, settings) / beam_gain(radar, settings)
+
+
+def noise_amplitude(radar: Radar, settings: Any) -> float:
+    """Return the amplitude of a path as strong as the noise that the detector looks at."""
+    return float(np.sqrt(noise_of_beam(radar, settings) / radar.power))
 
 
 def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapError:

@@ -25,7 +25,7 @@ from raychan.run.map_cells import MapCells, feeding_sources
 from raychan.run.mechanisms import choose, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
-from raychan.run.receiver import detections_in, map_of, noise_of_beam
+from raychan.run.receiver import detections_in, map_of, noise_amplitude, noise_of_beam
 from raychan.run.refinement_budget import STEPS, Budget
 from raychan.run.rules import first_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, changes
@@ -145,7 +145,10 @@ class SceneRefinement:
 
     def _carried(self, batch: Batch) -> tuple[Batch | None, Paths]:
         """Return a batch of routes, where they are kept, and their paths."""
-        paths = paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier)
+        radar = self.radar
+        paths = paths_of(
+            batch, self.geometry.facets, radar, radar.waveform.carrier, noise_amplitude(radar, self.settings)
+        )
         return (None if self.launches is None else batch), paths
 
     def _paths(

@@ -10,7 +10,7 @@ from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
 from raychan.run.received import received
-from raychan.run.receiver import detections_in, map_of, noise_equivalent_amplitude
+from raychan.run.receiver import detections_in, map_of, noise_amplitude, noise_equivalent_amplitude
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.solver import Batch
@@ -36,6 +36,8 @@ class SceneRoutes:
     rule: PruneRule
     batches: tuple[Batch, ...]
     stats: Stats
+    noise: float = 0.0
+    """Amplitude of a path as strong as the noise of the radar that they were traced for, where that bounds paths."""
 
     def __len__(self) -> int:
         return sum(len(batch.kind) for batch in self.batches)
@@ -66,7 +68,8 @@ def trace(
         refinement = SceneRefinement(geometry, points, radar, settings, model, lambda *_: None, stats, launches)
         if (first := refinement.first()) is not None:
             refinement.converged(first)
-            return SceneRoutes(geometry, rule, tuple(b for launch in launches for b in launch), stats)
+            batches = tuple(b for launch in launches for b in launch)
+            return SceneRoutes(geometry, rule, batches, stats, noise_amplitude(radar, settings))
     stats = Stats()
     batches = tuple(launch_routes(geometry, points, rule, stats))
     return SceneRoutes(geometry, rule, batches, stats)
@@ -85,7 +88,8 @@ def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
     if problem:
         raise ValueError(f"these routes do not serve this radar: {problem}")
     facets = routes.geometry.facets
-    return join([nothing(facets, radar), *(paths_of(batch, facets, radar, carrier) for batch in routes.batches)])
+    every = (paths_of(batch, facets, radar, carrier, routes.noise) for batch in routes.batches)
+    return join([nothing(facets, radar), *every])
 
 
 def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
