@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, REFLECT, TRANSMIT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
 from raychan.tracing.legs import Leg, legs_over, reachable
@@ -23,6 +24,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 Batch = Routes | DiffractedRoutes
+LegsFrom = Callable[[Geometry, Floats, int, Beam | None], list[Leg]]
+"""Gives the legs from an end, the direct one first (see `legs.legs_over`)."""
 
 # A launch beyond these limits cuts no more and says so.
 _TUBES = 10_000_000  # cut for phase: a quarter of a minute of one core; urban streets at 0.1 dB take a million
@@ -58,18 +61,20 @@ class Launch:
     Each route has a source (see `tracing.sources`).
     """
 
-    def __init__(self, geometry: Geometry, points: Points, rule: PruneRule) -> None:
+    def __init__(
+        self, geometry: Geometry, points: Points, rule: PruneRule, legs: LegsFrom = legs_over
+    ) -> None:
         self.geometry, self.points, self.rule = geometry, points, rule
-        self.legs = legs_over(geometry, np.asarray(rule.position, float), rule.bounces - 1, rule.beam)
+        self.legs = legs(geometry, np.asarray(rule.position, float), rule.bounces - 1, rule.beam)
         self.outs = self.legs
         if rule.rx is not None:
-            self.outs = legs_over(geometry, np.asarray(rule.rx, float), rule.bounces - 1, rule.beam)
+            self.outs = legs(geometry, np.asarray(rule.rx, float), rule.bounces - 1, rule.beam)
         self._found: dict[int, Contributions] = {}
 
     def whole(self, stats: Stats, progress: Progress | None = None) -> Iterator[tuple[Batch, Sources]]:
         """Yield all routes, and their sources (n,), batch by batch."""
         before = self.geometry.rays
-        for exact in self._exact():
+        for exact in self.exact():
             yield exact, np.full(len(exact.kind), EXACT)
         # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not
         # matter.
@@ -108,7 +113,7 @@ class Launch:
             stats.tubes += len(routes.kind)
             yield routes, sources_of(routes, i, len(leg.mirrors), out, depth)
 
-    def _exact(self) -> Iterator[Batch]:
+    def exact(self) -> Iterator[Batch]:
         """Yield the routes that need no tubes: over points, wedges, the ground's foot points, and the direct ones."""
         geometry, points, rule, refined = self.geometry, self.points, self.rule, self.rule.refinement
         legs, outs = self.legs, self.outs
