@@ -45,9 +45,7 @@ LEFT_OUT = (
 )
 
 
-def preview_of(
-    geometry: Geometry, points: Points, radar: Radar, settings: Any, model: Any
-) -> tuple[Launched, Stats]:
+def preview_of(geometry: Geometry, points: Points, radar: Radar, settings: Any, model: Any) -> tuple[Launched, Stats]:
     """Return the launch of a preview and what it cost; args as for `scene_refinement.SceneRefinement`."""
     stats, carrier = Stats(), radar.waveform.carrier
     batches = preview_routes(geometry, points, preview_rule(radar, settings, model), stats)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.em.phase_integral import quadratic_means
 from raychan.geometry.curved_patches import edge_to_cut, halved
+from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, SCATTERER, Points, Routes
 from raychan.tracing.contributions import Contributions
@@ -24,7 +25,7 @@ from raychan.tracing.radiation import FACING, Phases, phases_of, radiating
 from raychan.tracing.routes import routes_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Batch, Launch, Stats
-from raychan.tracing.tubes import MOST_BEND, Tubes, launch_tubes
+from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, launch_tubes
 from raychan.tracing.visibility import centre_visibility
 from raychan.world.geometry import Geometry
 
@@ -41,17 +42,26 @@ def preview_routes(geometry: Geometry, points: Points, rule: PruneRule, stats: S
 
     Args: geometry; points the targets given by their RCS; rule what may be left out.
     """
-    before = geometry.rays
-    launch = Launch(geometry, points, rule, legs_over_ground)
+    launch, refined = Launch(geometry, points, rule, legs_over_ground), rule.refinement.for_depth(rule.bounces)
+
+    def over(legs: list[Leg]) -> tuple[list[_Tubes], int]:
+        """Return the tubes over some legs, and the rays that this thread cast for them."""
+        before, seen = geometry.rays, []
+        for leg in legs:
+            outs = [out for out in launch.outs if len(leg.mirrors) + 1 + len(out.mirrors) <= rule.bounces]
+            seen.append(_Tubes.over(geometry, leg, outs, refined))
+        return seen, geometry.rays - before
+
+    (direct, some), (others, more) = run_pair(lambda: over(launch.legs[:1]), lambda: over(launch.legs[1:]))
+    before, found = geometry.rays, Contributions(refined)
     yield from launch.exact()
-    found = Contributions(rule.refinement.for_depth(rule.bounces))
-    for leg in launch.legs:
-        outs = [out for out in launch.outs if len(leg.mirrors) + 1 + len(out.mirrors) <= rule.bounces]
-        for routes in _Tubes.over(geometry, leg, outs, found).routes(found):
+    # What the direct leg finds prunes the others.
+    for tubes in direct + others:
+        for routes in tubes.routes(found):
             stats.tubes += len(routes.kind)
             yield routes
     stats.legs = len(launch.legs)
-    stats.rays += geometry.rays - before
+    stats.rays += some + more + geometry.rays - before
 
 
 def legs_over_ground(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
@@ -77,8 +87,9 @@ class _Tubes:
     view: View
 
     @staticmethod
-    def over(geometry: Geometry, leg: Leg, outs: list[Leg], found: Contributions) -> _Tubes:
+    def over(geometry: Geometry, leg: Leg, outs: list[Leg], rule: Refinement) -> _Tubes:
         """Return the tubes over a leg that may count over one of `outs`, cut where facets are large."""
+        found = Contributions(rule)
         allowed = reachable(geometry, leg) & (geometry.piece_role == SCATTERER)
         allowed[leg.pieces(geometry)] = False
         facet = seed_facets(geometry, leg, allowed)
@@ -86,14 +97,14 @@ class _Tubes:
         tubes = launch_tubes(geometry, leg, facet, whole)
         counts = np.zeros(len(facet), bool)
         for out in outs:
-            ph = phases_of(geometry, leg, out, tubes, found.rule)
+            ph = phases_of(geometry, leg, out, tubes, rule)
             counts[found.that_count(_SEEDS * ph.bound, ph.length, 0)] = True
-        facet, bary, cut = _cut(geometry, leg, outs[0], facet[counts], whole[: counts.sum()], found)
+        facet, bary, cut = _cut(geometry, leg, outs[0], facet[counts], whole[: counts.sum()], rule)
         tubes = launch_tubes(geometry, leg, facet, bary) if cut else tubes.take(counts)
         tubes = tubes.take(tubes.strength > 0.0)
-        view = centre_visibility(geometry, leg, tubes, True, found.rule)
+        view = centre_visibility(geometry, leg, tubes, True, rule)
         tubes, view = tubes.take(view.seen), view.take(view.seen)
-        write_leg(geometry, tubes, leg, view.corners, view.passed, found.rule)
+        write_leg(geometry, tubes, leg, view.corners, view.passed, rule)
         return _Tubes(geometry, leg, outs, tubes, view)
 
     def routes(self, found: Contributions) -> Iterator[Routes]:
@@ -122,10 +133,10 @@ def _sizes(ph: Phases) -> Floats:
 
 
 def _cut(
-    geometry: Geometry, leg: Leg, out: Leg, facet: Ints, bary: Floats, found: Contributions
+    geometry: Geometry, leg: Leg, out: Leg, facet: Ints, bary: Floats, rule: Refinement
 ) -> tuple[Ints, Floats, bool]:
     """Return facets (n,) and corners (n, 3, 3) of tubes cut until their phase is quadratic, and whether any was cut."""
-    f, rule = geometry.facets, found.rule
+    f = geometry.facets
     shape = f.vertices, f.normals, geometry.edge_curvature
     limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, True
     done: list[tuple[Ints, Floats]] = []

@@ -61,9 +61,7 @@ class Launch:
     Each route has a source (see `tracing.sources`).
     """
 
-    def __init__(
-        self, geometry: Geometry, points: Points, rule: PruneRule, legs: LegsFrom = legs_over
-    ) -> None:
+    def __init__(self, geometry: Geometry, points: Points, rule: PruneRule, legs: LegsFrom = legs_over) -> None:
         self.geometry, self.points, self.rule = geometry, points, rule
         self.legs = legs(geometry, np.asarray(rule.position, float), rule.bounces - 1, rule.beam)
         self.outs = self.legs

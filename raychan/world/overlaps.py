@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from raychan.geometry.closed_surfaces import winding
 from raychan.records import MIRROR
 from raychan.world.body import Body
 from raychan.world.limbs import alike
-from raychan.world.mesh import Floats
+from raychan.world.mesh import Floats, Mesh
 
 _SAMPLES = 400  # points on a body's surface
 _TESTS = 48  # most of these that are tested against another body
@@ -24,7 +25,15 @@ _BEAM = 1e-6  # of the two-way peak gain, -60 dB: below, a body is outside the b
 
 def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Floats:
     """Return points (count, 3) [m], world axes, spread over a body's surface, `depth` [m] below it; always the same."""
-    mesh, rng = body.geometry, np.random.default_rng(0)
+    name = f"surface sample {count} {depth}"
+    if name not in body.geometry.memo:
+        body.geometry.memo[name] = _sample(body.geometry, count, depth)
+    return np.asarray(body.motion.to_world(body.geometry.memo[name]))
+
+
+def _sample(mesh: Mesh, count: int, depth: float) -> Floats:
+    """Return the points of `surface_sample` (count, 3) [m] in the body's frame."""
+    rng = np.random.default_rng(0)
     share = np.cumsum(mesh.areas)
     face = np.minimum(np.searchsorted(share, rng.random(count) * share[-1]), len(share) - 1)
     u, v = rng.random((2, count, 1))
@@ -32,7 +41,7 @@ def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Flo
     a, b, c = np.moveaxis(mesh.corners[face], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.asarray(body.motion.to_world(a + u * (b - a) + v * (c - a) - depth * normal))
+    return np.asarray(a + u * (b - a) + v * (c - a) - depth * normal)
 
 
 def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
@@ -84,7 +93,8 @@ def _inside(body: Body, other: Body) -> float:
     asked = near[: max(8, min(_TESTS, _WORK // len(other.geometry.faces)))]
     if not len(asked):
         return 0.0
-    return float(np.mean([other.geometry.winding(p) > _INSIDE for p in asked])) * len(near) / len(places)
+    corners = np.ascontiguousarray(other.geometry.corners)
+    return float(np.mean([winding(corners, p) > _INSIDE for p in asked])) * len(near) / len(places)
 
 
 def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
