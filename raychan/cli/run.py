@@ -37,6 +37,13 @@ def run(
     max_bounces: MaxBounces = None,
     threads: Threads = None,
     set_: Changes = None,
+    preview: Annotated[
+        bool,
+        typer.Option(
+            "--preview",
+            help="A fast, coarse picture without bounces from body to body: --set model.mode=preview.",
+        ),
+    ] = False,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no pictures.")] = False,
     frames: Annotated[
         int | None,
@@ -76,7 +83,7 @@ def run(
         return
     if out is None:
         raise typer.BadParameter("missing: name a directory for the results", param_hint="--out")
-    loaded = Scene.load(scene).override(set_ or [])
+    loaded = Scene.load(scene).override([*(set_ or []), *(["model.mode=preview"] if preview else [])])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
     check_demand(loaded)
     show.warn(long_run(loaded, frames or 1))

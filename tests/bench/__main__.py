@@ -21,6 +21,7 @@ from bench.frame import frame
 from bench.laser import laser
 from bench.measure import Row
 from bench.memory import memory
+from bench.preview import preview
 from bench.rays import rays
 from bench.ship import ship
 from bench.size import size
@@ -31,7 +32,8 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, fine, memory)
+    f.__name__: f
+    for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, fine, memory, preview)
 }
 _ROOT = Path(__file__).parents[2]
 
