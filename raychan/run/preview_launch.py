@@ -21,7 +21,7 @@ from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.launch import write_leg
 from raychan.tracing.legs import Leg, Mirror, View, reachable
-from raychan.tracing.radiation import FACING, Phases, phases_of, radiating
+from raychan.tracing.radiation import FACING, phases_of, radiating
 from raychan.tracing.routes import routes_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Batch, Launch, Stats
@@ -34,6 +34,9 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 _SEEDS = 0.25  # of their bounds that seeds are pruned by; measured with the rest in `run.preview`
+_SEEN = 0.5  # the same, of tubes that are seen
+_SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; as in `tracing.contributions`
+_CLASSES, _A_CLASS = 64, 4.0  # of sizes below the threshold, and of these to a factor of two; not measured
 _CUTS = 12  # times a facet is halved at most: 64 parts a side, of a wall of 40 m no part is longer than 0.6 m
 
 
@@ -98,7 +101,7 @@ class _Tubes:
         counts = np.zeros(len(facet), bool)
         for out in outs:
             ph = phases_of(geometry, leg, out, tubes, rule)
-            counts[found.that_count(_SEEDS * ph.bound, ph.length, 0)] = True
+            counts |= _that_count(found, _SEEDS * ph.bound, ph.length)
         facet, bary, cut = _cut(geometry, leg, outs[0], facet[counts], whole[: counts.sum()], rule)
         tubes = launch_tubes(geometry, leg, facet, bary) if cut else tubes.take(counts)
         tubes = tubes.take(tubes.strength > 0.0)
@@ -116,9 +119,11 @@ class _Tubes:
             ph = phases_of(geometry, leg, out, tubes, found.rule)
             if out is leg:
                 found.add(ph)
-            rows = found.that_count(_sizes(ph), ph.length, 0)
-            tubes, ph = tubes.take(rows), ph.take(rows)
-            view = view.take(rows)
+            rows = np.flatnonzero(_that_count(found, _SEEN * ph.bound, ph.length))
+            ph = ph.take(rows)
+            kept = _that_count(found, np.abs(ph.in_phase * quadratic_means(ph.six, 0.5)), ph.length)
+            rows, ph = rows[kept], ph.take(kept)
+            tubes, view = tubes.take(rows), view.take(rows)
             if out is not leg:
                 view = centre_visibility(geometry, out, tubes, True, found.rule)
                 tubes, ph, view = tubes.take(view.seen), ph.take(view.seen), view.take(view.seen)
@@ -127,9 +132,18 @@ class _Tubes:
                 yield routes_of(geometry, leg, out, tubes, True, view.corners, view.passed)
 
 
-def _sizes(ph: Phases) -> Floats:
-    """Return what each tube scatters (n,) [1/m]."""
-    return np.abs(ph.in_phase * quadratic_means(ph.six, 0.5))
+def _that_count(found: Contributions, size: Floats, length: Floats) -> Bools:
+    """Return which tubes (n,) to keep: the weakest of each range cell are pruned while their sum in phase stays under
+    0.3 of the prune threshold; as `Contributions.that_count`, but by classes of sizes in place of a sort.
+
+    Args: size (n,) [1/m] of what each scatters, length (n,) [m] of its two-way path.
+    """
+    share = size / found.prune_threshold(length)
+    cell = np.asarray(length / found.rule.cell, np.int64)
+    octave = np.clip(_CLASSES + _A_CLASS * np.log2(np.maximum(share, 1e-9)), 0, _CLASSES - 1).astype(np.int64)
+    sums = np.bincount(cell * _CLASSES + octave, share, (int(cell.max(initial=0)) + 1) * _CLASSES)
+    sums = np.cumsum(sums.reshape(-1, _CLASSES), axis=1)
+    return np.asarray(sums[cell, octave] > _SHARE)
 
 
 def _cut(
