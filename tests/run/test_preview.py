@@ -146,3 +146,9 @@ def test_a_preview_says_that_it_is_one_and_states_an_error_for_each_detection(tm
     again = load_result(tmp_path / "out")
     assert again.require_scene().model.mode == "preview"
     np.testing.assert_array_equal(again.detections.power, result.detections.power)
+
+
+def test_the_stages_one_by_one_give_the_paths_of_simulate():
+    scene = scene_of(5, mode="preview")
+    paths = rc.transfer(rc.trace(scene), scene.radar)
+    np.testing.assert_array_equal(paths.amplitude, rc.simulate(scene).paths.amplitude)
