@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -13,6 +13,9 @@ from raychan.records import MIRROR
 from raychan.world.body import Body
 from raychan.world.limbs import alike
 from raychan.world.mesh import Floats, Mesh
+
+Kept = dict[tuple[str, ...], tuple[tuple[Body, ...], Any]]
+"""Bodies by their names, and what was found of them: a body that does not move is the same object at all times."""
 
 _SAMPLES = 400  # points on a body's surface
 _TESTS = 48  # most of these that are tested against another body
@@ -44,20 +47,29 @@ def _sample(mesh: Mesh, count: int, depth: float) -> Floats:
     return np.asarray(a + u * (b - a) + v * (c - a) - depth * normal)
 
 
-def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
+def overlaps(bodies: Sequence[Body], opaque: Sequence[bool], kept: Kept | None = None) -> list[str]:
     """Return a line for each pair of bodies that overlap, and for each body hidden inside another.
 
     Args: opaque: which bodies let no wave through. A body wholly inside one that lets waves in is intended; two that
-    fill nearly the same space are not.
+    fill nearly the same space are not. kept: what was found of the same bodies at another time.
     """
-    said = []
+    said, kept = [], {} if kept is None else kept
     solid = [i for i, body in enumerate(bodies) if body.resolved_role != MIRROR]
-    boxes = {i: _box(bodies[i]) for i in solid}
+    boxes = {i: _found(kept, (bodies[i],), _box) for i in solid}
     for i, k in combinations(solid, 2):
         low, high = np.maximum(boxes[i][0], boxes[k][0]), np.minimum(boxes[i][1], boxes[k][1])
         if (high - low > _DEPTH).all() and not alike(bodies[i], bodies[k]):
-            said += _told(bodies[i], bodies[k], opaque[i], opaque[k])
+            said += _found(kept, (bodies[i], bodies[k]), lambda a, b, i=i, k=k: _told(a, b, opaque[i], opaque[k]))
     return said
+
+
+def _found(kept: Kept, of: tuple[Body, ...], make: Callable[..., Any]) -> Any:
+    """Return what `make` finds of bodies, or found when they stood where they stand."""
+    names = tuple(body.name for body in of)
+    known = kept.get(names)
+    if known is None or any(a is not b for a, b in zip(known[0], of, strict=True)):
+        known = kept[names] = of, make(*of)
+    return known[1]
 
 
 def _told(one: Body, other: Body, one_opaque: bool, other_opaque: bool) -> list[str]:

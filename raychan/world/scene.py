@@ -246,7 +246,7 @@ class Scene(Described):
         }
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
         opaque = [all(m.kind != LAYER for m in self._chosen(b)) for b in self.bodies]
-        said += overlaps.overlaps(self.bodies, opaque)
+        said += overlaps.overlaps(self.bodies, opaque, self._static.setdefault("overlaps", {}))
         if self.radar_table is None:
             return said
         said += checks.edge_on(self.bodies, self.radar_table)
