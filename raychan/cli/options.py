@@ -86,6 +86,30 @@ Changes = Annotated[
     ),
 ]
 
+Preview = Annotated[
+    bool,
+    typer.Option(
+        "--preview",
+        help="A fast, coarse picture without bounces from body to body, the same as --set model.mode=preview.",
+    ),
+]
+Frames = Annotated[
+    int | None,
+    typer.Option(
+        help="Simulate a sequence of N frames; poses advance by velocities and turn rates.",
+        metavar="N",
+        callback=within(limits.FRAMES, True),
+    ),
+]
+FrameInterval = Annotated[
+    float | None,
+    typer.Option(
+        help="Seconds from frame to frame; if not given, frames follow without a pause.",
+        metavar="S",
+        callback=within(limits.INTERVAL),
+    ),
+]
+
 _SHIP = "A ship's scene file (TOML), or the name of a bundled one, such as ship_avoid."
 ShipSceneFile = Annotated[Path, typer.Argument(help=_SHIP, metavar="SCENE", show_default=False)]
 ShipChanges = Annotated[

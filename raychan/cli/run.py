@@ -9,8 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, within
-from raychan.world import limits
+from raychan.cli.options import (
+    Changes,
+    FrameInterval,
+    Frames,
+    MaxBounces,
+    Preview,
+    SceneFile,
+    Seed,
+    Threads,
+    Tolerance,
+)
 
 if TYPE_CHECKING:
     from raychan.run.result import Result
@@ -37,23 +46,10 @@ def run(
     max_bounces: MaxBounces = None,
     threads: Threads = None,
     set_: Changes = None,
+    preview: Preview = False,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no pictures.")] = False,
-    frames: Annotated[
-        int | None,
-        typer.Option(
-            help="Simulate a sequence of N frames; poses advance by velocities and turn rates.",
-            metavar="N",
-            callback=within(limits.FRAMES, True),
-        ),
-    ] = None,
-    frame_interval: Annotated[
-        float | None,
-        typer.Option(
-            help="Seconds from frame to frame; if not given, frames follow without a pause.",
-            metavar="S",
-            callback=within(limits.INTERVAL),
-        ),
-    ] = None,
+    frames: Frames = None,
+    frame_interval: FrameInterval = None,
 ) -> None:
     """Simulate a scene: paths, power-delay profile, I/Q cube, range-Doppler map, detections.
 
@@ -76,7 +72,7 @@ def run(
         return
     if out is None:
         raise typer.BadParameter("missing: name a directory for the results", param_hint="--out")
-    loaded = Scene.load(scene).override(set_ or [])
+    loaded = Scene.load(scene).override([*(set_ or []), *(["model.mode=preview"] if preview else [])])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
     check_demand(loaded)
     show.warn(long_run(loaded, frames or 1))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,12 @@ def training(
     """
     if min(*guard, *train) < 0:
         raise ValueError(f"guard = {guard}, train = {train}: must not be negative")
+    return _training(grid, tuple(guard), tuple(train), tuple(windows))
+
+
+@lru_cache(maxsize=4)
+def _training(grid: Grid, guard: tuple[int, int], train: tuple[int, int], windows: tuple[str, str]) -> Training:
+    """Return the training cells, kept for the next frame of a sequence."""
     cells, steps = _offsets(grid.count, guard, train)
     if not len(cells):
         raise ValueError(
@@ -127,6 +133,7 @@ def training(
     return Training(cells * np.array(grid.pad), _STRIDE * steps[1] * grid.pad[1], float(len(cells) ** 2 / alike.sum()))
 
 
+@lru_cache(maxsize=16)
 def factor(pfa: float, count: float, method: str = "ca", looks: int = 1) -> float:
     """Return the threshold over the mean (ca) or the ordered statistic (os) of `count` independent training cells.
 

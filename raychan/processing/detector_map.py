@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Training, batches, level, statistic
-from raychan.processing.peaks import maxima
+from raychan.processing.peaks import AROUND, maxima
 from raychan.records import RangeDoppler
 
 Floats = NDArray[np.float64]
@@ -17,7 +17,6 @@ Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 BEAMS = ("coherent", "mean")
-_AROUND = [(v, r) for v in (-1, 0, 1) for r in (-1, 0, 1) if v or r]
 _ROUNDING = 1e-5  # two sums of single precision over the receivers
 
 
@@ -86,7 +85,7 @@ class StrongestBeam:
         map of the strongest beams.
         """
         cells = np.argwhere(self.power > least)
-        for step in _AROUND:
+        for step in AROUND:
             near = (cells + step) % self.power.shape
             beside = np.empty(len(cells))
             for at in batches(len(cells), self.spectrum.shape[0]):

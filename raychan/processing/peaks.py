@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
 from raychan.processing.cfar import Grid
 from raychan.radar.side_lobes import SideLobeEnvelope
@@ -20,12 +19,17 @@ _FLOOR = 1e-12  # of a peak: rounding errors of single precision and of the fast
 _SLACK = 0.25  # resolution cells by which side lobes of other echoes may shift a peak (not measured)
 _STEEP = 5.0  # Np of power: more than any window falls in half a resolution cell
 _TINY = 1e-300
+AROUND = [(v, r) for v in (-1, 0, 1) for r in (-1, 0, 1) if v or r]
+"""Steps from a cell to the eight around it."""
 
 
 def maxima(power: Floats, least: float) -> Ints:
     """Return the local maxima (c, 2) of a map; both axes wrap as the transforms do."""
-    top = (power >= maximum_filter(power, size=3, mode="wrap")) & (power > least)
-    return np.argwhere(top)
+    cells = np.argwhere(power > least)
+    for step in AROUND:
+        near = (cells + step) % power.shape
+        cells = cells[power[tuple(cells.T)] >= power[tuple(near.T)]]
+    return cells
 
 
 def refine(power: Floats, cells: Ints) -> tuple[Floats, Floats]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.radar.waveform import Waveform
 from raychan.records import TRANSMIT, Detections, InteractionType, Paths, RangeDoppler
 from raychan.run.cell_sums import cell_sums
 from raychan.run.convergence import figure
@@ -188,7 +190,13 @@ def provenance(
 
 def response_of(receiver: Receiver) -> PointSpread:
     """Return the response of a receiver's processor."""
-    return PointSpread(receiver.waveform, receiver.range_window, receiver.rate_window)
+    return _spread(receiver.waveform, receiver.range_window, receiver.rate_window)
+
+
+@lru_cache(maxsize=2)
+def _spread(waveform: Waveform, range_window: str, rate_window: str) -> PointSpread:
+    """Return a response, kept with its tables for the next frame of a sequence."""
+    return PointSpread(waveform, range_window, rate_window)
 
 
 def _alike(paths: Paths) -> tuple[Ints, Ints]:

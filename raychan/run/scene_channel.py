@@ -17,6 +17,7 @@ from raychan.run.mechanisms import choose
 from raychan.run.messages import merged, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import Launched, PathStream
+from raychan.run.preview import preview_notes, preview_of
 from raychan.run.receiver import noise_of_beam
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.scene_refinement import SceneRefinement
@@ -27,6 +28,7 @@ from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Stats
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.scene import Scene
+from raychan.world.schema import PREVIEW
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     """Return the channel of a scene; arguments and errors as those of `simulate`.
 
     It is refined where detections need it. A frame with bodies that turn, or with more paths than can be held, is
-    launched twice instead, as a whole.
+    launched twice instead, as a whole; a preview once.
     """
     said = check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
@@ -64,6 +66,11 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         geometry, points = geometry_of(scene, model.tolerance_db), scene.points(0.0)
         beam_of(scene.radar)
     said += merged(geometry)
+    if model.mode == PREVIEW:
+        with clock.stage("trace"):
+            launched, stats = preview_of(geometry, points, scene.radar, scene.processing, model)
+        cost = _cost(stats, stats.rays, 1, model)
+        return Channel(geometry, points, launched, launched, model, None, cost, (*said, *preview_notes()))
     edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
     if not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)

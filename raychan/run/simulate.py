@@ -17,6 +17,7 @@ from raychan.run.labels import provenance
 from raychan.run.ledger import Entry
 from raychan.run.messages import counts, told
 from raychan.run.path_stream import Launched
+from raychan.run.preview import preview_error, preview_ledger
 from raychan.run.rate_spread import claimed, launch_share, motion, without
 from raychan.run.realization import realized
 from raychan.run.received import notes, received
@@ -29,6 +30,7 @@ from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
+from raychan.world.schema import PREVIEW
 
 _BELOW = 0.3  # of the amplitude of a cell's noise, a dB of tolerance: what tubes that no launch cuts may bring
 
@@ -63,7 +65,8 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     with clock.stage("detect"):
         rdmap = map_of(cube, radar, settings)
         detections = detections_in(rdmap, radar, settings)
-        error = _error_of(channel, radar, settings)
+        preview = channel.model.mode == PREVIEW
+        error = preview_error(rdmap, radar, settings) if preview else _error_of(channel, radar, settings)
     channel = replace(channel, launched=launched)
     windows = settings.range_window, settings.rate_window
     names = background(channel.geometry.facets)
@@ -116,8 +119,14 @@ def _explained(
     radar, settings, turned = scene.radar, scene.processing, channel.turned
     paths, model = channel.launched.paths, channel.model
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
+
+    def explained() -> tuple[Explanation, ...]:
+        return provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths))
+
+    if model.mode == PREVIEW:
+        return explained(), preview_ledger()
     reasons, left_out = run_pair(
-        lambda: provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths)),
+        explained,
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
     )
     if turned:

@@ -9,6 +9,8 @@ import numpy as np
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
+from raychan.run.preview import preview_rule
+from raychan.run.preview_launch import preview_routes
 from raychan.run.received import received
 from raychan.run.receiver import detections_in, map_of, noise_amplitude, noise_equivalent_amplitude
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
@@ -22,6 +24,7 @@ from raychan.units import C0
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
+from raychan.world.schema import PREVIEW
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,11 @@ def trace(
         geometry_of(scene, model.tolerance_db),
         scene.points(0.0),
     )
+    if model.mode == PREVIEW and not check:
+        rule = preview_rule(radar, settings, model)
+        stats = Stats()
+        batches = tuple(preview_routes(geometry, points, rule, stats))
+        return SceneRoutes(geometry, rule, batches, stats, noise_amplitude(radar, settings))
     rule = (check_rule if check else fine_rule)(radar, settings, model)
     if not (check or needed(scene, model.retrace, rule.refinement.max_edge)):
         stats, launches = Stats(), list[list[Batch]]()

@@ -125,7 +125,7 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
 
     def take_seen(view: View, ready: Bools) -> None:
         parts.append(tubes.take(ready))
-        _write_leg(geometry, parts[-1], leg, view.corners[ready], view.passed[ready], rule)
+        write_leg(geometry, parts[-1], leg, view.corners[ready], view.passed[ready], rule)
 
     ph = phases_of(geometry, leg, out, tubes, rule)
     # What returns little by itself may still carry the next bounces.
@@ -154,8 +154,8 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     return Tubes.join(parts)
 
 
-def _write_leg(geometry: Geometry, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints, rule: Refinement) -> None:
-    """Write the leg's mirrors and the layers passed into the tubes' history."""
+def write_leg(geometry: Geometry, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints, rule: Refinement) -> None:
+    """Write the leg's mirrors, met at corners (n, m, 3) [m], and the layers passed (n, l) into the tubes' history."""
     every = np.arange(len(tubes))
     for i, m in enumerate(leg.mirrors):
         facet = np.full(len(tubes), m.facet, np.int32)

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, REFLECT, TRANSMIT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
 from raychan.tracing.legs import Leg, legs_over, reachable
@@ -27,6 +28,8 @@ Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 Batch = Routes | DiffractedRoutes
 T = TypeVar("T")
+LegsFrom = Callable[[Geometry, Floats, int, Beam | None], list[Leg]]
+"""Gives the legs from an end, the direct one first (see `legs.legs_over`)."""
 
 # A launch beyond these limits cuts no more and says so.
 _TUBES = 10_000_000  # cut for phase: a quarter of a minute of one core; urban streets at 0.1 dB take a million
@@ -66,12 +69,12 @@ class Launch:
     Each route has a source (see `tracing.sources`).
     """
 
-    def __init__(self, geometry: Geometry, points: Points, rule: PruneRule) -> None:
+    def __init__(self, geometry: Geometry, points: Points, rule: PruneRule, legs: LegsFrom = legs_over) -> None:
         self.geometry, self.points, self.rule = geometry, points, rule
-        self.legs = legs_over(geometry, np.asarray(rule.position, float), rule.bounces - 1, rule.beam)
+        self.legs = legs(geometry, np.asarray(rule.position, float), rule.bounces - 1, rule.beam)
         self.outs = self.legs
         if rule.rx is not None:
-            self.outs = legs_over(geometry, np.asarray(rule.rx, float), rule.bounces - 1, rule.beam)
+            self.outs = legs(geometry, np.asarray(rule.rx, float), rule.bounces - 1, rule.beam)
         self._found: dict[int, Contributions] = {}
 
     def whole(
@@ -79,7 +82,7 @@ class Launch:
     ) -> Iterator[tuple[T, Sources]]:
         """Yield what `each`, called by any thread, makes of all routes, and their sources (n,), batch by batch."""
         before = self.geometry.rays
-        for exact in self._exact():
+        for exact in self.exact():
             yield each(exact), np.full(len(exact.kind), EXACT)
         # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not
         # matter.
@@ -148,7 +151,7 @@ class Launch:
             stats.tubes += tubes
             yield one[0], one[1]
 
-    def _exact(self) -> Iterator[Batch]:
+    def exact(self) -> Iterator[Batch]:
         """Yield the routes that need no tubes: over points, wedges, the ground's foot points, and the direct ones."""
         geometry, points, rule, refined = self.geometry, self.points, self.rule, self.rule.refinement
         legs, outs = self.legs, self.outs

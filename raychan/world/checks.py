@@ -15,7 +15,7 @@ from raychan.units import C0
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
-from raychan.world.point_in_body import Place, in_plane_of, place_of
+from raychan.world.point_in_body import Place, in_plane_of, place_of, within
 from raychan.world.schema import RadarTable
 
 
@@ -57,7 +57,7 @@ def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
                 where = "a place on its lit side"
                 raise SceneError(f"{what} is behind '{body.name}'", key=key, value=at.tolist(), allowed=where)
             continue
-        place = place_of(mesh.corners, local)
+        place = place_of(mesh.corners, local) if within(mesh.bounds, local) else Place.OUTSIDE
         if place != Place.OUTSIDE:
             where = "inside" if place == Place.INSIDE else "on the surface of"
             # A mesh in the wrong unit may enclose the radar.
@@ -82,7 +82,7 @@ def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:
     """Return a warning for each body that has facets in whose plane the radar lies."""
     said = []
     for body in bodies:
-        count = in_plane_of(body.geometry.corners, body.motion.to_body(np.array(radar.position)))
+        count = in_plane_of(body.geometry.planes, body.motion.to_body(np.array(radar.position)))
         if count:
             said.append(f"radar lies in the plane of {count} facets of '{body.name}': edge-on, they return nothing")
     return said

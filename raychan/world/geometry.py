@@ -22,7 +22,7 @@ from raychan.world.body import Body
 from raychan.world.inner_spheres import inner_spheres_of
 from raychan.world.ray_caster import RayCaster
 from raychan.world.scene_topology import SceneTopology, closed_pieces
-from raychan.world.schema import Model
+from raychan.world.schema import PREVIEW, Model
 from raychan.world.simplified import Merged, traced_scene
 from raychan.world.static_geometry import StaticGeometry, columns, computed_once
 from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
@@ -278,7 +278,9 @@ def surface_at(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:
 def geometry_of(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:
     """Return the geometry of a scene's bodies at time 0 as `surface_at` does, built once and kept with the scene."""
     merged = traced_scene(scene, tolerance_db)[1]
-    key = Geometry if merged is None else (Geometry, tolerance_db)
+    key: Any = Geometry if merged is None else (Geometry, tolerance_db)
+    # A preview shares what stands, in groups whose float32 coordinates round otherwise: never the geometry of a run.
+    key = (PREVIEW, key) if scene.model.mode == PREVIEW else key
     if key not in scene._derived:
         scene._derived[key] = surface_at(scene, tolerance_db)
     geometry: Geometry = scene._derived[key]

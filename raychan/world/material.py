@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -117,6 +118,7 @@ def names() -> tuple[str, ...]:
     return ("pec", *_ITU, *_FIXED, *_PANES)
 
 
+@lru_cache(maxsize=256)
 def material(name: str, frequency: float) -> Material:
     """Return a built-in material at a frequency [Hz]; SceneError with the nearest name for an unknown one."""
     if name == "pec":

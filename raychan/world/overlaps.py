@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
+from raychan.geometry.closed_surfaces import winding
 from raychan.records import MIRROR
 from raychan.world.body import Body
 from raychan.world.limbs import alike
-from raychan.world.mesh import Floats
+from raychan.world.mesh import Floats, Mesh
+
+Kept = dict[tuple[str, ...], tuple[tuple[Body, ...], Any]]
+"""Bodies by their names, and what was found of them: a body that does not move is the same object at all times."""
 
 _SAMPLES = 400  # points on a body's surface
 _TESTS = 48  # most of these that are tested against another body
@@ -24,7 +28,15 @@ _BEAM = 1e-6  # of the two-way peak gain, -60 dB: below, a body is outside the b
 
 def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Floats:
     """Return points (count, 3) [m], world axes, spread over a body's surface, `depth` [m] below it; always the same."""
-    mesh, rng = body.geometry, np.random.default_rng(0)
+    name = f"surface sample {count} {depth}"
+    if name not in body.geometry.memo:
+        body.geometry.memo[name] = _sample(body.geometry, count, depth)
+    return np.asarray(body.motion.to_world(body.geometry.memo[name]))
+
+
+def _sample(mesh: Mesh, count: int, depth: float) -> Floats:
+    """Return the points of `surface_sample` (count, 3) [m] in the body's frame."""
+    rng = np.random.default_rng(0)
     share = np.cumsum(mesh.areas)
     face = np.minimum(np.searchsorted(share, rng.random(count) * share[-1]), len(share) - 1)
     u, v = rng.random((2, count, 1))
@@ -32,23 +44,32 @@ def surface_sample(body: Body, count: int = _SAMPLES, depth: float = 0.0) -> Flo
     a, b, c = np.moveaxis(mesh.corners[face], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.asarray(body.motion.to_world(a + u * (b - a) + v * (c - a) - depth * normal))
+    return np.asarray(a + u * (b - a) + v * (c - a) - depth * normal)
 
 
-def overlaps(bodies: Sequence[Body], opaque: Sequence[bool]) -> list[str]:
+def overlaps(bodies: Sequence[Body], opaque: Sequence[bool], kept: Kept | None = None) -> list[str]:
     """Return a line for each pair of bodies that overlap, and for each body hidden inside another.
 
     Args: opaque: which bodies let no wave through. A body wholly inside one that lets waves in is intended; two that
-    fill nearly the same space are not.
+    fill nearly the same space are not. kept: what was found of the same bodies at another time.
     """
-    said = []
+    said, kept = [], {} if kept is None else kept
     solid = [i for i, body in enumerate(bodies) if body.resolved_role != MIRROR]
-    boxes = {i: _box(bodies[i]) for i in solid}
+    boxes = {i: _found(kept, (bodies[i],), _box) for i in solid}
     for i, k in combinations(solid, 2):
         low, high = np.maximum(boxes[i][0], boxes[k][0]), np.minimum(boxes[i][1], boxes[k][1])
         if (high - low > _DEPTH).all() and not alike(bodies[i], bodies[k]):
-            said += _told(bodies[i], bodies[k], opaque[i], opaque[k])
+            said += _found(kept, (bodies[i], bodies[k]), lambda a, b, i=i, k=k: _told(a, b, opaque[i], opaque[k]))
     return said
+
+
+def _found(kept: Kept, of: tuple[Body, ...], make: Callable[..., Any]) -> Any:
+    """Return what `make` finds of bodies, or found when they stood where they stand."""
+    names = tuple(body.name for body in of)
+    known = kept.get(names)
+    if known is None or any(a is not b for a, b in zip(known[0], of, strict=True)):
+        known = kept[names] = of, make(*of)
+    return known[1]
 
 
 def _told(one: Body, other: Body, one_opaque: bool, other_opaque: bool) -> list[str]:
@@ -84,7 +105,8 @@ def _inside(body: Body, other: Body) -> float:
     asked = near[: max(8, min(_TESTS, _WORK // len(other.geometry.faces)))]
     if not len(asked):
         return 0.0
-    return float(np.mean([other.geometry.winding(p) > _INSIDE for p in asked])) * len(near) / len(places)
+    corners = np.ascontiguousarray(other.geometry.corners)
+    return float(np.mean([winding(corners, p) > _INSIDE for p in asked])) * len(near) / len(places)
 
 
 def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:

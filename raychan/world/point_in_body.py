@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.closed_surfaces import clearance, winding
-from raychan.geometry.triangles import planes_of
 
 Floats = NDArray[np.float64]
 
@@ -24,14 +23,18 @@ class Place(IntEnum):
     ON = 2
 
 
+def within(bounds: Floats, point: Floats) -> bool:
+    """Return whether a point (3,) [m] is within bounds (2, 3) [m], or on them."""
+    return bool((point >= bounds[0] - _ON).all() and (point <= bounds[1] + _ON).all())
+
+
 def place_of(corners: Floats, point: Floats) -> Place:
     """Return the position of a point (3,) [m] relative to a surface of facets (n, 3, 3) [m]; an open one has no
     inside."""
     point = np.asarray(point, float)
     if not len(corners):
         return Place.OUTSIDE
-    low, high = corners.min(axis=(0, 1)) - _ON, corners.max(axis=(0, 1)) + _ON
-    if (point < low).any() or (point > high).any():
+    if not within(np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))]), point):
         return Place.OUTSIDE
     v = np.ascontiguousarray(corners)
     if clearance(v, point) <= _ON:
@@ -40,12 +43,15 @@ def place_of(corners: Floats, point: Floats) -> Place:
     return Place.INSIDE if abs(turns) > 0.5 and abs(turns - round(turns)) < _WHOLE else Place.OUTSIDE
 
 
-def in_plane_of(corners: Floats, point: Floats) -> int:
-    """Return the number of facets, of (n, 3, 3) [m], whose plane contains a point (3,) [m]: it sees them edge-on."""
-    normal, area = planes_of(np.ascontiguousarray(corners))
-    off = np.asarray(point, float) - corners[:, 0]
+def in_plane_of(planes: tuple[Floats, Floats], point: Floats) -> int:
+    """Return the number of facets whose plane contains a point (3,) [m]: it sees them edge-on.
+
+    Args: planes, a corner (n, 3) [m] of each facet and its unit normal (n, 3), zero where it has no area.
+    """
+    first, normal = planes
+    off = np.asarray(point, float) - first
     height = np.abs(np.einsum("ij,ij->i", off, normal))
-    return int(((height <= 1e-12 * np.linalg.norm(off, axis=1)) & (area > 0.0)).sum())
+    return int(((height <= 1e-12 * np.linalg.norm(off, axis=1)) & normal.any(axis=1)).sum())
 
 
 def refuse_within(corners: Floats, point: Floats, what: str) -> None:

@@ -25,11 +25,11 @@ from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.posed import index_of, points_of, posed, spheres_inside
 from raychan.world.radar_mount import mount, processing_of, radar_of
-from raychan.world.schema import BodyTable, InterfererTable, Model, RadarTable, SceneFile
+from raychan.world.schema import PREVIEW, BodyTable, InterfererTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 from raychan.world.schema_impairments import AtmosphereTable
 from raychan.world.seams import over_seams
-from raychan.world.static_geometry import StaticGeometry
+from raychan.world.static_geometry import FEW, MANY, StaticGeometry
 from raychan.world.surroundings import atmosphere_of, attenuation_of, check_places, interferers_of
 from raychan.world.topology import MeshTopology
 
@@ -246,7 +246,7 @@ class Scene(Described):
         }
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
         opaque = [all(m.kind != LAYER for m in self._chosen(b)) for b in self.bodies]
-        said += overlaps.overlaps(self.bodies, opaque)
+        said += overlaps.overlaps(self.bodies, opaque, self._static.setdefault("overlaps", {}))
         if self.radar_table is None:
             return said
         said += checks.edge_on(self.bodies, self.radar_table)
@@ -273,7 +273,7 @@ class Scene(Described):
     def static_geometry(self) -> StaticGeometry | None:
         """Geometry of the static bodies, shared by all instants; None where it does not pay."""
         if StaticGeometry not in self._static:
-            self._static[StaticGeometry] = StaticGeometry.of(self.bodies)
+            self._static[StaticGeometry] = StaticGeometry.of(self.bodies, FEW if self.model.mode == PREVIEW else MANY)
         static = self._static[StaticGeometry]
         return static and static.at(self.bodies)
 

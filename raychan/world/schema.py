@@ -184,11 +184,16 @@ class ProcessingTable(Table):
     """Taper of the detector's beams over a uniform line or rectangle."""
 
 
+PREVIEW = "preview"
+"""The mode of `Model` whose frames are coarse and fast."""
+
+
 class Model(Table):
     """[model]: the mechanisms that are modelled, and the tolerance."""
 
-    mode: Literal["physical", "auto"] = "physical"
-    """physical: all that max_bounces and max_transmissions allow; auto: of these only what tolerance_db needs."""
+    mode: Literal["physical", "auto", "preview"] = "physical"
+    """physical: all that max_bounces and max_transmissions allow; auto: of these only what tolerance_db needs; preview:
+    a fast, coarse picture, without bounces from body to body (see `raychan run --preview`)."""
     max_bounces: Bounces = 3
     tolerance_db: Tolerance = 0.5
     max_transmissions: Layers = 4

@@ -22,6 +22,7 @@ from bench.frame import frame
 from bench.laser import laser
 from bench.measure import Row
 from bench.memory import memory
+from bench.preview import preview
 from bench.rays import rays
 from bench.ship import ship
 from bench.size import size
@@ -32,7 +33,22 @@ from raychan.run.output_files import write_whole
 from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
-_GROUPS = rays, laser, synthesis, phase_noise, scaling, frame, threads, before, turbine, ship, size, fine, memory
+_GROUPS = (
+    rays,
+    laser,
+    synthesis,
+    phase_noise,
+    scaling,
+    frame,
+    threads,
+    before,
+    turbine,
+    ship,
+    size,
+    fine,
+    memory,
+    preview,
+)
 ALL: dict[str, Benchmark] = {f.__name__: f for f in _GROUPS}
 _ROOT = Path(__file__).parents[2]
 

@@ -13,7 +13,10 @@ from raychan.signal.baseband import synthesize
 def test_footprints_that_stay_one_path_change_no_cell_by_a_tenth_of_the_noise(speed):
     scene = rc.Scene(
         bodies=[rc.Body("car", shape="car", position=(12.0, 1.0, 0.0), yaw_deg=20.0, velocity=(speed, 0.0, 0.0))],
-        radar={"position": [0.0, 0.0, 0.6], "waveform": {"bandwidth_mhz": 800.0, "chirp_us": 30.0, "chirps": 64, "samples": 256}},
+        radar={
+            "position": [0.0, 0.0, 0.6],
+            "waveform": {"bandwidth_mhz": 800.0, "chirp_us": 30.0, "chirps": 64, "samples": 256},
+        },
         model={"max_bounces": 2, "tolerance_db": 1.0},
     )
     routes = rc.trace(scene)

@@ -42,7 +42,7 @@ def scene(rng: Any, folder: Path | None = None) -> dict[str, Any]:
         "min_snr_db": float(rng.uniform(5.0, 25.0)),
     }
     model = {
-        "mode": str(rng.choice(["physical", "physical", "auto"])),
+        "mode": str(rng.choice(["physical", "physical", "auto", "preview"])),
         "max_bounces": int(rng.integers(1, 4)),
         "max_transmissions": int(rng.integers(0, 4)),
         "tolerance_db": float(rng.uniform(3.0, 6.0)),

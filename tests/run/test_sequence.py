@@ -170,3 +170,18 @@ def test_where_no_place_for_compiled_loops_can_be_written_they_are_kept_for_the_
     assert done.returncode == 0, done.stderr
     place, kept = done.stdout.split()
     assert int(kept) > 0 and not os.path.exists(place), done.stderr
+
+
+def test_warnings_on_bodies_that_stand_or_run_into_each_other_are_those_of_a_scene_made_there(file):
+    """What was found of a pair that stands is kept; a pair of which one moves is looked at anew."""
+    boxes = [
+        rc.Body("stands", shape="box", position=(8.0, 3.0, 0.0)),
+        rc.Body("leans", shape="box", position=(8.4, 3.4, 0.0)),
+        rc.Body("comes", shape="box", position=(8.3, -2.3, 0.0), velocity=(0.0, 5.0, 0.0)),
+    ]
+    radar = rc.Scene.load(file).radar
+    scene = rc.Scene(bodies=boxes, radar=radar)
+    said = [[w for w in scene.at(t).warnings if "overlap" in w] for t in (0.0, 0.5, 1.0)]
+    fresh = [[w for w in rc.Scene(bodies=boxes, radar=radar).at(t).warnings if "overlap" in w] for t in (0.0, 0.5, 1.0)]
+    assert said == fresh
+    assert [len(s) for s in said] == [1, 1, 3]

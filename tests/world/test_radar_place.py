@@ -56,9 +56,10 @@ def test_a_body_turned_inside_out_still_has_an_inside():
 
 
 def test_facets_whose_plane_holds_a_point_are_counted():
-    corners = np.array(box((-1, -1, -1), (1, 1, 1)).triangles)
-    assert in_plane_of(corners, np.array([5.0, 1.0, 0.3])) == 2
-    assert in_plane_of(corners, np.array([5.0, 1.1, 0.3])) == 0
+    cube = box((-1, -1, -1), (1, 1, 1))
+    planes = np.array(cube.triangles)[:, 0], np.array(cube.face_normals)
+    assert in_plane_of(planes, np.array([5.0, 1.0, 0.3])) == 2
+    assert in_plane_of(planes, np.array([5.0, 1.1, 0.3])) == 0
 
 
 @pytest.mark.parametrize(("distance", "word"), [(0.4, "inside"), (1.0, "on")])

@@ -1,0 +1,165 @@
+"""A preview: the direct echoes of a fine run, within a cell and 3 dB, at a small part of its cost; and it says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.boxes_and_balls import WAVEFORM, scene_of
+from support.places import SCENES
+from support.previews import beside
+from support.results import assert_same
+
+import raychan as rc
+from raychan import parallel
+from raychan.cli import invoke
+from raychan.records import REFLECT
+from raychan.run.sequence import frames
+from raychan.run.storage import load_result
+from raychan.units import undb
+
+ABOVE_DB = 23.0  # SNR: what is weaker by up to 3 dB is still detected
+
+
+@pytest.fixture(scope="module")
+def urban():
+    return rc.Scene.load(SCENES / "urban.toml").override(["model.mode=preview"])
+
+
+def check(fine: rc.Result, coarse: rc.Result) -> None:
+    """Assert that direct echoes are where they are in the fine run, within 3 dB or what both state."""
+    found = beside(fine, coarse)
+    strong = found.snr >= ABOVE_DB
+    assert strong.any()
+    assert (found.cells[strong] <= 1.0).all(), found
+    sure = strong & (found.error <= 3.0)  # the fine run itself knows the level
+    assert (np.abs(found.level[sure]) <= 3.0).all(), found
+
+
+@pytest.mark.parametrize("seed", [1, 3, 5, 8])
+def test_direct_echoes_of_random_scenes_are_within_a_cell_and_3_db_of_a_fine_run(seed):
+    check(rc.simulate(scene_of(seed, tolerance_db=1.0)), rc.simulate(scene_of(seed, mode="preview")))
+
+
+@pytest.mark.parametrize("name", ["urban", "living_street"])
+def test_direct_echoes_of_streets_are_within_a_cell_and_3_db_of_a_fine_run(name):
+    scene = rc.Scene.load(SCENES / f"{name}.toml")
+    fine = rc.simulate(scene, tolerance_db=3.0)
+    check(fine, rc.simulate(scene.override(["model.mode=preview"])))
+
+
+def scene_with(body: rc.Body, **model: object) -> rc.Scene:
+    radar = {"waveform": WAVEFORM, "position": (0, 0, 1.0), "power_dbm": 20.0, "noise": False}
+    return rc.Scene(bodies=[body], radar=radar, model={"mode": "preview", **model})
+
+
+def test_a_sphere_returns_by_the_radar_equation():
+    """Sigma = pi a^2 (d / (d + a))^2 from a distance d to its surface: the wave is spherical."""
+    a, d = 0.4, 8.0
+    ball = rc.Body("ball", shape="sphere", params={"radius": a}, position=(d + a, 0.0, 1.0))
+    scene = scene_with(ball)
+    result = rc.simulate(scene)
+    wave, gain = scene.radar.waveform, np.linalg.norm(scene.radar.tx_field(np.array([[1.0, 0.0, 0.0]]))) ** 2
+    sigma = np.pi * a**2 * (d / (d + a)) ** 2
+    power = undb(20.0) * 1e-3 * gain**2 * wave.wavelength**2 * sigma / ((4.0 * np.pi) ** 3 * d**4)
+    assert 10.0 * np.log10(result.detections.power[0] / power) == pytest.approx(0.0, abs=0.5)
+    assert result.detections.range[0] == pytest.approx(d, abs=0.1)
+
+
+def test_a_plate_larger_than_tubes_returns_as_in_a_fine_run():
+    plate = rc.Body("plate", shape="plate", params={"width": 2.0, "height": 2.0}, position=(9, 0, 1), yaw_deg=180.0)
+    fine = rc.simulate(scene_with(plate, mode="physical", max_bounces=1, tolerance_db=0.5))
+    coarse = rc.simulate(scene_with(plate))
+    assert 10.0 * np.log10(coarse.detections.power[0] / fine.detections.power[0]) == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_target_given_by_its_rcs_returns_over_the_ground_as_in_a_fine_run():
+    """Its routes are exact in both, all four: straight or over the ground, out and back."""
+    bodies = [
+        rc.Body("ground", shape="ground", material="asphalt"),
+        rc.Body(
+            "point",
+            shape="box",
+            params={"length": 0.2, "width": 0.2, "height": 0.2},
+            position=(9, 0, 0.5),
+            rcs_dbsm=5.0,
+        ),
+    ]
+    radar = {"waveform": WAVEFORM, "position": (0, 0, 1.0), "power_dbm": 20.0}
+    fine, coarse = (
+        rc.simulate(rc.Scene(bodies=bodies, radar=radar, model={"mode": m})) for m in ("physical", "preview")
+    )
+    at = [p.trajectories.kind[p.trajectory].astype(bool).sum(axis=1) for p in (fine.paths, coarse.paths)]
+    assert sorted(at[1])[-4:] == [1, 2, 2, 3]
+    assert coarse.detections.power[0] == pytest.approx(fine.detections.power[0], rel=1e-3)
+
+
+def test_fewer_bounces_than_the_ground_needs_leave_it_out(urban):
+    met = [rc.simulate(urban, max_bounces=n).paths for n in (1, 2, 3)]
+    kinds = [(p.trajectories.kind == REFLECT).sum(axis=1)[p.trajectory] for p in met]
+    assert [int(k.max()) for k in kinds] == [0, 1, 2]
+
+
+def test_a_frame_of_a_sequence_is_the_single_run_of_its_time_to_the_last_bit(urban):
+    made = list(frames(urban, 3, 0.05, seed=7))
+    assert_same(
+        made[0].result, rc.simulate(rc.Scene.load(SCENES / "urban.toml").override(["model.mode=preview"]), seed=7)
+    )
+    assert_same(made[2].result, rc.simulate(urban.without_caches().at(0.1), seed=9))
+    assert made[2].result.warnings == rc.simulate(urban.at(0.1), seed=9).warnings
+
+
+def test_threads_do_not_change_a_preview():
+    made = []
+    try:
+        for threads in (1, 3):
+            parallel.set_threads(threads)
+            made.append(rc.simulate(scene_of(2, mode="preview"), seed=4))
+    finally:
+        parallel.set_threads(None)
+    assert_same(*made)
+    assert made[0].stats["rays"] == made[1].stats["rays"]
+
+
+def test_a_fine_run_does_not_depend_on_a_preview_of_the_same_bodies():
+    """Both share meshes, and what is derived from bodies; a preview groups the facets of bodies that move otherwise."""
+    car = {"name": "car", "shape": "car", "position": [9.0, 1.0, 0.0], "velocity_mps": [3.0, 0.0, 0.0]}
+    tables = {
+        "radar": {"waveform": WAVEFORM, "position": [0.0, 0.0, 0.5]},
+        "model": {"max_bounces": 1, "tolerance_db": 3.0},
+        "bodies": [{"name": "ground", "shape": "ground"}, car],
+    }
+    scene = rc.Scene.from_dict(tables)
+    coarse = scene.override(["model.mode=preview"])
+    rc.simulate(coarse)
+    again = rc.simulate(coarse.override(["model.mode=physical"]))
+    assert_same(again, rc.simulate(rc.Scene.from_dict(tables)))
+
+
+def test_a_preview_says_that_it_is_one_and_states_an_error_for_each_detection(tmp_path, urban, capsys):
+    result = rc.simulate(urban)
+    assert np.isfinite(result.detections.error_db).all() and (result.detections.error_db >= 2.9).all()
+    assert result.detections.converged.all()
+    assert sum(w.startswith("preview: levels may be off") for w in result.warnings) == 1
+    assert result.ledger["preview"].level_db == "unknown"
+    assert invoke(["run", "urban", "--preview", "--no-pictures", "--out", str(tmp_path / "out")]) == 0
+    assert "preview: levels may be off" in "".join(capsys.readouterr())
+    again = load_result(tmp_path / "out")
+    assert again.require_scene().model.mode == "preview"
+    np.testing.assert_array_equal(again.detections.power, result.detections.power)
+
+
+def test_the_stages_one_by_one_give_the_paths_of_simulate():
+    scene = scene_of(5, mode="preview")
+    paths = rc.transfer(rc.trace(scene), scene.radar)
+    np.testing.assert_array_equal(paths.amplitude, rc.simulate(scene).paths.amplitude)
+
+
+@pytest.mark.parametrize("key", [{}, {"noise": False}, {"rx_position": [0.0, 3.0, 1.0]}, {"rx_polarization": "both"}])
+def test_any_radar_sees_a_car_over_the_ground_or_nothing(key):
+    radar = {"waveform": WAVEFORM, "position": [0.0, 0.0, 1.0], **key}
+    car = rc.Body("car", shape="car", position=(9.0, 1.0, 0.0), velocity=(2.0, 0.0, 0.0))
+    ground = rc.Body("ground", shape="ground")
+    seen = rc.simulate(rc.Scene(bodies=[ground, car], radar=radar, model={"mode": "preview"}))
+    assert len(seen.paths.length) > 1000 and "car" in seen.provenance[0].bodies + seen.provenance[-1].bodies
+    empty = rc.simulate(rc.Scene(bodies=[], radar=radar, model={"mode": "preview"}))
+    assert len(empty.paths.length) == ("rx_position" in key)
