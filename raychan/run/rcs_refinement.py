@@ -31,6 +31,7 @@ _STEPS = 12  # rules, each of half the phase of the one before: rays run out ear
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and larger tubes may miss them (not measured)
 _EDGE_ALONE = 0.3  # m: the same for convex bodies; a larger tube may bend more than its phase integral follows
 _RAYS = 200.0  # rays of two launches over a flat body, about, for an area of max_edge squared
+_BEHIND = 0.05  # m: how far curved patches of coarse meshes bulge through their neighbours, about; not measured
 _COVER_ALONE = 1.05  # in place of COVER for convex bodies: no launch misses a hidden part (command not noted)
 _CURVED = 0.01  # of the value, a radian of a rule's `phase`: error that launches over the same curved facets share
 _TERMINATOR = 0.25  # of 1 / k: PO's abrupt terminator on a sphere of any radius, against Mie's series
@@ -124,7 +125,7 @@ def _launched(case: Case, rules: list[Refinement]) -> tuple[SourceSums, float]:
         left = case.max_rays - (case.geometry.rays - start)
         if left <= 0 or sums.rule.max(initial=0) + 1 >= len(rules) or _agreed(case, sums, doubt, off):
             break
-        rows = sums.to_refine(_LEFT * within * abs(sums.value) / _cover(case), left / cost)
+        rows = sums.to_refine(_cover(case), _LEFT * within * abs(sums.value), left / cost)
         if not len(rows):
             break
         so_far, coarse = case.geometry.rays, case.geometry.uncut
@@ -174,7 +175,8 @@ def _off(case: Case, sums: SourceSums, rules: list[Refinement]) -> float:
     curved = _CURVED if case.geometry.curved.any() else 0.0
     coarsest = rules[int(sums.rule.min(initial=len(rules) - 1))].phase
     merged = _off_by_merging(case.geometry, sums.sums.by_bounce(case.bounces)[:, case.row, case.col])
-    return float(_cover(case) * (sums.doubt + curved * coarsest * abs(sums.value) + merged))
+    cover = _cover(case)
+    return float(sums.off(cover) + cover * (curved * coarsest * abs(sums.value) + merged))
 
 
 def _cover(case: Case) -> float:
@@ -232,6 +234,7 @@ def refinements(
             relative=0.03 * fine,
             max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
+            behind=_BEHIND,
         )
 
 

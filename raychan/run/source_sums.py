@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from raychan.channel.error import COVER
 from raychan.run.scattering import BySource
@@ -24,6 +25,8 @@ that shrink by this still brings."""
 _WEIGHT = 1.5  # of a launch in a mean over one of the rule before: changes that do not die out shrink by about 0.8 a
 # rule (bodies of primitives, a person and a traffic light, 3 views each; command not noted)
 _GROWTH = 2.6  # tubes of the next rule over those of this, about
+_LEVEL = 0.995  # one-sided share of Student's t: 99 % of both sides, as COVER is meant to cover
+_SIGMAS = 2.576  # the same of a normal variable, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,9 @@ class SourceSums:
     sense (a bias of size), the newest launch counts alone.
 
     Fields: sums by source; `last` (s,) [m] what the newest launch gave, `change` (s,) from the one before; `doubt_of`
-    (s,) [m] how far off the sums may be; `rule` (s,) of the newest launch, `launches` (s,) so far; `mean` (3, s) of
-    sums of weights, their squares, and weighted powers [m^2]; `scatters` (s,) which are means.
+    (s,) [m] how far off the sums may be: the last changes, of means the standard error of one component; `rule` (s,) of
+    the newest launch, `launches` (s,) so far; `mean` (4, s) of sums of weights, their squares, weighted powers [m^2],
+    and launches; `scatters` (s,) which are means.
     """
 
     sums: BySource
@@ -59,7 +63,7 @@ class SourceSums:
         last = new.amplitude[:, element[0], element[1]]
         change, n = last - old.amplitude[:, element[0], element[1]], len(last)
         rules, launched = np.full(n, rule), np.full(n, rule + 1)
-        return SourceSums(new, element, last, change, change, rules, launched, np.zeros((3, n)), np.zeros(n, bool))
+        return SourceSums(new, element, last, change, change, rules, launched, np.zeros((4, n)), np.zeros(n, bool))
 
     @property
     def value(self) -> complex:
@@ -67,10 +71,20 @@ class SourceSums:
         row, col = self.element
         return complex(self.sums.amplitude[:, row, col].sum())
 
-    @property
-    def doubt(self) -> float:
-        """How far off [m] the sum may be: by what its sources may, in phase as they are, or of unrelated phases."""
-        return float(max(abs(self.doubt_of.sum()), np.linalg.norm(self.doubt_of)))
+    def off(self, cover: float) -> float:
+        """Return how far off [m] the sum may be, by `cover` times the last changes, in phase as they are or of
+        unrelated phases, and by what covers 99 % of the means, more standard deviations where few launches tell these.
+
+        Means err in amplitude and phase alike, and only the component along the sum changes its level.
+        Source: Welch, Biometrika 34, 1947: degrees of freedom of a sum of variances.
+        """
+        changes, means = self.doubt_of[~self.scatters], np.abs(self.doubt_of[self.scatters]) ** 2
+        off = cover * max(abs(changes.sum()), np.linalg.norm(changes))
+        if not means.any():
+            return float(off)
+        # A complex amplitude of n launches has 2 (n - 1).
+        freedom = means.sum() ** 2 / (means**2 / (2.0 * (self.mean[3, self.scatters] - 1.0))).sum()
+        return float(np.hypot(off, stdtrit(freedom, _LEVEL) * np.sqrt(means.sum())))
 
     @property
     def next_rule(self) -> Ints:
@@ -82,18 +96,18 @@ class SourceSums:
         """How many tubes (s,) that takes, about."""
         return np.asarray(np.maximum(self.sums.tubes, 1.0) * np.where(self.next_rule > self.rule, _GROWTH, 1.0))
 
-    def to_refine(self, leave: float, most: float) -> Ints:
+    def to_refine(self, cover: float, leave: float, most: float) -> Ints:
         """Return the sources, as row numbers, that count.
 
-        Args: leave [m] by which all others may be off, in phase as they are and as if of unrelated phases; most tubes
-        that the next launch may have.
+        Args: cover as for `off`; leave [m] by which all others may be off, in phase as they are and as if of unrelated
+        phases; most tubes that the next launch may have.
         """
         # Both directions of a facet are refined together, so that an exchange of both ends changes nothing.
         source = self.sums.source
         _, pair = np.unique(depth_of(source) << 32 | facet_of(source), return_inverse=True)
+        off = self.doubt_of * np.where(self.scatters, _SIGMAS, cover)
         power, tubes, real, imaginary = (
-            np.bincount(pair, x)
-            for x in (np.abs(self.doubt_of) ** 2, self.next_tubes, self.doubt_of.real, self.doubt_of.imag)
+            np.bincount(pair, x) for x in (np.abs(off) ** 2, self.next_tubes, off.real, off.imag)
         )
         # Those first that are most off for what they cost.
         order = np.argsort(power / tubes, kind="stable")
@@ -143,20 +157,18 @@ class SourceSums:
 
 
 def _mean(sums: SourceSums, rows: Ints, new: Complexes, rule: Ints) -> tuple[Floats, Complexes]:
-    """Return the sums (3, k) of the means of some rows with a new launch (k, 2, 2), and how far off (k,) [m] they are.
-
-    That is sqrt(2) times their standard error, as the change between two launches of equal errors is of one's error.
-    """
+    """Return the sums (4, k) of the means of some rows with a new launch (k, 2, 2), and the standard error (k,) [m] of
+    one component of each, in the direction of the last change."""
     row, col = sums.element
     w, first = _weights(sums.rule[rows]), ~sums.scatters[rows]
     last, value = sums.last[rows], new[:, row, col]
-    before = np.where(first, [w, w**2, w * np.abs(last) ** 2], sums.mean[:, rows])
+    before = np.where(first, [w, w**2, w * np.abs(last) ** 2, np.ones(len(w))], sums.mean[:, rows])
     w = _weights(rule)
-    mean = before + np.array([w, w**2, w * np.abs(value) ** 2])
+    mean = before + np.array([w, w**2, w * np.abs(value) ** 2, np.ones(len(w))])
     old = np.where(first, last, sums.sums.amplitude[rows, row, col])
     middle = old + w / mean[0] * (value - old)
     spread = np.maximum(mean[2] / mean[0] - np.abs(middle) ** 2, 0.0)
-    error = np.sqrt(2.0 * spread / (mean[0] ** 2 / mean[1] - 1.0))
+    error = np.sqrt(0.5 * spread / (mean[0] ** 2 / mean[1] - 1.0))
     return mean, error * np.exp(1j * np.angle(value - old))
 
 
