@@ -1,4 +1,8 @@
-"""Refinement of a cross-section: ever finer launches until two agree, and the error to state of the last."""
+"""A cross-section that converges: coarse launches first, then finer where it is open, and the error to state.
+
+The first two launches trace the whole body. Their change tells which sources of tubes (first facet, number of bounces)
+leave the sum open; these are traced again, each time finer or on another lattice.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.error import COVER, LARGEST_DB, MAX_ERROR_DB, stated_error
+from raychan.channel.error import COVER, stated_error
 from raychan.channel.mesh_error import MeshError, creeping
 from raychan.channel.terminator_error import terminator_error
-from raychan.run.scattering import reciprocal_scattering
+from raychan.run.rcs_doubt import Doubt
+from raychan.run.scattering import BodyLaunch, BySource
+from raychan.run.source_sums import SourceSums
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
@@ -25,12 +31,18 @@ _STEPS = 12  # rules, each of half the phase of the one before: rays run out ear
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and larger tubes may miss them (not measured)
 _EDGE_ALONE = 0.3  # m: the same for convex bodies; a larger tube may bend more than its phase integral follows
 _RAYS = 200.0  # rays of two launches over a flat body, about, for an area of max_edge squared
+_BEHIND = 0.05  # m: how far curved patches of coarse meshes bulge through their neighbours, about; not measured
 _COVER_ALONE = 1.05  # in place of COVER for convex bodies: no launch misses a hidden part (command not noted)
 _CURVED = 0.01  # of the value, a radian of a rule's `phase`: error that launches over the same curved facets share
 _TERMINATOR = 0.25  # of 1 / k: PO's abrupt terminator on a sphere of any radius, against Mie's series
 _TUBES = 30_000  # tubes that a launch may always subdivide, if max_rays allow
 _NULL = 1e-4  # of the strongest polarisation, -80 dB: a change below it does not count
 _COUNTS = 1e-3  # of the strongest bounce, -60 dB: one below it does not count
+_LEFT = 0.3  # of the tolerance: what the last changes of sources that are not traced again may add up to; not measured
+_HALF = 0.5  # of the tolerance: launches within it are refined no further for what the mesh leaves open; not measured
+_OVER = 2.0  # times the rays left: what a launch that was expected to cost less may cast; not measured
+_JITTER = 0.2  # of an edge: how far cuts may lie off its middle, for lattices of their own; not measured
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # spreads numbered lattices evenly
 _GROWTH = 2.6  # rays of the next rule over those of all before it, about
 
 
@@ -56,7 +68,8 @@ class Case:
 
     def launch(self, geometry: Geometry, rule: Refinement) -> Complexes:
         """Return the scattering amplitudes (bounces, 2, 2) [m] of one launch."""
-        return reciprocal_scattering(geometry, self.leg, self.out, self.frequency, self.bounces, rule)
+        launch = BodyLaunch(geometry, (self.leg, self.out), self.frequency, self.bounces)
+        return launch.whole(rule).by_bounce(self.bounces)
 
 
 @dataclass(frozen=True)
@@ -72,48 +85,20 @@ class Value:
     matrix: Complexes
 
 
-@dataclass(frozen=True)
-class _Launches:
-    """What the launches of one case gave: the amplitude by the first and by the last, how far off the last may be, and
-    the last's amplitudes by bounces, of the case's polarisation and of all."""
-
-    first: complex
-    value: complex
-    off: float
-    by_bounce: Complexes
-    matrix: Complexes
-
-
 def refined(case: Case) -> Value:
-    """Return the cross-section of a case, refined until the last two launches agree or rays run out."""
-    geometry = case.geometry
-    rays, ring = case.rays, _terminator(case)
+    """Return the cross-section of a case, refined until it is within the tolerance or rays run out."""
+    rays = case.rays
     rules = [
         replace(step, max_tubes=_most_tubes(i, case.max_rays), max_rays=case.max_rays)
-        for i, step in enumerate(refinements(geometry, case.frequency, max_rays=case.max_rays))
+        for i, step in enumerate(refinements(case.geometry, case.frequency, max_rays=case.max_rays))
     ]
-    found = _launched(case, rules, ring)
-    first, value, off = found.first, found.value, found.off
-
-    def other(mesh: Geometry) -> complex:
-        return complex(case.launch(mesh, rules[0])[:, case.row, case.col].sum())
-
-    # Errors that refinement does not reduce: what the mesh leaves open, and waves that creep around the body. Launches
-    # and normals err at the same specular points, at worst in phase; creeping waves and other surfaces are of unrelated
-    # phase and add in squares.
-    around, share = creeping(case.mesh_error.rounded or geometry, rules[0].wavenumber)
-    sure = value != 0.0 and stated_error(value, off, 1.0) <= LARGEST_DB
-    # Where the launches do not agree, other surfaces of the mesh add nothing to know.
-    off += case.mesh_error.facets(first, value, other) * abs(value) if sure else 0.0
-    error_db = stated_error(value, math.hypot(off, max(around if ring else 0.0, share * abs(value))), 1.0)
-    # The difference between two surfaces is a figure, however large.
-    folds_db = case.mesh_error.edges_db(first, value, other) if sure else 0.0
-    by_bounce = found.by_bounce
+    sums, error_db = _launched(case, rules)
+    amplitudes = sums.sums.by_bounce(case.bounces)
+    by_bounce = amplitudes[:, case.row, case.col]
     counted = np.flatnonzero(np.abs(by_bounce) > _COUNTS * np.abs(by_bounce).max(initial=0.0))
-    # A level of zero has no error in dB.
-    known = min(math.hypot(error_db, folds_db), MAX_ERROR_DB) if sure and error_db <= LARGEST_DB else np.nan
     most, further = int(counted.max(initial=-1)) + 1, _further(case, rules[0], by_bounce)
-    return Value(4.0 * np.pi * abs(value) ** 2, known, case.rays - rays, most, further, found.matrix)
+    sigma = 4.0 * np.pi * abs(sums.value) ** 2
+    return Value(sigma, error_db, case.rays - rays, most, further, amplitudes.sum(axis=0))
 
 
 def _terminator(case: Case) -> float:
@@ -127,39 +112,99 @@ def _terminator(case: Case) -> float:
     return _TERMINATOR / k + (terminator_error(area, *ends, k, case.row, case.col) if case.out != case.leg else 0.0)
 
 
-def _launched(case: Case, rules: list[Refinement], ring: float) -> _Launches:
-    """Launch by finer and finer rules until two launches in a row agree, or rays run out."""
-    geometry, max_rays = case.geometry, case.max_rays
-    before, first = None, 0j
-    rays, off, value, by_bounce = case.rays, np.inf, 0j, np.zeros(case.bounces, complex)
-    curved = _CURVED if geometry.curved.any() else 0.0
-    cover = _COVER_ALONE if geometry.convex_alone else COVER
-    # Long tubes may err alike in two launches.
-    cover *= np.sqrt(_stretch(geometry, max_rays))
-    for rule in rules:
-        coarse, so_far = geometry.uncut, geometry.rays
-        s = case.launch(geometry, rule)
-        by_bounce = s[:, case.row, case.col]
-        value = complex(by_bounce.sum())
-        if geometry.uncut > coarse and geometry.rays - so_far > max_rays:
-            # Rays ran out before it was known what hides what: the error is unknown.
-            off = np.inf
+def _launched(case: Case, rules: list[Refinement]) -> tuple[SourceSums, float]:
+    """Launch the whole body twice, then trace the sources again that leave the sum open, until it is within the
+    tolerance or rays run out; return the sums, and the error to state [dB]."""
+    launch = BodyLaunch(case.geometry, (case.leg, case.out), case.frequency, case.bounces)
+    start, within = case.geometry.rays, 1.0 - 10.0 ** (-case.tolerance_db / 20.0)
+    sums, first, known = _whole(case, launch, rules)
+    doubt, off = _doubt(case, rules[0], first), np.inf
+    cost = (case.geometry.rays - start) / max(float(sums.sums.tubes.sum()), 1.0)
+    while known:
+        off = _off(case, sums, rules)
+        left = case.max_rays - (case.geometry.rays - start)
+        if left <= 0 or sums.rule.max(initial=0) + 1 >= len(rules) or _agreed(case, sums, doubt, off):
             break
-        if before is None:
-            first = value
-        else:
-            change = abs(value - before)
-            shared = curved * rule.phase * abs(value) + ring + _off_by_merging(geometry, by_bounce)
-            off = cover * (change + shared)
-            spent = (case.rays - rays) * _GROWTH > max_rays
-            # In a null of this polarisation nothing is left to find.
-            null = change < _NULL * np.abs(s.sum(axis=0)).max()
-            agreed = stated_error(value, off, 1.0) <= case.tolerance_db or null
-            # Tubes that only max_tubes kept from being subdivided may err alike in two launches.
-            if spent or (geometry.uncut == coarse and agreed):
-                break
-        before = value
-    return _Launches(first, value, off, by_bounce, s.sum(axis=0))
+        rows = sums.to_refine(_cover(case), _LEFT * within * abs(sums.value), left / cost)
+        if not len(rows):
+            break
+        so_far, coarse = case.geometry.rays, case.geometry.uncut
+        parts = [
+            launch.again(replace(rules[i], jitter=_jitter(n), max_rays=_OVER * left), source)
+            for i, n, source in sums.groups(rows)
+        ]
+        if case.geometry.uncut > coarse:
+            # Rays ran out before it was known what hides what.
+            break
+        cost = (case.geometry.rays - so_far) / float(sums.next_tubes[rows].sum())
+        sums = sums.joined(rows, parts)
+    return sums, doubt.error_db(sums.value, off)
+
+
+def _doubt(case: Case, rule: Refinement, first: complex) -> Doubt:
+    """Return the errors that refinement does not reduce; first the amplitude by a launch of the rule."""
+
+    def other(mesh: Geometry) -> complex:
+        return complex(case.launch(mesh, rule)[:, case.row, case.col].sum())
+
+    waves = creeping(case.mesh_error.rounded or case.geometry, rule.wavenumber)
+    return Doubt(case.mesh_error, other, first, _cover(case) * _terminator(case), waves)
+
+
+def _jitter(launch: int) -> float:
+    """Return how far the cuts of a launch lie off the middle of edges: no two launches share a lattice."""
+    return _JITTER * (launch * _GOLDEN % 1.0)
+
+
+def _agreed(case: Case, sums: SourceSums, doubt: Doubt, off: float) -> bool:
+    """Tell whether the sum is within the tolerance, or as near as refinement brings it."""
+    value = sums.value
+    # In a null of this polarisation nothing is left to find.
+    if abs(sums.doubt_of.sum()) < _NULL * np.abs(sums.sums.amplitude.sum(axis=0)).max():
+        return True
+    launches_db = stated_error(value, off, 1.0)
+    if launches_db > case.tolerance_db:
+        return False
+    if doubt.error_db(value, off) <= case.tolerance_db or not doubt.error_db(value, 0.0) <= case.tolerance_db:
+        return True
+    return launches_db <= _HALF * case.tolerance_db
+
+
+def _off(case: Case, sums: SourceSums, rules: list[Refinement]) -> float:
+    """Return how far [m] the sum may be off by the tubes of launches."""
+    curved = _CURVED if case.geometry.curved.any() else 0.0
+    coarsest = rules[int(sums.rule.min(initial=len(rules) - 1))].phase
+    merged = _off_by_merging(case.geometry, sums.sums.by_bounce(case.bounces)[:, case.row, case.col])
+    cover = _cover(case)
+    return float(sums.off(cover) + cover * (curved * coarsest * abs(sums.value) + merged))
+
+
+def _cover(case: Case) -> float:
+    """Return the factor from the change between launches to the error to state."""
+    cover = _COVER_ALONE if case.geometry.convex_alone else COVER
+    # Long tubes may err alike in two launches.
+    return float(cover * np.sqrt(_stretch(case.geometry, case.max_rays)))
+
+
+def _whole(case: Case, launch: BodyLaunch, rules: list[Refinement]) -> tuple[SourceSums, complex, bool]:
+    """Launch the whole body twice, and again while tubes are coarser than asked for; return the sums of the last two,
+    the amplitude by the first, and whether rays sufficed to know what hides what."""
+    geometry, start = case.geometry, case.geometry.rays
+    before: BySource | None = None
+    first = 0j
+    for i, rule in enumerate(rules):
+        coarse, so_far = geometry.uncut, geometry.rays
+        found = launch.whole(rule)
+        sums = SourceSums.of(before or found, found, (case.row, case.col), i)
+        first = first if i else sums.value
+        if geometry.uncut > coarse and geometry.rays - so_far > case.max_rays:
+            return sums, first, False
+        spent = (geometry.rays - start) * _GROWTH > case.max_rays
+        # Tubes that only max_tubes kept from being subdivided may err alike in two launches.
+        if i and (spent or geometry.uncut == coarse):
+            break
+        before = found
+    return sums, first, True
 
 
 def _off_by_merging(geometry: Geometry, by_bounce: Complexes) -> float:
@@ -189,6 +234,7 @@ def refinements(
             relative=0.03 * fine,
             max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
+            behind=_BEHIND,
         )
 
 

@@ -225,7 +225,8 @@ def _landed_tubes(
     """Return the tubes `rows` on the planes of the facets that their rays meet, or of the facet that the centre ray
     meets where these are not of one surface; the reflection is written into their history."""
     geometry = step.geometry
-    rows, facet, reach = resolve_hits(rows, tubes.points, directions, hit, one_surface, geometry.first, geometry.normal)
+    planes = geometry.first, geometry.normal
+    rows, facet, reach = resolve_hits(rows, tubes.points, directions, hit, one_surface, *planes, step.rule.behind)
     n = len(rows)
     before = IncidentTubes(
         tubes.points, directions, tubes.length, tubes.normals, tubes.facet, tubes.spread, tubes.strength, tubes.flat,

@@ -192,9 +192,13 @@ def on_one_surface(rows, hit, plane, smooth, normal, least_cosine, out):  # type
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def resolve_hits(rows, points, directions, hit, one_surface, first, normal):  # type: ignore[no-untyped-def]
+def resolve_hits(rows, points, directions, hit, one_surface, first, normal, behind):  # type: ignore[no-untyped-def]
     """Return the tubes (m,) of `rows` that land, the facet (m, 4) on whose plane each ray lands, and after how far
-    (m, 4) [m]. Tubes with a ray that misses or grazes the centre's plane are slivers, and are dropped."""
+    (m, 4) [m]. Tubes with a ray that misses or grazes the centre's plane are slivers, and are dropped.
+
+    Args: behind [m] how far behind the mirror a ray of a tube may land all rays of which meet one surface: where two
+    surfaces run into each other, or a curved patch bulges over its facet, a corner lies behind the surface beside it.
+    """
     m = len(rows)
     kept, facet, reach = np.empty(m, np.int64), np.empty((m, 4), hit.dtype), np.empty((m, 4))
     count = 0
@@ -208,7 +212,8 @@ def resolve_hits(rows, points, directions, hit, one_surface, first, normal):  # 
                 height += normal[f, c] * (first[f, c] - points[i, q, c])
             t = height / slope if slope != 0.0 else np.inf
             facet[count, q], reach[count, q] = f, t
-            lands &= t > _BEHIND and t < _GRAZING_REACH * reach[count, 3] + 1.0
+            least = -behind if one_surface[i] else _BEHIND
+            lands &= t > least and t < _GRAZING_REACH * abs(reach[count, 3]) + 1.0
         if lands:
             kept[count] = i
             count += 1

@@ -26,8 +26,13 @@ def sources_of(routes: Routes, leg: int, mirrors: int, out: int, depth: int) -> 
     """
     surface = routes.kind != TRANSMIT
     first = np.argmax(surface & (np.cumsum(surface, axis=1) == mirrors + 1), axis=1)
-    facet = routes.facet[np.arange(len(first)), first].astype(np.int64)
-    return np.asarray(((np.int64(leg) << _LEG | out) << _DEPTH | depth) << _FACET | facet)
+    facet = routes.facet[np.arange(len(first)), first]
+    return source_of(leg, out, depth, facet)
+
+
+def source_of(leg: int, out: int, depth: int, facet: Ints) -> Sources:
+    """Return the source (n,) of tubes that start on facets (n,) and scatter at the bounce `depth`; numbers of legs."""
+    return np.asarray(((np.int64(leg) << _LEG | out) << _DEPTH | depth) << _FACET | facet.astype(np.int64))
 
 
 def depth_of(source: Sources) -> Ints:

@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.before import before
+from bench.cross_section import cross_section
 from bench.fine import fine
 from bench.frame import frame
 from bench.laser import laser
@@ -48,6 +49,7 @@ _GROUPS = (
     fine,
     memory,
     preview,
+    cross_section,
 )
 ALL: dict[str, Benchmark] = {f.__name__: f for f in _GROUPS}
 _ROOT = Path(__file__).parents[2]

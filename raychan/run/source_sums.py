@@ -1,0 +1,184 @@
+"""The amplitudes of a body by source over several launches: how far off they may be, and which sources to refine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from raychan.channel.error import COVER
+from raychan.run.scattering import BySource
+from raychan.tracing.sources import Sources, depth_of, facet_of
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
+_Kind = TypeVar("_Kind", bound=np.generic)
+
+_SHRINKS = COVER / (1.0 + COVER)
+"""Of two changes in a row, the later over the earlier: COVER times the last change covers all that a series of changes
+that shrink by this still brings."""
+_WEIGHT = 1.5  # of a launch in a mean over one of the rule before: changes that do not die out shrink by about 0.8 a
+# rule (bodies of primitives, a person and a traffic light, 3 views each; command not noted)
+_GROWTH = 2.6  # tubes of the next rule over those of this, about
+_LEVEL = 0.995  # one-sided share of Student's t: 99 % of both sides, as COVER is meant to cover
+_SIGMAS = 2.576  # the same of a normal variable, in standard deviations
+
+
+@dataclass(frozen=True)
+class SourceSums:
+    """The amplitudes of each source over the launches so far.
+
+    Tubes whose phase or outline is not yet resolved scatter from lattice to lattice: changes turn round and hardly
+    shrink. Their mean over launches falls faster than a finer launch brings; where changes shrink, or go on in one
+    sense (a bias of size), the newest launch counts alone.
+
+    Fields: sums by source; `last` (s,) [m] what the newest launch gave, `change` (s,) from the one before; `doubt_of`
+    (s,) [m] how far off the sums may be: the last changes, of means the standard error of one component; `rule` (s,) of
+    the newest launch, `launches` (s,) so far; `mean` (4, s) of sums of weights, their squares, weighted powers [m^2],
+    and launches; `scatters` (s,) which are means.
+    """
+
+    sums: BySource
+    element: tuple[int, int]
+    last: Complexes
+    change: Complexes
+    doubt_of: Complexes
+    rule: Ints
+    launches: Ints
+    mean: Floats
+    scatters: NDArray[np.bool_]
+
+    @staticmethod
+    def of(before: BySource, after: BySource, element: tuple[int, int], rule: int) -> SourceSums:
+        """Return the sums of two whole launches; element the row and column of the polarisation."""
+        new, old = (
+            BySource.join([a, replace(b, amplitude=0.0 * b.amplitude, tubes=0.0 * b.tubes)])
+            for a, b in ((after, before), (before, after))
+        )
+        last = new.amplitude[:, element[0], element[1]]
+        change, n = last - old.amplitude[:, element[0], element[1]], len(last)
+        rules, launched = np.full(n, rule), np.full(n, rule + 1)
+        return SourceSums(new, element, last, change, change, rules, launched, np.zeros((4, n)), np.zeros(n, bool))
+
+    @property
+    def value(self) -> complex:
+        """The amplitude [m] of the polarisation asked for."""
+        row, col = self.element
+        return complex(self.sums.amplitude[:, row, col].sum())
+
+    def off(self, cover: float) -> float:
+        """Return how far off [m] the sum may be, by `cover` times the last changes, in phase as they are or of
+        unrelated phases, and by what covers 99 % of the means, more standard deviations where few launches tell these.
+
+        Means err in amplitude and phase alike, and only the component along the sum changes its level.
+        Source: Welch, Biometrika 34, 1947: degrees of freedom of a sum of variances.
+        """
+        changes, means = self.doubt_of[~self.scatters], np.abs(self.doubt_of[self.scatters]) ** 2
+        off = cover * max(abs(changes.sum()), np.linalg.norm(changes))
+        if not means.any():
+            return float(off)
+        # A complex amplitude of n launches has 2 (n - 1).
+        freedom = means.sum() ** 2 / (means**2 / (2.0 * (self.mean[3, self.scatters] - 1.0))).sum()
+        return float(np.hypot(off, stdtrit(freedom, _LEVEL) * np.sqrt(means.sum())))
+
+    @property
+    def next_rule(self) -> Ints:
+        """The rule (s,) by which to trace each source again: a mean takes two launches of each."""
+        return np.asarray(self.rule + (~self.scatters | (self.launches % 2 == 0)))
+
+    @property
+    def next_tubes(self) -> Floats:
+        """How many tubes (s,) that takes, about."""
+        return np.asarray(np.maximum(self.sums.tubes, 1.0) * np.where(self.next_rule > self.rule, _GROWTH, 1.0))
+
+    def to_refine(self, cover: float, leave: float, most: float) -> Ints:
+        """Return the sources, as row numbers, that count.
+
+        Args: cover as for `off`; leave [m] by which all others may be off, in phase as they are and as if of unrelated
+        phases; most tubes that the next launch may have.
+        """
+        # Both directions of a facet are refined together, so that an exchange of both ends changes nothing.
+        source = self.sums.source
+        _, pair = np.unique(depth_of(source) << 32 | facet_of(source), return_inverse=True)
+        off = self.doubt_of * np.where(self.scatters, _SIGMAS, cover)
+        power, tubes, real, imaginary = (
+            np.bincount(pair, x) for x in (np.abs(off) ** 2, self.next_tubes, off.real, off.imag)
+        )
+        # Those first that are most off for what they cost.
+        order = np.argsort(power / tubes, kind="stable")
+        together = np.hypot(np.cumsum(real[order]), np.cumsum(imaginary[order]))
+        rest = np.maximum(together, np.sqrt(np.cumsum(power[order])))
+        first = int(np.flatnonzero(rest <= leave).max(initial=-1)) + 1
+        # Where no source stands out all are refined.
+        best = order[first if first < len(order) else 0 :][::-1]
+        return np.flatnonzero(np.isin(pair, best[np.cumsum(tubes[best]) <= most]))
+
+    def groups(self, rows: Ints) -> Iterator[tuple[int, int, Sources]]:
+        """Give the sources of some rows by the rule and the number of their next launch."""
+        key = np.stack([self.next_rule[rows], self.launches[rows]])
+        for rule, launch in np.unique(key, axis=1).T:
+            yield int(rule), int(launch), self.sums.source[rows[(key == [[rule], [launch]]).all(axis=0)]]
+
+    def joined(self, rows: Ints, parts: list[BySource]) -> SourceSums:
+        """Return the sums with a further launch of the sources of some rows."""
+        again, (row, col), k = BySource.join(parts), self.element, len(rows)
+        place = np.full(len(self.last), -1)
+        place[rows] = np.arange(k)
+        at = place[np.searchsorted(self.sums.source, again.source)]
+        new, tubes = np.zeros((k, 2, 2), complex), np.zeros(k)
+        new[at], tubes[at] = again.amplitude, again.tubes
+        rule, old = self.next_rule[rows], self.sums.amplitude[rows]
+        change, before = new[:, row, col] - self.last[rows], self.change[rows]
+        slow = np.abs(change) > _SHRINKS * np.abs(before)
+        turned = (change * before.conj()).real < 0.0
+        scatters = self.scatters[rows] | (slow & turned)
+        mean, off = _mean(self, rows, new, rule)
+        doubt = np.where(slow & ~turned, change + before, change)
+        doubt[scatters] = off[scatters]
+        weight = _weights(rule) / mean[0]
+        amplitude = np.where(scatters[:, None, None], old + weight[:, None, None] * (new - old), new)
+        own = self.sums
+        return SourceSums(
+            BySource(own.source, _with(own.amplitude, rows, amplitude), _with(own.tubes, rows, tubes)),
+            self.element,
+            last=_with(self.last, rows, new[:, row, col]),
+            change=_with(self.change, rows, change),
+            doubt_of=_with(self.doubt_of, rows, doubt),
+            rule=_with(self.rule, rows, rule),
+            launches=_with(self.launches, rows, self.launches[rows] + 1),
+            mean=_with(self.mean.T, rows, mean.T).T,
+            scatters=_with(self.scatters, rows, scatters),
+        )
+
+
+def _mean(sums: SourceSums, rows: Ints, new: Complexes, rule: Ints) -> tuple[Floats, Complexes]:
+    """Return the sums (4, k) of the means of some rows with a new launch (k, 2, 2), and the standard error (k,) [m] of
+    one component of each, in the direction of the last change."""
+    row, col = sums.element
+    w, first = _weights(sums.rule[rows]), ~sums.scatters[rows]
+    last, value = sums.last[rows], new[:, row, col]
+    before = np.where(first, [w, w**2, w * np.abs(last) ** 2, np.ones(len(w))], sums.mean[:, rows])
+    w = _weights(rule)
+    mean = before + np.array([w, w**2, w * np.abs(value) ** 2, np.ones(len(w))])
+    old = np.where(first, last, sums.sums.amplitude[rows, row, col])
+    middle = old + w / mean[0] * (value - old)
+    spread = np.maximum(mean[2] / mean[0] - np.abs(middle) ** 2, 0.0)
+    error = np.sqrt(0.5 * spread / (mean[0] ** 2 / mean[1] - 1.0))
+    return mean, error * np.exp(1j * np.angle(value - old))
+
+
+def _weights(rule: Ints) -> Floats:
+    """Return the weights (n,) in a mean of launches by some rules (n,)."""
+    return np.asarray(_WEIGHT ** rule.astype(float))
+
+
+def _with(values: NDArray[_Kind], rows: Ints, new: NDArray[_Kind]) -> NDArray[_Kind]:
+    """Return a copy of values with new ones in some rows."""
+    changed = values.copy()
+    changed[rows] = new
+    return changed

@@ -1,0 +1,81 @@
+"""Cross-sections to a tolerance: how often `rcs` reaches it, and whether what it states covers the true error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import trimesh
+
+import raychan as rc
+from bench.measure import Row
+from raychan.poses import direction
+from raychan.run.rcs_refinement import refinements
+from raychan.run.scattering import scattering
+from raychan.run.single_body import facets_of
+from raychan.tracing.legs import Leg
+from raychan.world.geometry import Geometry
+from raychan.world.mesh import make_mesh
+
+_F, _BOUNCES, _TOLERANCE_DB = 77e9, 3, 0.5
+_WEIGHTS = np.array([1.0, 1.5, 2.25])  # of three launches in the truth, the finest last
+
+
+def cross_section(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
+    """Random bodies of primitives with flat facets, 0.5 dB asked for: the truth is the mean of three finer launches of
+    the whole body, and counts where it is known to a quarter of a dB."""
+    seeds, views, most, finer = (2, 4, 1_000_000, 4) if quick else (5, 48, 6_000_000, 6)
+    for seed in range(1, seeds + 1):
+        mesh, rng = _assembled(seed), np.random.default_rng(seed)
+        geometry, rows, start = Geometry(facets_of(mesh, "pec", _F)), list[Any](), perf_counter()
+        for az, el in zip(rng.uniform(-180.0, 180.0, views), rng.uniform(-5.0, 20.0, views), strict=True):
+            got = rc.rcs(mesh, _F, az, el, tolerance_db=_TOLERANCE_DB, max_rays=most)
+            true, unsure = _truth(geometry, az, el, finer)
+            rows.append((float(got.error_db), abs(10.0 * np.log10(float(got.sigma) / true)), unsure, int(got.rays)))
+        stated, off, unsure, rays = np.array(rows).T
+        known = np.isfinite(stated) & (unsure < 0.5 * _TOLERANCE_DB)
+        told = known & (off > 1e-3)
+        reached, covered = float(np.mean(stated <= _TOLERANCE_DB)), float(np.mean((off <= stated)[known]))
+        yield Row(
+            "cross_section", f"body {seed}, {views} views", perf_counter() - start, bar="stated 90 %, covered 95 %",
+            met=reached >= 0.9 and covered >= 0.95, more={
+                "stated_within_tolerance": reached, "covered": covered, "truths_known": int(known.sum()),
+                "median_stated_over_true": float(np.median((stated / off)[told])) if told.any() else None,
+                "rays_mean": float(rays.mean()),
+            },
+        )  # fmt: skip
+
+
+def _assembled(seed: int) -> Any:
+    """Return five boxes, cylinders and spheres through each other, with flat facets: the mesh leaves nothing open."""
+    rng, parts = np.random.default_rng(seed), []
+    for _ in range(5):
+        a, b, c = rng.uniform(0.1, 0.6, 3)
+        kinds = (
+            lambda a=a, b=b, c=c: trimesh.creation.box((a, b, c)),
+            lambda a=a, b=b: trimesh.creation.cylinder(a / 2.0, b, sections=48),
+            lambda a=a: trimesh.creation.icosphere(3, a / 2.0),
+        )
+        place = np.eye(4)
+        part = kinds[rng.integers(3)]()
+        if rng.random() < 0.5:
+            place = trimesh.transformations.random_rotation_matrix(rng.random(3))
+        place[:3, 3] = rng.uniform(-0.5, 0.5, 3)
+        parts.append(part.apply_transform(place))
+    whole = trimesh.util.concatenate(parts)
+    return make_mesh(whole.vertices, whole.faces, normals=np.repeat(whole.face_normals[:, None], 3, axis=1))
+
+
+def _truth(geometry: Geometry, az: float, el: float, steps: int) -> tuple[float, float]:
+    """Return sigma [m^2] by the mean of the last three of so many launches, and its standard error [dB]."""
+    leg = Leg(end=direction(np.radians(az), np.radians(el)), far=True)
+    rules = islice(refinements(geometry, _F), steps - 3, steps)
+    found = np.array([scattering(geometry, leg, leg, _F, _BOUNCES, rule)[:, 0, 0].sum() for rule in rules])
+    share = _WEIGHTS / _WEIGHTS.sum()
+    mean = share @ found
+    error = np.sqrt(share @ np.abs(found - mean) ** 2 / (1.0 / (share @ share) - 1.0))
+    return float(4.0 * np.pi * abs(mean) ** 2), float(20.0 * np.log10(1.0 + error / abs(mean)))
