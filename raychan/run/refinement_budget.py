@@ -10,6 +10,7 @@ from raychan.tracing.solver import Stats
 STEPS = 6
 """Launches, each half as coarse as the one before."""
 _RAYS = 2.5  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
+_LEAST = 300_000  # rays that further launches may cast however few the first one did: a quarter of a second
 _GROWTH = 2.0  # rays and seconds of a step over those of the one before, about
 _BYTES = 400.0  # a path
 
@@ -18,7 +19,8 @@ class Budget:
     """The budgets of a scene's model: `max_rays`, `max_seconds`, `max_memory_mb`, counted from the first launch on."""
 
     def __init__(self, model: Any, stats: Stats) -> None:
-        self._rays = (1.0 + _RAYS) * stats.rays if model.max_rays == "auto" else float(model.max_rays)
+        further = max(_RAYS * stats.rays, _LEAST)
+        self._rays = stats.rays + further if model.max_rays == "auto" else float(model.max_rays)
         self._seconds, self._memory = model.max_seconds, model.max_memory_mb
         self._cast, self._start = stats.rays, time.perf_counter()
         self._spent = 0.0
