@@ -33,7 +33,7 @@ from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.solver import Batch, Launch, Stats
-from raychan.tracing.sources import EXACT, Sources, launches
+from raychan.tracing.sources import EXACT, Sources, launches, neighbours
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -202,17 +202,16 @@ class SceneRefinement:
         feeding = [feeding_sources(own, x, float(t)) for x, t in zip(sums, cells.tolerance, strict=True)]
         del sums
         wanted = np.ones((len(cells.place), 2), bool)
-        budget, steps, ended = Budget(self.model, self.stats), 0, ""
+        budget, steps, ended, beside = Budget(self.model, self.stats), 0, "", neighbours(self.geometry)
         while wanted.any() and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
             changed = np.zeros((len(cells.place), 2), complex)
             for deep in (0, 1):
                 some = [f[deep] for f, w in zip(feeding, wanted[:, deep], strict=True) if w]
                 if some and len(again := np.unique(np.concatenate(some))):
-                    # The first launch cut shallow tubes already: they are a step ahead.
-                    rule = step_rule(self.radar, self.settings, self.model, steps + 1 - deep)
-                    by = list(launches(again, len(self.geometry.facets.body)))
-                    new = self._paths(launch.again(rule.refinement, by, self.stats))
+                    rule = step_rule(self.radar, self.settings, self.model, steps + 1)
+                    by = list(launches(again, len(self.geometry.facets.body), beside))
+                    new = self._paths(launch.again(replace(rule.refinement, least=steps + 1), by, self.stats))
                     assert new is not None
                     changed += changes(response, *held.replace(*new, by), cells.place)
             cells.changed(changed, wanted)
