@@ -21,7 +21,9 @@ Classes = tuple[Sources, Sources]
 _SHALLOW = 0.5  # of the tolerance, as an amplitude: so much shallow tubes may bring that are not traced again
 _DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
 _EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
-_REST = 0.15  # of the tolerance, as an amplitude: so much the last changes of sources may add up to that are not refined
+_REST = (
+    0.15  # of the tolerance, as an amplitude: so much the last changes of sources may add up to that are not refined
+)
 _NOTHING = 1e-3  # of the tolerance, as an amplitude: smaller changes are not kept one by one
 _UNKNOWN = 0.757
 """Factor by which changes are taken to shrink a step where there was one only. COVER, chosen for launches a factor 3
@@ -107,7 +109,10 @@ class MapCells:
         slow, found = self.slowness, np.zeros(len(self))
         for i, changes in enumerate(self._changes):
             whole, rms = changes.sums()
-            sizes = abs((slow[i] * whole).sum() + self.left[i]), float(np.hypot(np.hypot(*(slow[i] * rms)), abs(self.left[i])))
+            sizes = (
+                abs((slow[i] * whole).sum() + self.left[i]),
+                float(np.hypot(np.hypot(*(slow[i] * rms)), abs(self.left[i]))),
+            )
             found[i] = COVER * max(sizes)
         return found
 

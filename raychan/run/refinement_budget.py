@@ -9,8 +9,8 @@ from raychan.tracing.solver import Stats
 
 STEPS = 6
 """Launches, each half as coarse as the one before."""
-_RAYS = 2.5  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
-_LEAST = 300_000  # rays that further launches may cast however few the first one did: a quarter of a second
+_RAYS = 2.0  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
+_LEAST = 600_000  # rays that further launches may cast however few the first one did: half a second of one core
 _GROWTH = 2.0  # rays and seconds of a step over those of the one before on the same facets, about
 _BYTES = 400.0  # a path
 

@@ -201,7 +201,8 @@ class SceneRefinement:
         """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why."""
         feeding, facets = _feeding(held, response, cells), len(self.geometry.facets.body)
         budget, steps, ended = Budget(self.model, self.stats), 0, ""
-        by = list(launches(_united(feeding), facets, neighbours(self.geometry)))
+        beside = neighbours(self.geometry)
+        by = list(launches(_united(feeding), facets, beside))
         while by and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
             rule = step_rule(self.radar, self.settings, self.model, steps + 1)
@@ -210,7 +211,7 @@ class SceneRefinement:
             own, sums = by_source(response, *held.replace(*new, by), cells.place)
             for i, change in enumerate(sums):
                 cells.changed(i, own, change)
-            before, by = by, list(launches(_united(_wanted(cells)), facets))
+            before, by = by, list(launches(_united(_wanted(cells)), facets, beside))
             steps += 1
             if by:
                 ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))

@@ -64,8 +64,10 @@ class Judged:
 
 
 def detections(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
-    """Judge detections of random scenes: share within the tolerance by their own statement, share whose stated error covers
-    the true one, among those whose truth is known; and the worst by seed."""
+    """Judge detections of random scenes: how many state the tolerance, how many of these errors cover the true one.
+
+    Then the worst by seed.
+    """
     count = _QUICK if quick else _SCENES
     yield from rows([judged(random_scene(_FIRST + i)) for i in range(count)])
 
