@@ -211,7 +211,7 @@ class SceneRefinement:
             own, sums = by_source(response, *held.replace(*new, by), cells.place)
             for i, change in enumerate(sums):
                 cells.changed(i, own, change)
-            before, by = by, list(launches(_united(_wanted(cells)), facets, beside))
+            before, by = by, list(launches(_united(_wanted(cells)), facets))
             steps += 1
             if by:
                 ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))
