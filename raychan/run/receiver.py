@@ -130,12 +130,31 @@ def noise_amplitude(radar: Radar, settings: Any) -> float:
 
 
 def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapError:
-    """Return the map of what two launches differ by: the samples of one less those of the other, without noise."""
-    return MapError(quiet_map(quiet.samples - others.samples, radar, settings))
+    """Return the map of what two launches differ by: the samples of one less those of the other, without noise.
+
+    Of an array whose beams the detector sees it is what they differ by in the beam towards a cell's echo, or the mean
+    over beams in all directions where that is more: errors from elsewhere are outside of that beam.
+    """
+    change = quiet.samples - others.samples
+    if bank_of(radar, settings) is None:
+        return MapError(quiet_map(change, radar, settings))
+    echo, wrong = (_quiet_spectrum(x, radar, settings) for x in (quiet.samples, change))
+    turned = np.exp(-1j * np.angle(echo))
+    # Over as many orthogonal beams as receivers the powers add up to that of all receivers.
+    towards, mean = np.abs((wrong * turned).mean(axis=0)) ** 2, (np.abs(wrong) ** 2).mean(axis=0) / len(wrong)
+    return MapError(np.maximum(towards, mean).astype(np.float64))
 
 
 def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     """Return the powers (v, r) [W] of the map of samples (antenna, chirp, sample) without noise."""
+    return _quiet(samples, radar, settings).power
+
+
+def _quiet_spectrum(samples: Any, radar: Radar, settings: Any) -> Any:
+    return _quiet(samples, radar, settings).spectrum
+
+
+def _quiet(samples: Any, radar: Radar, settings: Any) -> RangeDoppler:
     cube = channel(Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0), radar)
     windows = (settings.range_window, settings.rate_window, settings.pad)
-    return virtual_range_doppler(cube, radar, *windows, resolve=False).power
+    return virtual_range_doppler(cube, radar, *windows, resolve=False)

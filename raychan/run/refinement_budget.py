@@ -9,8 +9,9 @@ from raychan.tracing.solver import Stats
 
 STEPS = 6
 """Launches, each half as coarse as the one before."""
-_RAYS = 2.5  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
-_GROWTH = 2.0  # rays and seconds of a step over those of the one before, about
+_RAYS = 2.0  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
+_LEAST = 600_000  # rays that further launches may cast however few the first one did: half a second of one core
+_GROWTH = 2.0  # rays and seconds of a step over those of the one before on the same facets, about
 _BYTES = 400.0  # a path
 
 
@@ -18,21 +19,26 @@ class Budget:
     """The budgets of a scene's model: `max_rays`, `max_seconds`, `max_memory_mb`, counted from the first launch on."""
 
     def __init__(self, model: Any, stats: Stats) -> None:
-        self._rays = (1.0 + _RAYS) * stats.rays if model.max_rays == "auto" else float(model.max_rays)
+        further = max(_RAYS * stats.rays, _LEAST)
+        self._rays = stats.rays + further if model.max_rays == "auto" else float(model.max_rays)
         self._seconds, self._memory = model.max_seconds, model.max_memory_mb
         self._cast, self._start = stats.rays, time.perf_counter()
         self._spent = 0.0
 
-    def ended(self, steps: int, stats: Stats, paths: int) -> str:
-        """Return what leaves no room for a further step, '' if nothing does; paths held."""
+    def ended(self, steps: int, stats: Stats, paths: int, share: float) -> str:
+        """Return what leaves no room for a further step, '' if nothing does.
+
+        Args: steps taken; paths held; share of the facets of the step before that the next one traces again.
+        """
         cast, self._cast = stats.rays - self._cast, stats.rays
         spent, before = time.perf_counter() - self._start, self._spent
         self._spent = spent
         if steps >= STEPS:
             return f"{STEPS} steps"
-        if stats.rays + _GROWTH * cast > self._rays:
+        growth = _GROWTH * share
+        if stats.rays + growth * cast > self._rays:
             return "the budget of rays (model.max_rays)"
-        if self._seconds is not None and spent + _GROWTH * (spent - before) > self._seconds:
+        if self._seconds is not None and spent + growth * (spent - before) > self._seconds:
             return "the budget of time (model.max_seconds)"
         if self._memory is not None and _GROWTH * paths * _BYTES > 1e6 * self._memory:
             return "the budget of memory (model.max_memory_mb)"

@@ -9,7 +9,7 @@ tolerance, or a budget ends.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,21 +21,20 @@ from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
-from raychan.run.map_cells import MapCells, feeding_sources
+from raychan.run.map_cells import Classes, MapCells, class_of, feeding_sources
 from raychan.run.mechanisms import choose, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.receiver import detections_in, map_of, noise_amplitude, noise_of_beam
 from raychan.run.refinement_budget import STEPS, Budget
 from raychan.run.rules import first_rule, step_rule
-from raychan.run.sourced_paths import SourcedPaths, changes
+from raychan.run.sourced_paths import SourcedPaths, by_source, changes
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Batch, Launch, Stats
-from raychan.tracing.sources import EXACT, Sources, launches
-from raychan.tracing.tubes import Refinement
+from raychan.tracing.sources import EXACT, Sources, launches, neighbours
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -204,39 +203,60 @@ class SceneRefinement:
         fed = np.abs(level) ** 2 > _UNEXPLAINED * power
         place, level = place[fed], level[fed]
         place[:, 2] = np.abs(level)
-        return MapCells.of(place, level, self.model.tolerance_db)
+        return MapCells(place, level, self.model.tolerance_db)
 
     def _refined(
         self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells
     ) -> tuple[int, tuple[Unreached, ...], str]:
         """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why."""
-        own, sums = held.by_source(response, cells.place)
-        feeding = [feeding_sources(own, x, float(t)) for x, t in zip(sums, cells.tolerance, strict=True)]
-        del sums
-        wanted = np.ones((len(cells.place), 2), bool)
+        feeding, facets = _feeding(held, response, cells), len(self.geometry.facets.body)
         budget, steps, ended = Budget(self.model, self.stats), 0, ""
-        while wanted.any() and not ended:
+        beside = neighbours(self.geometry)
+        by = list(launches(_united(feeding), facets, beside))
+        while by and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
-            jobs: list[tuple[Refinement, int, Wanted]] = []
-            # Deep tubes, of which a launch takes longest, first.
-            for deep in (1, 0):
-                some = [f[deep] for f, w in zip(feeding, wanted[:, deep], strict=True) if w]
-                if some and len(again := np.unique(np.concatenate(some))):
-                    # The first launch cut shallow tubes already: they are a step ahead.
-                    rule = step_rule(self.radar, self.settings, self.model, steps + 1 - deep)
-                    by = launches(again, len(self.geometry.facets.body))
-                    jobs += [(rule.refinement, i, what) for i, what in by]
-            new = self._paths(launch.again(jobs, self.stats, self._carried))
+            rule = step_rule(self.radar, self.settings, self.model, steps + 1)
+            finer = replace(rule.refinement, least=steps + 1)
+            new = self._paths(launch.again(finer, by, self.stats, self._carried))
             assert new is not None
-            changed = changes(response, *held.replace(*new, [(i, what) for _, i, what in jobs]), cells.place)
-            cells.changed(changed, wanted)
-            wanted = cells.open
+            own, sums = by_source(response, *held.replace(*new, by), cells.place)
+            for i, change in enumerate(sums):
+                cells.changed(i, own, change)
+            before, by = by, list(launches(_united(_wanted(cells)), facets))
             steps += 1
-            ended = budget.ended(steps, self.stats, len(held))
+            if by:
+                ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))
         for slow, classes in zip(cells.slowness, feeding, strict=True):
             for factor, one in zip(slow, classes, strict=True):
                 held.doubt(one, float(factor))
-        return steps, tuple(_unreached(cells, wanted)), ended
+        return steps, tuple(_unreached(cells)), ended
+
+
+def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list[Classes]:
+    """Return the sources that feed each cell, shallow and deep, and note what the deep tubes bring that are left."""
+    own, sums = held.by_source(response, cells.place)
+    deep, found = class_of(own) == 1, []
+    for i, x in enumerate(sums):
+        found.append(feeding_sources(own, x, float(cells.tolerance[i])))
+        cells.left[i] = x[deep & ~np.isin(own, found[-1][1])].sum()
+    return found
+
+
+def _wanted(cells: MapCells) -> Iterator[Classes]:
+    """Give the sources of each open cell that are to be traced again."""
+    none = np.zeros(0, np.int64)
+    for i, classes in enumerate(cells.open):
+        if classes.any():
+            shallow, deep = cells.wanted(i)
+            yield shallow if classes[0] else none, deep if classes[1] else none
+
+
+def _united(classes: Iterable[Classes]) -> Sources:
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *(x for both in classes for x in both)]))
+
+
+def _facets(by: list[tuple[int, Wanted]]) -> int:
+    return sum(int(wanted.facets.sum()) for _, wanted in by)
 
 
 def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
@@ -245,8 +265,9 @@ def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
     return [take(b, keep[i:j]) for b, i, j in zip(batches, ends, ends[1:], strict=False)]
 
 
-def _unreached(cells: MapCells, wanted: Bools) -> Iterator[Unreached]:
+def _unreached(cells: MapCells) -> Iterator[Unreached]:
     """Give the cells of which a class of tubes is still to be refined."""
-    for i in np.flatnonzero(wanted.any(axis=1)):
-        shallow, deep = cells.change[i]
+    change = cells.change
+    for i in np.flatnonzero(cells.open.any(axis=1)):
+        shallow, deep = change[i]
         yield Unreached(float(cells.place[i, 0]), float(cells.place[i, 1]), bool(deep > shallow))

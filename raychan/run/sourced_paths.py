@@ -3,6 +3,7 @@ again, and what it replaced stays known, for the difference tells the error."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -123,15 +124,21 @@ class SourcedPaths:
         share = np.sqrt(self._moved[1] / self._moved[0]) if self._moved[0] > 0.0 else 0.0
         return np.asarray(share * np.exp(1j * turn))
 
-    def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, list[Complexes]]:
+    def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, Iterator[Complexes]]:
         """Return the sources (s,) of the first launch, and for each of the cells (c, 3) the sums (s,) of its paths
         there."""
-        part = self._parts[0]
-        own, group = np.unique(part.source, return_inverse=True)
-        most, found = max(1, _SUMS // max(len(own), 1)), list[Complexes]()
-        for i in range(0, len(cells), most):
-            found.extend(_sums(response, part.paths, group, len(own), cells[i : i + most]))
-        return own, found
+        return by_source(response, self._parts[0].paths, self._parts[0].source, cells)
+
+
+def by_source(
+    response: PointSpread, paths: Paths, source: Sources, cells: Floats
+) -> tuple[Sources, Iterator[Complexes]]:
+    """Return the sources (s,), in order, of the trajectories (w,) of paths, and for each of the cells (c, 3) the sums
+    (s,) of its paths there."""
+    own, group = np.unique(source, return_inverse=True)
+    most = max(1, _SUMS // max(len(own), 1))
+    parts = (_sums(response, paths, group, len(own), cells[i : i + most]) for i in range(0, len(cells), most))
+    return own, (row for part in parts for row in part)
 
 
 def _powers(first: _Part, rows: NDArray[np.bool_], paths: Paths, source: Sources) -> Floats:

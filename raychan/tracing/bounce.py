@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.parallel import parallel_for
-from raychan.records import REFLECT
+from raychan.records import MIRROR, REFLECT
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.edge_crossings import FacetPlanes, TubeRays, edges_within
 from raychan.tracing.launch import write_layers
@@ -158,8 +158,11 @@ def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: 
     in_phase, _, length = _contribution_bounds(step, tubes)
     if step.last:
         # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.
-        # Before more mirrors that is not known. Where the centre ray meets nothing a body may still stand beside it.
+        # Before more mirrors that is not known. Where the centre ray meets nothing, or the ground, from which tubes do
+        # not return, a body may still stand beside it.
         span, length = np.empty((2, len(tubes)))
+        f = geometry.facets
+        mid = np.where(f.role[f.body[mid]] == MIRROR, -1, mid)
         planes = geometry.first, geometry.normal
         rays = tubes.points, directions, tubes.length
         phase_at_hits(*rays, mid, ahead, *planes, out.image, out.far, step.rule.wavenumber, span, length)

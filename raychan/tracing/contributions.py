@@ -22,7 +22,6 @@ _MANY = 4096  # tubes from which on pruning pays; not measured
 _THREADS = 1000  # tubes from which on a second thread pays; not measured
 _NOTHING = 1e-100  # 1/m
 _DEPTH = 1e-2  # of the strongest cell: without noise weaker cells are refined as if they held this; not measured
-_ALONE = 0.15  # of the field found: what a tube may bring that a coarse launch does not cut; not measured
 _SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; not measured
 
 
@@ -125,12 +124,13 @@ class Contributions:
 
     def deep_threshold(self, length: Floats) -> Floats:
         """Return the contribution [1/m] (n,) below which tubes that bounced are not cut: where the rule is coarse, what
-        alone would not make a detection nor change what was found by much."""
+        alone would not make a detection nor change what was found by more than a good part of the tolerance: what is
+        not cut is missed where its centre is hidden."""
         if self.rule.coarse == 1.0:
             return self.prune_threshold(length)
         at = np.minimum(self._cell(length), len(self._level) - 1)
         level = np.maximum(self._level[at], _DEPTH * self._level.max())
-        return np.maximum(max(self.rule.coarse * self.rule.floor, _NOTHING), _ALONE * level)
+        return np.maximum(max(self.rule.coarse * self.rule.floor, _NOTHING), self.rule.relative * level)
 
     def add(self, ph: Phases) -> None:
         """Add tubes that are seen: in each cell the sum of their amplitudes, or their rms sum where that cancels."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.geometry.curved_patches import edge_to_cut, halved
 from raychan.geometry.lit_parts import lit_parts
+from raychan.poses import sizes
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
@@ -101,6 +102,8 @@ def _bisect_for_phase(
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
         edge = edge_to_cut(facet, bary, *(*shape, *images, *limits))
+        if level < rule.least:
+            edge = np.where((edge < 0) & (geometry.curved[facet] | (not across)), _longest(facet, bary, shape[0]), edge)
         more = found.budget.affords_phase(geometry, facet, edge >= 0)
         ready = ~more
         if held + np.count_nonzero(ready) > rule.batch:
@@ -112,6 +115,13 @@ def _bisect_for_phase(
             left.append((*halved(facet[more], bary[more], edge[more], rule.jitter, level), level + 1))
     if held:
         yield _joined(done)
+
+
+def _longest(facet: Ints, bary: Floats, vertices: Floats) -> NDArray[np.int8]:
+    """Return the longest edge (n,) of patches of facets (n,) with corners bary (n, 3, 3)."""
+    corner = bary @ vertices[facet]
+    lengths = sizes(corner - np.roll(corner, -1, axis=1))
+    return np.argmax(lengths, axis=1).astype(np.int8)
 
 
 def _joined(parts: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:

@@ -101,18 +101,20 @@ class Launch:
             progress("trace", 1.0)
 
     def again(
-        self, wanted: list[tuple[Refinement, int, Wanted]], stats: Stats, each: Callable[[Batch], T]
+        self, refinement: Refinement, wanted: list[tuple[int, Wanted]], stats: Stats, each: Callable[[Batch], T]
     ) -> Iterator[tuple[T, Sources]]:
         """Yield what `each`, called by any thread, makes of the routes of tubes traced again, and their sources (n,).
 
-        Args: wanted refinements by which tubes are cut, numbers of legs in, and what is wanted there (see
+        Args: refinement by which tubes are cut; wanted numbers of legs in, and what is wanted there (see
         `tracing.sources`). What is too weak to be cut is judged by what the whole launch found.
         """
         before, budgets = self.geometry.rays, list[Budget]()
-        parts = [(refinement, i, part) for refinement, i, what in wanted for part in what.parts(_PART)]
+        # Deep tubes, of which a launch takes longest, first.
+        deepest = sorted(wanted, key=lambda one: -one[1].depth)
+        parts = [(i, part) for i, what in deepest for part in what.parts(_PART)]
         for group in self._groups(range(len(parts))):
             jobs: list[tuple[int, Contributions, Wanted | None]] = []
-            for refinement, i, what in (parts[j] for j in group):
+            for i, what in (parts[j] for j in group):
                 budgets.append(Budget(self._limited(refinement)))
                 jobs.append((i, self._found[i].frozen(budgets[-1]), what))
             yield from self._together(jobs, stats, each)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import TRANSMIT, Routes
 from raychan.tracing.shooting import Wanted
+from raychan.world.geometry import Geometry
 
 Ints = NDArray[np.signedinteger]
 Sources = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 EXACT = -1
 """Source of routes that are not of tubes."""
@@ -50,10 +52,13 @@ def _legs_of(source: Sources) -> tuple[Ints, Ints]:
     return source >> (_LEG + _DEPTH + _FACET), (source >> (_DEPTH + _FACET)) & ((1 << _LEG) - 1)
 
 
-def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
+def launches(
+    source: Sources, facets: int, beside: Callable[[Bools], Bools] | None = None
+) -> Iterator[tuple[int, Wanted]]:
     """Give the launches that trace sources (n,) again: numbers of legs in, and what is wanted there, one depth each.
 
-    From each facet of a launch all its outgoing legs are traced: see `covered`.
+    From each facet of a launch all its outgoing legs are traced: see `covered`. Args: beside tells of facets (f,) those
+    to launch from beside them (see `neighbours`).
     """
     own = source[source != EXACT]
     (leg, out), depth = _legs_of(own), depth_of(own)
@@ -61,7 +66,25 @@ def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
         mine = (leg == i) & (depth == d)
         wanted = np.zeros(facets, bool)
         wanted[facet_of(own[mine])] = True
-        yield int(i), Wanted(wanted, int(d), frozenset(map(int, out[mine])))
+        yield int(i), Wanted(beside(wanted) if beside else wanted, int(d), frozenset(map(int, out[mine])))
+
+
+def neighbours(geometry: Geometry) -> Callable[[Bools], Bools]:
+    """Return a function of facets (f,) that adds the rest of their planes, and the facets across their edges.
+
+    A coarse launch sees nothing of a facet that meets or shows a surface with a small part of it only.
+    """
+    plane, pair = geometry.plane, geometry.scene_topology.half_edges("pair").reshape(-1, 2) // 3
+
+    def beside(wanted: Bools) -> Bools:
+        of_plane = np.zeros(int(plane.max(initial=-1)) + 1, bool)
+        of_plane[plane[wanted]] = True
+        every = wanted | of_plane[plane]
+        for one, other in (pair.T, pair[:, ::-1].T):
+            every[other[wanted[one]]] = True
+        return every
+
+    return beside
 
 
 def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:

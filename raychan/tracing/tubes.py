@@ -42,7 +42,9 @@ class Refinement:
     may make, `max_cuts` for visibility, `max_rays` (see `Contributions.affords`); `jitter` (0 to 0.5) moves cuts off
     the middle, for a second lattice; `coarse`
     not 1: tubes that bounced are cut only where one alone may bring so many times the floor, and a good part of
-    what is found there; `behind` [m] how far behind its mirror a corner of a tube may land (see `resolve_hits`).
+    what is found there; `least` bisections of each first tube on a curved facet, and of all that bounce again, for a
+    launch to be finer where the one before was fine enough; `behind` [m] how far behind its mirror a corner of a tube
+    may land (see `resolve_hits`).
     """
 
     wavenumber: float
@@ -61,6 +63,7 @@ class Refinement:
     max_rays: float = np.inf
     jitter: float = 0.0
     coarse: float = 1.0
+    least: int = 0
     behind: float = 1e-6
 
     def for_depth(self, bounces: int) -> Refinement:

@@ -18,6 +18,7 @@ from rich.table import Table
 
 from bench.before import before
 from bench.cross_section import cross_section
+from bench.detections import detections
 from bench.fine import fine
 from bench.frame import frame
 from bench.laser import laser
@@ -50,6 +51,7 @@ _GROUPS = (
     memory,
     preview,
     cross_section,
+    detections,
 )
 ALL: dict[str, Benchmark] = {f.__name__: f for f in _GROUPS}
 _ROOT = Path(__file__).parents[2]

@@ -7,6 +7,7 @@ import pytest
 from support.boxes_and_balls import WAVEFORM, scene_of
 
 import raychan as rc
+from raychan.channel.error import COVER
 from raychan.run import refinement_budget
 from raychan.run.map_cells import MapCells, feeding_sources
 from raychan.run.rules import step_rule
@@ -15,6 +16,13 @@ from raychan.run.sourced_paths import SourcedPaths
 from raychan.tracing.solver import Stats
 from raychan.tracing.sources import depth_of, launches
 from raychan.world.geometry import geometry_of
+
+SHALLOW, DEEP = 1 << 31, 2 << 31  # sources of facet 0: bounces 1 and 2
+
+
+def one_cell():
+    """Return a cell of level 1 that no launch has changed."""
+    return MapCells(np.array([[10.0, 0.0, 1.0]]), np.array([1.0 + 0j]), 0.5)
 
 
 def fine(of, monkeypatch):
@@ -55,9 +63,7 @@ def test_what_was_never_cut_is_in_doubt():
     assert np.sort(np.abs(held.doubtful.amplitude)) == pytest.approx(np.sort(np.abs(first.paths.amplitude[deep])))
     by = list(launches(np.unique(first.source[depth_of(first.source) > 1]), len(refinement.geometry.facets.body)))
     rule = step_rule(of.radar, of.processing, of.model, 0)
-    paths, source = refinement._paths(
-        first.launch.again([(rule.refinement, *one) for one in by], Stats(), refinement._carried)
-    )
+    paths, source = refinement._paths(first.launch.again(rule.refinement, by, Stats(), refinement._carried))
     change, _ = held.replace(paths, source, by)
     assert held.doubtful.amplitude.sum() == pytest.approx(change.amplitude.sum())
     assert len(held.now.amplitude) == len(paths.amplitude) + np.count_nonzero(~deep)
@@ -103,11 +109,64 @@ def test_sources_left_out_bring_less_than_their_share():
 
 @pytest.mark.parametrize(("q", "factor"), [(0.3, 1.0), (0.64, 1.0), (0.75, 3.0 / 1.8), (1.2, 3.0)])
 def test_changes_that_do_not_shrink_count_as_the_rest_of_their_series(q, factor):
-    cells = MapCells.of(np.array([[10.0, 0.0, 1.0]]), np.array([1.0 + 0j]), 0.5)
-    wanted = np.ones((1, 2), bool)
+    cells = one_cell()
     for change in (0.1, 0.1 * q):
-        cells.changed(np.array([[change, 0.0]]), wanted)
+        cells.changed(0, np.array([SHALLOW]), np.array([change + 0j]))
     assert cells.slowness[0, 0] == pytest.approx(factor, rel=0.02)
+    assert cells.doubt[0] == pytest.approx(COVER * factor * 0.1 * q, rel=0.02)
+
+
+def test_changes_that_cancel_count_by_their_rms_sum():
+    """Two sources change a level to opposite sides: that says nothing of their next changes."""
+    cells = one_cell()
+    cells.changed(0, np.array([SHALLOW, SHALLOW + 1]), np.array([0.03, -0.03 + 0j]))
+    assert cells.level[0] == pytest.approx(1.0)
+    assert cells.doubt[0] == pytest.approx(COVER * cells.slowness[0, 0] * 0.03 * np.sqrt(2.0))
+    assert cells.open[0].tolist() == [True, False]
+
+
+def test_deep_tubes_that_were_never_cut_keep_a_cell_from_its_tolerance():
+    cells = one_cell()
+    cells.changed(0, np.array([SHALLOW, DEEP]), np.array([0.001, 0.002 + 0j]))
+    assert not cells.open.any()
+    cells.left[0] = 0.1
+    assert cells.open[0].tolist() == [False, True]
+
+
+def test_what_changed_most_is_traced_again():
+    """All but the weakest, whose sum and rms sum stay under their share of the tolerance."""
+    rng = np.random.default_rng(3)
+    cells, source = one_cell(), SHALLOW + np.arange(300)
+    change = rng.normal(size=300) * 10.0 ** rng.uniform(-4, -1, 300) * np.exp(2j * np.pi * rng.uniform(size=300))
+    cells.changed(0, source, change)
+    again, none = cells.wanted(0)
+    left = ~np.isin(source, again) & (np.abs(change) > 1e-3 * cells.tolerance[0] * abs(cells.level[0]))
+    limit = 0.15 * cells.tolerance[0] * abs(cells.level[0])
+    assert len(none) == 0 and 0 < left.sum() < 300
+    assert abs(change[left].sum()) <= limit and np.sqrt((np.abs(change[left]) ** 2).sum()) <= limit
+    assert np.abs(change[left]).max() <= np.abs(change[np.isin(source, again)]).min()
+
+
+def test_a_scene_of_few_rays_may_still_be_refined():
+    """Three and a half times a hundred rays is no budget: a lone corner needs some thousands."""
+    model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}).model
+    stats = Stats(rays=100)
+    budget = refinement_budget.Budget(model, stats)
+    stats.rays = 10_000
+    assert budget.ended(1, stats, 10, 1.0) == ""
+    stats.rays = 2_000_000
+    assert "max_rays" in budget.ended(2, stats, 10, 1.0)
+
+
+def test_a_step_that_traces_few_facets_again_fits_into_what_is_left():
+    model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}, model={"max_rays": 2_500_000}).model
+    ended = []
+    for share in (1.0, 0.1):
+        stats = Stats(rays=1_000_000)
+        budget = refinement_budget.Budget(model, stats)
+        stats.rays = 2_000_000
+        ended.append(budget.ended(1, stats, 10, share))
+    assert "max_rays" in ended[0] and ended[1] == ""
 
 
 @pytest.mark.parametrize(("yaw", "side"), [(160.0, 0.2), (180.0, 0.12), (190.0, 0.3)])

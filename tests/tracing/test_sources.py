@@ -13,7 +13,7 @@ from raychan.channel.paths import join, paths_of
 from raychan.run.rules import fine_rule
 from raychan.signal.baseband import synthesize
 from raychan.tracing.solver import Launch, Stats
-from raychan.tracing.sources import EXACT, covered, depth_of, facet_of, launches
+from raychan.tracing.sources import EXACT, covered, depth_of, facet_of, launches, neighbours
 from raychan.world.geometry import geometry_of
 
 
@@ -75,9 +75,7 @@ def test_tracing_all_sources_again_by_the_same_rule_gives_the_same_samples(whole
     scene, launch, routes, sources = whole
     by = list(launches(np.unique(sources), len(launch.geometry.facets.body)))
     stats = Stats()
-    again = [
-        batch for batch, _ in launch.again([(launch.rule.refinement, *one) for one in by], stats, lambda routes: routes)
-    ]
+    again = [batch for batch, _ in launch.again(launch.rule.refinement, by, stats, lambda routes: routes)]
     assert stats.rays > 0
 
     def samples(batches):
@@ -97,3 +95,20 @@ def test_uncut_deep_tubes_cost_fewer_rays(whole):
     list(Launch(launch.geometry, launch.points, rough).whole(stats, lambda routes: routes))
     list(Launch(launch.geometry, launch.points, launch.rule).whole(fine, lambda routes: routes))
     assert stats.rays < 0.9 * fine.rays
+
+
+def test_beside_facets_lie_the_rest_of_their_plane_and_what_shares_an_edge(whole):
+    _, launch, *_ = whole
+    geometry = launch.geometry
+    beside, rng = neighbours(geometry), np.random.default_rng(1)
+    corners = [[tuple(np.round(p, 6)) for p in v] for v in geometry.facets.vertices]
+    for chosen in rng.choice(len(corners), 5, replace=False):
+        wanted = np.zeros(len(corners), bool)
+        wanted[chosen] = True
+        body = geometry.facets.body
+        slow = [
+            body[i] == body[chosen]
+            and (geometry.plane[i] == geometry.plane[chosen] or len(set(corners[i]) & set(corners[chosen])) >= 2)
+            for i in range(len(corners))
+        ]
+        assert beside(wanted).tolist() == slow
