@@ -31,7 +31,6 @@ _STEPS = 12  # rules, each of half the phase of the one before: rays run out ear
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and larger tubes may miss them (not measured)
 _EDGE_ALONE = 0.3  # m: the same for convex bodies; a larger tube may bend more than its phase integral follows
 _RAYS = 200.0  # rays of two launches over a flat body, about, for an area of max_edge squared
-_BEHIND = 0.05  # m: how far curved patches of coarse meshes bulge through their neighbours, about; not measured
 _COVER_ALONE = 1.05  # in place of COVER for convex bodies: no launch misses a hidden part (command not noted)
 _CURVED = 0.01  # of the value, a radian of a rule's `phase`: error that launches over the same curved facets share
 _TERMINATOR = 0.25  # of 1 / k: PO's abrupt terminator on a sphere of any radius, against Mie's series
@@ -234,7 +233,6 @@ def refinements(
             relative=0.03 * fine,
             max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
-            behind=_BEHIND,
         )
 
 

@@ -229,7 +229,7 @@ def _landed_tubes(
     meets where these are not of one surface; the reflection is written into their history."""
     geometry = step.geometry
     planes = geometry.first, geometry.normal
-    rows, facet, reach = resolve_hits(rows, tubes.points, directions, hit, one_surface, *planes, step.rule.behind)
+    rows, facet, reach = resolve_hits(rows, tubes.points, directions, hit, one_surface, *planes)
     n = len(rows)
     before = IncidentTubes(
         tubes.points, directions, tubes.length, tubes.normals, tubes.facet, tubes.spread, tubes.strength, tubes.flat,

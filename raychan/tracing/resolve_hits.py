@@ -21,6 +21,7 @@ Bools = NDArray[np.bool_]
 
 _SHRINK = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share; not measured
 _BEHIND = -1e-6  # m: a hit no farther behind its tube than this is rounding
+_BULGE = -0.05  # m: how far curved patches of coarse meshes bulge through their neighbours, about; not measured
 _GRAZING_REACH = (
     10.0  # times the centre's distance (and 1 m more) to a corner's hit: beyond, a ray grazes; not measured
 )
@@ -192,12 +193,12 @@ def on_one_surface(rows, hit, plane, smooth, normal, least_cosine, out):  # type
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def resolve_hits(rows, points, directions, hit, one_surface, first, normal, behind):  # type: ignore[no-untyped-def]
+def resolve_hits(rows, points, directions, hit, one_surface, first, normal):  # type: ignore[no-untyped-def]
     """Return the tubes (m,) of `rows` that land, the facet (m, 4) on whose plane each ray lands, and after how far
     (m, 4) [m]. Tubes with a ray that misses or grazes the centre's plane are slivers, and are dropped.
 
-    Args: behind [m] how far behind the mirror a ray of a tube may land all rays of which meet one surface: where two
-    surfaces run into each other, or a curved patch bulges over its facet, a corner lies behind the surface beside it.
+    Where two surfaces run into each other, or a curved patch bulges over its facet, a corner lies behind the surface
+    beside it: of a tube all rays of which meet one surface they may land as far behind as that.
     """
     m = len(rows)
     kept, facet, reach = np.empty(m, np.int64), np.empty((m, 4), hit.dtype), np.empty((m, 4))
@@ -212,7 +213,7 @@ def resolve_hits(rows, points, directions, hit, one_surface, first, normal, behi
                 height += normal[f, c] * (first[f, c] - points[i, q, c])
             t = height / slope if slope != 0.0 else np.inf
             facet[count, q], reach[count, q] = f, t
-            least = -behind if one_surface[i] else _BEHIND
+            least = _BULGE if one_surface[i] else _BEHIND
             lands &= t > least and t < _GRAZING_REACH * abs(reach[count, 3]) + 1.0
         if lands:
             kept[count] = i

@@ -43,8 +43,7 @@ class Refinement:
     the middle, for a second lattice; `coarse`
     not 1: tubes that bounced are cut only where one alone may bring so many times the floor, and a good part of
     what is found there; `least` bisections of each first tube on a curved facet, and of all that bounce again, for a
-    launch to be finer where the one before was fine enough; `behind` [m] how far behind its mirror a corner of a tube
-    may land (see `resolve_hits`).
+    launch to be finer where the one before was fine enough.
     """
 
     wavenumber: float
@@ -64,7 +63,6 @@ class Refinement:
     jitter: float = 0.0
     coarse: float = 1.0
     least: int = 0
-    behind: float = 1e-6
 
     def for_depth(self, bounces: int) -> Refinement:
         """Return the same rule with slots for so many bounces, and for layers on every stretch between them."""
