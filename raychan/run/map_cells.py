@@ -21,6 +21,7 @@ _EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of i
 _UNKNOWN = 0.757
 """Factor by which changes are taken to shrink a step where there was one only. COVER, chosen for launches a factor 3
 apart, covers errors that fall with the size to the power of 0.40 or faster; for steps of a factor 2 that is 2^-0.40."""
+_QUIET = 0.87  # of the least detection: noise of its cell raises a level by more (1.2 dB) once in 40 times
 _SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unknown
 
 
@@ -36,6 +37,8 @@ class MapCells:
     before: Floats
     tolerance: Floats
     """Relative amplitude (c,) by which the level may be wrong."""
+    least: float = 0.0
+    """Amplitude of the weakest level of which a detection may come."""
 
     @staticmethod
     def of(place: Floats, level: Complexes, tolerance_db: float) -> MapCells:
@@ -58,6 +61,15 @@ class MapCells:
         self.tolerance = np.maximum(self.tolerance, speckle)
         return count
 
+    def spare(self, least: float) -> None:
+        """Let levels below an amplitude, that of the least detection, be wrong by what keeps them from becoming one."""
+        self.least = _QUIET * least
+
+    @property
+    def allowed(self) -> Floats:
+        """Relative amplitude (c,) by which the level may be wrong: the tolerance, or what a weak one lacks."""
+        return np.maximum(self.tolerance, self.least / np.maximum(np.abs(self.level), 1e-300) - 1.0)
+
     @property
     def slowness(self) -> Floats:
         """By what factor (c, 2) the rest of a series of changes exceeds COVER times its last one, 1 to _SLOWEST.
@@ -70,9 +82,9 @@ class MapCells:
     @property
     def open(self) -> Bools:
         """Which classes of tubes (c, 2) must be refined."""
-        tolerance = self.tolerance[:, None]
+        tolerance = self.allowed[:, None]
         share = COVER * self.slowness * self.change / np.maximum(np.abs(self.level), 1e-300)[:, None]
-        over = np.hypot(share[:, 0], share[:, 1]) > self.tolerance
+        over = np.hypot(share[:, 0], share[:, 1]) > tolerance[:, 0]
         largest = share >= share.max(axis=1, keepdims=True)
         return np.asarray(over[:, None] & ((share > _EITHER * tolerance) | largest) & (share > 0.0))
 

@@ -10,8 +10,15 @@ from raychan.tracing.solver import Stats
 STEPS = 6
 """Launches, each half as coarse as the one before."""
 _RAYS = 2.5  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
+_LOOKS = 4.5  # times the rays of a look that a run may cast unless model.max_rays is given; command not noted
 _GROWTH = 2.0  # rays and seconds of a step over those of the one before, about
 _BYTES = 400.0  # a path
+
+
+def within(model: Any, stats: Stats) -> Any:
+    """Return the settings of a model chosen by a look: without a budget of rays of its own it has that of the finer
+    first launch that a fixed model takes."""
+    return model.model_copy(update={"max_rays": round(_LOOKS * stats.rays)}) if model.max_rays == "auto" else model
 
 
 class Budget:

@@ -188,7 +188,8 @@ class Model(Table):
     """[model]: the mechanisms that are modelled, and the tolerance."""
 
     mode: Literal["physical", "auto"] = "physical"
-    """physical: all that max_bounces and max_transmissions allow; auto: of these only what tolerance_db needs."""
+    """physical: all that max_bounces and max_transmissions allow; auto: of these only what detections need, to
+    tolerance_db, by a coarse launch."""
     max_bounces: Bounces = 3
     tolerance_db: Tolerance = 0.5
     max_transmissions: Layers = 4

@@ -16,6 +16,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from bench.auto import auto
 from bench.fine import fine
 from bench.frame import frame
 from bench.laser import laser
@@ -31,7 +32,8 @@ from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]
 ALL: dict[str, Benchmark] = {
-    f.__name__: f for f in (rays, laser, synthesis, phase_noise, scaling, frame, turbine, ship, size, fine, memory)
+    f.__name__: f
+    for f in (rays, laser, synthesis, phase_noise, scaling, frame, auto, turbine, ship, size, fine, memory)
 }
 _ROOT = Path(__file__).parents[2]
 
