@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 UNKNOWN = "unknown"
@@ -31,6 +31,16 @@ class ModelChoice(Entry):
     diffraction: bool
     why: tuple[str, ...]
     """A line for each mechanism, with its level and whether it is needed."""
+
+    def over(self, used: int, every: int) -> ModelChoice:
+        """Return the choice with a line on how many of the legs over mirrors carry tubes."""
+        if used == every:
+            return self
+        line = (
+            f"{used} of {every} legs over mirrors: of the others a mirror is not seen from the one before, at points "
+            "0.15 m apart (estimate): left out"
+        )
+        return replace(self, why=(*self.why, line))
 
     def applied_to(self, model: Any) -> Any:
         """Return the model settings with what was chosen."""

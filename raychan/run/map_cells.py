@@ -74,7 +74,7 @@ class MapCells:
 
     def __init__(self, place: Floats, level: Complexes, tolerance_db: float) -> None:
         self.place, self.level = place, level
-        self.left = np.zeros(len(place), complex)
+        self.left, self._least = np.zeros(len(place), complex), 0.0
         self.tolerance = np.full(len(place), 1.0 - 10.0 ** (-tolerance_db / 20.0))
         self._changes = [_Changes(np.zeros(0, np.int64), np.zeros(0, complex), np.zeros((2, 2))) for _ in place]
 
@@ -87,6 +87,15 @@ class MapCells:
         count = int((speckle > self.tolerance).sum())
         self.tolerance = np.maximum(self.tolerance, speckle)
         return count
+
+    def spare(self, least: float) -> None:
+        """Let levels below an amplitude, from which on detections come, be wrong by what keeps them from one."""
+        self._least = least
+
+    @property
+    def allowed(self) -> Floats:
+        """By which share of its amplitude (c,) a level may be wrong: the tolerance, or what a weak one lacks."""
+        return np.maximum(self.tolerance, self._least / np.maximum(np.abs(self.level), 1e-300) - 1.0)
 
     def changed(self, i: int, source: Sources, by: Complexes) -> None:
         """Note by what sources (s,), in order, changed cell i."""
@@ -124,16 +133,16 @@ class MapCells:
     @property
     def open(self) -> Bools:
         """Which classes of tubes (c, 2) must be refined."""
-        level = np.maximum(np.abs(self.level), 1e-300)
-        over = self.doubt / level > self.tolerance
+        level, tolerance = np.maximum(np.abs(self.level), 1e-300), self.allowed
+        over = self.doubt / level > tolerance
         share = COVER * self.slowness * self.change / level[:, None]
         largest = share >= share.max(axis=1, keepdims=True)
-        return np.asarray(over[:, None] & ((share > _EITHER * self.tolerance[:, None]) | largest) & (share > 0.0))
+        return np.asarray(over[:, None] & ((share > _EITHER * tolerance[:, None]) | largest) & (share > 0.0))
 
     def wanted(self, i: int) -> Classes:
         """Return the sources whose last changes keep cell i open, shallow and deep: all but the weakest, as long as
         neither their sum nor their rms sum exceeds a share of the tolerance."""
-        known, limit = self._changes[i], _REST * self.tolerance[i] * abs(self.level[i])
+        known, limit = self._changes[i], _REST * self.allowed[i] * abs(self.level[i])
         classes = class_of(known.source)
         found = [_but_weakest(known.source[classes == j], known.change[classes == j], limit, True) for j in (0, 1)]
         return found[0], found[1]

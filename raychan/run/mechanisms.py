@@ -12,10 +12,15 @@ from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, TRANSMIT, Paths
 from raychan.run.ledger import NOTHING, ModelChoice
-from raychan.run.receiver import quiet_map
+from raychan.run.receiver import noise_of_beam, quiet_map
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 
+Floats = NDArray[np.float64]
+
+_SHARE = 0.5  # of the tolerance, as an amplitude: what is left out of bounces, and of layers; not measured
+QUIET = 0.87  # of the least detection: noise of its cell raises a level by more (1.2 dB) once in 40 times
+_FAINT = 1e-8  # of the strongest cell: the weakest detection possible where there is no noise; not measured
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of the transform that gives a mechanism's level (not measured)
 
 
@@ -40,53 +45,87 @@ def needed(paths: Paths, chosen: ModelChoice) -> NDArray[np.bool_]:
 
 def peak(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> float:
     """Return the strongest cell [W] of the noise-free map of some of the paths."""
-    if not rows.any():
-        return 0.0
+    return float(_levels(paths, rows, radar, settings).max()) if rows.any() else 0.0
+
+
+def _levels(paths: Paths, rows: NDArray[np.bool_], radar: Radar, settings: Any) -> Floats:
+    """Return the noise-free map [W] of some of the paths."""
     # One pair of elements is as loud as the mean over all.
     one = dataclasses.replace(
         radar, noise=False, elements=radar.elements[:1], tx_elements=radar.tx_elements[:1], multiplexing="none",
         ddm_slots=None, rx_polarization=None if radar.rx_polarization == "both" else radar.rx_polarization,
     )  # fmt: skip
     cube = synthesize(take(paths, rows), one, tolerance=_LEVEL)
-    return float(quiet_map(cube.samples, one, settings).max())
+    return np.asarray(quiet_map(cube.samples, one, settings))
 
 
-def choose(paths: Paths, radar: Radar, settings: Any, noise: float, tolerance_db: float) -> ModelChoice:
-    """Return the fewest bounces and layers that keep every detectable return within the tolerance.
+def least_detection(radar: Radar, settings: Any) -> float:
+    """Return the power [W] of the weakest detection that thermal noise allows; 0 without noise."""
+    return noise_of_beam(radar, settings) * float(undb(settings.min_snr_db))
 
-    Args: paths of a launch with all mechanisms; noise [W] of a cell of the map (0: 80 dB under the strongest cell
-    counts). A mechanism counts where its strongest cell could change the weakest detectable return by the tolerance
-    [dB].
+
+def choose(paths: Paths, radar: Radar, settings: Any, tolerance_db: float) -> ModelChoice:
+    """Return the fewest bounces and layers that keep every detectable return within the tolerance [dB].
+
+    Args: paths of a launch with all mechanisms. All that has more bounces, or more layers, is left out together where
+    in no cell of the map it could change what is detected there, or the weakest detectable return (without noise: 80 dB
+    under the strongest cell), by half the tolerance.
     """
-    everything = np.ones(len(paths.delay), bool)
-    weakest = noise * undb(settings.min_snr_db) if noise > 0.0 else peak(paths, everything, radar, settings) * 1e-8
-    limit = float(weakest) * (10.0 ** (tolerance_db / 20.0) - 1.0) ** 2
-    why, chosen = [], []
-    if limit == 0.0:
+    chances = _Chances(paths, radar, settings, tolerance_db)
+    if chances.least == 0.0:
         return _choice(1, 0, False, ["nothing returns and there is no noise: no mechanism is needed"], tolerance_db)
-    for name, count, least in (
-        ("interactions", interactions(paths), 1),
-        ("thin layers passed", layers(paths), 0),
-    ):
-        keep = least
-        for n in range(least, int(count.max(initial=least)) + 1):
-            level = peak(paths, count == n, radar, settings)
-            needed = level > limit
-            keep = n if needed else keep
-            if level > 0.0:
-                say = "needed" if needed else "not needed"
-                why.append(
-                    f"{n} {name}: strongest cell {db(level / limit):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
-                )
-        chosen.append(keep)
-    level = peak(paths, (paths.trajectories.kind == DIFFRACT).any(axis=1)[paths.trajectory], radar, settings)
-    say = "needed" if level > limit else "not needed"
-    why.append(
-        f"diffraction: strongest cell {db(max(level / limit, 1e-30)):+.0f} dB of what {tolerance_db:g} dB allow: {say}"
+    kept: list[int] = []
+    for name, count, fewest in (("interactions", interactions(paths), 1), ("thin layers passed", layers(paths), 0)):
+        most = int(count.max(initial=fewest))
+        while most > fewest and not chances.needed(count >= most, f"{most} {name} or more"):
+            most -= 1
+        kept.append(most)
+    over = (paths.trajectories.kind == DIFFRACT).any(axis=1)[paths.trajectory]
+    diffraction = bool(over.any()) and chances.needed(over, "diffraction")
+    return _choice(kept[0], kept[1], diffraction, chances.why, tolerance_db, chances.left_db)
+
+
+class _Chances:
+    """What groups of paths could change of a map's detectable cells, and what was found: a line each, `why`, and the
+    strongest cell `left_db` [dB] of those that are not needed, against the weakest detectable return."""
+
+    def __init__(self, paths: Paths, radar: Radar, settings: Any, tolerance_db: float) -> None:
+        self._paths, self._radar, self._settings, self._tolerance_db = paths, radar, settings, tolerance_db
+        total = _levels(paths, np.ones(len(paths.delay), bool), radar, settings)
+        self.least = least_detection(radar, settings) or _FAINT * float(total.max())
+        self._total, self._weak = np.sqrt(total), QUIET * np.sqrt(self.least)
+        self.why: list[str] = []
+        self.left_db: float | str = NOTHING
+
+    def needed(self, rows: NDArray[np.bool_], name: str) -> bool:
+        """Tell whether paths (n,) are needed."""
+        levels = _levels(self._paths, rows, self._radar, self._settings)
+        level, brought = float(levels.max()) / self.least, np.sqrt(levels)
+        # Where all together stays below any detection, with them or without, nothing depends on them.
+        matters = self._total + brought >= self._weak
+        allowed = _SHARE * (10.0 ** (self._tolerance_db / 20.0) - 1.0) * np.maximum(self._total, self._weak)
+        share = float((brought / allowed)[matters].max(initial=0.0)) ** 2
+        needed, there = share > 1.0, float(db(max(level, 1e-30)))
+        most = f"at most {db(share):+.0f} dB of what {self._tolerance_db:g} dB allow" if share > 0.0 else "nothing"
+        self.why.append(
+            f"{name}: strongest cell {there:+.0f} dB of the weakest detection possible, {most} in a cell that may be "
+            f"detected: {'needed' if needed else 'left out'}"
+        )
+        if not needed:
+            self.left_db = there if self.left_db == NOTHING else max(float(self.left_db), there)
+        return needed
+
+
+def _choice(
+    bounces: int,
+    transmissions: int,
+    diffraction: bool,
+    why: list[str],
+    tolerance_db: float,
+    level: float | str = NOTHING,
+) -> ModelChoice:
+    how = (
+        f"chosen by a coarse launch with all mechanisms for a tolerance of {tolerance_db:g} dB; level: the strongest "
+        "cell of what is left out, against the weakest detection possible"
     )
-    return _choice(chosen[0], chosen[1], level > limit, why, tolerance_db)
-
-
-def _choice(bounces: int, transmissions: int, diffraction: bool, why: list[str], tolerance_db: float) -> ModelChoice:
-    how = f"chosen by a coarse launch with all mechanisms for a tolerance of {tolerance_db:g} dB"
-    return ModelChoice(NOTHING, "estimate", how, bounces, transmissions, diffraction, tuple(why))
+    return ModelChoice(level, "estimate", how, bounces, transmissions, diffraction, tuple(why))

@@ -11,8 +11,16 @@ STEPS = 6
 """Launches, each half as coarse as the one before."""
 _RAYS = 2.0  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
 _LEAST = 600_000  # rays that further launches may cast however few the first one did: half a second of one core
+_LOOKS = 4.5  # times the rays of a look that a run may cast unless model.max_rays is given; command not noted
 _GROWTH = 2.0  # rays and seconds of a step over those of the one before on the same facets, about
 _BYTES = 400.0  # a path
+
+
+def within(model: Any, stats: Stats) -> Any:
+    """Return the settings of a model chosen by a look: without a budget of rays of its own it has that of the finer
+    first launch that a fixed model takes."""
+    most = round(max(_LOOKS * stats.rays, stats.rays + _LEAST))
+    return model.model_copy(update={"max_rays": most}) if model.max_rays == "auto" else model
 
 
 class Budget:

@@ -36,6 +36,8 @@ _LONG = 60.0  # s from which the time is announced
 _CGROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 _COARSE = 3.0  # times half the noise: a corner of three faces returns by six tubes, some 10 times the noise if detected
 _COARSER = 3.0  # times the tolerance: the check launch
+_PHASE, _TURN, _EDGE = 0.5, 0.5, 1.0  # rad, rad, m: a look's tubes: rays against later steps; command not noted
+_FLOOR = 4.0  # times half the noise: a look's uncut tube: rays against weak echoes missed; command not noted
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
 
@@ -67,6 +69,14 @@ def first_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
     alone may bring about what a detection needs, or as much of what is found there."""
     rule = step_rule(radar, settings, model, 0)
     return replace(rule, refinement=replace(rule.refinement, coarse=_COARSE))
+
+
+def look_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
+    """Return the prune rule of the launch that tells what a model needs: coarser yet than the first launch."""
+    rule = first_rule(radar, settings, model)
+    refined = rule.refinement
+    seen = replace(refined, phase=_PHASE, turn=_TURN, max_edge=_EDGE, floor=_FLOOR * refined.floor)
+    return replace(rule, refinement=seen)
 
 
 def step_rule(radar: Radar, settings: Any, model: Any, step: int) -> PruneRule:

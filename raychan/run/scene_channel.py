@@ -18,7 +18,6 @@ from raychan.run.messages import merged, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import Launched, PathStream
 from raychan.run.preview import preview_notes, preview_of
-from raychan.run.receiver import noise_of_beam
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.segments import Retraced, Traced
@@ -104,7 +103,7 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
         # The check launch, with all mechanisms, tells which of them the fine one needs.
         with clock.stage("check"):
             others, more = launch(replace(checked, diffraction=radar.rx_position is None))
-            chosen = choose(others.paths, radar, settings, noise_of_beam(radar, settings), model.tolerance_db)
+            chosen = choose(others.paths, radar, settings, model.tolerance_db)
             model = chosen.applied_to(model)
     rule = fine_rule(radar, settings, model)
     again = needed(scene, model.retrace, rule.refinement.max_edge)

@@ -22,12 +22,12 @@ from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
 from raychan.run.map_cells import Classes, MapCells, class_of, feeding_sources
-from raychan.run.mechanisms import choose, needed
+from raychan.run.mechanisms import QUIET, choose, least_detection, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
-from raychan.run.receiver import detections_in, map_of, noise_amplitude, noise_of_beam
-from raychan.run.refinement_budget import STEPS, Budget
-from raychan.run.rules import first_rule, step_rule
+from raychan.run.receiver import detections_in, map_of, noise_amplitude
+from raychan.run.refinement_budget import STEPS, Budget, within
+from raychan.run.rules import first_rule, look_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, by_source, changes
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
@@ -125,7 +125,8 @@ class SceneRefinement:
         # Diffraction is modelled for a receiver beside the transmitter only.
         over = self.radar.rx_position is None or self.model.diffraction
         asked = self.model.model_copy(update={"diffraction": over}) if auto else self.model
-        launch = Launch(self.geometry, self.points, first_rule(self.radar, self.settings, asked))
+        rule = (look_rule if auto else first_rule)(self.radar, self.settings, asked)
+        launch = Launch(self.geometry, self.points, rule, lit=auto)
         batches = launch.whole(self.stats, self._carried, lambda _, share: self.tell("trace", 0.5 * share))
         found = self._paths(batches, MOST)
         if found is None:
@@ -134,9 +135,9 @@ class SceneRefinement:
         if not auto:
             return First(launch, paths, source, None)
         # The first launch, with all mechanisms, tells which of them are needed.
-        noise = noise_of_beam(self.radar, self.settings)
-        chosen = choose(paths, self.radar, self.settings, noise, self.model.tolerance_db)
-        self.model = chosen.applied_to(self.model)
+        chosen = choose(paths, self.radar, self.settings, self.model.tolerance_db)
+        chosen = chosen.over(len(launch.legs), len(launch.every[0]))
+        self.model = within(chosen.applied_to(self.model), self.stats)
         keep = needed(paths, chosen)
         if self.launches is not None:
             self.launches[0] = counting(self.launches[0], keep)
@@ -176,6 +177,8 @@ class SceneRefinement:
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
         cells = self._cells(rough, response, first.paths)
         steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", 0
+        if first.chosen is not None:
+            cells.spare(QUIET * math.sqrt(least_detection(radar, self.settings) / radar.power))
         if len(cells.place) and self.model.speckle:
             speckled = cells.loosened(
                 spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.carrier)
@@ -235,9 +238,9 @@ class SceneRefinement:
 def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list[Classes]:
     """Return the sources that feed each cell, shallow and deep, and note what the deep tubes bring that are left."""
     own, sums = held.by_source(response, cells.place)
-    deep, found = class_of(own) == 1, []
+    deep, allowed, found = class_of(own) == 1, cells.allowed, []
     for i, x in enumerate(sums):
-        found.append(feeding_sources(own, x, float(cells.tolerance[i])))
+        found.append(feeding_sources(own, x, float(allowed[i])))
         cells.left[i] = x[deep & ~np.isin(own, found[-1][1])].sum()
     return found
 

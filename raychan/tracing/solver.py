@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import compress
 from typing import TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, REFLECT, TRANSMIT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
 from raychan.tracing.legs import Leg, legs_over, reachable
+from raychan.tracing.lit_legs import lit_legs
 from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
@@ -66,15 +68,25 @@ def launch_routes(
 class Launch:
     """The launches over one scene: the `whole`, and further ones of some of its tubes, cut finer.
 
-    Each route has a source (see `tracing.sources`).
+    Each route has a source (see `tracing.sources`). With `lit` tubes go over the legs only that may carry anything (see
+    `tracing.lit_legs`); `every` holds all of both ends.
     """
 
-    def __init__(self, geometry: Geometry, points: Points, rule: PruneRule, legs: LegsFrom = legs_over) -> None:
+    def __init__(
+        self, geometry: Geometry, points: Points, rule: PruneRule, legs: LegsFrom = legs_over, lit: bool = False
+    ) -> None:
         self.geometry, self.points, self.rule = geometry, points, rule
         self.legs = legs(geometry, np.asarray(rule.position, float), rule.bounces - 1, rule.beam)
         self.outs = self.legs
         if rule.rx is not None:
             self.outs = legs(geometry, np.asarray(rule.rx, float), rule.bounces - 1, rule.beam)
+        self.every = self.legs, self.outs
+        if lit:
+            layers = rule.refinement.layers
+            self.legs = list(compress(self.legs, lit_legs(geometry, self.legs, layers)))
+            self.outs = self.legs
+            if rule.rx is not None:
+                self.outs = list(compress(self.every[1], lit_legs(geometry, self.every[1], layers)))
         self._found: dict[int, Contributions] = {}
 
     def whole(
@@ -156,7 +168,7 @@ class Launch:
     def exact(self) -> Iterator[Batch]:
         """Yield the routes that need no tubes: over points, wedges, the ground's foot points, and the direct ones."""
         geometry, points, rule, refined = self.geometry, self.points, self.rule, self.rule.refinement
-        legs, outs = self.legs, self.outs
+        legs, outs = self.every
         found: Batch | None = point_routes(geometry, points, legs, outs, rule.bounces, refined.slots, refined.layers)
         if found is not None:
             yield found
@@ -184,7 +196,7 @@ class Launch:
         )
 
     def _finished(self, stats: Stats, before: int, budgets: list[Budget]) -> None:
-        stats.legs = len(self.legs)
+        stats.legs = len(self.every[0])
         stats.rays += self.geometry.rays - before
         for budget in budgets:
             stats.uncut = _added(stats.uncut, budget.uncut)

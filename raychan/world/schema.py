@@ -192,8 +192,9 @@ class Model(Table):
     """[model]: the mechanisms that are modelled, and the tolerance."""
 
     mode: Literal["physical", "auto", "preview"] = "physical"
-    """physical: all that max_bounces and max_transmissions allow; auto: of these only what tolerance_db needs; preview:
-    a fast, coarse picture, without bounces from body to body (see `raychan run --preview`)."""
+    """physical: all that max_bounces and max_transmissions allow; auto: of these only what detections need, to
+    tolerance_db, by a coarse launch; preview: a fast, coarse picture, without bounces from body to body (see
+    `raychan run --preview`)."""
     max_bounces: Bounces = 3
     tolerance_db: Tolerance = 0.5
     max_transmissions: Layers = 4

@@ -16,6 +16,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from bench.auto import auto
 from bench.before import before
 from bench.cross_section import cross_section
 from bench.detections import detections
@@ -52,6 +53,7 @@ _GROUPS = (
     preview,
     cross_section,
     detections,
+    auto,
 )
 ALL: dict[str, Benchmark] = {f.__name__: f for f in _GROUPS}
 _ROOT = Path(__file__).parents[2]

@@ -1,0 +1,60 @@
+"""What `model.mode = "auto"` saves: CPU of a frame against the fixed model, and whether it finds the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+import raychan as rc
+from bench.measure import Row, barred, paired
+
+_BAR = 0.7
+_MODES = ("auto", "physical")
+_BESIDE = 1.0  # cells along range and rate between two detections that are the same
+
+
+def auto(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
+    """CPU of a frame in mode auto against the fixed model, in turn, and how far their detections agree."""
+    for name in ("urban", "living_street", "occluded_pedestrian"):
+        for tolerance in (1.0,) if quick else (0.5, 1.0):
+            yield _row(scenes / f"{name}.toml", tolerance, repeats)
+
+
+def _row(file: Path, tolerance: float, repeats: int) -> Row:
+    """Return the row of one scene at a tolerance [dB]."""
+    made = {mode: rc.Scene.load(file).override([f"model.mode={mode}"]) for mode in _MODES}
+    found = {mode: rc.simulate(scene, tolerance_db=tolerance) for mode, scene in made.items()}
+    pairs = []
+    for _ in range(repeats):
+        took = []
+        for mode in _MODES:
+            start = process_time()
+            rc.simulate(made[mode], tolerance_db=tolerance)
+            took.append(process_time() - start)
+        pairs.append((took[0], took[1]))
+    ours, theirs = found["auto"], found["physical"]
+    row = paired("auto", f"{file.stem}, {tolerance:g} dB", pairs, "fixed model", **agreement(ours, theirs, tolerance))
+    return barred(row, f"<= {_BAR}, none lost", row.ratio is not None and row.ratio <= _BAR and not row.more["lost"])
+
+
+def agreement(ours: rc.Result, theirs: rc.Result, tolerance: float) -> dict[str, int | float]:
+    """Return how the detections of two results agree: how many both find, of these how many differ by more than both
+    errors stated, and how many are `lost`: found by the second alone, with a stated error that leaves it detectable."""
+    scene, a, b = ours.scene, ours.detections, theirs.detections
+    wave, least = scene.radar.channel_waveform, scene.processing.min_snr_db
+    both = beyond = lost = 0
+    for i in range(len(b.range)):
+        off = [np.abs(a.range - b.range[i]) / wave.range_resolution, np.abs(a.rate - b.rate[i]) / wave.rate_resolution]
+        near = np.max(off, axis=0) <= _BESIDE
+        if near.any():
+            j = int(np.argmin(np.where(near, off[0] + off[1], np.inf)))
+            both += 1
+            # An error that is not stated (NaN) is unknown: nothing lies beyond it.
+            beyond += bool(abs(a.snr[j] - b.snr[i]) > a.error_db[j] + b.error_db[i])
+        else:
+            lost += bool(b.snr[i] - b.error_db[i] > least)
+    within = [int((d.error_db <= tolerance).sum()) for d in (a, b)]
+    return {"both": both, "beyond": beyond, "lost": lost, "within": within[0], "within, fixed": within[1]}
