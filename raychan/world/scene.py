@@ -29,7 +29,7 @@ from raychan.world.schema import PREVIEW, BodyTable, InterfererTable, Model, Rad
 from raychan.world.schema_errors import checked
 from raychan.world.schema_impairments import AtmosphereTable
 from raychan.world.seams import over_seams
-from raychan.world.static_geometry import FEW, MANY, StaticGeometry
+from raychan.world.static_geometry import StaticGeometry
 from raychan.world.surroundings import atmosphere_of, attenuation_of, check_places, interferers_of
 from raychan.world.topology import MeshTopology
 
@@ -273,7 +273,7 @@ class Scene(Described):
     def static_geometry(self) -> StaticGeometry | None:
         """Geometry of the static bodies, shared by all instants; None where it does not pay."""
         if StaticGeometry not in self._static:
-            self._static[StaticGeometry] = StaticGeometry.of(self.bodies, FEW if self.model.mode == PREVIEW else MANY)
+            self._static[StaticGeometry] = StaticGeometry.of(self.bodies, self.model.mode == PREVIEW)
         static = self._static[StaticGeometry]
         return static and static.at(self.bodies)
 

@@ -41,7 +41,7 @@ class StaticGeometry:
     """What is kept of bodies through all instants, and the `instances`: large bodies that move, posed at one instant.
     What is kept does not depend on the instant that was asked for first."""
 
-    def __init__(self, moving: Bools, count: NDArray[np.int64], many: int = MANY) -> None:
+    def __init__(self, moving: Bools, count: NDArray[np.int64], many: int) -> None:
         self.moving = np.flatnonzero(moving)
         at = np.concatenate([[0], np.cumsum(count)])
         self._rows = {int(b): np.arange(at[b], at[b + 1], dtype=np.int32) for b in self.moving}
@@ -59,8 +59,9 @@ class StaticGeometry:
         self._columns: dict[str, tuple[SharedRows, ...]] = {}
 
     @staticmethod
-    def of(bodies: Sequence[Body], many: int = MANY) -> StaticGeometry | None:
-        """Return what is to be kept of bodies; None where sharing does not pay, below `many` facets."""
+    def of(bodies: Sequence[Body], few: bool = False) -> StaticGeometry | None:
+        """Return what is to be kept of bodies; None where sharing does not pay, below MANY facets, or FEW."""
+        many = FEW if few else MANY
         moving = np.array([b.moves for b in bodies], bool)
         if not moving.any():
             return None
