@@ -17,7 +17,7 @@ from raychan.geometry.curved_patches import edge_to_cut, halved
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, SCATTERER, Points, Routes
-from raychan.tracing.contributions import Contributions
+from raychan.tracing.contributions import SHARE, Contributions
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.launch import write_leg
 from raychan.tracing.legs import Leg, Mirror, View, reachable
@@ -37,7 +37,6 @@ Bools = NDArray[np.bool_]
 # 20 % more CPU than at 0.25, at 0.1 echoes of the living street lose 6 dB (command not noted).
 _SEEDS = 0.25
 _SEEN = 0.5  # the same, of tubes that are seen: at 0.25 echoes of the living street lose 4 dB, at 0.5 they lose 2
-_SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; as in `tracing.contributions`
 _CLASSES, _A_CLASS = 64, 4.0  # of sizes below the threshold, and of these to a factor of two; not measured
 _CUTS = 12  # times a facet is halved at most: 64 parts a side, of a wall of 40 m no part is longer than 0.6 m
 
@@ -145,7 +144,7 @@ def _that_count(found: Contributions, size: Floats, length: Floats) -> Bools:
     octave = np.clip(_CLASSES + _A_CLASS * np.log2(np.maximum(share, 1e-9)), 0, _CLASSES - 1).astype(np.int64)
     sums = np.bincount(cell * _CLASSES + octave, share, (int(cell.max(initial=0)) + 1) * _CLASSES)
     sums = np.cumsum(sums.reshape(-1, _CLASSES), axis=1)
-    return np.asarray(sums[cell, octave] > _SHARE)
+    return np.asarray(sums[cell, octave] > SHARE)
 
 
 def _cut(

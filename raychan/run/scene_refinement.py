@@ -119,6 +119,9 @@ class SceneRefinement:
     launches: list[list[Batch]] | None = None
     """Where given, the routes of all launches are kept here."""
 
+    def __post_init__(self) -> None:
+        self._noise = noise_amplitude(self.radar, self.settings)
+
     def first(self) -> First | None:
         """Return the first launch; None where it brings more paths than can be held."""
         auto = self.model.mode == "auto"
@@ -145,10 +148,7 @@ class SceneRefinement:
 
     def _carried(self, batch: Batch) -> tuple[Batch | None, Paths]:
         """Return a batch of routes, where they are kept, and their paths."""
-        radar = self.radar
-        paths = paths_of(
-            batch, self.geometry.facets, radar, radar.waveform.carrier, noise_amplitude(radar, self.settings)
-        )
+        paths = paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier, self._noise)
         return (None if self.launches is None else batch), paths
 
     def _paths(

@@ -22,7 +22,7 @@ _MANY = 4096  # tubes from which on pruning pays; not measured
 _THREADS = 1000  # tubes from which on a second thread pays; not measured
 _NOTHING = 1e-100  # 1/m
 _DEPTH = 1e-2  # of the strongest cell: without noise weaker cells are refined as if they held this; not measured
-_SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; not measured
+SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; not measured
 
 
 class Budget:
@@ -161,12 +161,12 @@ class Contributions:
             return np.arange(len(bound))
         share = bound / self.prune_threshold(length)
         # The weakest few are enough: none that alone exceeds the sum is looked at.
-        weak = np.flatnonzero(share < _SHARE)
+        weak = np.flatnonzero(share < SHARE)
         cell = self._cell(length[weak])
         order = np.lexsort((share[weak], cell))
         cell, running = cell[order], np.cumsum(share[weak[order]])
         first = np.searchsorted(cell, cell)
         running -= np.where(first > 0, running[first - 1], 0.0)
         keep = np.ones(len(bound), bool)
-        keep[weak[order[running <= _SHARE]]] = False
+        keep[weak[order[running <= SHARE]]] = False
         return np.flatnonzero(keep)
