@@ -4,7 +4,8 @@ its three corners."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
+from raychan.parallel import parallel_for
 from raychan.radar.dual_paths import columns_of
 from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Trajectories
 from raychan.units import C0
@@ -23,6 +25,9 @@ Floats = NDArray[np.float64]
 _SMALL = 1e-3
 """Of the noise in a map cell: by so much the samples may be off for each footprint that is long in range but is one
 path all the same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
+
+
+_MANY = 20_000  # trajectories from which on a second thread pays; not measured
 
 
 def paths_of(
@@ -161,23 +166,32 @@ def _joined(parts: list[Trajectories], rows: list[NDArray[np.intp]], rx: Floats)
     """Return some rows of several sets of trajectories as one set; unused slots repeat the receiver rx (3,) [m]."""
     slots, begin = max(p.kind.shape[1] for p in parts), np.cumsum([0, *map(len, rows)])
     empty: dict[str, Any] = {"body": -1, "part": -1, "kind": 0, "vertices": rx}
-    columns = {}
+    columns, copies = dict[str, NDArray[Any]](), list[Callable[[], None]]()
     for f in dataclasses.fields(Trajectories):
         held = [getattr(p, f.name) for p in parts]
         wide = (slots,) if f.name in empty else ()
-        out = np.empty((begin[-1], *wide, *held[0].shape[1 + len(wide) :]), held[0].dtype)
+        out = columns[f.name] = np.empty((begin[-1], *wide, *held[0].shape[1 + len(wide) :]), held[0].dtype)
         for i, one in enumerate(held):
-            place = out[begin[i] : begin[i + 1]]
-            if len(one) == len(place) and one.shape[1:] == place.shape[1:]:
-                place[:] = one
-            elif one.shape[1:] == place.shape[1:]:
-                # With mode "clip" numpy writes straight to `out`; all numbers are in range.
-                one.take(rows[i], axis=0, out=place, mode="clip")
-            else:
-                place[:, : one.shape[1]] = one[rows[i]]
-                place[:, one.shape[1] :] = empty[f.name]
-        columns[f.name] = out
+            copies.append(partial(_copy, one, rows[i], out[begin[i] : begin[i + 1]], empty.get(f.name)))
+
+    def some(at: slice) -> None:
+        for copy in copies[at]:
+            copy()
+
+    parallel_for(len(copies), some, 2 if begin[-1] > _MANY else len(copies) + 1)
     return parts[0].rebuilt(**columns)
+
+
+def _copy(one: NDArray[Any], rows: NDArray[np.intp], place: NDArray[Any], empty: Any) -> None:
+    """Copy some rows of a column to their place, whose slots beyond those of the column become empty ones."""
+    if one.shape[1:] != place.shape[1:]:
+        place[:, : one.shape[1]] = one[rows]
+        place[:, one.shape[1] :] = empty
+    elif len(one) == len(place):
+        place[:] = one
+    else:
+        # With mode "clip" numpy writes straight to `out`; all numbers are in range.
+        one.take(rows, axis=0, out=place, mode="clip")
 
 
 def of_trajectories(paths: Paths, keep: NDArray[np.bool_]) -> Paths:

@@ -42,6 +42,8 @@ class _Changes:
 
     def add(self, source: Sources, by: Complexes, least: float) -> None:
         """Note changes by sources (s,), in order, that replace earlier ones of these."""
+        if not len(source):
+            return
         at = np.minimum(np.searchsorted(source, self.source), len(source) - 1)
         again = source[at] == self.source
         classes = class_of(self.source[again])

@@ -103,7 +103,7 @@ class _Chances:
         level, brought = float(levels.max()) / self.least, np.sqrt(levels)
         # Where all together stays below any detection, with them or without, nothing depends on them.
         matters = self._total + brought >= self._weak
-        allowed = _SHARE * (10.0 ** (self._tolerance_db / 20.0) - 1.0) * np.maximum(self._total, self._weak)
+        allowed = _SHARE * (1.0 - 10.0 ** (-self._tolerance_db / 20.0)) * np.maximum(self._total, self._weak)
         share = float((brought / allowed)[matters].max(initial=0.0)) ** 2
         needed, there = share > 1.0, float(db(max(level, 1e-30)))
         most = f"at most {db(share):+.0f} dB of what {self._tolerance_db:g} dB allow" if share > 0.0 else "nothing"

@@ -65,7 +65,8 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
     said = []
     stated = counts(found, tolerance_db)
     n, over = len(found.range), stated["over_tolerance"]
-    if over or stated["not_converged"]:
+    # A preview refines nothing: no tolerance counts.
+    if (over or stated["not_converged"]) and "preview" not in ledger:
         within = n - over - stated["not_converged"]
         worst = f"; the largest error stated is {stated['reached_db']:.1f} dB" if over else ""
         said.append(f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{worst}")

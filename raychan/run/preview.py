@@ -27,8 +27,9 @@ from raychan.units import C0
 from raychan.world.geometry import Geometry
 
 # What levels are stated to be off by: they cover all of 168 direct echoes of 30 random scenes and of two streets, whose
-# levels are off by 3.5 dB at most (`make bench BENCH="--only preview"`). Less covers fewer, more tells less.
-_SHARE_DB = 3.0  # of any detection
+# levels are off by 3.5 dB at most (`make bench BENCH="--only preview"`), and a lamp post of 41.7 dB SNR off by 3.4 dB
+# (seed 2023 of a blind attack). Less covers fewer, more tells less.
+_SHARE_DB = 4.0  # of any detection
 _WEAK = 4.0  # times the noise's amplitude: what else weak ones are off by
 
 _BOUNCES = 3  # over the ground, to a body, and over the ground
@@ -75,7 +76,10 @@ def preview_error(rdmap: RangeDoppler, radar: Radar, settings: Any) -> MapError:
 
 def preview_notes() -> tuple[str, ...]:
     """Return the line by which a preview says what it is."""
-    return (f"preview: levels may be off by {_SHARE_DB:g} dB, those of weak echoes by more; left out: {LEFT_OUT}",)
+    return (
+        f"preview: levels may be off by {_SHARE_DB:g} dB, those of weak echoes and of bodies seen in part by more; "
+        f"left out: {LEFT_OUT}",
+    )
 
 
 def preview_ledger() -> dict[str, Entry]:

@@ -16,8 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
 from raychan.columns import take
+from raychan.parallel import run_pair
+from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
@@ -31,7 +34,7 @@ from raychan.run.rules import first_rule, look_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, by_source, changes
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
-from raychan.signal.baseband import noisy, synthesize
+from raychan.signal.baseband import noisy, stand_apart, synthesize
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Batch, Launch, Stats
 from raychan.tracing.sources import EXACT, Sources, launches, neighbours
@@ -88,21 +91,24 @@ class Converged:
             for u in self.unreached[:_NAMED]
         ]
         more = f" and {len(self.unreached) - _NAMED} more" if len(self.unreached) > _NAMED else ""
+        steps = "once" if self.steps == 1 else f"{self.steps} times"
         return [
             *said,
-            f"refined {self.steps} times, ended by {self.ended}: the level still changes by more than "
+            f"refined {steps}, ended by {self.ended}: the level still changes by more than "
             f"{self.model.tolerance_db:g} dB at {'; '.join(told)}{more}",
         ]
 
 
 @dataclass(frozen=True)
 class First:
-    """The first launch: its paths, the source of each of their trajectories, and the mechanisms chosen by them."""
+    """The first launch: its paths, the source of each of their trajectories, the mechanisms chosen by them, and the
+    paths of those that were left out."""
 
     launch: Launch
     paths: Paths
     source: Sources
-    chosen: ModelChoice | None
+    chosen: ModelChoice | None = None
+    left: Paths | None = None
 
 
 @dataclass
@@ -136,7 +142,7 @@ class SceneRefinement:
             return None
         paths, source = found
         if not auto:
-            return First(launch, paths, source, None)
+            return First(launch, paths, source)
         # The first launch, with all mechanisms, tells which of them are needed.
         chosen = choose(paths, self.radar, self.settings, self.model.tolerance_db)
         chosen = chosen.over(len(launch.legs), len(launch.every[0]))
@@ -144,7 +150,7 @@ class SceneRefinement:
         keep = needed(paths, chosen)
         if self.launches is not None:
             self.launches[0] = counting(self.launches[0], keep)
-        return First(launch, of_trajectories(paths, keep), source[keep], chosen)
+        return First(launch, of_trajectories(paths, keep), source[keep], chosen, of_trajectories(paths, ~keep))
 
     def _carried(self, batch: Batch) -> tuple[Batch | None, Paths]:
         """Return a batch of routes, where they are kept, and their paths."""
@@ -187,8 +193,11 @@ class SceneRefinement:
             steps, unreached, ended = self._refined(first.launch, held, response, cells)
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
-        now = held.now if steps else first.paths
-        quiet, off = synthesize(now, radar), synthesize(held.doubtful, radar, tolerance=_LEVEL)
+        now, doubtful = held.now if steps else first.paths, held.doubtful(whole=stand_apart(radar))
+        if first.left is not None:
+            # What a level lacks is known: it needs no factor that covers what is not.
+            doubtful = join([doubtful, scaled(first.left, np.full(len(first.left.length), 1.0 / COVER))])
+        quiet, off = run_pair(lambda: synthesize(now, radar), lambda: synthesize(doubtful, radar, tolerance=_LEVEL))
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
         return Converged(launched, others, self.model, first.chosen, steps, unreached, ended, speckled)

@@ -95,17 +95,18 @@ class SourcedPaths:
         """All paths, of the newest launch of each source."""
         return join([p.paths for p in self._parts], self.counts)
 
-    @property
-    def doubtful(self) -> Paths:
-        """What the newest launches changed, times the factors of `doubt`; the paths of deep tubes never traced again;
-        and of other tubes never traced again the share that those traced again changed by, in unrelated phases."""
-        parts, keep = [self._parts[0].paths], [self._untouched]
+    def doubtful(self, whole: bool) -> Paths:
+        """Return what the newest launches changed, times the factors of `doubt`; the paths of deep tubes never traced
+        again; and of other tubes never traced again the share that those traced again changed by, in unrelated phases;
+        not `whole`: without the way that they go."""
+        held = [p.paths if whole else p.bare for p in self._parts]
+        parts, keep = [held[0]], [self._untouched]
         factor: list[NDArray[Any]] = [self._share]
-        for p in self._parts:
+        for p, paths in zip(self._parts, held, strict=True):
             new = (p.state == _NOW) & (depth_of(p.source) >= DEEP if p.first else True)
             doubts = self._factor(p.source)
             for rows, sign in ((new, 1.0), (p.state == _BEFORE, -1.0)):
-                parts.append(p.paths)
+                parts.append(paths)
                 keep.append(rows)
                 factor.append(sign * doubts)
         every = join(parts, keep)

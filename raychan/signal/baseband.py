@@ -54,8 +54,7 @@ def synthesize(
     samples = np.zeros((len(elements), wave.n_chirps, wave.n_samples), np.complex64)
     if len(paths.length):
         sent = [one.since(first) for one in radar.transmissions]
-        placed = elements.any() or any(one.offset.any() for one in sent)
-        fronts = fronts_of(paths) if placed else None
+        fronts = fronts_of(paths) if stand_apart(radar) else None
         amplitude = np.sqrt(radar.power) * paths.amplitude
         echoes = Echoes(paths.delay, paths.length_rate / C0, amplitude, fronts)
         for one in sent:
@@ -79,6 +78,11 @@ def synthesize(
         samples = np.concatenate([samples, crossed])
     quiet = Cube(samples=samples, noise_power=0.0)
     return quiet if rng is None else noisy(quiet, radar, rng)
+
+
+def stand_apart(radar: Radar) -> bool:
+    """Tell whether elements stand off the radar's place, so that samples depend on where paths scatter."""
+    return bool(radar.elements_world.any() or any(one.offset.any() for one in radar.transmissions))
 
 
 def fronts_of(paths: Paths) -> Wavefronts:

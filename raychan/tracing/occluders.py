@@ -48,7 +48,9 @@ class Occluders:
     def __init__(self, geometry: Geometry) -> None:
         f = geometry.facets
         area = geometry.wall_area
-        large = (area >= _LEAST_AREA) & (geometry.scene_topology.edges_around <= _MOST_EDGES)
+        # A plane has no edges around it where two facets lie back to back: a closed body without thickness.
+        edges = geometry.scene_topology.edges_around
+        large = (area >= _LEAST_AREA) & (edges > 0) & (edges <= _MOST_EDGES)
         if len(f.role) < 2:
             # A wall hides other bodies only: how far its own body's curved surface lies before its facets is unknown.
             large[:] = False

@@ -66,8 +66,12 @@ def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
             raise SceneError(problem, key=key, value=at.tolist(), allowed=allowed)
 
 
-def array_fits(radar: Radar) -> None:
-    """Raise SceneError where the array cannot have what [processing] asks of it: ESPRIT, or a taper over its beams."""
+def radar_fits(radar: Radar, diffraction: bool) -> None:
+    """Raise SceneError where the radar cannot have what is asked of it: diffraction to a receiver elsewhere, or of its
+    array ESPRIT, or a taper over its beams."""
+    if diffraction and radar.rx_position is not None:
+        problem = "diffraction is modelled for a receiver beside the transmitter only"
+        raise SceneError(problem, key="model.diffraction", value=True, allowed="false with radar.rx_position")
     asked, aperture = radar.processing, Aperture(radar.virtual_elements, C0 / radar.waveform.middle)
     if asked.doa == "esprit" and not aperture.uniform:
         allowed = "bartlett, capon or music; esprit only with elements on a uniform line along y or z"

@@ -53,6 +53,8 @@ class MeshReport:
             said.append(f"{self.zero_area} faces of zero area dropped")
         if self.duplicates:
             said.append(f"{self.duplicates} duplicate faces dropped")
+        if self.watertight and min(self.size) == 0.0:
+            said.append("closed, but without thickness: a sheet whose two sides lie on each other")
         if self.flipped:
             said.append(f"{self.flipped} faces turned to face outward")
         if not self.watertight:

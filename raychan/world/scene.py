@@ -19,6 +19,7 @@ from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
 from raychan.world.build import body_of, material_of, scene_text
 from raychan.world.errors import SceneError, nearest
+from raychan.world.fixed import Fixed
 from raychan.world.idle_keys import idle_keys
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 __all__ = ["Body", "Scene", "SceneError"]
 
 
-class Scene(Described):
+class Scene(Fixed, Described):
     """Bodies, materials, a radar and settings.
 
     Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar an object, a table as
@@ -189,11 +190,11 @@ class Scene(Described):
                 _ = body.motion, body.resolved_role, body.fluctuates
             except SceneError as e:
                 raise e.at(key="bodies") from None
-        self.bodies = over_seams(self.bodies)
+        self.__dict__["bodies"] = over_seams(self.bodies)
         checks.radar_outside(self.bodies, self.radar_table)
         check_places(self.interferers, self.bodies, self.radar_table)
         if self.radar_table is not None:
-            checks.array_fits(self.radar)
+            checks.radar_fits(self.radar, self.model.diffraction)
 
     @cached_property
     def radar(self) -> Radar:
@@ -210,16 +211,17 @@ class Scene(Described):
         if time == 0.0:
             return self
         moved = copy(self)
-        moved.bodies = tuple(b.at(time) for b in self.bodies)
+        then = moved.__dict__
+        then["bodies"] = tuple(b.at(time) for b in self.bodies)
         moved._derived = self._derived if moved._stands_as(self) else {}
         moved._static = self._static
         if self.radar_table is not None:
             there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
-            moved.radar_table = self.radar_table.model_copy(update={"position": there.tolist()})
-            moved.__dict__["radar"] = self.radar_at(time)
-        moved.interferers = tuple(x.at(time) for x in self.interferers)
-        moved.__dict__.pop("warnings", None)
-        moved.text, moved._data = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
+            then["radar_table"] = self.radar_table.model_copy(update={"position": there.tolist()})
+            then["radar"] = self.radar_at(time)
+        then["interferers"] = tuple(x.at(time) for x in self.interferers)
+        then.pop("warnings", None)
+        then["text"], then["_data"] = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
         try:
             checks.radar_outside(moved.bodies, moved.radar_table)
             check_places(moved.interferers, moved.bodies, moved.radar_table)

@@ -156,7 +156,7 @@ def traced_scene(scene: T, tolerance_db: float | None) -> tuple[T, Merged | None
     if merged is None:
         return scene, None
     traced = copy(scene)
-    traced.bodies = bodies
+    traced.__dict__["bodies"] = bodies
     # As the scene's own, what is kept of bodies that do not move serves all instants.
     traced._static = scene._static.setdefault(f"simplified {tolerance}", {})
     return traced, merged

@@ -129,6 +129,7 @@ def test_info_tells_of_scenes_and_of_meshes(scene, tmp_path, capsys):
         (["info", "nothing.stl"], "nothing.stl"),
         (["run", "{scene}", "--out", "o", "--set", "radar.antenna=horn.toml"], "no antenna file"),
         (["run", "{scene}", "--out", "o", "--set", "radar.antenna={{kind='array', gain=3}}"], "gain_dbi"),
+        (["run", "{scene}", "--out", "o", "--preview", "--set", "model.mode=auto"], "model.mode"),
         (["sing"], "sing"),
     ],
 )

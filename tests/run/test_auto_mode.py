@@ -59,6 +59,18 @@ def test_bounces_below_any_detection_are_left_out_and_their_level_is_told():
     assert len(theirs.detections.range) >= 1 and agreement(ours, theirs, 0.5)["lost"] == 0
 
 
+@pytest.mark.parametrize("height", [0.5, 0.8, 1.1])
+def test_the_stated_error_holds_what_the_bounces_left_out_would_bring(height):
+    ball = rc.Body("ball", shape="sphere", params={"radius": 0.3}, position=(12.0, 0.0, height))
+    bodies, asked = [rc.Body("ground", shape="ground"), ball], (("auto", 6.0), ("physical", 0.1))
+    ours, theirs = (
+        rc.simulate(rc.Scene(bodies=bodies, radar=RADAR, model={"mode": m, "tolerance_db": t})) for m, t in asked
+    )
+    found = agreement(ours, theirs, 6.0)
+    assert found["both"] == len(theirs.detections.range) >= 2
+    assert found["beyond"] == 0
+
+
 def test_legs_over_a_mirror_behind_a_wall_are_not_lit_and_those_over_the_ground_are():
     size = {"length": 0.2, "width": 6.0, "height": 3.0}
     front = rc.Body("front", shape="box", params=size, position=(6.0, 0.0, 0.0))
@@ -84,3 +96,12 @@ def test_levels_below_detection_may_be_wrong_by_what_they_lack_and_others_by_the
     assert (np.abs(cells.level[:2]) * (1.0 + cells.allowed[:2]) <= 1.0 + 1e-12).all()
     cells.level[0] = 1.5  # it has become a detection
     assert cells.allowed[0] == strict[0]
+
+
+def test_a_cell_whose_sources_bring_nothing_any_more_keeps_its_changes():
+    cells = MapCells(np.zeros((1, 3)), np.array([1.0 + 0.0j]), 0.5)
+    source = np.array([5, 9], np.int64)
+    cells.changed(0, source, np.array([0.2, 0.1j]))
+    before = cells.doubt
+    cells.changed(0, np.zeros(0, np.int64), np.zeros(0, complex))
+    np.testing.assert_array_equal(cells.doubt, before)

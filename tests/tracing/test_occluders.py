@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from support.boxes_and_balls import WAVEFORM
 from support.facets import ball, facets, facing_facets, ground
 
 import raychan as rc
@@ -141,3 +142,22 @@ def test_paths_are_the_same_bit_for_bit_whether_or_not_hidden_facets_are_looked_
     every = paths()
     for name in ("length", "amplitude", "length_rate", "body", "kind", "vertices"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(every, name), err_msg=name)
+
+
+@pytest.mark.parametrize("others", [[], [rc.Body("ground", shape="ground")]])
+@pytest.mark.parametrize("thickness", [0.0, 1e-9, 1e-3])
+def test_a_closed_body_without_thickness_hides_what_a_plate_of_its_size_hides(thickness, others):
+    flat = trimesh.creation.box((thickness, 2.0, 1.5))
+    sign = rc.Body("sign", mesh=flat, position=(6.0, 0.3, 0.75), material=rc.PEC)
+    beyond = rc.Body("ball", shape="sphere", params={"radius": 0.6}, position=(10.0, 3.5, 0.8))
+    hidden = rc.Body("behind", shape="sphere", params={"radius": 0.3}, position=(8.0, 0.3, 0.9))
+    radar = {"waveform": WAVEFORM, "position": (0.0, 0.0, 0.6), "power_dbm": 20.0}
+    scene = rc.Scene(bodies=[sign, beyond, hidden, *others], radar=radar, model={"max_bounces": 1})
+    geometry = geometry_of(scene, 0.5)
+    lit = seed_facets(geometry, Leg(end=np.array([0.0, 0.0, 0.6])), np.ones(geometry.piece.max() + 1, bool))
+    names = {geometry.facets.body_names[b] for b in geometry.facets.body[lit]}
+    assert "ball" in names
+    assert any("without thickness" in note for note in scene.warnings) == (thickness < 1e-6)
+    seen = rc.simulate(scene).detections
+    assert any(np.abs(seen.range - np.linalg.norm([10.0, 3.5, 0.2]) + 0.6) < 0.4)
+    assert not any(np.abs(seen.range - 7.7) < 0.4)

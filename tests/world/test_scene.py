@@ -186,3 +186,13 @@ def test_real_sampling_mirrors_the_range_axis():
 def test_materials_outside_their_source_are_told():
     scene = Scene([Body(name="w", shape="wall", material="brick")], frequency=77e9)
     assert "extrapolated" in scene.warnings[0]
+
+
+@pytest.mark.parametrize("name", ["bodies", "radar", "model", "processing", "frequency", "materials", "warnings"])
+def test_a_scene_that_is_made_is_not_changed_by_an_assignment(name):
+    scene = Scene.from_text(BARE_RADAR + BALL)
+    for one in (scene, scene.at(0.1)):
+        before = getattr(one, name)
+        with pytest.raises(AttributeError, match=rf"Scene\.{name} cannot be set again: .*override"):
+            setattr(one, name, None)
+        assert getattr(one, name) is before

@@ -156,3 +156,11 @@ def test_nan_and_empty_meshes_name_file_and_body(tmp_path, bad):
     with pytest.raises(SceneError) as caught:
         Scene.load(tmp_path / "s.toml")
     assert caught.value.key == "bodies.b" and "m.obj" in str(caught.value)
+
+
+def test_diffraction_to_a_receiver_elsewhere_is_refused_before_anything_is_traced():
+    text = BARE_RADAR.replace("[radar]", "[radar]\nrx_position = [0.0, 3.0, 1.0]") + BALL
+    with pytest.raises(SceneError) as caught:
+        Scene.from_text(text + "\n[model]\ndiffraction = true\n")
+    assert caught.value.key == "model.diffraction"
+    assert "rx_position" in str(caught.value)
