@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.em.phase_integral import quadratic_means
 from raychan.geometry.curved_patches import edge_to_cut, halved
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, SCATTERER, Points, Routes
-from raychan.tracing.contributions import SHARE, Contributions
+from raychan.tracing.contributions import SHARE, Contributions, amplitudes
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.launch import write_leg
 from raychan.tracing.legs import Leg, Mirror, View, reachable
@@ -118,17 +117,21 @@ class _Tubes:
             _, facing = radiating(out, self.tubes, FACING)
             tubes, view = self.tubes.take(facing), self.view.take(facing)
             ph = phases_of(geometry, leg, out, tubes, found.rule)
+            each = None
             if out is leg:
-                found.add(ph)
+                each = amplitudes(ph)
+                found.add(ph, each)
             rows = np.flatnonzero(_that_count(found, _SEEN * ph.bound, ph.length))
             ph = ph.take(rows)
-            kept = _that_count(found, np.abs(ph.in_phase * quadratic_means(ph.six, 0.5)), ph.length)
-            rows, ph = rows[kept], ph.take(kept)
+            each = amplitudes(ph) if each is None else each[rows]
+            kept = np.flatnonzero(_that_count(found, np.abs(each), ph.length))
+            rows, ph, each = rows[kept], ph.take(kept), each[kept]
             tubes, view = tubes.take(rows), view.take(rows)
             if out is not leg:
                 view = centre_visibility(geometry, out, tubes, True, found.rule)
-                tubes, ph, view = tubes.take(view.seen), ph.take(view.seen), view.take(view.seen)
-                found.add(ph)
+                tubes, ph, each = tubes.take(view.seen), ph.take(view.seen), each[view.seen]
+                view = view.take(view.seen)
+                found.add(ph, each)
             if len(tubes):
                 yield routes_of(geometry, leg, out, tubes, True, view.corners, view.passed)
 

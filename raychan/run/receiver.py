@@ -102,11 +102,15 @@ def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
     map, or of a beam over it."""
     if not radar.noise:
         return 0.0
-    # The strongest direction of both antennas, on a grid finer than any beam of use.
-    azimuth, elevation = np.meshgrid(np.radians(np.arange(-90.0, 90.1, 1.0)), np.radians(np.arange(-60.0, 60.1, 1.0)))
-    look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
-    ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
-    return float(noise_amplitude(radar, settings) * 4.0 * np.pi / radar.waveform.wavelength / np.prod(list(ends)))
+    gain = radar.kept.get(noise_equivalent_amplitude)
+    if gain is None:
+        # The strongest direction of both antennas, on a grid finer than any beam of use.
+        angles = (np.radians(np.arange(-most, most + 0.1, 1.0)) for most in (90.0, 60.0))
+        azimuth, elevation = np.meshgrid(*angles)
+        look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
+        ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
+        gain = radar.kept[noise_equivalent_amplitude] = float(np.prod(list(ends)))
+    return float(noise_amplitude(radar, settings) * 4.0 * np.pi / radar.waveform.wavelength / gain)
 
 
 def noise_of_cell(radar: Radar, settings: Any) -> float:

@@ -15,6 +15,7 @@ from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
@@ -81,6 +82,17 @@ class Budget:
         return np.zeros_like(wanted)
 
 
+def amplitudes(ph: Phases) -> Complexes:
+    """Return what tubes scatter (n,) [1/m], by the phase integral over a quadratic phase."""
+    each = np.empty(len(ph.six), complex)
+
+    def some(rows: slice) -> None:
+        each[rows] = ph.in_phase[rows] * quadratic_means(ph.six[rows], 0.5)
+
+    parallel_for(len(each), some, _THREADS)
+    return each
+
+
 class Contributions:
     """The scattered field [1/m] of a launch so far, in each stretch `rule.cell` [m] of two-way length.
 
@@ -132,16 +144,14 @@ class Contributions:
         level = np.maximum(self._level[at], _DEPTH * self._level.max())
         return np.maximum(max(self.rule.coarse * self.rule.floor, _NOTHING), self.rule.relative * level)
 
-    def add(self, ph: Phases) -> None:
-        """Add tubes that are seen: in each cell the sum of their amplitudes, or their rms sum where that cancels."""
+    def add(self, ph: Phases, each: Complexes | None = None) -> None:
+        """Add tubes that are seen: in each cell the sum of their amplitudes, or their rms sum where that cancels.
+
+        Args: each (n,) amplitude, where `amplitudes` gave them already.
+        """
         if not len(ph.six):
             return
-        each = np.empty(len(ph.six), complex)
-
-        def some(rows: slice) -> None:
-            each[rows] = ph.in_phase[rows] * quadratic_means(ph.six[rows], 0.5)
-
-        parallel_for(len(each), some, _THREADS)
+        each = amplitudes(ph) if each is None else each
         cell = self._cell(ph.length)
         # One more cell at the end, which stays empty, for all longer paths.
         n = max(len(self._level), int(cell.max()) + 3)

@@ -12,6 +12,7 @@ from raychan.geometry.closed_surfaces import clearance, winding
 Floats = NDArray[np.float64]
 
 _ON = 1e-6  # m: a point nearer to a facet than this is on it
+_EDGE_ON = 1e-12  # of its distance: a point nearer to the plane of a facet lies in it
 _WHOLE = 0.01  # deviation of a winding number from an integer: in an open body it is no integer
 
 
@@ -51,7 +52,10 @@ def in_plane_of(planes: tuple[Floats, Floats], point: Floats) -> int:
     first, normal = planes
     off = np.asarray(point, float) - first
     height = np.abs(np.einsum("ij,ij->i", off, normal))
-    return int(((height <= 1e-12 * np.linalg.norm(off, axis=1)) & normal.any(axis=1)).sum())
+    # Few facets are left of which the distance is needed.
+    near = np.flatnonzero(height <= _EDGE_ON * np.abs(off).max(initial=0.0) * np.sqrt(3.0))
+    off, height, normal = off[near], height[near], normal[near]
+    return int(((height <= _EDGE_ON * np.linalg.norm(off, axis=1)) & normal.any(axis=1)).sum())
 
 
 def refuse_within(corners: Floats, point: Floats, what: str) -> None:
