@@ -136,6 +136,20 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def edge_of_fan(facet, bary, n, fan):  # type: ignore[no-untyped-def]
+    """Return at which edge (n,) to bisect each patch that spreads reflected rays by more than `fan` [rad]; -1: none."""
+    out, normal = np.empty(len(facet), np.int8), np.empty((3, 3))
+    for i in range(len(facet)):
+        f, w = facet[i], bary[i]
+        for c in range(3):
+            _normal_on(n[f], w[c, 0], w[c, 1], w[c, 2], normal[c])
+        n0, n1, n2 = distance(normal[0], normal[1]), distance(normal[1], normal[2]), distance(normal[2], normal[0])
+        # A ray turns by twice the turn of the normal.
+        out[i] = largest(n0, n1, n2) if 2.0 * max(n0, n1, n2) > fan else -1
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def halved(facet, bary, edge, jitter, level):  # type: ignore[no-untyped-def]
     """Return (facet, bary) of both halves of patches cut from a point of `edge` (m,) to the opposite corner.
 

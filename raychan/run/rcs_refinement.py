@@ -27,6 +27,8 @@ from raychan.world.limits import BOUNCES
 
 Complexes = NDArray[np.complex128]
 
+_FAN = 0.05  # rad by which a tube may spread the rays that a curved surface reflects: trades rays for the bias of fans
+# that meet gaps (bodies of primitives, a person and a traffic light, 4 views; command not noted)
 _STEPS = 12  # rules, each of half the phase of the one before: rays run out earlier
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and larger tubes may miss them (not measured)
 _EDGE_ALONE = 0.3  # m: the same for convex bodies; a larger tube may bend more than its phase integral follows
@@ -233,6 +235,8 @@ def refinements(
             relative=0.03 * fine,
             max_edge=longest,
             jitter=0.0 if i % 2 == 0 else 0.13,
+            fan=max(_FAN, 4.0 * _FAN * fine),
+            patch=1.0,
         )
 
 

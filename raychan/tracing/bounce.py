@@ -28,11 +28,12 @@ from raychan.tracing.resolve_hits import (
     phase_at_hits,
     reflect_directions,
     resolve_hits,
+    spread_at_hits,
     tubes_at_hits,
 )
 from raychan.tracing.shared_work import all_of
 from raychan.tracing.silhouette_crossings import silhouette_crossings_of
-from raychan.tracing.subdivide import subdivide
+from raychan.tracing.subdivide import bisect, edge_of_spread, subdivide
 from raychan.tracing.tubes import CENTRE, Refinement, Tubes, slices
 from raychan.tracing.visibility import on_facets
 from raychan.world.geometry import Geometry
@@ -42,7 +43,7 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Rows = NDArray[np.signedinteger]
 
-_SAME_PATCH_COSINE = 0.98  # of the normals of one smooth patch over a tube; trades cuts for accuracy, not measured
+_DEEPER = 2.0  # fans that a tube may spread its rays by after its first bounce; trades rays for bias, not measured
 _BUDGET_SHARE = 0.1  # of a cut for visibility: what a cut between bounces takes of the budget; not measured
 _PARALLEL_FROM = 2000  # tubes from which on a second thread pays; not measured
 _PART = 16384  # tubes that one thread follows at once; not measured
@@ -105,11 +106,28 @@ def bounce(
 
 def _flown(step: _Bounce, tubes: Tubes) -> tuple[list[Tubes], list[Floats]]:
     """Return the tubes where they land, and what they could contribute from there."""
+    tubes = _narrowed(step, tubes)
     n, layers, landed = len(tubes), step.rule.layers, list[Tubes]()
     flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, layers), -1, np.int32), np.zeros((2, n), np.int8))
     while len(flight.tubes):
         flight = _cast_and_subdivide(step, flight, landed)
     return landed, [_contribution_bounds(step, t) for t in landed]
+
+
+def _narrowed(step: _Bounce, tubes: Tubes) -> Tubes:
+    """Return the tubes, those on curved surfaces bisected until each spreads its rays by `_DEEPER` fans at most; on
+    first surfaces the launch does so."""
+    rule, done = step.rule, list[Tubes]()
+    if step.first or rule.fan == np.inf:
+        return tubes
+    for _ in range(rule.levels):
+        edge = edge_of_spread(tubes.k, tubes.normals, tubes.facet, step.geometry.curved, _DEEPER * rule.fan)
+        wide = edge >= 0
+        if not wide.any():
+            break
+        done.append(tubes.take(~wide))
+        tubes = bisect(step.geometry, step.leg, tubes, np.flatnonzero(wide), edge[wide], False, rule.jitter)
+    return Tubes.join([tubes, *done])
 
 
 def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> _Flight:
@@ -133,7 +151,7 @@ def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> 
     rows = np.flatnonzero(matters & one_surface)
     facets, distances = geometry.cast(*corner_rays(rows, points, directions, tubes.facet, flight.start))
     hit[rows, :3], reach[rows, :3] = facets.reshape(-1, 3), distances.reshape(-1, 3)
-    on_one_surface(rows, hit, geometry.plane, geometry.smooth, geometry.normal, _SAME_PATCH_COSINE, one_surface)
+    on_one_surface(rows, hit, geometry.plane, geometry.smooth, geometry.normal, rule.patch, one_surface)
     side = _edges_within(step, tubes, points, directions, hit, reach, np.flatnonzero(matters))
     mixed = (~one_surface & (mid >= 0)) | side.any(axis=1)
     split = found.budget.affords(
@@ -156,6 +174,10 @@ def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: 
     """
     geometry, out, found = step.geometry, step.out, step.found
     in_phase, _, length = _contribution_bounds(step, tubes)
+    if step.rule.fan < np.inf:
+        grown = np.empty(len(tubes))
+        spread_at_hits(tubes.points, directions, mid, ahead, grown)
+        in_phase *= grown
     if step.last:
         # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.
         # Before more mirrors that is not known. Where the centre ray meets nothing, or the ground, from which tubes do

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.curved_patches import edge_to_cut, halved
+from raychan.geometry.curved_patches import edge_of_fan, edge_to_cut, halved
 from raychan.geometry.lit_parts import lit_parts
 from raychan.poses import sizes
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
@@ -102,6 +102,8 @@ def _bisect_for_phase(
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
         edge = edge_to_cut(facet, bary, *(*shape, *images, *limits))
+        if rule.fan < np.inf and not across:
+            edge = np.where(edge < 0, edge_of_fan(facet, bary, shape[1], rule.fan), edge)
         if level < rule.least:
             edge = np.where((edge < 0) & (geometry.curved[facet] | (not across)), _longest(facet, bary, shape[0]), edge)
         more = found.budget.affords_phase(geometry, facet, edge >= 0)
@@ -147,7 +149,8 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     view = centre_visibility(geometry, leg, tubes, True, rule)
     found.add(ph.take(view.seen))
     ready = geometry.convex_alone or found.budget.spent(geometry)
-    matters = (ph.bound > found.prune_threshold(ph.length)) & (not ready)
+    carries = more and rule.fan < np.inf
+    matters = ((ph.in_phase if carries else ph.bound) > found.prune_threshold(ph.length)) & (not ready)
     take_seen(view, view.seen & ~matters)
     known: View | None = view.take(matters)
     tubes, matters = tubes.take(matters), matters[matters]
@@ -160,7 +163,7 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
         rows = np.flatnonzero(split)
         tubes, _ = subdivide(geometry, leg, tubes, rows, s.side, True, rule.jitter)
         ph = phases_of(geometry, leg, out, tubes, rule)
-        known, matters = None, ph.bound > found.prune_threshold(ph.length)
+        known, matters = None, (ph.in_phase if carries else ph.bound) > found.prune_threshold(ph.length)
     return Tubes.join(parts)
 
 

@@ -156,6 +156,24 @@ def phase_at_hits(  # type: ignore[no-untyped-def]
         span[i] = high - low
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def spread_at_hits(points, directions, hit, reach, grown):  # type: ignore[no-untyped-def]
+    """Write by how much more tubes may scatter where they land than on their mirror, `grown` (n,), at least 1: the root
+    of the area across the centre's ray there over that before, for of A E the field E falls with the root of A.
+
+    Args: hit (n,) facet that the centre ray meets after reach (n,) [m], -1 for none: then 1.
+    """
+    p = np.empty((3, 3))
+    for i in range(len(hit)):
+        grown[i] = 1.0
+        if hit[i] >= 0:
+            for q in range(3):
+                for c in range(3):
+                    p[q, c] = points[i, q, c] + reach[i] * directions[i, q, c]
+            there, before = _twice_area(p, directions[i, 3]), _twice_area(points[i], directions[i, 3])
+            grown[i] = math.sqrt(max(abs(there / before), 1.0)) if before != 0.0 else 1.0
+
+
 @njit(cache=True, nogil=True)
 def corner_rays(rows, points, directions, facet, start):  # type: ignore[no-untyped-def]
     """Return origins and directions (3 m, 3), facets left (3 m,) and distances from which hits count (3 m,) of the

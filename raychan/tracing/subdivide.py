@@ -84,6 +84,25 @@ def _parts(
 
 
 @njit(cache=True, nogil=True)
+def edge_of_spread(k, normals, facet, curved, fan):  # type: ignore[no-untyped-def]
+    """Return the edge (n,) between whose corners the reflected rays of each tube spread most; -1 where they spread by
+    no more than `fan` [rad], or the facet is not curved (f,)."""
+    out, d = np.full(len(k), -1, np.int64), np.empty((3, 3))
+    for i in range(len(k)):
+        if curved[facet[i]]:
+            for q in range(3):
+                twice = 0.0
+                for c in range(3):
+                    twice += 2.0 * k[i, q, c] * normals[i, q, c]
+                for c in range(3):
+                    d[q, c] = k[i, q, c] - twice * normals[i, q, c]
+            e0, e1, e2 = distance(d[0], d[1]), distance(d[1], d[2]), distance(d[2], d[0])
+            if max(e0, e1, e2) > fan:
+                out[i] = largest(e0, e1, e2)
+    return out
+
+
+@njit(cache=True, nogil=True)
 def longest_edges(points):  # type: ignore[no-untyped-def]
     """Return the longest edge (n,) of each tube: from corner 0, 1 or 2 to the next."""
     out = np.empty(len(points), np.int64)

@@ -43,7 +43,10 @@ class Refinement:
     the middle, for a second lattice; `coarse`
     not 1: tubes that bounced are cut only where one alone may bring so many times the floor, and a good part of
     what is found there; `least` bisections of each first tube on a curved facet, and of all that bounce again, for a
-    launch to be finer where the one before was fine enough.
+    launch to be finer where the one before was fine enough; `fan` [rad] by which curved facets may
+    spread the rays of a tube that bounces again (twice that after its first bounce): where it is not infinite, tubes
+    are cut by what they may bring where they land; `patch` least cosine between the normals of facets of one smooth
+    patch for a tube to land on several of them, 1: on one only.
     """
 
     wavenumber: float
@@ -63,6 +66,8 @@ class Refinement:
     jitter: float = 0.0
     coarse: float = 1.0
     least: int = 0
+    fan: float = np.inf
+    patch: float = 0.98
 
     def for_depth(self, bounces: int) -> Refinement:
         """Return the same rule with slots for so many bounces, and for layers on every stretch between them."""

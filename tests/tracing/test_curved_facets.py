@@ -11,6 +11,7 @@ from support.targets import F
 from support.triangles import nodes, on_patch
 from truth import po
 
+from raychan.geometry.curved_patches import edge_of_fan, halved
 from raychan.run.rcs_refinement import refinements
 from raychan.run.single_body import facets_of
 from raychan.tracing.footprints import element_of
@@ -41,6 +42,26 @@ def test_lit_half_of_a_sphere_projects_to_its_disc():
     for routes in tube_routes(geometry, leg, [leg], np.ones(len(geometry.piece_role), bool), rule, 1):
         shadow += float(routes.area @ np.einsum("nj,j->n", routes.normals[:, 0], leg.end))
     assert shadow == pytest.approx(np.pi * 0.1**2, rel=2e-3)
+
+
+def test_patches_of_a_sphere_are_cut_until_their_reflected_rays_spread_by_the_fan():
+    """Corner normals of patches of a sphere are their places over its radius: rays turn by twice the angle between."""
+    geometry = Geometry(facets_of(trimesh.creation.icosphere(2, 0.5), "pec", F))
+    normals, fan = geometry.facets.normals, 0.1
+    facet = np.arange(len(normals), dtype=np.int32)
+    bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
+    for level in range(12):
+        edge = edge_of_fan(facet, bary, normals, fan)
+        rest = np.flatnonzero(edge < 0)
+        corner = np.einsum("nqi,nij->nqj", bary, normals[facet])
+        corner /= np.linalg.norm(corner, axis=2, keepdims=True)
+        spread = 2.0 * np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2).max(axis=1)
+        assert ((spread > fan) == (edge >= 0)).all()
+        if len(rest) == len(facet):
+            break
+        one, other = halved(facet[edge >= 0], bary[edge >= 0], edge[edge >= 0], 0.0, level)
+        facet, bary = np.concatenate([facet[rest], one]), np.concatenate([bary[rest], other])
+    assert level > 0 and (edge < 0).all()
 
 
 @pytest.mark.parametrize(("subdivisions", "share"), [(2, 0.02), (3, 0.02), (4, 0.02)])

@@ -12,7 +12,7 @@ from raychan.tracing.history import History
 from raychan.tracing.legs import Leg
 from raychan.tracing.resolve_hits import IncidentTubes, LandedTubes, ReflectingFacets, tubes_at_hits
 from raychan.tracing.silhouette_crossings import silhouette_crossings_of
-from raychan.tracing.subdivide import bisect, subdivide
+from raychan.tracing.subdivide import bisect, edge_of_spread, subdivide
 from raychan.tracing.tubes import Tubes
 from raychan.world.geometry import Geometry
 
@@ -69,6 +69,18 @@ def test_parts_have_the_area_of_the_whole_and_rays_of_its_source():
     known = side[parent].any(axis=1)
     assert known.any() and (~known).any()
     assert (at[known].min(axis=1) * at[known].max(axis=1)).min() > -1e-12
+
+
+def test_tubes_are_cut_where_their_rays_spread_most_off_a_curved_mirror():
+    """Rays along -z on a cylinder of radius 1 about the y axis turn by twice the angle of their foot: with corners at
+    angles 0, 0.01 and 0.04, the second edge spreads by 0.06 rad and the third by 0.08."""
+    angle = np.array([0.0, 0.01, 0.04])
+    normals = np.zeros((2, 4, 3))
+    normals[:, :3, 0], normals[:, :3, 2] = np.sin(angle), np.cos(angle)
+    k = np.broadcast_to([0.0, 0.0, -1.0], (2, 4, 3)).copy()
+    facet, curved = np.array([0, 1], np.int32), np.array([True, False])
+    assert edge_of_spread(k, normals, facet, curved, 0.07).tolist() == [2, -1]
+    assert edge_of_spread(k, normals, facet, curved, 0.09).tolist() == [-1, -1]
 
 
 def shares_inside(tubes, i, source, ends, margin=0.0, steps=4000):
