@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
 from raychan.columns import take
 from raychan.radar.radar import Radar
@@ -28,7 +29,7 @@ from raychan.run.point_spread import PointSpread
 from raychan.run.receiver import detections_in, map_of, noise_amplitude
 from raychan.run.refinement_budget import STEPS, Budget, within
 from raychan.run.rules import first_rule, look_rule, step_rule
-from raychan.run.sourced_paths import SourcedPaths, by_source, changes
+from raychan.run.sourced_paths import SourcedPaths, by_source, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
@@ -44,6 +45,7 @@ Bools = NDArray[np.bool_]
 _MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may bring above it
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
+_SLOW = "changes that shrink too slowly for more steps to help"
 _NAMED = 3  # cells that a line names
 
 
@@ -188,7 +190,8 @@ class SceneRefinement:
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
         now = held.now if steps else first.paths
-        quiet, off = synthesize(now, radar), synthesize(held.doubtful, radar, tolerance=_LEVEL)
+        doubtful = raised(response, held.doubtful, cells.place, cells.doubt / COVER)
+        quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
         return Converged(launched, others, self.model, first.chosen, steps, unreached, ended, speckled)
@@ -225,14 +228,15 @@ class SceneRefinement:
             own, sums = by_source(response, *held.replace(*new, by), cells.place)
             for i, change in enumerate(sums):
                 cells.changed(i, own, change)
-            before, by = by, list(launches(_united(_wanted(cells)), facets))
             steps += 1
+            cells.give_up(steps, STEPS - steps)
+            before, by = by, list(launches(_united(_wanted(cells)), facets))
             if by:
                 ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))
-        for slow, classes in zip(cells.slowness, feeding, strict=True):
-            for factor, one in zip(slow, classes, strict=True):
-                held.doubt(one, float(factor))
-        return steps, tuple(_unreached(cells)), ended
+        for i in range(len(cells)):
+            held.doubt(*cells.slowness(i))
+        unreached = tuple(_unreached(cells))
+        return steps, unreached, ended or (_SLOW if unreached else "")
 
 
 def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list[Classes]:
@@ -248,7 +252,7 @@ def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list
 def _wanted(cells: MapCells) -> Iterator[Classes]:
     """Give the sources of each open cell that are to be traced again."""
     none = np.zeros(0, np.int64)
-    for i, classes in enumerate(cells.open):
+    for i, classes in enumerate(cells.to_refine):
         if classes.any():
             shallow, deep = cells.wanted(i)
             yield shallow if classes[0] else none, deep if classes[1] else none
