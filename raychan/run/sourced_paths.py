@@ -181,7 +181,11 @@ def raised(response: PointSpread, doubtful: Paths, cells: Floats, least: Floats)
         lack = least[i] - abs(found[i])
         if lack <= _LACK * least[i]:
             continue
-        echo = _echo(response, doubtful, int(strongest[i, 0]), cells[i])
+        # Where no path reaches the cell, the strongest of all.
+        row = int(strongest[i, 0]) if strongest[i, 0] >= 0 else int(np.argmax(np.abs(doubtful.amplitude)))
+        if not doubtful.amplitude[row]:
+            continue
+        echo = scaled(_echo(response, doubtful, row, cells[i]), np.array([lack / doubtful.amplitude[row]]))
         waves = _sums(response, echo, np.zeros(1, np.int64), 1, cells)[:, 0]
         if waves[i]:
             factor = lack * np.exp(1j * np.angle(found[i])) / waves[i]

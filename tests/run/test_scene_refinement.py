@@ -170,6 +170,11 @@ def test_doubtful_paths_bring_at_least_what_a_cell_may_be_wrong_by():
     after = np.abs(changes(response, more, np.full(len(more.trajectories.kind), -1), place).sum(axis=1))
     assert len(more.length) == len(paths.length) + 2
     assert after == pytest.approx(np.maximum(before, least), rel=0.02)
+    # A cell so strong that no path tells in it, and one where nothing is in doubt.
+    strong = np.array([[10.0, 0.0, 1.0]])
+    more = raised(response, paths, strong, np.array([0.1]))
+    assert np.abs(changes(response, more, np.full(len(more.trajectories.kind), -1), strong).sum()) == pytest.approx(0.1)
+    assert len(raised(response, paths, strong, np.zeros(1)).length) == len(paths.length)
 
 
 def test_a_source_counts_by_the_factor_of_the_cell_that_it_matters_most_to():
