@@ -31,7 +31,7 @@ from raychan.run.point_spread import PointSpread
 from raychan.run.receiver import detections_in, map_of, noise_amplitude
 from raychan.run.refinement_budget import STEPS, Budget, within
 from raychan.run.rules import first_rule, look_rule, step_rule
-from raychan.run.sourced_paths import SourcedPaths, by_source, changes
+from raychan.run.sourced_paths import SourcedPaths, by_source, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, stand_apart, synthesize
@@ -47,6 +47,7 @@ Bools = NDArray[np.bool_]
 _MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may bring above it
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
+_SLOW = "changes that shrink too slowly for more steps to help"
 _NAMED = 3  # cells that a line names
 
 
@@ -193,7 +194,8 @@ class SceneRefinement:
             steps, unreached, ended = self._refined(first.launch, held, response, cells)
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
-        now, doubtful = held.now if steps else first.paths, held.doubtful(whole=stand_apart(radar))
+        now = held.now if steps else first.paths
+        doubtful = raised(response, held.doubtful(stand_apart(radar)), cells.place, cells.doubt / COVER)
         if first.left is not None:
             # What a level lacks is known: it needs no factor that covers what is not.
             doubtful = join([doubtful, scaled(first.left, np.full(len(first.left.length), 1.0 / COVER))])
@@ -234,14 +236,15 @@ class SceneRefinement:
             own, sums = by_source(response, *held.replace(*new, by), cells.place)
             for i, change in enumerate(sums):
                 cells.changed(i, own, change)
-            before, by = by, list(launches(_united(_wanted(cells)), facets))
             steps += 1
+            cells.give_up(steps, STEPS - steps)
+            before, by = by, list(launches(_united(_wanted(cells)), facets))
             if by:
                 ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))
-        for slow, classes in zip(cells.slowness, feeding, strict=True):
-            for factor, one in zip(slow, classes, strict=True):
-                held.doubt(one, float(factor))
-        return steps, tuple(_unreached(cells)), ended
+        for i in range(len(cells)):
+            held.doubt(*cells.slowness(i))
+        unreached = tuple(_unreached(cells))
+        return steps, unreached, ended or (_SLOW if unreached else "")
 
 
 def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list[Classes]:
@@ -257,7 +260,7 @@ def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list
 def _wanted(cells: MapCells) -> Iterator[Classes]:
     """Give the sources of each open cell that are to be traced again."""
     none = np.zeros(0, np.int64)
-    for i, classes in enumerate(cells.open):
+    for i, classes in enumerate(cells.to_refine):
         if classes.any():
             shallow, deep = cells.wanted(i)
             yield shallow if classes[0] else none, deep if classes[1] else none

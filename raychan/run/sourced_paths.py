@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join, of_trajectories
+from raychan.columns import take
 from raychan.radar.dual_paths import scaled
 from raychan.records import Paths
 from raychan.run.point_spread import PointSpread
@@ -22,6 +23,7 @@ Complexes = NDArray[np.complexfloating]
 
 DEEP = 2
 """From this bounce on a tube is deep: the first launch cuts it only where it alone may make a detection."""
+_LACK = 0.01  # of what doubtful paths must bring at least: by so much they may miss it (paths added; not measured)
 _SUMS = 1 << 21  # sums by cell and source held at once: bounds the memory
 _GONE, _BEFORE, _NOW = 0, 1, 2
 
@@ -47,7 +49,7 @@ class SourcedPaths:
 
     def __init__(self, paths: Paths, source: Sources) -> None:
         self._parts = [_Part(paths, source, np.full(len(source), _NOW, np.int8), True)]
-        self._doubted = np.zeros(0, np.int64), np.zeros(0)
+        self._doubted = np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
         self._moved = np.zeros(2)
 
     def replace(self, paths: Paths, source: Sources, launches: list[tuple[int, Wanted]]) -> tuple[Paths, Sources]:
@@ -66,17 +68,16 @@ class SourcedPaths:
         self._parts.append(_Part(paths, source, np.full(len(source), _NOW, np.int8), False))
         return join(changed), np.concatenate(sources)
 
-    def doubt(self, source: Sources, factor: float) -> None:
-        """Count the last changes of sources (n,) times a factor; of several factors the largest counts."""
-        if factor > 1.0 and len(source):
-            every = np.concatenate([self._doubted[0], source])
-            own, at = np.unique(every, return_inverse=True)
-            factors = np.ones(len(own))
-            np.maximum.at(factors, at, np.concatenate([self._doubted[1], np.full(len(source), factor)]))
-            self._doubted = own, factors
+    def doubt(self, source: Sources, factor: Floats, share: Floats) -> None:
+        """Count the last changes of sources (n,) times factors (n,), those of the cell that they matter most to, of
+        whose tolerance they are such a share (n,)."""
+        own, factors, shares = (np.concatenate(x) for x in zip(self._doubted, (source, factor, share), strict=True))
+        order = np.lexsort((shares, own))
+        last = order[np.append(own[order][1:] != own[order][:-1], True)[: len(order)]]
+        self._doubted = own[last], factors[last], shares[last]
 
     def _factor(self, source: Sources) -> Floats:
-        own, factors = self._doubted
+        own, factors, _ = self._doubted
         if not len(own):
             return np.ones(len(source))
         at = np.minimum(np.searchsorted(own, source), len(own) - 1)
@@ -164,6 +165,43 @@ def _by(own: Sources, source: Sources, amplitude: Complexes) -> Complexes:
 def changes(response: PointSpread, paths: Paths, source: Sources, cells: Floats) -> Complexes:
     """Return the sums (c, 2) in cells (c, 3) of paths, by the source (w,) of their trajectories: shallow, deep."""
     return _sums(response, paths, (depth_of(source) >= DEEP).astype(np.int64), 2, cells)
+
+
+def raised(response: PointSpread, doubtful: Paths, cells: Floats, least: Floats) -> Paths:
+    """Return doubtful paths with echoes that bring their sums in cells (c, 3) to so much (c,) at least: unrelated
+    changes that cancel in one launch need not do so in the next.
+
+    An echo comes from where the strongest path of its cell comes from.
+    """
+    every = np.zeros(len(doubtful.length), np.int64)
+    if not (len(every) and len(cells)):
+        return doubtful
+    sums, _, strongest = response.in_cells(every, 1, doubtful.amplitude, doubtful.delay, doubtful.range_rate, cells)
+    found, parts = sums[:, 0], [doubtful]
+    for i in np.argsort(-least, kind="stable"):
+        lack = least[i] - abs(found[i])
+        if lack <= _LACK * least[i]:
+            continue
+        # Where no path reaches the cell, the strongest of all.
+        row = int(strongest[i, 0]) if strongest[i, 0] >= 0 else int(np.argmax(np.abs(doubtful.amplitude)))
+        if not doubtful.amplitude[row]:
+            continue
+        echo = scaled(_echo(response, doubtful, row, cells[i]), np.array([lack / doubtful.amplitude[row]]))
+        waves = _sums(response, echo, np.zeros(1, np.int64), 1, cells)[:, 0]
+        if waves[i]:
+            factor = lack * np.exp(1j * np.angle(found[i])) / waves[i]
+            parts.append(scaled(echo, np.array([factor])))
+            found = found + factor * waves
+    return join(parts)
+
+
+def _echo(response: PointSpread, paths: Paths, row: int, cell: Floats) -> Paths:
+    """Return one of the paths, moved to the range and rate of a cell (3,)."""
+    keep = np.zeros(len(paths.trajectories.kind), bool)
+    keep[paths.trajectory[row]] = True
+    one = take(of_trajectories(paths, keep), np.flatnonzero(paths.trajectory == paths.trajectory[row]) == row)
+    length = 2.0 * (cell[0] - cell[1] * response.waveform.centre)
+    return one.rebuilt(length=np.array([length]), length_rate=np.array([2.0 * cell[1]]))
 
 
 def _sums(response: PointSpread, paths: Paths, group: NDArray[np.int64], count: int, cells: Floats) -> Complexes:

@@ -10,9 +10,10 @@ import raychan as rc
 from raychan.channel.error import COVER
 from raychan.run import refinement_budget
 from raychan.run.map_cells import MapCells, feeding_sources
+from raychan.run.point_spread import PointSpread
 from raychan.run.rules import step_rule
 from raychan.run.scene_refinement import SceneRefinement
-from raychan.run.sourced_paths import SourcedPaths
+from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.tracing.solver import Stats
 from raychan.tracing.sources import depth_of, launches
 from raychan.world.geometry import geometry_of
@@ -60,12 +61,12 @@ def test_what_was_never_cut_is_in_doubt():
     deep = depth_of(first.source)[first.paths.trajectory] > 1
     assert deep.any()
     held = SourcedPaths(first.paths, first.source)
-    assert np.sort(np.abs(held.doubtful.amplitude)) == pytest.approx(np.sort(np.abs(first.paths.amplitude[deep])))
+    assert np.sort(np.abs(held.doubtful(whole=True).amplitude)) == pytest.approx(np.sort(np.abs(first.paths.amplitude[deep])))
     by = list(launches(np.unique(first.source[depth_of(first.source) > 1]), len(refinement.geometry.facets.body)))
     rule = step_rule(of.radar, of.processing, of.model, 0)
     paths, source = refinement._paths(first.launch.again(rule.refinement, by, Stats(), refinement._carried))
     change, _ = held.replace(paths, source, by)
-    assert held.doubtful.amplitude.sum() == pytest.approx(change.amplitude.sum())
+    assert held.doubtful(whole=True).amplitude.sum() == pytest.approx(change.amplitude.sum())
     assert len(held.now.amplitude) == len(paths.amplitude) + np.count_nonzero(~deep)
 
 
@@ -107,13 +108,31 @@ def test_sources_left_out_bring_less_than_their_share():
     assert (np.sort(np.abs(sums[left]))[-1] <= np.abs(sums[np.isin(source, shallow)])).all()
 
 
-@pytest.mark.parametrize(("q", "factor"), [(0.3, 1.0), (0.64, 1.0), (0.75, 3.0 / 1.8), (1.2, 3.0)])
+@pytest.mark.parametrize(("q", "factor"), [(0.3, 0.5**0.5), (0.64, 1.0), (0.75, 3.0 / 1.8), (1.2, 3.0)])
 def test_changes_that_do_not_shrink_count_as_the_rest_of_their_series(q, factor):
     cells = one_cell()
     for change in (0.1, 0.1 * q):
         cells.changed(0, np.array([SHALLOW]), np.array([change + 0j]))
-    assert cells.slowness[0, 0] == pytest.approx(factor, rel=0.02)
+    assert cells.slowness(0)[1] == pytest.approx(factor, rel=0.02)
     assert cells.doubt[0] == pytest.approx(COVER * factor * 0.1 * q, rel=0.02)
+
+
+@pytest.mark.parametrize("turn", [np.pi, 0.5 * np.pi])
+def test_changes_to_and_fro_are_no_series(turn):
+    """The error of the newer of two launches has at most half of the power of what they differ by."""
+    cells = one_cell()
+    for change in (0.1, 0.09 * np.exp(1j * turn)):
+        cells.changed(0, np.array([SHALLOW]), np.array([change]))
+    assert cells.doubt[0] == pytest.approx(COVER * 0.5**0.5 * 0.09)
+
+
+def test_a_source_that_changed_once_keeps_its_unknown_ratio():
+    """Others that changed twice say nothing of it."""
+    cells = one_cell()
+    cells.changed(0, np.array([SHALLOW, SHALLOW + 1]), np.array([0.1, 0.02 + 0j]))
+    cells.changed(0, np.array([SHALLOW]), np.array([0.01 + 0j]))
+    factor = dict(zip(*cells.slowness(0)[:2], strict=True))
+    assert factor == pytest.approx({SHALLOW: 0.5**0.5, SHALLOW + 1: 2.0 / COVER})
 
 
 def test_changes_that_cancel_count_by_their_rms_sum():
@@ -121,8 +140,55 @@ def test_changes_that_cancel_count_by_their_rms_sum():
     cells = one_cell()
     cells.changed(0, np.array([SHALLOW, SHALLOW + 1]), np.array([0.03, -0.03 + 0j]))
     assert cells.level[0] == pytest.approx(1.0)
-    assert cells.doubt[0] == pytest.approx(COVER * cells.slowness[0, 0] * 0.03 * np.sqrt(2.0))
+    assert cells.doubt[0] == pytest.approx(2.0 * 0.03 * np.sqrt(2.0))
     assert cells.open[0].tolist() == [True, False]
+
+
+def test_a_cell_out_of_reach_is_given_up_after_three_steps():
+    cells = one_cell()
+    for steps in (1, 2, 3):
+        cells.changed(0, np.array([SHALLOW]), np.array([0.9 * (-1.0) ** steps + 0j]))
+        assert cells.to_refine[0, 0]
+        cells.give_up(steps, 3)
+    assert cells.open[0, 0] and not cells.to_refine[0, 0]
+
+
+def test_doubtful_paths_bring_at_least_what_a_cell_may_be_wrong_by():
+    """Echoes at the place of each cell raise the sums there to the rms sums, and nothing elsewhere."""
+    of = scene_of(2)
+    refinement = SceneRefinement(
+        geometry_of(of), of.points(0.0), of.radar, of.processing, of.model, lambda *_: None, Stats()
+    )
+    paths = refinement.first().paths
+    response = PointSpread(of.radar.channel_waveform, of.processing.range_window, of.processing.rate_window)
+    step = of.radar.waveform.range_resolution
+    place = np.array([[10.0, 0.0, 1e-6], [10.0 + 12.0 * step, 0.0, 1e-6], [10.0 + 24.0 * step, 0.0, 1e-6]])
+    source = np.full(len(paths.trajectories.kind), -1)
+    before = np.abs(changes(response, paths, source, place).sum(axis=1))
+    least = before * [2.0, 0.5, 3.0]
+    more = raised(response, paths, place, least)
+    after = np.abs(changes(response, more, np.full(len(more.trajectories.kind), -1), place).sum(axis=1))
+    assert len(more.length) == len(paths.length) + 2
+    assert after == pytest.approx(np.maximum(before, least), rel=0.02)
+    # A cell so strong that no path tells in it, and one where nothing is in doubt.
+    strong = np.array([[10.0, 0.0, 1.0]])
+    more = raised(response, paths, strong, np.array([0.1]))
+    assert np.abs(changes(response, more, np.full(len(more.trajectories.kind), -1), strong).sum()) == pytest.approx(0.1)
+    assert len(raised(response, paths, strong, np.zeros(1)).length) == len(paths.length)
+
+
+def test_a_source_counts_by_the_factor_of_the_cell_that_it_matters_most_to():
+    of = scene_of(2)
+    refinement = SceneRefinement(
+        geometry_of(of), of.points(0.0), of.radar, of.processing, of.model, lambda *_: None, Stats()
+    )
+    first = refinement.first()
+    held = SourcedPaths(first.paths, first.source)
+    own = np.unique(first.source[depth_of(first.source) > 1])[:1]
+    for factor, share in ((3.0, 0.2), (0.7, 0.9), (2.0, 0.1)):
+        held.doubt(own, np.array([factor]), np.array([share]))
+    assert held._factor(own) == pytest.approx(0.7)
+    assert held._factor(own + 1) == pytest.approx(1.0)
 
 
 def test_deep_tubes_that_were_never_cut_keep_a_cell_from_its_tolerance():
