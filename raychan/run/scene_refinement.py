@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
 from raychan.columns import take
-from raychan.parallel import run_pair
 from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
@@ -199,7 +198,8 @@ class SceneRefinement:
         if first.left is not None:
             # What a level lacks is known: it needs no factor that covers what is not.
             doubtful = join([doubtful, scaled(first.left, np.full(len(first.left.length), 1.0 / COVER))])
-        quiet, off = run_pair(lambda: synthesize(now, radar), lambda: synthesize(doubtful, radar, tolerance=_LEVEL))
+        # One after the other: both at once take the memory of both.
+        quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
         return Converged(launched, others, self.model, first.chosen, steps, unreached, ended, speckled)
