@@ -25,8 +25,6 @@ Floats = NDArray[np.float64]
 _SMALL = 1e-3
 """Of the noise in a map cell: by so much the samples may be off for each footprint that is long in range but is one
 path all the same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
-
-
 _MANY = 20_000  # trajectories from which on a second thread pays; not measured
 
 

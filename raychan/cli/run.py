@@ -72,8 +72,8 @@ def run(
         return
     if out is None:
         raise typer.BadParameter("missing: name a directory for the results", param_hint="--out")
-    if preview and any(key.startswith("model.mode=") and key != "model.mode=preview" for key in set_ or []):
-        raise typer.BadParameter("--set gives another model.mode: leave one of both out", param_hint="--preview")
+    if preview and any(one.split("=")[0].strip() == "model.mode" for one in set_ or []):
+        raise typer.BadParameter("--set gives model.mode too: leave one of both out", param_hint="--preview")
     loaded = Scene.load(scene).override([*(set_ or []), *(["model.mode=preview"] if preview else [])])
     options = {"seed": seed, "tolerance_db": tolerance, "max_bounces": max_bounces}
     check_demand(loaded)

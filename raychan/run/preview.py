@@ -28,7 +28,7 @@ from raychan.world.geometry import Geometry
 
 # What levels are stated to be off by: they cover all of 168 direct echoes of 30 random scenes and of two streets, whose
 # levels are off by 3.5 dB at most (`make bench BENCH="--only preview"`), and a lamp post of 41.7 dB SNR off by 3.4 dB
-# (seed 2023 of a blind attack). Less covers fewer, more tells less.
+# (a random scene; command not noted). Less covers fewer, more tells less.
 _SHARE_DB = 4.0  # of any detection
 _WEAK = 4.0  # times the noise's amplitude: what else weak ones are off by
 

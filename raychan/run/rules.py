@@ -37,8 +37,9 @@ _CGROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_
 _COARSE = 3.0  # times half the noise: a corner of three faces returns by six tubes, some 10 times the noise if detected
 _COARSER = 3.0  # times the tolerance: the check launch
 _PHASE, _TURN, _EDGE = 0.5, 0.5, 1.0  # rad, rad, m: a look's tubes: rays against later steps; command not noted
-_FLOOR = 2.0  # times half the noise: a look's uncut tube; at 4 half the rays, but two levels beyond the errors stated
-# (the occluded pedestrian at 1 dB, `make bench BENCH="--only auto"`)
+# Times half the noise: a look's uncut tube. At 4 frames take 4 to 26 % less CPU, but three levels in place of one lie
+# beyond the errors stated (`make bench BENCH="--only auto"`, docs/measurements.md).
+_FLOOR = 2.0
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
 
