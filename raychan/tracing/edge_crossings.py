@@ -173,19 +173,51 @@ def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side
             break
 
 
+@njit(cache=True)
+def _line_beside(points, source, k, far, plane, facet, planes, beside, own, side, work):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the corners' distances [m] from a line that parts the hidden rays from the others, in which
+    the tube's own plane meets that of a neighbour, or of a neighbour's, of a facet in the way: a body that runs into
+    this one may hide it by faces that no ray met."""
+    hidden, some = np.empty(4, np.int32), 0
+    for r in range(4):
+        hidden[r] = 1 if facet[r] >= 0 else (0 if plane[r] >= 0 else -1)
+        some |= 1 << hidden[r] if hidden[r] >= 0 else 0
+    if some != 3:
+        return
+    for r in range(4):
+        f = facet[r]
+        if f < 0 or (r > 0 and f == facet[r - 1]):
+            continue
+        for e in range(12):
+            # Its neighbours, then theirs.
+            g = beside[f, e % 3]
+            if e >= 3 and g >= 0:
+                g = beside[g, e // 3 - 1]
+            if g < 0 or planes.number[g] == planes.number[f]:
+                continue
+            at, n = planes.point[g], planes.normal[g]
+            if _two_planes(points, source, k, far, hidden, at, n, points[3], own, np.int32(1), np.int32(0), work):
+                copy_to(side, work)
+                return
+
+
 @njit(cache=True, nogil=True)
-def meeting_lines(points, source, k, far, plane, facet, first, normal, own, side):  # type: ignore[no-untyped-def]
+def meeting_lines(points, source, k, far, plane, facet, planes, beside, own, side):  # type: ignore[no-untyped-def]
     """Fill in the rows of side (n, 3) that are zero: distances [m] of corners from the line in which two of the planes
-    that a tube's rays hit meet.
+    that a tube's rays hit meet, or else the tube's own plane and one beside them.
 
     Args: points (n, 4, 3) [m] corners and centre; source (n, 3) [m] where the rays come from, or k (n, 3) their
     direction when far; plane (n, 4) where each ray lands (-1: nowhere); facet (n, 4) met by each ray, -1 for the tube's
-    own plane, of normal own (n, 3); first, normal (m, 3): a point and the normal of each facet.
+    own plane, of normal own (n, 3); planes of all facets as `FacetPlanes`; beside (f, 3) facets across their edges, -1
+    for none.
     """
     work = np.empty(3)
+    first, normal = planes.point, planes.normal
     for i in range(points.shape[0]):
-        if side[i, 0] == 0.0 and side[i, 1] == 0.0 and side[i, 2] == 0.0:
+        if not side[i].any():
             _meeting_line(points[i], source[i], k[i], far, plane[i], facet[i], first, normal, own[i], side[i], work)
+        if not side[i].any():
+            _line_beside(points[i], source[i], k[i], far, plane[i], facet[i], planes, beside, own[i], side[i], work)
 
 
 @njit(cache=True, forceinline=True)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.tracing.edge_crossings import meeting_lines
+from raychan.tracing.edge_crossings import FacetPlanes, meeting_lines
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.radiation import exit_points
 from raychan.tracing.shadow_edges import shadow_edges_of
@@ -114,7 +114,9 @@ def _shadow_edges(geometry: Geometry, leg: Leg, facet: Ints, slack: Floats, part
     points, met, planes, source, back, own = parts
     found = shadow_edges_of(geometry, leg).across(points, facet, slack)
     # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
-    meeting_lines(points, source, back, leg.far, planes, met, geometry.first, geometry.normal, own, found)
+    every = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
+    beside = geometry.scene_topology.beside
+    meeting_lines(points, source, back, leg.far, planes, met, every, beside, own, found)
     return found
 
 

@@ -64,6 +64,13 @@ class SceneTopology:
         return np.concatenate(at) if at else np.zeros((0, 2) if name == "pair" else 0, np.int32)
 
     @cached
+    def beside(self) -> Ints:
+        """The facets (n, 3) across the edges of each, -1 for none."""
+        found, pair = np.full(3 * len(self.plane), -1, np.int32), self.half_edges("pair")
+        found[pair] = pair[:, ::-1] // 3
+        return found.reshape(-1, 3)
+
+    @cached
     def borders(self) -> Bools:
         """Which half edges (3 n,) border a plane: 3 f + k runs from corner k of facet f to the next."""
         return np.concatenate([np.zeros(0, bool), *(j.border for j, _ in self.joined)])

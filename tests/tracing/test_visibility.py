@@ -133,3 +133,20 @@ def test_a_tube_far_beside_all_silhouettes_has_no_shadow():
     clear = (np.hypot(y, z) > 20.0).all(axis=1) & ((y > 1.0).all(axis=1) | (z > 1.0).all(axis=1))
     assert clear.sum() > 20
     assert not side[clear].any()
+
+
+def test_a_body_that_runs_into_a_plate_hides_it_up_to_the_line_where_they_meet():
+    # Seen from a little below the slab: rays past its front face end on its underside, which few tubes meet.
+    slab = trimesh.creation.box(extents=(0.4, 2.0, 0.3))
+    slab.apply_translation((8.0, 0.0, 0.35))
+    geometry = Geometry(facets([slab, across(8.0, (-0.5, -1.0), (0.5, 1.0))]))
+    leg = Leg(end=np.zeros(3))
+    tubes = small_tubes(geometry, leg, np.random.default_rng(4))
+    view = tube_visibility(geometry, leg, tubes, np.ones(len(tubes), bool), True, RULE)
+    z = tubes.points[:, :3, 2] - 0.2
+    # Of tubes that the slab's upper edge, at 0.51 m, does not reach, and of which no ray ends on its underside.
+    rows = (z.min(axis=1) < -1e-3) & (z.max(axis=1) > 6e-3) & (z.max(axis=1) < 0.3) & view.mixed
+    rows &= ~(np.abs(tubes.points[..., 2] - 0.203) < 3e-3).any(axis=1)
+    assert rows.sum() > 20
+    side, z = (x / x[:, np.abs(x[0]).argmax()][:, None] for x in (view.side[rows], z[rows]))
+    np.testing.assert_allclose(side, z, rtol=1e-9, atol=1e-9)

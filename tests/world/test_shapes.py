@@ -185,3 +185,32 @@ def test_bad_parameters_are_named(name, params, key):
 def test_nearest_shape_is_suggested():
     with pytest.raises(SceneError, match="did you mean 'car'"):
         build("carr")
+
+
+def shared_area(one, other):
+    """Return the area that two triangles (3, 2) share, by clipping the first along the sides of the second."""
+    kept = list(one)
+    for a, b in zip(other, np.roll(other, -1, axis=0), strict=True):
+        inside = [(b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) for p in kept]
+        clipped = []
+        for i, (p, f) in enumerate(zip(kept, inside, strict=True)):
+            q, g = kept[(i + 1) % len(kept)], inside[(i + 1) % len(kept)]
+            clipped += ([p] if f >= 0.0 else []) + ([p + f / (f - g) * (q - p)] if f * g < 0.0 else [])
+        kept = clipped
+    x, y = np.array(kept).T if kept else np.zeros((2, 1))
+    return 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+@pytest.mark.parametrize("name", sorted(set(SHAPES) - {"ground"}))
+def test_no_two_faces_of_a_shape_lie_in_one_place(name):
+    # Which of two such faces a ray meets is a matter of rounding: shadows on them never converge.
+    c = build(name).corners
+    n = flat_normals(build(name))
+    height = np.einsum("fj,fj->f", n, c[:, 0])
+    on_ground = (n[:, 2] < -0.999) & (np.abs(height) < 1e-6)
+    for i, j in cKDTree(np.column_stack([n, height])).query_pairs(2e-5):
+        if on_ground[i]:
+            continue
+        u = c[i, 1] - c[i, 0]
+        axes = np.stack([u, np.cross(n[i], u)]) / np.linalg.norm(u)
+        assert shared_area(c[i] @ axes.T, c[j] @ axes.T) < 1e-6, (i, j)

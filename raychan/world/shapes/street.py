@@ -49,7 +49,7 @@ def guard_rail(length: float = 8.0, height: float = 0.75, material: str = "metal
         raise ValueError("a rail of more than 10 km has too many posts")
     posts = np.linspace(-0.5 * length + 0.3, 0.5 * length - 0.3, max(2, int(length // 2.0)))
     for x in posts:
-        made.add("posts", material, block((x - 0.05, deep - 0.01, 0.0), (x + 0.05, deep + 0.1, height)))
+        made.add("posts", material, block((x - 0.05, deep - 0.01, 0.0), (x + 0.05, deep + 0.1, height - 0.01)))
     return made.mesh()
 
 
@@ -99,7 +99,9 @@ def bench(length: float = 1.8, height: float = 0.85, depth: float = 0.6, materia
     for x in (-half + 0.15, half - 0.22):
         made.add("legs", "metal", block((x, -deep + 0.05, 0.0), (x + 0.06, -deep + 0.1, seat - 0.035)))
         made.add("legs", "metal", block((x, deep - 0.075, 0.0), (x + 0.06, deep - 0.036, height - 0.05)))
-        made.add("legs", "metal", block((x, -deep + 0.05, seat - 0.08), (x + 0.06, deep - 0.04, seat - 0.036)))
+        # The bar shares no plane with the legs: two faces in one place hide each other by rounding.
+        bar = (x + 0.005, -deep + 0.06, seat - 0.08), (x + 0.055, deep - 0.05, seat - 0.036)
+        made.add("legs", "metal", block(*bar))
     return made.mesh()
 
 
