@@ -100,25 +100,38 @@ class _Changes:
 
 
 class MapCells:
-    """Map cells that are or may become detections: `place` (c, 3), each range [m], rate [m/s] and amplitude; `level`
-    (c,), the sum of paths there; `left` (c,), that of deep tubes that are never traced again; `tolerance` (c,), by
-    which share of its amplitude a level may be wrong."""
+    """Levels in map cells that are or may become detections, of all cells at one pair of elements after the other:
+    `level` (n,), the sum of paths there; `left` (n,), that of deep tubes that are never traced again; `tolerance` (n,),
+    by which share of its amplitude a level may be wrong. `place` (c, 3) of the cells: range [m], rate [m/s] and
+    amplitude.
+
+    Args: level (p, c) at each pair of elements, whose mean power a tolerance counts from, or (c,) at one.
+    """
 
     def __init__(self, place: Floats, level: Complexes, tolerance_db: float) -> None:
-        self.place, self.level = place, level
-        self.left, self._least = np.zeros(len(place), complex), 0.0
-        self.tolerance = np.full(len(place), 1.0 - 10.0 ** (-tolerance_db / 20.0))
-        self._changes = [_Changes.none() for _ in place]
-        self._given_up = np.zeros(len(place), bool)
+        level = np.atleast_2d(level)
+        self.place, self.level = place, level.ravel()
+        self.left, self._least = np.zeros(len(self.level), complex), 0.0
+        self.tolerance = np.full(len(self.level), 1.0 - 10.0 ** (-tolerance_db / 20.0))
+        if len(level) > 1:
+            mean = np.sqrt((np.abs(level) ** 2).mean(axis=0))
+            self.tolerance *= (mean / np.maximum(np.abs(level), 1e-300)).ravel()
+        self._changes = [_Changes.none() for _ in self.level]
+        self._given_up = np.zeros(len(self.level), bool)
 
     def __len__(self) -> int:
-        return len(self.place)
+        return len(self.level)
+
+    def cell_of(self, i: int) -> Floats:
+        """Return the place (3,) of the cell of level i."""
+        return np.asarray(self.place[i % len(self.place)])
 
     def loosened(self, spread_db: Floats) -> int:
-        """Let levels be wrong by what displaced bodies move them, (c,) [dB], where that is more; return how many."""
+        """Let levels be wrong by what displaced bodies move them, (c,) [dB], where that is more; return of how many
+        cells."""
         speckle = 1.0 - 10.0 ** (-spread_db / 20.0)
-        count = int((speckle > self.tolerance).sum())
-        self.tolerance = np.maximum(self.tolerance, speckle)
+        count = int((speckle > self.tolerance[: len(speckle)]).sum())
+        self.tolerance = np.maximum(self.tolerance, np.tile(speckle, len(self) // max(len(speckle), 1)))
         return count
 
     def spare(self, least: float) -> None:

@@ -27,13 +27,14 @@ from raychan.run.map_cells import Classes, MapCells, class_of, feeding_sources
 from raychan.run.mechanisms import QUIET, choose, least_detection, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
+from raychan.run.probes import probes_of
 from raychan.run.receiver import detections_in, map_of, noise_amplitude
 from raychan.run.refinement_budget import STEPS, Budget, within
 from raychan.run.rules import first_rule, look_rule, step_rule
-from raychan.run.sourced_paths import SourcedPaths, by_source, changes, raised
+from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
-from raychan.signal.baseband import noisy, stand_apart, synthesize
+from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Batch, Launch, Stats
 from raychan.tracing.sources import EXACT, Sources, launches, neighbours
@@ -127,6 +128,7 @@ class SceneRefinement:
 
     def __post_init__(self) -> None:
         self._noise = noise_amplitude(self.radar, self.settings)
+        self._probes = probes_of(self.radar)
 
     def first(self) -> First | None:
         """Return the first launch; None where it brings more paths than can be held."""
@@ -179,7 +181,7 @@ class SceneRefinement:
         """Return the paths of a scene, refined where cells of its map need it."""
         radar, window = replace(self.radar, noise=False), self.settings.range_window
         rough = synthesize(first.paths, radar, tolerance=_LEVEL)
-        held = SourcedPaths(first.paths, first.source)
+        held = SourcedPaths(first.paths, first.source, self._probes)
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
         cells = self._cells(rough, response, first.paths)
         steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", 0
@@ -194,7 +196,7 @@ class SceneRefinement:
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
         now = held.now if steps else first.paths
-        doubtful = raised(response, held.doubtful(stand_apart(radar)), cells.place, cells.doubt / COVER)
+        doubtful = raised(response, held.doubtful, cells.place, cells.doubt[: len(cells.place)] / COVER)
         if first.left is not None:
             # What a level lacks is known: it needs no factor that covers what is not.
             doubtful = join([doubtful, scaled(first.left, np.full(len(first.left.length), 1.0 / COVER))])
@@ -213,11 +215,13 @@ class SceneRefinement:
         place = np.stack([rdmap.range[at[:, 1]], rdmap.rate[at[:, 0]], np.zeros(len(at))], axis=1)
         power = rdmap.power[at[:, 0], at[:, 1]] / radar.power
         place[:, 2] = np.sqrt(power)
-        level = changes(response, paths, np.full(len(paths.trajectories.kind), EXACT), place).sum(axis=1)
+        alike = np.full(len(paths.trajectories.kind), EXACT)
+        level = changes(response, paths, alike, place).sum(axis=1)
         fed = np.abs(level) ** 2 > _UNEXPLAINED * power
         place, level = place[fed], level[fed]
         place[:, 2] = np.abs(level)
-        return MapCells(place, level, self.model.tolerance_db)
+        others = (changes(response, p.seen(paths), alike, place).sum(axis=1) for p in self._probes)
+        return MapCells(place, np.stack([level, *others]), self.model.tolerance_db)
 
     def _refined(
         self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells
@@ -233,7 +237,7 @@ class SceneRefinement:
             finer = replace(rule.refinement, least=steps + 1)
             new = self._paths(launch.again(finer, by, self.stats, self._carried))
             assert new is not None
-            own, sums = by_source(response, *held.replace(*new, by), cells.place)
+            own, sums = held.sums_of(*held.replace(*new, by), response, cells.place)
             for i, change in enumerate(sums):
                 cells.changed(i, own, change)
             steps += 1
@@ -282,7 +286,7 @@ def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
 
 def _unreached(cells: MapCells) -> Iterator[Unreached]:
     """Give the cells of which a class of tubes is still to be refined."""
-    change = cells.change
-    for i in np.flatnonzero(cells.open.any(axis=1)):
-        shallow, deep = change[i]
-        yield Unreached(float(cells.place[i, 0]), float(cells.place[i, 1]), bool(deep > shallow))
+    change, last = cells.change, np.flatnonzero(cells.open.any(axis=1))
+    for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
+        (shallow, deep), place = change[i], cells.cell_of(i)
+        yield Unreached(float(place[0]), float(place[1]), bool(deep > shallow))

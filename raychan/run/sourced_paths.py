@@ -15,6 +15,7 @@ from raychan.columns import take
 from raychan.radar.dual_paths import scaled
 from raychan.records import Paths
 from raychan.run.point_spread import PointSpread
+from raychan.run.probes import Probe
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.sources import Sources, covered, depth_of
 
@@ -38,16 +39,15 @@ class _Part:
     state: NDArray[np.int8]
     first: bool
 
-    @property
-    def bare(self) -> Paths:
-        """The paths without the way that they go."""
-        return _bare(self.paths)
-
 
 class SourcedPaths:
-    """The paths of a first launch, with the source (w,) of each trajectory, and of further ones that replace some."""
+    """The paths of a first launch, with the source (w,) of each trajectory, and of further ones that replace some.
 
-    def __init__(self, paths: Paths, source: Sources) -> None:
+    Args: probes elements besides the phase centres at which sums in map cells are followed too.
+    """
+
+    def __init__(self, paths: Paths, source: Sources, probes: tuple[Probe, ...] = ()) -> None:
+        self._probes = probes
         self._parts = [_Part(paths, source, np.full(len(source), _NOW, np.int8), True)]
         self._doubted = np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
         self._moved = np.zeros(2)
@@ -55,14 +55,14 @@ class SourcedPaths:
     def replace(self, paths: Paths, source: Sources, launches: list[tuple[int, Wanted]]) -> tuple[Paths, Sources]:
         """Replace what some launches traced again; return what this changes: the new paths and the old ones with their
         sign turned, and the source (w,) of each trajectory."""
-        changed, sources = [_bare(paths)], [source]
+        changed, sources = [self._needed(paths)], [source]
         for part in self._parts:
             hit = covered(part.source, launches)
             old = hit & (part.state == _NOW)
             shallow = old & (depth_of(part.source) < DEEP)
             if part.first and shallow.any():
                 self._moved += _powers(part, shallow, paths, source)
-            changed.append(_negative(of_trajectories(part.bare, old)))
+            changed.append(_negative(of_trajectories(self._needed(part.paths), old)))
             sources.append(part.source[old])
             part.state[hit] = np.where(old[hit], _BEFORE, _GONE)
         self._parts.append(_Part(paths, source, np.full(len(source), _NOW, np.int8), False))
@@ -96,11 +96,15 @@ class SourcedPaths:
         """All paths, of the newest launch of each source."""
         return join([p.paths for p in self._parts], self.counts)
 
-    def doubtful(self, whole: bool) -> Paths:
-        """Return what the newest launches changed, times the factors of `doubt`; the paths of deep tubes never traced
-        again; and of other tubes never traced again the share that those traced again changed by, in unrelated phases;
-        not `whole`: without the way that they go."""
-        held = [p.paths if whole else p.bare for p in self._parts]
+    def _needed(self, paths: Paths) -> Paths:
+        """Return paths without the way that they go, which only sums at other elements depend on."""
+        return paths if self._probes else _bare(paths)
+
+    @property
+    def doubtful(self) -> Paths:
+        """What the newest launches changed, times the factors of `doubt`; the paths of deep tubes never traced again;
+        and of other tubes never traced again the share that those traced again changed by, in unrelated phases."""
+        held = [self._needed(p.paths) for p in self._parts]
         parts, keep = [held[0]], [self._untouched]
         factor: list[NDArray[Any]] = [self._share]
         for p, paths in zip(self._parts, held, strict=True):
@@ -127,20 +131,21 @@ class SourcedPaths:
         return np.asarray(share * np.exp(1j * turn))
 
     def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, Iterator[Complexes]]:
-        """Return the sources (s,) of the first launch, and for each of the cells (c, 3) the sums (s,) of its paths
-        there."""
-        return by_source(response, self._parts[0].paths, self._parts[0].source, cells)
+        """Return the sources (s,) of the first launch, and the sums (s,) of its paths as `sums_of` gives them."""
+        return self.sums_of(self._parts[0].paths, self._parts[0].source, response, cells)
 
-
-def by_source(
-    response: PointSpread, paths: Paths, source: Sources, cells: Floats
-) -> tuple[Sources, Iterator[Complexes]]:
-    """Return the sources (s,), in order, of the trajectories (w,) of paths, and for each of the cells (c, 3) the sums
-    (s,) of its paths there."""
-    own, group = np.unique(source, return_inverse=True)
-    most = max(1, _SUMS // max(len(own), 1))
-    parts = (_sums(response, paths, group, len(own), cells[i : i + most]) for i in range(0, len(cells), most))
-    return own, (row for part in parts for row in part)
+    def sums_of(
+        self, paths: Paths, source: Sources, response: PointSpread, cells: Floats
+    ) -> tuple[Sources, Iterator[Complexes]]:
+        """Return the sources (s,), in order, of the trajectories (w,) of paths, and the sums (s,) of its paths: in each
+        of the cells (c, 3) at the phase centres, then in each at the first probe, and so on."""
+        own, group = np.unique(source, return_inverse=True)
+        most = max(1, _SUMS // max(len(own), 1))
+        seen = (some for part in ((paths,), (p.seen(paths) for p in self._probes)) for some in part)
+        parts = (
+            _sums(response, x, group, len(own), cells[i : i + most]) for x in seen for i in range(0, len(cells), most)
+        )
+        return own, (row for part in parts for row in part)
 
 
 def _powers(first: _Part, rows: NDArray[np.bool_], paths: Paths, source: Sources) -> Floats:

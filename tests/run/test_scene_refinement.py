@@ -61,14 +61,12 @@ def test_what_was_never_cut_is_in_doubt():
     deep = depth_of(first.source)[first.paths.trajectory] > 1
     assert deep.any()
     held = SourcedPaths(first.paths, first.source)
-    assert np.sort(np.abs(held.doubtful(whole=True).amplitude)) == pytest.approx(
-        np.sort(np.abs(first.paths.amplitude[deep]))
-    )
+    assert np.sort(np.abs(held.doubtful.amplitude)) == pytest.approx(np.sort(np.abs(first.paths.amplitude[deep])))
     by = list(launches(np.unique(first.source[depth_of(first.source) > 1]), len(refinement.geometry.facets.body)))
     rule = step_rule(of.radar, of.processing, of.model, 0)
     paths, source = refinement._paths(first.launch.again(rule.refinement, by, Stats(), refinement._carried))
     change, _ = held.replace(paths, source, by)
-    assert held.doubtful(whole=True).amplitude.sum() == pytest.approx(change.amplitude.sum())
+    assert held.doubtful.amplitude.sum() == pytest.approx(change.amplitude.sum())
     assert len(held.now.amplitude) == len(paths.amplitude) + np.count_nonzero(~deep)
 
 

@@ -1,0 +1,45 @@
+"""Elements of an array at which levels are followed while a launch is refined.
+
+A tube reaches all elements from one place. Where it is large and near, that place, and so the phase across the array,
+is known less well than the level at the phase centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.radar.radar import Radar
+from raychan.records import Paths
+from raychan.signal.baseband import fronts_of, stand_apart
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A transmitter and a receiver: offsets (3,) [m] from the phase centres, world axes; carrier [Hz]."""
+
+    tx: Floats
+    rx: Floats
+    carrier: float
+
+    def seen(self, paths: Paths) -> Paths:
+        """Return paths as these elements see them: with the phase of what is longer than between the phase centres."""
+        later = fronts_of(paths).longer(self.tx, self.rx) / C0
+        return paths.rebuilt(amplitude=paths.amplitude * np.exp(-2j * np.pi * self.carrier * later))
+
+
+def probes_of(radar: Radar) -> tuple[Probe, ...]:
+    """Return the two pairs of elements farthest apart along the virtual array; none of a radar of one element."""
+    if not stand_apart(radar):
+        return ()
+    tx = np.array([one.offset for one in radar.transmissions])
+    every = (tx[:, None] + radar.elements_world).reshape(-1, 3)
+    off = every - every.mean(axis=0)
+    along = off @ np.linalg.svd(off, full_matrices=False)[2][0]
+    ends = (divmod(int(i), len(radar.elements_world)) for i in (along.argmin(), along.argmax()))
+    return tuple(Probe(tx[i], radar.elements_world[j], radar.waveform.carrier) for i, j in ends)
