@@ -30,8 +30,8 @@ Complexes = NDArray[np.complex128]
 _FAN = 0.05  # rad by which a tube may spread the rays that a curved surface reflects: trades rays for the bias of fans
 # that meet gaps (bodies of primitives, a person and a traffic light, 4 views; command not noted)
 _WEAKER = 0.7  # of the last rule, a rule from the third on: contribution of tubes too weak to be cut. At 0.5 parts that
-# hide each other from curved mirrors take three to six times the rays at the seventh rule and are off about as much (a person, seed
-# 7702, view 2, each of four sources by three lattices; command not kept)
+# hide each other from curved mirrors take three to six times the rays at the seventh rule and are off about as much (a
+# person, seed 7702, view 2, each of four sources by three lattices; command not kept)
 _STEPS = 12  # rules, each of half the phase of the one before: rays run out earlier
 _FIRST_EDGE = 0.1  # m: parts of cars that hide others are of this size, and larger tubes may miss them (not measured)
 _EDGE_ALONE = 0.3  # m: the same for convex bodies; a larger tube may bend more than its phase integral follows
