@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,20 +26,20 @@ Complexes = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class BySource:
-    """Scattering amplitudes (s, 2, 2) [m] of a launch by the source (s,) of their tubes, ascending, and how many tubes
-    (s,) each has."""
+    """Scattering amplitudes (s, 2, 2) [m] of a launch by the source (s,) of their tubes, ascending, and the rays (s,)
+    of each: those of the launch in proportion to tubes."""
 
     source: Sources
     amplitude: Complexes
-    tubes: Floats
+    rays: Floats
 
     @staticmethod
-    def of(source: Sources, gains: Complexes, tubes: Floats) -> BySource:
-        """Return the sums of gains (n, 2, 2) and tubes (n,) of each source (n,)."""
+    def of(source: Sources, gains: Complexes, rays: Floats) -> BySource:
+        """Return the sums of gains (n, 2, 2) and rays (n,) of each source (n,)."""
         own, at = np.unique(source, return_inverse=True)
         flat, n = gains.reshape(-1, 4), len(own)
         sums = [np.bincount(at, x.real, n) + 1j * np.bincount(at, x.imag, n) for x in flat.T]
-        return BySource(own, np.stack(sums, axis=1).reshape(n, 2, 2), np.bincount(at, tubes, n).astype(float))
+        return BySource(own, np.stack(sums, axis=1).reshape(n, 2, 2), np.bincount(at, rays, n).astype(float))
 
     @staticmethod
     def join(parts: list[BySource]) -> BySource:
@@ -47,7 +47,7 @@ class BySource:
         return BySource.of(
             np.concatenate([np.zeros(0, np.int64), *(p.source for p in parts)]),
             np.concatenate([np.zeros((0, 2, 2), complex), *(p.amplitude for p in parts)]),
-            np.concatenate([np.zeros(0), *(p.tubes for p in parts)]),
+            np.concatenate([np.zeros(0), *(p.rays for p in parts)]),
         )
 
     def by_bounce(self, bounces: int) -> Complexes:
@@ -88,12 +88,14 @@ class BodyLaunch:
 
     def _over(self, i: int, found: Contributions, wanted: Wanted | None = None) -> list[BySource]:
         leg, out = self._ways[i]
-        parts = []
+        parts, start = [], self.geometry.rays
         for source, gains in _gains(self.geometry, leg, out, self.frequency, self.bounces, found, (i, wanted)):
             gains = gains.transpose(0, 2, 1) if i else gains
             gains = 0.5 * (gains + gains.transpose(0, 2, 1)) if len(self._ways) == 1 else 0.5 * gains
             parts.append(BySource.of(source, gains, np.ones(len(source))))
-        return parts
+        # Of a source before curved parts that hide each other a tube takes ten times the rays of another.
+        each = (self.geometry.rays - start) / max(sum(float(p.rays.sum()) for p in parts), 1.0)
+        return [replace(p, rays=each * p.rays) for p in parts]
 
 
 def scattering(geometry: Geometry, leg: Leg, out: Leg, frequency: float, bounces: int, rule: Refinement) -> Complexes:

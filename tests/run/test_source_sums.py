@@ -25,12 +25,14 @@ def test_all_sources_traced_again_by_the_same_rule_are_the_whole_launch(rx):
     geometry = Geometry(facets_of(corner.mesh(corner.trihedral_faces(0.1, True)), "pec", F))
     ends = tuple(Leg(end=view(*x)[0], far=True) for x in ((20.0, 7.0), rx))
     leg, out = ends if rx != (20.0, 7.0) else (ends[0], ends[0])
-    launch = BodyLaunch(geometry, (leg, out), F, 3)
+    launch, before = BodyLaunch(geometry, (leg, out), F, 3), geometry.rays
     rule = next(islice(refinements(geometry, F), 1, None))
     whole = launch.whole(rule)
     again = launch.again(rule, whole.source)
     assert set(depth_of(whole.source)) == {1, 2, 3}
     size = np.abs(whole.amplitude.sum(axis=0)).max()
+    # Each ray belongs to one source.
+    assert whole.rays.sum() + again.rays.sum() == pytest.approx(geometry.rays - before)
     # What is too weak to be cut is judged by the whole field found, which the launch itself had only in part.
     np.testing.assert_allclose(again.by_bounce(3), whole.by_bounce(3), atol=2e-3 * size)
 
@@ -62,6 +64,37 @@ def test_a_bias_that_does_not_shrink_doubles_the_doubt():
     sums = SourceSums.of(levels[0], levels[1], (0, 0), 1).joined(np.array([0]), [levels[2]])
     assert sums.value == pytest.approx(1.2)
     assert sums.off(1.8) == pytest.approx(1.8 * 0.2)
+
+
+def changed(changes, rays):
+    """Return the sums of sources that changed by so much from 1 and took so many rays, after two launches."""
+    source, n = np.arange(len(rays), dtype=np.int64) + (2 << 31), len(rays)
+    before, after = (np.ones(n), 1.0 + np.asarray(changes))
+    return SourceSums.of(
+        *(
+            BySource(source, a[:, None, None] * np.ones((2, 2), complex), np.array(rays, float))
+            for a in (before, after)
+        ),
+        (0, 0),
+        1,
+    )
+
+
+def test_rays_go_to_the_sources_that_are_most_off_for_what_they_take():
+    """Variance over rays: 1e-2 / 100, 1e-2 / 1e4, 1e-4 / 5 and 1e-4 / 1000: only sources are traced that are within a
+    tenth of the best one is traced, whatever the rest leaves open."""
+    sums = changed([0.1, 0.1, 0.01, 0.01], [100.0, 10_000.0, 5.0, 1000.0])
+    assert list(sums.to_refine(1.8, 1e-3, 1e6, 12)) == [0, 2]
+    # What rays do not suffice for leaves them to others.
+    assert list(sums.to_refine(1.8, 1e-3, 100.0, 12)) == [2]
+
+
+def test_a_source_by_the_last_rule_leaves_the_rays_to_others():
+    sums = changed([0.1, 0.02], [100.0, 100.0])
+    ended = replace(sums, rule=np.array([11, 1]))
+    assert list(sums.to_refine(1.8, 1e-3, 1e6, 12)) == [0]
+    assert list(ended.to_refine(1.8, 1e-3, 1e6, 12)) == [1]
+    assert not len(ended.to_refine(1.8, 1e-3, 1e6, 2))
 
 
 def test_the_stated_error_of_few_noisy_sources_covers_99_percent():
