@@ -36,6 +36,7 @@ from raychan.signal.nufft import (
     kernel_polynomials,
     kernel_transform,
     kernel_weights,
+    rows_under,
     spread,
     wrap_margins,
 )
@@ -204,8 +205,8 @@ class Keystone:
             strength = np.empty((len(later), self.planes), self.sort)
             waves = some.amplitude, some.delay, some.delay_rate, later
             place_sources(x, y, strength, *waves, ramp, grid, self.rest, self.terms)
-            first, end = math.ceil(x.min() - half), math.ceil(x.max() + half)
-            cells = np.zeros((self.planes, end - first, self.columns + 2 * half), self.sort)
+            first, rows = rows_under(x, self.width)
+            cells = np.zeros((self.planes, rows, self.columns + 2 * half), self.sort)
             flat = cells.view(cells.real.dtype).reshape(-1)
             spread(cells, flat, x - first, y, strength, self.polynomials.astype(flat.dtype))
             wrap_margins(cells, half)

@@ -106,6 +106,16 @@ def _add_row(flat, start, part, weight, width):  # type: ignore[no-untyped-def]
             cells[j] += weight * some[j]
 
 
+def rows_under(x: Floats, width: int) -> tuple[int, int]:
+    """Return the first row that `spread` writes to, and their number, for sources at rows x (n,) of at least half the
+    kernel's width.
+
+    The last row follows from the first one of the last source, as `spread` counts: x + width / 2 may round down.
+    """
+    first = math.ceil(x.min() - 0.5 * width)
+    return first, math.ceil(x.max() - 0.5 * width) + width - first
+
+
 @njit(cache=True, nogil=True, fastmath=True)
 def wrap_margins(grid, margin):  # type: ignore[no-untyped-def]
     """Add the margins of a periodic grid (p, rows, columns) to the columns at its other end that they stand for."""
