@@ -18,6 +18,7 @@ from rich.table import Table
 
 from bench.auto import auto
 from bench.before import before
+from bench.cold import cold
 from bench.cross_section import cross_section
 from bench.detections import detections
 from bench.fine import fine
@@ -43,6 +44,7 @@ _GROUPS = (
     phase_noise,
     scaling,
     frame,
+    cold,
     threads,
     before,
     turbine,
