@@ -30,6 +30,7 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 OBLIQUE_SHARE = 0.1  # of their sum in phase that tubes facing away from an end are taken to add up to; not measured
+_ON_PLANE = 1e-6  # m: corners so near to the plane of an antenna lie on it
 GAP_LEVELS = 1  # subdivisions of a hidden tube in search of a part that is seen; not measured
 
 
@@ -58,10 +59,22 @@ def launch(
         facet = facet[only[facet]]
     for part, bary in _bisect_for_phase(geometry, facet, shape, images, found, not more):
         part, bary = lit_parts(part, bary, *shape, geometry.both_sides, leg.image, leg.far)
-        tubes = launch_tubes(geometry, leg, part, bary)
+        tubes = _clip_where_gains_end(geometry, leg, out, launch_tubes(geometry, leg, part, bary))
         if leg.mirrors:
             tubes = _prune_facing_away(geometry, leg, out, others, tubes, found)
         yield _clip_at_shadows(geometry, leg, out, tubes, found, more)
+
+
+def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -> Tubes:
+    """Return the tubes, clipped at the planes behind which the gain of an end ends at once."""
+    for end in [leg] if out is leg else [leg, out]:
+        for normal in end.gain_ends:
+            side = (tubes.points[:, :CENTRE] - end.image) @ normal
+            across = (side.min(axis=1) < -_ON_PLANE) & (side.max(axis=1) > _ON_PLANE)
+            if across.any():
+                parts, _ = subdivide(geometry, leg, tubes, np.flatnonzero(across), side, True, 0.0)
+                tubes = Tubes.join([tubes.take(~across), parts])
+    return tubes
 
 
 def _prune_facing_away(

@@ -120,6 +120,14 @@ class Leg:
         images, _, normals = self._chain[:3]
         return images, self.far, normals, np.zeros((0, 0)) if self.beam is None else self.beam.table
 
+    @property
+    def gain_ends(self) -> Floats:
+        """Normals (k, 3) of the planes through the image behind which the end's gain ends at once."""
+        normals = np.zeros((0, 3)) if self.beam is None or self.far else self.beam.ends
+        for m in self.mirrors:
+            normals = normals - 2.0 * np.outer(normals @ m.normal, m.normal)
+        return normals
+
     def outside_beam(self, points: Floats, radius: Floats) -> Bools:
         """Tell which spheres (n,), about points (n, 3) of this radius (n,) [m], lie outside the beam over this leg."""
         if self.beam is None or self.far:
