@@ -30,8 +30,7 @@ class Beam:
         sizes = [np.linalg.norm(f(look), axis=1).reshape(shape) for f in (radar.tx_field, radar.rx_field)]
         self.table = np.maximum.reduce([s / max(s.max(), 1e-300) for s in sizes])
         self._look = look
-        axes = [x[:, 0] for one, x in ((radar.tx, radar.axes), (radar.rx, radar.rx_axes)) if _ends_at_once(one)]
-        self.ends = np.unique(np.reshape(axes, (-1, 3)), axis=0)
+        self.ends: Floats = getattr(radar, "gain_ends", np.zeros((0, 3)))
         """Normals (k, 3) of the planes through an antenna behind which its gain ends at once."""
 
     def __call__(self, look: Floats) -> Floats:
@@ -55,11 +54,6 @@ class Beam:
         """The directions of the table in which there is some field, as a tree; None where that is all of them."""
         some = self.table.ravel() > 0.0
         return None if some.all() else cKDTree(self._look[some])
-
-
-def _ends_at_once(antenna: Any) -> bool:
-    """Tell whether an antenna's gain ends at once behind its plane."""
-    return bool(getattr(getattr(antenna, "element", antenna), "front", False))
 
 
 def beam_of(radar: Any) -> Beam:

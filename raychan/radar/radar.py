@@ -236,6 +236,13 @@ class Radar:
         # Apart, so that an antenna at T0 gives k T0 F f_s to the last digit.
         return float(own + K_BOLTZMANN * (self.noise_temperature_k - T0) * rate)
 
+    @property
+    def gain_ends(self) -> Floats:
+        """Normals (k, 3) of the planes through an antenna behind which its gain ends at once, world axes."""
+        both = (self.tx, self.axes), (self.rx, self.rx_axes)
+        ahead = [axes[:, 0] for one, axes in both if getattr(getattr(one, "element", one), "front", False)]
+        return np.unique(np.reshape(ahead, (-1, 3)), axis=0)
+
     def tx_field(self, direction_world: Floats) -> Complexes:
         """Return sqrt(gain) times polarisation (n, 3), world axes, in unit directions (n, 3) away from the radar."""
         return self._vector(self.tx, direction_world, self.axes)
