@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -141,7 +142,7 @@ class SourcedPaths:
         of the cells (c, 3) at the phase centres, then in each at the first probe, and so on."""
         own, group = np.unique(source, return_inverse=True)
         most = max(1, _SUMS // max(len(own), 1))
-        seen = (some for part in ((paths,), (p.seen(paths) for p in self._probes)) for some in part)
+        seen = chain([paths], (p.seen(paths) for p in self._probes))
         parts = (
             _sums(response, x, group, len(own), cells[i : i + most]) for x in seen for i in range(0, len(cells), most)
         )

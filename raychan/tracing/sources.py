@@ -74,14 +74,14 @@ def neighbours(geometry: Geometry) -> Callable[[Bools], Bools]:
 
     A coarse launch sees nothing of a facet that meets or shows a surface with a small part of it only.
     """
-    plane, pair = geometry.plane, geometry.scene_topology.half_edges("pair").reshape(-1, 2) // 3
+    plane, across = geometry.plane, geometry.scene_topology.beside
 
     def beside(wanted: Bools) -> Bools:
         of_plane = np.zeros(int(plane.max(initial=-1)) + 1, bool)
         of_plane[plane[wanted]] = True
         every = wanted | of_plane[plane]
-        for one, other in (pair.T, pair[:, ::-1].T):
-            every[other[wanted[one]]] = True
+        met = across[wanted]
+        every[met[met >= 0]] = True
         return every
 
     return beside
