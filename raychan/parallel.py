@@ -10,10 +10,10 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from itertools import count
 from typing import Any, TypeVar
+
+from raychan.crew import Crew, Loop, own
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -35,65 +35,6 @@ class cached(cached_property):  # type: ignore[type-arg]
 
 class Stopped(Exception):
     """Raised in the second of two functions when the first has failed or was interrupted."""
-
-
-class _ThreadState(threading.local):
-    """State of a thread: the event that it is told to stop."""
-
-    stop: threading.Event | None = None
-
-
-class _Crew:
-    """Threads that help: a loop or a second function takes those that are free and gives them back."""
-
-    def __init__(self) -> None:
-        self._lock, self._asked, self._out = threading.Lock(), 0, 0
-        self._pool: ThreadPoolExecutor | None = None
-
-    def size(self) -> int:
-        """Return how many threads work at most, the first one among them."""
-        if not self._asked:
-            self._asked = _from_environment()
-        return self._asked
-
-    def resize(self, threads: int) -> None:
-        """Set how many threads work from now on."""
-        self._asked, self._pool = threads, None
-
-    def take(self, most: int) -> int:
-        """Return how many threads, up to `most`, now help the caller."""
-        with self._lock:
-            got = max(min(most, self.size() - 1 - self._out), 0)
-            self._out += got
-            return got
-
-    def give_back(self, threads: int) -> None:
-        """Let threads help others again."""
-        with self._lock:
-            self._out -= threads
-
-    def pool(self) -> ThreadPoolExecutor:
-        """Return the threads themselves."""
-        with self._lock:
-            if self._pool is None:
-                self._pool = ThreadPoolExecutor(max(self.size() - 1, 1), "raychan-rows")
-            return self._pool
-
-
-_own = _ThreadState()
-_crew = _Crew()
-
-
-def _start_anew() -> None:
-    """Forget threads: a forked child has none of its parent's."""
-    global _crew
-    asked = _crew._asked
-    _crew = _Crew()
-    _crew._asked = asked
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_start_anew)
 
 
 def threads() -> int:
@@ -121,6 +62,19 @@ def _from_environment() -> int:
     return int(text)
 
 
+_crew = Crew(_from_environment)
+
+
+def _start_anew() -> None:
+    """Forget threads: a forked child has none of its parent's."""
+    global _crew
+    _crew = _crew.anew()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_start_anew)
+
+
 def parallel_for(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
     """Call `work` with slices that cover rows 0 to n, on all threads that are free: none of them has less than half of
     `least` rows.
@@ -128,37 +82,32 @@ def parallel_for(n: int, work: Callable[[slice], None], least: int = 2000) -> No
     Each thread takes the next slice as soon as it is done with one. The work must release the interpreter's lock.
     Raises: what the work raises, once all threads have ended.
     """
-    if _own.stop is not None and _own.stop.is_set():
-        raise Stopped
+    _stop_if_told()
     most = 2 * n // max(least, 1)
-    helpers = _crew.take(most - 1) if n >= least else 0
-    if not helpers:
+    helpers = min(most - 1, _crew.free()) if n >= least else 0
+    if helpers < 1:
         work(slice(0, n))
         return
     slices = min(most, _SLICES * (helpers + 1))
-    turns, failed = count(), threading.Event()
+    _crew.share(Loop(slices, lambda i: work(slice(i * n // slices, (i + 1) * n // slices)), helpers))
 
-    def shift() -> None:
-        while not failed.is_set() and (i := next(turns)) < slices:
-            try:
-                work(slice(i * n // slices, (i + 1) * n // slices))
-            except BaseException:
-                failed.set()
-                raise
 
-    try:
-        pool = _crew.pool()
-        others = [pool.submit(shift) for _ in range(helpers)]
-        try:
-            shift()
-        finally:
-            # One that has not begun is not waited for: its slices are done.
-            rest = [other for other in others if not other.cancel()]
-            first = [error for other in rest if (error := other.exception()) is not None]
-    finally:
-        _crew.give_back(helpers)
-    if first:
-        raise first[0]
+def parallel_tasks(n: int, task: Callable[[int], None]) -> None:
+    """Call `task` with 0 to n - 1, on all threads: also on those that become free while it runs.
+
+    Raises: what a task raises, once all threads have ended.
+    """
+    _stop_if_told()
+    if n < 2 or _crew.size() < 2:
+        for i in range(n):
+            task(i)
+    else:
+        _crew.share(Loop(n, task, n - 1))
+
+
+def _stop_if_told() -> None:
+    if own.stop is not None and own.stop.is_set():
+        raise Stopped
 
 
 def was_interrupted(failure: BaseException | None) -> bool:
@@ -172,47 +121,36 @@ def was_interrupted(failure: BaseException | None) -> bool:
 
 
 def run_pair(here: Callable[[], A], there: Callable[[], B]) -> tuple[A, B]:
-    """Return what two functions return, `here` called by this thread and `there` by another, if one is free, else one
-    after the other.
+    """Return what two functions return, `here` called by this thread and `there` by another, if one becomes free, else
+    one after the other.
 
-    If `here` fails or is interrupted, `there` is stopped at its next `parallel_for`. Raises: what they raise, `here`
-    first.
+    If `here` fails or is interrupted, `there` is stopped at its next loop. Raises: what they raise, `here` first.
     """
-    if not _crew.take(1):
+    if _crew.size() < 2:
         return here(), there()
-    stop, given_back = threading.Event(), threading.Lock()
-    found: list[B] = []
-    failed: list[BaseException] = []
+    stop, found = threading.Event(), list[B]()
 
-    def one_ended() -> None:
-        # Whichever ends first leaves its thread to the other.
-        if given_back.acquire(blocking=False):
-            _crew.give_back(1)
-
-    def second() -> None:
-        _own.stop = stop
+    def second(_: int) -> None:
+        outer, own.stop = own.stop, stop
         try:
             found.append(there())
-        except BaseException as error:
-            failed.append(error)
         finally:
-            one_ended()
+            own.stop = outer
 
-    # Not a thread of a pool: one that an interruption leaves behind must not keep the process from ending.
-    other = threading.Thread(target=second, name="raychan-beside", daemon=True)
+    other = Loop(1, second, 1)
+    _crew.offer(other)
     try:
-        other.start()
         first = here()
-        one_ended()
-        other.join()
     except BaseException as failure:
         stop.set()
-        one_ended()
-        if other.is_alive():
-            other.join()
+        _crew.finish(other)
         if was_interrupted(failure):
             raise KeyboardInterrupt from failure
         raise
-    if failed:
-        raise failed[0]
+    try:
+        other.work()
+    finally:
+        _crew.finish(other)
+    if other.error is not None:
+        raise other.error
     return first, found[0]

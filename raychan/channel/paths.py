@@ -142,42 +142,55 @@ def join(parts: Sequence[Paths], keep: Sequence[NDArray[np.bool_]] | None = None
         rows = [np.arange(len(p.trajectories.kind)) for p in parts]
     else:
         rows = [np.flatnonzero(k) for k in keep]
-    some: list[Any] = [slice(None)] * len(parts)
+    some = [np.arange(len(p.trajectory)) for p in parts]
     if keep is not None:
         some = [np.flatnonzero(k[p.trajectory]) for p, k in zip(parts, keep, strict=True)]
     begin, number = np.cumsum([0, *map(len, rows)]), list[NDArray[np.int32]]()
     for i, p in enumerate(parts):
         new = p.trajectory if keep is None else (np.cumsum(keep[i], dtype=np.int32) - 1)[p.trajectory[some[i]]]
         number.append(new + np.int32(begin[i]))
-    columns = {
-        name: np.concatenate([getattr(p, name)[r] for p, r in zip(parts, some, strict=True)])
-        for name in columns_of(parts[0])
-    }
-    return parts[0].rebuilt(
-        **columns,
-        trajectory=np.concatenate(number),
-        trajectories=_joined([p.trajectories for p in parts], rows, parts[0].rx),
-    )
+    copies = list[Callable[[], None]]()
+    columns = {name: _column([getattr(p, name) for p in parts], some, copies) for name in columns_of(parts[0])}
+    way = _joined([p.trajectories for p in parts], rows, parts[0].rx, copies)
 
-
-def _joined(parts: list[Trajectories], rows: list[NDArray[np.intp]], rx: Floats) -> Trajectories:
-    """Return some rows of several sets of trajectories as one set; unused slots repeat the receiver rx (3,) [m]."""
-    slots, begin = max(p.kind.shape[1] for p in parts), np.cumsum([0, *map(len, rows)])
-    empty: dict[str, Any] = {"body": -1, "part": -1, "kind": 0, "vertices": rx}
-    columns, copies = dict[str, NDArray[Any]](), list[Callable[[], None]]()
-    for f in dataclasses.fields(Trajectories):
-        held = [getattr(p, f.name) for p in parts]
-        wide = (slots,) if f.name in empty else ()
-        out = columns[f.name] = np.empty((begin[-1], *wide, *held[0].shape[1 + len(wide) :]), held[0].dtype)
-        for i, one in enumerate(held):
-            copies.append(partial(_copy, one, rows[i], out[begin[i] : begin[i + 1]], empty.get(f.name)))
-
-    def some(at: slice) -> None:
+    def done(at: slice) -> None:
         for copy in copies[at]:
             copy()
 
-    parallel_for(len(copies), some, 2 if begin[-1] > _MANY else len(copies) + 1)
-    return parts[0].rebuilt(**columns)
+    parallel_for(len(copies), done, 2 if begin[-1] > _MANY else len(copies) + 1)
+    return parts[0].rebuilt(
+        **columns, trajectory=np.concatenate(number), trajectories=parts[0].trajectories.rebuilt(**way)
+    )
+
+
+def _joined(
+    parts: list[Trajectories], rows: list[NDArray[np.intp]], rx: Floats, copies: list[Callable[[], None]]
+) -> dict[str, NDArray[Any]]:
+    """Return the columns of some rows of several sets of trajectories as one set, to be filled by `copies`, to which
+    are added; unused slots repeat the receiver rx (3,) [m]."""
+    slots = max(p.kind.shape[1] for p in parts)
+    empty: dict[str, Any] = {"body": -1, "part": -1, "kind": 0, "vertices": rx}
+    return {
+        f.name: _column(
+            [getattr(p, f.name) for p in parts], rows, copies, slots if f.name in empty else 0, empty.get(f.name)
+        )
+        for f in dataclasses.fields(Trajectories)
+    }
+
+
+def _column(
+    held: list[NDArray[Any]],
+    rows: list[NDArray[np.intp]],
+    copies: list[Callable[[], None]],
+    slots: int = 0,
+    empty: Any = None,
+) -> NDArray[Any]:
+    """Return a column for some rows of several, of so many slots, to be filled by `copies`, to which are added."""
+    begin, wide = np.cumsum([0, *map(len, rows)]), (slots,) if slots else ()
+    out = np.empty((begin[-1], *wide, *held[0].shape[1 + len(wide) :]), held[0].dtype)
+    for i, one in enumerate(held):
+        copies.append(partial(_copy, one, rows[i], out[begin[i] : begin[i + 1]], empty))
+    return out
 
 
 def _copy(one: NDArray[Any], rows: NDArray[np.intp], place: NDArray[Any], empty: Any) -> None:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from raychan.parallel import parallel_for
+from raychan.parallel import parallel_tasks
 from raychan.world.geometry import Geometry
 
 T = TypeVar("T")
@@ -20,13 +20,14 @@ def all_of(geometry: Geometry, tasks: Sequence[Callable[[], T]]) -> list[T]:
     found: dict[int, T] = {}
     caller, elsewhere = threading.get_ident(), []
 
-    def some(rows: slice) -> None:
+    def one(i: int) -> None:
         before = geometry.rays
-        for i in range(len(tasks))[rows]:
-            found[i] = tasks[i]()
+        found[i] = tasks[i]()
         if threading.get_ident() != caller:
-            elsewhere.append(geometry.rays - before)
+            rays = geometry.rays - before
+            elsewhere.append(rays)
+            geometry.count_rays(-rays)  # they are the caller's
 
-    parallel_for(len(tasks), some, least=2)
+    parallel_tasks(len(tasks), one)
     geometry.count_rays(sum(elsewhere))
     return [found[i] for i in range(len(tasks))]

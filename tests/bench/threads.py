@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import raychan as rc
 from bench.measure import Row, barred, paired, seconds
@@ -42,25 +43,37 @@ def threads(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
 
 @contextmanager
 def _shared() -> Iterator[list[float]]:
-    """Give the seconds that the calling thread spends in `parallel_for`, calls within calls counted once."""
-    real, caller, spent, inside = parallel.parallel_for, threading.get_ident(), [0.0], [False]
+    """Give the seconds that the calling thread spends in loops that threads share, calls within calls counted once."""
+    caller, spent, inside = threading.get_ident(), [0.0], [False]
 
-    def timed(n: int, work: Callable[[slice], None], least: int = 2000) -> None:
-        # Loops too short for a second thread are not shared.
-        if inside[0] or n < least or threading.get_ident() != caller:
-            return real(n, work, least)
+    def timed(real: Callable[..., None], shared: bool, *args: Any) -> None:
+        if not shared or inside[0] or threading.get_ident() != caller:
+            return real(*args)
         inside[0], start = True, perf_counter()
         try:
-            return real(n, work, least)
+            return real(*args)
         finally:
             inside[0] = False
             spent[0] += perf_counter() - start
 
-    modules = [m for m in list(sys.modules.values()) if getattr(m, "parallel_for", None) is real]
-    for module in modules:
-        module.parallel_for = timed  # type: ignore[attr-defined]
-    try:
+    # Loops too short for a second thread are not shared.
+    rows, tasks = parallel.parallel_for, parallel.parallel_tasks
+    with (
+        _replaced(rows, lambda n, work, least=2000: timed(rows, n >= least, n, work, least)),
+        _replaced(tasks, lambda n, task: timed(tasks, n > 1, n, task)),
+    ):
         yield spent
+
+
+@contextmanager
+def _replaced(real: Callable[..., None], other: Callable[..., None]) -> Iterator[None]:
+    """Put another function in place of one of `raychan.parallel`, in all modules."""
+    name = real.__name__
+    modules = [m for m in list(sys.modules.values()) if getattr(m, name, None) is real]
+    for module in modules:
+        setattr(module, name, other)
+    try:
+        yield
     finally:
         for module in modules:
-            module.parallel_for = real  # type: ignore[attr-defined]
+            setattr(module, name, real)

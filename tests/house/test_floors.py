@@ -9,6 +9,7 @@ from support.places import TESTS
 
 ROOT = Path(__file__).parents[2] / "raychan"
 STOREYS = (
+    ("crew",),
     ("units", "parallel", "compile"),
     ("poses", "reprs", "kinds", "vectors"),
     ("columns",),

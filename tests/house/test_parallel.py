@@ -5,11 +5,12 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 
 import pytest
 
 from raychan import parallel
-from raychan.parallel import Stopped, parallel_for, run_pair, set_threads
+from raychan.parallel import Stopped, parallel_for, parallel_tasks, run_pair, set_threads
 
 
 @pytest.fixture(autouse=True)
@@ -79,6 +80,49 @@ def test_rows_within_rows_are_worked_on_too():
     parallel_for(12, lambda rows: parallel_for(50, lambda inner: total.append(inner.stop - inner.start), 2), 2)
     assert sum(total) % 50 == 0
     assert sum(total) >= 50
+
+
+@pytest.mark.parametrize("caller_is_quick", [True, False])
+def test_a_thread_that_has_no_task_left_helps_with_rows_within_the_task_of_another(caller_is_quick):
+    caller, both, quick_ended, late = threading.get_ident(), threading.Barrier(2), threading.Event(), set()
+
+    def task(i: int) -> None:
+        both.wait(30.0)
+        if (threading.get_ident() == caller) == caller_is_quick:
+            quick_ended.set()
+            return
+        assert quick_ended.wait(30.0)
+        deadline = time.monotonic() + 30.0
+        while len(late) < 2 and time.monotonic() < deadline:
+            late.update(threads_of(100))
+
+    parallel_tasks(2, task)
+    assert len(late) == 2
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+def test_each_task_is_done_once(threads):
+    set_threads(threads)
+    done: list[tuple[int, int]] = []
+
+    def note(i: int, j: int) -> None:
+        done.append((i, j))
+
+    for n in (0, 1, 2, 50):
+        done.clear()
+        parallel_tasks(n, lambda i: parallel_tasks(3, partial(note, i)))
+        assert sorted(done) == [(i, j) for i in range(n) for j in range(3)]
+
+
+def test_what_any_task_raises_is_raised_through_all_loops():
+    def inner(i: int, j: int) -> None:
+        if (i, j) == (3, 2):
+            raise ValueError("3, 2")
+
+    for _ in range(20):
+        with pytest.raises(ValueError, match="3, 2"):
+            parallel_tasks(8, lambda i: parallel_tasks(4, lambda j: inner(i, j)))
+    assert len(threads_of(100, 2, 10.0)) == 2
 
 
 def test_what_the_rows_of_any_thread_raise_is_raised_and_no_thread_is_lost():
