@@ -4,7 +4,7 @@ again, and what it replaced stays known, for the difference tells the error."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import chain
 from typing import Any
 
@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join, of_trajectories
-from raychan.columns import take
-from raychan.radar.dual_paths import scaled
+from raychan.radar.dual_paths import columns_of, scaled
 from raychan.records import Paths
 from raychan.run.point_spread import PointSpread
 from raychan.run.probes import Probe
@@ -203,11 +202,12 @@ def raised(response: PointSpread, doubtful: Paths, cells: Floats, least: Floats)
 
 def _echo(response: PointSpread, paths: Paths, row: int, cell: Floats) -> Paths:
     """Return one of the paths, moved to the range and rate of a cell (3,)."""
-    keep = np.zeros(len(paths.trajectories.kind), bool)
-    keep[paths.trajectory[row]] = True
-    one = take(of_trajectories(paths, keep), np.flatnonzero(paths.trajectory == paths.trajectory[row]) == row)
+    way, at = paths.trajectories, paths.trajectory[row]
     length = 2.0 * (cell[0] - cell[1] * response.waveform.centre)
-    return one.rebuilt(length=np.array([length]), length_rate=np.array([2.0 * cell[1]]))
+    moved = {name: getattr(paths, name)[row : row + 1] for name in columns_of(paths)}
+    moved |= {"length": np.array([length]), "length_rate": np.array([2.0 * cell[1]])}
+    its = way.rebuilt(**{f.name: getattr(way, f.name)[at : at + 1] for f in fields(way)})
+    return paths.rebuilt(**moved, trajectory=np.zeros(1, np.int32), trajectories=its)
 
 
 def _sums(response: PointSpread, paths: Paths, group: NDArray[np.int64], count: int, cells: Floats) -> Complexes:
