@@ -121,9 +121,9 @@ def lattice(road: Road, rays: int, phased: bool) -> Run:
     outs = [Leg(end=road.end)]
     v = road.fine.vertices[road.targets(road.fine)].reshape(-1, 3)
     for facet in np.flatnonzero(road.fine.role[road.fine.body] == MIRROR)[:1]:
-        mirror = Mirror(
-            tracer.first[facet], tracer.normal[facet], int(facet), int(road.fine.body[facet]), tracer.first[facet], 1e3
-        )
+        first, normal = tracer.first[facet], tracer.normal[facet]
+        endless = np.full(2, -np.inf), np.full(2, np.inf), np.zeros((2, 3))
+        mirror = Mirror(first, normal, int(facet), int(road.fine.body[facet]), first, 1e3, *endless)
         outs.append(Leg(end=road.end, mirrors=(mirror,)))
         image = v - 2.0 * ((v - mirror.point) @ mirror.normal)[:, None] * mirror.normal
         v = np.concatenate([v, image])

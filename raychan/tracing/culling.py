@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
-from raychan.poses import sizes
 from raychan.tracing.cache import cache_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.occluders import Occluders
@@ -85,9 +84,7 @@ def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     if not pieces.all():
         rows = rows[pieces[geometry.piece[rows]]]
     if leg.mirrors:
-        v = f.vertices[rows]
-        middle = v.mean(axis=1)
-        rows = rows[leg.may_reach(middle, sizes(v - middle[:, None]).max(axis=1))]
+        rows = rows[leg.may_leave(f.vertices[rows])]
     return rows
 
 

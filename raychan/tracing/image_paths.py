@@ -12,7 +12,10 @@ import numpy as np
 
 from raychan.compile.jit import njit
 from raychan.radar.beam_kernels import field_towards
-from raychan.vectors import length_to
+from raychan.vectors import copy_to, dot, length_to
+
+_ROUNDING = 1e-9  # rad, and m
+_BEYOND = 1e-4  # m about a mirror, for rounding: a ray too many does no harm
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -28,21 +31,41 @@ def _mirror_point(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _may_reach(point, size, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
-    """Tell whether a ray may reach a sphere: in front of the last mirror, over the circle about each mirror."""
+    """Tell whether a ray may reach a sphere: in front of the last mirror, over the circle about each mirror.
+
+    Rays to a sphere fill a cone about the ray to its centre. A mirror's plane cuts it along an ellipse, which is long
+    where the rays graze the mirror.
+    """
     m = len(at)
     if m == 0:
         return True
-    height = 0.0
-    for c in range(3):
-        height += (point[c] - at[m - 1, c]) * normal[m - 1, c]
-    if not height > -size:
-        return False
+    sine = size / length_to(point, images[m], False)
+    if not sine < 1.0:
+        return True
+    cosine, wide = math.sqrt(1.0 - sine * sine), math.asin(sine)
+    spread = size
     x, y, z = point[0], point[1], point[2]
     for i in range(m - 1, -1, -1):
-        x, y, z = _mirror_point(x, y, z, images[i + 1], at[i], normal[i])
-        # A ray to any point of the sphere meets a mirror nearer to the ray to its centre than the sphere's radius.
+        image, n = images[i + 1], normal[i]
+        height = (x - at[i, 0]) * n[0] + (y - at[i, 1]) * n[1] + (z - at[i, 2]) * n[2]
+        if not height > -spread:
+            return False
+        if not (x - image[0]) * n[0] + (y - image[1]) * n[1] + (z - image[2]) * n[2] > 0.0:
+            return True
+        x, y, z = _mirror_point(x, y, z, image, at[i], n)
+        ray = x - image[0], y - image[1], z - image[2]
+        to = centre[i, 0] - image[0], centre[i, 1] - image[1], centre[i, 2] - image[2]
+        length, away = math.sqrt(dot(ray, ray)), math.sqrt(dot(to, to))
+        if radius[i] < away:
+            apart = math.acos(min(max(dot(ray, to) / (length * away), -1.0), 1.0))
+            if not apart < math.asin(radius[i] / away) + wide + _ROUNDING:
+                return False
+        # From the cone's axis to the far end of the ellipse.
+        slope = min(dot(ray, n) / length, 1.0)
+        steep = slope * cosine - math.sqrt(1.0 - slope * slope) * sine
+        spread = length * sine / steep if steep > 0.0 else np.inf
         off = math.sqrt((x - centre[i, 0]) ** 2 + (y - centre[i, 1]) ** 2 + (z - centre[i, 2]) ** 2)
-        if not off < radius[i] + size:
+        if not off < radius[i] + spread + _ROUNDING:
             return False
     return True
 
@@ -56,15 +79,51 @@ def may_reach(points, size, images, at, normal, centre, radius):  # type: ignore
     return ok
 
 
-@njit(cache=True, nogil=True)
-def may_leave(points, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
-    """Tell of which tubes of corners and centre (n, 4, 3) [m] a ray may come to the end over the mirrors."""
-    ok = np.empty(len(points), np.bool_)
-    for i in range(len(points)):
-        size = 0.0
-        for q in range(3):
-            size = max(size, length_to(points[i, q], points[i, 3], False))
-        ok[i] = _may_reach(points[i, 3], size, images, at, normal, centre, radius)
+@njit(cache=True, forceinline=True)
+def _clipped(left, count, toward, least, other):  # type: ignore[no-untyped-def]
+    """Write what of a convex polygon `left`, of so many corners, lies where x . toward >= least into `other`; return
+    its number of corners."""
+    k, last = 0, left[count - 1]
+    before = dot(last, toward) - least
+    for j in range(count):
+        here = left[j]
+        ahead = dot(here, toward) - least
+        if (ahead < 0.0) != (before < 0.0):
+            t = before / (before - ahead)
+            for c in range(3):
+                other[k, c] = last[c] + t * (here[c] - last[c])
+            k += 1
+        if ahead >= 0.0:
+            copy_to(other[k], here)
+            k += 1
+        last, before = here, ahead
+    return k
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def may_leave(corners, images, at, normal, low, high, axes):  # type: ignore[no-untyped-def]
+    """Tell of which triangles of corners (n, 3 or more, 3) [m] a ray may come to the end over the mirrors: of what lies
+    in front of each mirror, and whose rays meet the rectangle about it, something is left.
+
+    Args: low, high (m, 2) [m] ends of the rectangles along their axes (m, 2, 3).
+    """
+    m = len(at)
+    ok = np.empty(len(corners), np.bool_)
+    left, other = np.empty((2, 3 + 5 * m, 3))
+    for i in range(len(corners)):
+        count = 3
+        left[:3] = corners[i, :3]
+        for j in range(m - 1, -1, -1):
+            count = _clipped(left, count, normal[j], dot(at[j], normal[j]), other) if count else 0
+            for q in range(count):
+                p = other[q]
+                left[q, 0], left[q, 1], left[q, 2] = _mirror_point(p[0], p[1], p[2], images[j + 1], at[j], normal[j])
+            for side in range(2):
+                along = axes[j, side]
+                back = -along[0], -along[1], -along[2]
+                count = _clipped(left, count, along, low[j, side] - _BEYOND, other) if count else 0
+                count = _clipped(other, count, back, -high[j, side] - _BEYOND, left) if count else 0
+        ok[i] = count > 0
     return ok
 
 
@@ -78,6 +137,22 @@ def mirror_points(points, images, at, normal):  # type: ignore[no-untyped-def]
             x, y, z = _mirror_point(x, y, z, images[i + 1], at[i], normal[i])
             out[j, i, 0], out[j, i, 1], out[j, i, 2] = x, y, z
     return out
+
+
+@njit(cache=True, nogil=True)
+def on_mirrors(corners, low, high, axes):  # type: ignore[no-untyped-def]
+    """Return the rows (k,) of mirror points (n, m, 3) [m] that all lie within the rectangle about their mirror (see
+    `may_leave`)."""
+    rows, k = np.empty(len(corners), np.int64), 0
+    for j in range(len(corners)):
+        within = True
+        for i in range(len(low)):
+            for side in range(2):
+                x = dot(corners[j, i], axes[i, side])
+                within = within and low[i, side] - _BEYOND <= x <= high[i, side] + _BEYOND
+        rows[k] = j
+        k += within
+    return rows[:k]
 
 
 @njit(cache=True, nogil=True)

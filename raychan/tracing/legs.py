@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from itertools import permutations
 from typing import Any
 
@@ -12,45 +13,17 @@ from numpy.typing import NDArray
 from raychan.radar.beam_table import Beam
 from raychan.records import BLOCKER, MIRROR
 from raychan.tracing.cache import cache_of
-from raychan.tracing.image_paths import may_leave, may_reach, mirror_points, rays_from, stretch, weights
+from raychan.tracing.image_paths import may_leave, may_reach, mirror_points, on_mirrors, rays_from, stretch, weights
+from raychan.tracing.mirrors import Mirror
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+_ON_PLANE = 1e-6  # m: corners so near to a plane lie on it
 _LEAST_AREA = 0.5  # m^2 of a mirror; at street distances smaller faces lie within a few Fresnel zones
 _MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not measured
-
-
-@dataclass(frozen=True, eq=False)
-class Mirror:
-    """A plane that reflects: a point on it [m], its unit normal towards the lit side, one of its facets, its body, and
-    the circle (centre [m], radius [m]) that holds all of it."""
-
-    point: Floats
-    normal: Floats
-    facet: int
-    body: int
-    centre: Floats
-    radius: float
-
-    @staticmethod
-    def of(geometry: Geometry, facet: int, side: float) -> Mirror:
-        """Return the mirror of the plane of a facet, lit on its outward side (+1) or from behind (-1)."""
-        v = geometry.facets.vertices[geometry.plane == geometry.plane[facet]].reshape(-1, 3)
-        centre = 0.5 * (v.min(axis=0) + v.max(axis=0))
-        radius = float(np.linalg.norm(v - centre, axis=1).max())
-        body = int(geometry.facets.body[facet])
-        return Mirror(geometry.first[facet], side * geometry.normal[facet], facet, body, centre, radius)
-
-    def turned(self) -> Mirror:
-        """Return the same plane lit from its other side."""
-        return Mirror(self.point, -self.normal, self.facet, self.body, self.centre, self.radius)
-
-    def image(self, x: Floats) -> Floats:
-        """Return x mirrored at the plane."""
-        return x - 2.0 * np.dot(x - self.point, self.normal) * self.normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +57,7 @@ class Leg:
     beam: Beam | None = None
     image: Floats = field(init=False)
     _chain: tuple[Floats, ...] = field(init=False, repr=False)
+    _rectangles: tuple[Floats, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         images = [np.asarray(self.end, float)]
@@ -93,6 +67,9 @@ class Leg:
         sheets = [np.array([getattr(m, name) for m in self.mirrors]) for name in ("point", "normal", "centre")]
         radius = np.array([m.radius for m in self.mirrors])
         object.__setattr__(self, "_chain", (np.array(images), *(s.reshape(-1, 3) for s in sheets), radius))
+        ends = (np.array([getattr(m, name) for m in self.mirrors]).reshape(-1, 2) for name in ("low", "high"))
+        axes = np.array([m.axes for m in self.mirrors]).reshape(-1, 2, 3)
+        object.__setattr__(self, "_rectangles", (*ends, axes))
 
     def pieces(self, geometry: Geometry) -> Ints:
         """Return the pieces (m,) of the mirrors."""
@@ -128,6 +105,31 @@ class Leg:
             normals = normals - 2.0 * np.outer(normals @ m.normal, m.normal)
         return normals
 
+    @cached_property
+    def windows(self) -> Floats:
+        """Normals (k, 3) of the planes through the image and the sides of the rectangles about the mirrors: all rays
+        over the mirrors run between them."""
+        found = np.zeros((0, 3))
+        for m in self.mirrors:
+            found = found - 2.0 * np.outer(found @ m.normal, m.normal)
+            to = m.corners - self._chain[0][1 + len(found) // 4]
+            sides = np.cross(to, np.roll(to, -1, axis=0))
+            found = np.concatenate([found, sides / np.linalg.norm(sides, axis=1)[:, None]])
+        return found
+
+    def bounds_of_light(self, points: Floats) -> Floats:
+        """Return signed distances (n, 3) [m] of the corners (n, 3 or more, 3) [m] of triangles from a line that bounds
+        what of them the leg reaches; zeros where none runs through them: where they meet the plane of the last mirror,
+        or rays over a side of a mirror's rectangle."""
+        found = np.zeros((len(points), 3))
+        rows, last = np.flatnonzero(self.may_leave(points)), self.mirrors[-1]
+        planes = [(last.point, last.normal), *((self.image, normal) for normal in self.windows)]
+        for point, normal in planes if len(rows) else []:
+            side = (points[rows, :3] - point) @ normal
+            across = (side.min(axis=1) < -_ON_PLANE) & (side.max(axis=1) > _ON_PLANE) & ~found[rows].any(axis=1)
+            found[rows[across]] = side[across]
+        return found
+
     def outside_beam(self, points: Floats, radius: Floats) -> Bools:
         """Tell which spheres (n,), about points (n, 3) of this radius (n,) [m], lie outside the beam over this leg."""
         if self.beam is None or self.far:
@@ -156,8 +158,9 @@ class Leg:
         return ok
 
     def may_leave(self, points: Floats) -> Bools:
-        """Tell from which tubes (n, 4, 3) [m] a ray may come to the end over the circle about each mirror."""
-        ok: Bools = may_leave(points, *self._chain)
+        """Tell from which triangles of corners (n, 3 or more, 3) [m] a ray may come to the end, and to which from it,
+        over the rectangle about each mirror."""
+        ok: Bools = may_leave(points, *self._chain[:3], *self._rectangles)
         return ok
 
     def visible(
@@ -171,7 +174,7 @@ class Leg:
         n = len(points)
         corners = self.mirror_points(points)
         chain = *self._chain[:3], self.far, 2.0 * geometry.extent + 1.0
-        rows, skip = np.arange(n), np.full(n, -1, np.int32)
+        rows, skip = on_mirrors(corners, *self._rectangles), np.full(n, -1, np.int32)
         for i, m in enumerate(self.mirrors):
             rows, start, d, _ = stretch(i, rows, points, corners, *chain)
             hit, _ = geometry.cast(start, d, skip[rows])

@@ -103,6 +103,11 @@ def tube_visibility(
         found = _shadow_edges(geometry, leg, tubes.facet[rows], slack[rows], parts)
         side[rows] = found
         mixed[rows] |= (found != 0.0).any(axis=1)
+    if leg.mirrors:
+        # What the leg lights may lie between all rays: a strip of a long facet beside a small mirror.
+        rows = np.flatnonzero(corners & (mixed | ~some) & ~side.any(axis=1))
+        side[rows] = leg.bounds_of_light(tubes.points[rows])
+        mixed[rows] |= (side[rows] != 0.0).any(axis=1)
     return Visibility(centre, some, mixed, side)
 
 
