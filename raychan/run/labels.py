@@ -50,12 +50,9 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
     trajectories = paths.trajectories
     backdrop = set(map(whole, background))
     first, index = _alike(paths)
-    for row in first:
-        met = [
-            link
-            for link in zip(trajectories.body[row], trajectories.part[row], trajectories.kind[row], strict=True)
-            if link[2]
-        ]
+    links = (x[first].tolist() for x in (trajectories.body, trajectories.part, trajectories.kind))
+    for row in zip(*links, strict=True):
+        met = [link for link in zip(*row, strict=True) if link[2]]
         names.append(tuple(_name(paths, b, p, k) for b, p, k in met))
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
         left = [b for b in map(whole, bodies[-1]) if b not in backdrop]
@@ -160,13 +157,15 @@ def provenance(
     receiver: Receiver,
     error: Floats,
     beam: Callable[[int], NDArray[np.complexfloating[Any, Any]]] | None = None,
+    known: Chains | None = None,
 ) -> tuple[Explanation, ...]:
     """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate.
 
     Args: beam, what the beam towards a detection (row) passes of each path (n,) as a factor of its wave: of detections
-    that an array tells apart in one cell, each is explained by the paths in its own beam.
+    that an array tells apart in one cell, each is explained by the paths in its own beam; known the paths' chains, if
+    they are known already.
     """
-    known, response = chains(paths, receiver.background), response_of(receiver)
+    known, response = known or chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
     at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
