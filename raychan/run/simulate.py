@@ -68,8 +68,11 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         )
     names = background(channel.geometry.facets)
     with clock.stage("detect"):
+        # The chains of a preview take as long as its detection; those of other runs are found beside the ledger.
+        preview = channel.model.mode == PREVIEW
         (rdmap, detections, error), (by_chain, warnings) = run_pair(
-            lambda: _detected(scene, channel, cube), lambda: (chains(launched.paths, names), scene.warnings)
+            lambda: _detected(scene, channel, cube),
+            lambda: (chains(launched.paths, names) if preview else None, scene.warnings),
         )
     channel = replace(channel, launched=launched)
     windows = settings.range_window, settings.rate_window
@@ -124,7 +127,7 @@ def _detected(scene: Scene, channel: Channel, cube: Cube) -> Detected:
 
 
 def _explained(
-    scene: Scene, channel: Channel, detected: Detected, receiver: Receiver, by_chain: Chains
+    scene: Scene, channel: Channel, detected: Detected, receiver: Receiver, by_chain: Chains | None
 ) -> tuple[tuple[Explanation, ...], dict[str, Entry]]:
     """Return where each detection came from, and the ledger of what the run left out."""
     radar, settings, turned = scene.radar, scene.processing, channel.turned
