@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from raychan.records import Cube, RangeDoppler
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex64]
 
 
 def range_doppler(
@@ -37,20 +40,18 @@ def range_doppler(
     if min(pad) < 1 or any(int(p) != p for p in pad):
         raise ValueError(f"pad = {pad}: whole numbers from 1 on wanted")
     taper_r, taper_v = window(range_window, samples), window(rate_window, chirps)
-    # One chirp has one rate: padded, all rows would be equal.
-    cells_r, cells_v = int(pad[0]) * samples, int(pad[1]) * chirps if chirps > 1 else 1
+    cells_r = int(pad[0]) * samples
     image = 1.0 if waveform.complex_sampling else 2.0
     workers = threads()
+    doppler, undone = _without_doppler(waveform, range_window, int(pad[1]))
+    cells_v = len(doppler)
 
     weight = (image * taper_v / taper_v.sum()).astype(np.float32)
     weighted = cube.samples * weight[:, None]
     rows = scipy.fft.ifft(weighted, cells_v, axis=1, norm="forward", workers=workers, overwrite_x=True)
     rows = scipy.fft.fftshift(rows, axes=1)
-    doppler = (np.arange(cells_v) - cells_v // 2) / (cells_v * waveform.repetition)
-    t = (np.arange(samples) - 0.5 * (samples - 1)) * waveform.chirp_duration / samples
     # exp(-j2 pi f_d t) is removed row by row, so that the beat of the delay alone remains.
-    undone = np.exp(2j * np.pi * doppler[:, None] * t) * (taper_r / taper_r.sum())
-    rows *= undone.astype(np.complex64)
+    rows *= undone
     spectrum = scipy.fft.ifft(rows, cells_r, axis=2, norm="forward", workers=workers, overwrite_x=True)
     spectrum = spectrum[..., : cells_r if waveform.complex_sampling else cells_r // 2]
 
@@ -67,3 +68,17 @@ def range_doppler(
         unambiguous_range=waveform.unambiguous_range,
         unambiguous_rate=0.5 * metre_per_hertz / waveform.repetition,
     )
+
+
+@lru_cache(maxsize=1)
+def _without_doppler(waveform: Waveform, range_window: str, pad: int) -> tuple[Floats, Complexes]:
+    """Return the Doppler shifts (v,) [Hz] of the rows of a map, and the factors (v, s) that take them out of a ramp's
+    samples and weight these by a window; kept for the next frame of a sequence."""
+    chirps, samples = waveform.n_chirps, waveform.n_samples
+    # One chirp has one rate: padded, all rows would be equal.
+    cells = pad * chirps if chirps > 1 else 1
+    doppler = (np.arange(cells) - cells // 2) / (cells * waveform.repetition)
+    t = (np.arange(samples) - 0.5 * (samples - 1)) * waveform.chirp_duration / samples
+    taper = window(range_window, samples)
+    undone = np.exp(2j * np.pi * doppler[:, None] * t) * (taper / taper.sum())
+    return doppler, undone.astype(np.complex64)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.records import Complexes, Paths
 from raychan.run.point_spread import PointSpread
+from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -55,8 +56,13 @@ def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown
             taken = np.array([strongest])
             folds, near = _folds(paths, taken, response, shown, mirrored)[0], np.ones(1, bool)
         power = _powers(paths, taken, response, shown, mirrored)
-        at, rate = response.stands(paths.delay[taken], paths.range_rate[taken], shown.rate is not None)
-        places, place = np.unique(folds[near], axis=0, return_inverse=True)
+        at, rate = response.stands(*_moving(paths, taken), shown.rate is not None)
+        folds = folds[near]
+        # As a rule all are at one place, which sorting them takes longest to tell.
+        alone = bool((folds == folds[0]).all())
+        places, place = (
+            (folds[:1], np.zeros(len(folds), int)) if alone else np.unique(folds, axis=0, return_inverse=True)
+        )
         for i, whole in enumerate(places):
             weight = power * (place.ravel() == i)
             total = float(weight.sum())
@@ -79,12 +85,17 @@ def aliased(at: Floats, shown: float, response: PointSpread) -> tuple[Floats, ND
     return away[near, row], (whole[near, row] != 0.0) | (near > 0)
 
 
+def _moving(paths: Paths, rows: Ints) -> tuple[Floats, Floats]:
+    """Return the delays (n,) [s] and range rates (n,) [m/s] of some paths."""
+    return paths.length[rows] / C0, 0.5 * paths.length_rate[rows]
+
+
 def _folds(
     paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """Return the ambiguity numbers (n, 2) of range and rate between paths and the place shown, and whether the paths
     lie within the main lobe about it once these are removed."""
-    at, rate = response.stands(paths.delay[rows], paths.range_rate[rows], shown.rate is not None)
+    at, rate = response.stands(*_moving(paths, rows), shown.rate is not None)
     sign = -1.0 if mirrored else 1.0
     away, smear = np.zeros((len(rows), 2)), np.zeros(len(rows))
     away[:, 0] = sign * at - shown.at_range
@@ -101,11 +112,11 @@ def _folds(
 
 def _powers(paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool) -> Floats:
     """Return the powers (n,) that paths, or their mirror images, contribute to the cell shown."""
-    delay = paths.delay[rows]
+    delay, rate = _moving(paths, rows)
     if shown.rate is None:
         wave: Complexes = paths.amplitude[rows] * response.in_profile(delay, shown.range)[0]
     else:
         sign = -1.0 if mirrored else 1.0
         cell = sign * shown.range, sign * shown.rate
-        wave = response.image_in_cell(paths.amplitude[rows], delay, paths.range_rate[rows], *cell)[0]
+        wave = response.image_in_cell(paths.amplitude[rows], delay, rate, *cell)[0]
     return np.abs(wave) ** 2

@@ -50,12 +50,9 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
     trajectories = paths.trajectories
     backdrop = set(map(whole, background))
     first, index = _alike(paths)
-    for row in first:
-        met = [
-            link
-            for link in zip(trajectories.body[row], trajectories.part[row], trajectories.kind[row], strict=True)
-            if link[2]
-        ]
+    links = (x[first].tolist() for x in (trajectories.body, trajectories.part, trajectories.kind))
+    for row in zip(*links, strict=True):
+        met = [link for link in zip(*row, strict=True) if link[2]]
         names.append(tuple(_name(paths, b, p, k) for b, p, k in met))
         bodies.append(tuple(paths.body_names[b] for b, _, k in met if k != TRANSMIT))
         left = [b for b in map(whole, bodies[-1]) if b not in backdrop]
@@ -160,13 +157,15 @@ def provenance(
     receiver: Receiver,
     error: Floats,
     beam: Callable[[int], NDArray[np.complexfloating[Any, Any]]] | None = None,
+    known: Chains | None = None,
 ) -> tuple[Explanation, ...]:
     """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate.
 
     Args: beam, what the beam towards a detection (row) passes of each path (n,) as a factor of its wave: of detections
-    that an array tells apart in one cell, each is explained by the paths in its own beam.
+    that an array tells apart in one cell, each is explained by the paths in its own beam; known the paths' chains, if
+    they are known already.
     """
-    known, response = chains(paths, receiver.background), response_of(receiver)
+    known, response = known or chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
     at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
@@ -200,25 +199,35 @@ def _spread(waveform: Waveform, range_window: str, rate_window: str) -> PointSpr
 
 
 def _alike(paths: Paths) -> tuple[Ints, Ints]:
-    """Return a trajectory of each chain, and the chain of each path (n,); slot by slot, for speed."""
+    """Return a trajectory of each chain, and the chain of each path (n,)."""
     trajectories = paths.trajectories
     code, most = np.zeros(len(trajectories.kind), np.int64), 1
-    width = (len(paths.body_names) + 1) * (len(paths.part_names) + 1) * len(InteractionType)
+    parts = len(paths.part_names) + 1
+    width = (len(paths.body_names) + 1) * parts * len(InteractionType)
+    number = np.int32 if width < np.iinfo(np.int32).max else np.int64
+    # Slot by slot and in half the bytes, for speed.
     for body, part, kind in zip(trajectories.body.T, trajectories.part.T, trajectories.kind.T, strict=True):
+        kind = np.ascontiguousarray(kind)
         if not kind.any():
             break
         if most > np.iinfo(np.int64).max // width:
             code = np.unique(code, return_inverse=True)[1].astype(np.int64)
             most = int(code.max(initial=0)) + 1
-        slot = (body + 1) * np.int64(len(paths.part_names) + 1) + part + 1
-        code, most = code * width + np.where(kind > 0, slot * len(InteractionType) + kind, 0), most * width
+        slot = (body.astype(number) + number(1)) * number(parts) + part
+        slot = (slot + number(1)) * number(len(InteractionType)) + kind
+        slot[kind == 0] = 0
+        code *= width
+        code += slot
+        most *= width
     taken = np.zeros(len(code), bool)
     taken[paths.trajectory] = True
     rows = np.flatnonzero(taken)
-    _, first, inverse = np.unique(code[rows], return_index=True, return_inverse=True)
-    chain = np.full(len(code), -1, np.int64)
-    chain[rows] = inverse
-    return rows[first], chain[paths.trajectory]
+    taken_codes, chain = code[rows], np.full(len(code), -1, np.int64)
+    # Neighbours are mostly alike: one of each run is sorted.
+    heads = np.flatnonzero(np.diff(taken_codes, prepend=-1))
+    _, first, inverse = np.unique(taken_codes[heads], return_index=True, return_inverse=True)
+    chain[rows] = np.repeat(inverse, np.diff(heads, append=len(rows)))
+    return rows[heads[first]], chain[paths.trajectory]
 
 
 def _sums(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:

@@ -67,6 +67,7 @@ class PointSpread:
         self._range = window(range_window, waveform.n_samples)
         self._rate = window(rate_window, waveform.n_chirps)
         self._by_parts: dict[int, tuple[Complexes, Floats]] = {}
+        self._beyond: dict[int, tuple[Floats, Floats]] = {}
 
     @cached_property
     def _range_tables(self) -> Complexes:
@@ -123,8 +124,7 @@ class PointSpread:
     ) -> Sums:
         least = _LEAST * cells[:, 2] / max(len(rate), 1)
         tables = self._tables(rate)
-        in_range = np.abs(self._range_tables).max(axis=1)
-        beyond = _beyond(in_range), np.stack([_beyond(x) for x in np.abs(tables[3][0]).sum(axis=0).T])
+        beyond = self._bounds(len(tables[3][1]))
         # Few sums are made by parts of the paths; many, which do not fit a processor's cache, by parts of the cells.
         parts = -(-len(rate) // _PART) if len(cells) * count <= _FEW else 1
         sums = [_Sums.of(len(cells), count) for _ in range(max(parts, 1))]
@@ -165,6 +165,15 @@ class PointSpread:
             C0,
         )
         return ramp, (len(self._range), count, _FINE), self._range_tables, self._by_parts[parts]
+
+    def _bounds(self, parts: int) -> tuple[Floats, Floats]:
+        """Return upper bounds of the range response (s,) and of the rate responses of a frame in parts (2, m), at 0,
+        1, 2, ... cells from the peak."""
+        if parts not in self._beyond:
+            in_range = np.abs(self._range_tables).max(axis=1)
+            rates = np.abs(self._by_parts[parts][0]).sum(axis=0).T
+            self._beyond[parts] = _beyond(in_range), np.stack([_beyond(x) for x in rates])
+        return self._beyond[parts]
 
     @property
     def mirrors(self) -> bool:

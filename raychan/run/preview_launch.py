@@ -6,8 +6,9 @@ nothing bounces from body to body. What that leaves out is said in `run.preview`
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,12 @@ from raychan.geometry.curved_patches import edge_to_cut, halved
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, SCATTERER, Points, Routes
+from raychan.run.preview_bounds import facet_bounds
 from raychan.tracing.contributions import SHARE, Contributions, amplitudes
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.launch import write_leg
 from raychan.tracing.legs import Leg, Mirror, View, reachable
-from raychan.tracing.radiation import FACING, phases_of, radiating
+from raychan.tracing.radiation import FACING, Phases, phases_of, radiating
 from raychan.tracing.routes import routes_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Batch, Launch, Stats
@@ -31,40 +33,68 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
+Complexes = NDArray[np.complex128]
+Rows = NDArray[np.intp]
+S = TypeVar("S")
+T = TypeVar("T")
 
-# Seeds are pruned by a share of their bounds, which tubes out of phase stay under: at 1 tracing the urban street takes
-# 20 % more CPU than at 0.25, at 0.1 echoes of the living street lose 6 dB (command not noted).
-_SEEDS = 0.25
-_SEEN = 0.5  # the same, of tubes that are seen: at 0.25 echoes of the living street lose 4 dB, at 0.5 they lose 2
+# By how much what is pruned is counted: less traces fewer tubes, more loses less. Levels of direct echoes beside fine
+# runs of the living street, and CPU of a frame of the urban street: seeds by 0.6, 0.63 dB (rms) and 0.18 s; by 1, 0.48
+# dB and 0.19 s; by 2, 0.44 dB and 0.22 s. Seen ones by 1: a weak echo of the urban street is off by 5 dB, by 2 by 3.3.
+# Amplitudes by 1: a lone sphere is off by 0.6 dB, by 3 by 0.2 (all: commands not kept).
+_SEEDS = 1.0  # facets, by their bounds, before it is known whether they are seen
+_SEEN = 2.0  # tubes that are seen, by their bounds
+_SURE = 3.0  # tubes that are seen, by their amplitudes
 _CLASSES, _A_CLASS = 64, 4.0  # of sizes below the threshold, and of these to a factor of two; not measured
 _CUTS = 12  # times a facet is halved at most: 64 parts a side, of a wall of 40 m no part is longer than 0.6 m
 
 
-def preview_routes(geometry: Geometry, points: Points, rule: PruneRule, stats: Stats) -> Iterator[Batch]:
-    """Yield the routes of a preview, batch by batch; stats is filled.
+def preview_routes(
+    geometry: Geometry, points: Points, rule: PruneRule, stats: Stats, each: Callable[[Batch], T]
+) -> list[T]:
+    """Return what `each`, called by any thread, makes of the routes of a preview, batch by batch; stats is filled.
 
     Args: geometry; points the targets given by their RCS; rule what may be left out.
     """
     launch, refined = Launch(geometry, points, rule, legs_over_ground), rule.refinement.for_depth(rule.bounces)
 
-    def over(legs: list[Leg]) -> tuple[list[_Tubes], int]:
-        """Return the tubes over some legs, and the rays that this thread cast for them."""
-        before, seen = geometry.rays, []
-        for leg in legs:
-            outs = [out for out in launch.outs if len(leg.mirrors) + 1 + len(out.mirrors) <= rule.bounces]
-            seen.append(_Tubes.over(geometry, leg, outs, refined))
-        return seen, geometry.rays - before
+    def over(legs: list[Leg]) -> list[_Tubes]:
+        outs = ([out for out in launch.outs if len(leg.mirrors) + 1 + len(out.mirrors) <= rule.bounces] for leg in legs)
+        return [_Tubes.over(geometry, leg, some, refined) for leg, some in zip(legs, outs, strict=True)]
 
-    (direct, some), (others, more) = run_pair(lambda: over(launch.legs[:1]), lambda: over(launch.legs[1:]))
-    before, found = geometry.rays, Contributions(refined)
-    yield from launch.exact()
-    # What the direct leg finds prunes the others.
-    for tubes in direct + others:
-        for routes in tubes.routes(found):
-            stats.tubes += len(routes.kind)
-            yield routes
+    def first() -> tuple[list[_Tubes], list[T]]:
+        direct = over(launch.legs[:1])
+        return direct, [each(routes) for routes in launch.exact()]
+
+    def made(tubes: list[_Tubes], found: list[Contributions]) -> list[tuple[int, T]]:
+        return [
+            (len(routes.kind), each(routes))
+            for one, what in zip(tubes, found, strict=True)
+            for routes in one.routes(what)
+        ]
+
+    ((direct, exact), some), (others, more) = run_pair(
+        lambda: _counted(geometry, first), lambda: _counted(geometry, lambda: over(launch.legs[1:]))
+    )
+    # Every leg is pruned against what the direct leg has found straight back, and itself.
+    found = Contributions(refined)
+    for tubes in direct:
+        tubes.add_to(found)
+    copies = [found.frozen(found.budget) for _ in others]
+    (near, rays), (far, rays_far) = run_pair(
+        lambda: _counted(geometry, lambda: made(direct, [found])),
+        lambda: _counted(geometry, lambda: made(others, copies)),
+    )
+    stats.tubes += sum(count for count, _ in near + far)
     stats.legs = len(launch.legs)
-    stats.rays += some + more + geometry.rays - before
+    stats.rays += some + more + rays + rays_far
+    return exact + [one for _, one in near + far]
+
+
+def _counted(geometry: Geometry, what: Callable[[], S]) -> tuple[S, int]:
+    """Return what a function returns, and the rays that this thread cast for it."""
+    before = geometry.rays
+    return what(), geometry.rays - before
 
 
 def legs_over_ground(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
@@ -80,89 +110,123 @@ def legs_over_ground(geometry: Geometry, end: Floats, bounces: int, beam: Beam |
 
 
 @dataclass(frozen=True)
+class _Straight:
+    """Tubes (n,) that radiate back over the leg by which they came: their numbers, phases and amplitudes."""
+
+    rows: Rows
+    phases: Phases
+    each: Complexes
+
+
+@dataclass(frozen=True)
 class _Tubes:
-    """Tubes on their first surface that may count, and how the end of their leg in sees their centres."""
+    """Tubes on their first surface that may count, how the end of their leg in sees their centres, and what goes
+    straight back, None where that leg is none of the legs out."""
 
     geometry: Geometry
     leg: Leg
     outs: list[Leg]
     tubes: Tubes
     view: View
+    straight: _Straight | None
 
     @staticmethod
     def over(geometry: Geometry, leg: Leg, outs: list[Leg], rule: Refinement) -> _Tubes:
         """Return the tubes over a leg that may count over one of `outs`, cut where facets are large."""
-        found = Contributions(rule)
+        nothing = Contributions(rule)
         allowed = reachable(geometry, leg) & (geometry.piece_role == SCATTERER)
         allowed[leg.pieces(geometry)] = False
         facet = seed_facets(geometry, leg, allowed)
-        whole = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
-        tubes = launch_tubes(geometry, leg, facet, whole)
         counts = np.zeros(len(facet), bool)
-        for out in outs:
-            ph = phases_of(geometry, leg, out, tubes, rule)
-            counts |= _that_count(found, _SEEDS * ph.bound, ph.length)
-        facet, bary, cut = _cut(geometry, leg, outs[0], facet[counts], whole[: counts.sum()], rule)
-        tubes = launch_tubes(geometry, leg, facet, bary) if cut else tubes.take(counts)
-        tubes = tubes.take(tubes.strength > 0.0)
+        for bound, length in facet_bounds(geometry, leg, outs, facet, rule.wavenumber):
+            counts |= that_count(nothing, _turned(bound, length, rule), length, _SEEDS)
+        facet, bary = _cut(geometry, leg, outs[0], facet[counts], rule)
+        tubes = launch_tubes(geometry, leg, facet, bary)
+        if not (tubes.strength > 0.0).all():
+            tubes = tubes.take(tubes.strength > 0.0)
         view = centre_visibility(geometry, leg, tubes, True, rule)
         tubes, view = tubes.take(view.seen), view.take(view.seen)
         write_leg(geometry, tubes, leg, view.corners, view.passed, rule)
-        return _Tubes(geometry, leg, outs, tubes, view)
+        straight = None
+        if leg in outs:
+            rows, ph = _radiated(geometry, leg, leg, tubes, nothing)
+            straight = _Straight(rows, ph, amplitudes(ph))
+        return _Tubes(geometry, leg, outs, tubes, view, straight)
+
+    def add_to(self, found: Contributions) -> None:
+        """Add what goes straight back to what a launch has found."""
+        if self.straight:
+            found.add(self.straight.phases, self.straight.each)
 
     def routes(self, found: Contributions) -> Iterator[Routes]:
         """Yield the routes over each leg out; what the strongest hide in their range cells is left out."""
         geometry, leg = self.geometry, self.leg
+        self.add_to(found)
         for out in sorted(self.outs, key=lambda x: x is not leg):
-            _, facing = radiating(out, self.tubes, FACING)
-            tubes, view = self.tubes.take(facing), self.view.take(facing)
-            ph = phases_of(geometry, leg, out, tubes, found.rule)
-            each = None
-            if out is leg:
+            if out is leg and self.straight:
+                rows, ph, each = self.straight.rows, self.straight.phases, self.straight.each
+            else:
+                rows, ph = _radiated(geometry, leg, out, self.tubes, found)
                 each = amplitudes(ph)
-                found.add(ph, each)
-            rows = np.flatnonzero(_that_count(found, _SEEN * ph.bound, ph.length))
-            ph = ph.take(rows)
-            each = amplitudes(ph) if each is None else each[rows]
-            kept = np.flatnonzero(_that_count(found, np.abs(each), ph.length))
-            rows, ph, each = rows[kept], ph.take(kept), each[kept]
-            tubes, view = tubes.take(rows), view.take(rows)
+            kept = np.flatnonzero(that_count(found, each, ph.length, _SURE))
+            rows = rows[kept]
+            tubes, view = self.tubes.take(rows), self.view.take(rows)
             if out is not leg:
                 view = centre_visibility(geometry, out, tubes, True, found.rule)
-                tubes, ph, each = tubes.take(view.seen), ph.take(view.seen), each[view.seen]
+                kept, tubes = kept[view.seen], tubes.take(view.seen)
                 view = view.take(view.seen)
-                found.add(ph, each)
+                found.add(ph.take(kept), each[kept])
             if len(tubes):
                 yield routes_of(geometry, leg, out, tubes, True, view.corners, view.passed)
 
 
-def _that_count(found: Contributions, size: Floats, length: Floats) -> Bools:
-    """Return which tubes (n,) to keep: the weakest of each range cell are pruned while their sum in phase stays under
-    0.3 of the prune threshold; as `Contributions.that_count`, but by classes of sizes in place of a sort.
+def _radiated(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions) -> tuple[Rows, Phases]:
+    """Return the numbers of the tubes that face the end of a leg out and may count there, and their phases."""
+    ph = phases_of(geometry, leg, out, tubes, found.rule)
+    _, facing = radiating(out, tubes, FACING)
+    each = _turned(np.where(facing, ph.bound, 0.0), ph.length, found.rule)
+    rows = np.flatnonzero(facing & that_count(found, each, ph.length, _SEEN))
+    return rows, ph.take(rows)
 
-    Args: size (n,) [1/m] of what each scatters, length (n,) [m] of its two-way path.
+
+def that_count(found: Contributions, each: Complexes, length: Floats, weight: float) -> Bools:
+    """Return which tubes (n,) to keep: the weakest of each range cell are pruned while their sum, and their sum in
+    unrelated phases, both times `weight`, stay under 0.3 of the prune threshold.
+
+    Args: each (n,) [1/m] what a tube scatters; length (n,) [m] of its two-way path.
     """
-    share = size / found.prune_threshold(length)
+    share = each / found.prune_threshold(length)
     cell = np.asarray(length / found.rule.cell, np.int64)
-    octave = np.clip(_CLASSES + _A_CLASS * np.log2(np.maximum(share, 1e-9)), 0, _CLASSES - 1).astype(np.int64)
-    sums = np.bincount(cell * _CLASSES + octave, share, (int(cell.max(initial=0)) + 1) * _CLASSES)
-    sums = np.cumsum(sums.reshape(-1, _CLASSES), axis=1)
-    return np.asarray(sums[cell, octave] > SHARE)
+    octave = _CLASSES + _A_CLASS * np.log2(np.maximum(np.abs(share), 1e-9))
+    octave = np.clip(octave, 0, _CLASSES - 1).astype(np.int64)
+    at, classes = cell * _CLASSES + octave, (int(cell.max(initial=0)) + 1) * _CLASSES
+    # Sums over the classes of a cell, up to each class: by classes in place of a sort, for speed.
+    real, imag, power = (
+        np.cumsum(np.bincount(at, x, classes).reshape(-1, _CLASSES), axis=1)
+        for x in (share.real, share.imag, np.abs(share) ** 2)
+    )
+    sums = np.maximum.accumulate(np.maximum(np.hypot(real, imag), np.sqrt(power)), axis=1)
+    return np.asarray(weight * sums[cell, octave] > SHARE)
 
 
-def _cut(
-    geometry: Geometry, leg: Leg, out: Leg, facet: Ints, bary: Floats, rule: Refinement
-) -> tuple[Ints, Floats, bool]:
-    """Return facets (n,) and corners (n, 3, 3) of tubes cut until their phase is quadratic, and whether any was cut."""
+def _turned(bound: Floats, length: Floats, rule: Refinement) -> Complexes:
+    """Return bounds (n,) [1/m] with the phases of paths of these lengths (n,) [m]."""
+    return np.asarray(bound * np.exp(-1j * rule.wavenumber * length))
+
+
+def _cut(geometry: Geometry, leg: Leg, out: Leg, facet: Ints, rule: Refinement) -> tuple[Ints, Floats]:
+    """Return facets (n,) and corners (n, 3, 3) of tubes over facets, cut until their phase is quadratic."""
     f = geometry.facets
     shape = f.vertices, f.normals, geometry.edge_curvature
     limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, True
     done: list[tuple[Ints, Floats]] = []
+    bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
     for level in range(_CUTS + 1):
         edge = edge_to_cut(facet, bary, *shape, leg.image, leg.far, out.image, out.far, *limits)
         more = (edge >= 0) & (level < _CUTS)
-        done.append((facet[~more], bary[~more]))
         if not more.any():
+            done.append((facet, bary))
             break
+        done.append((facet[~more], bary[~more]))
         facet, bary = halved(facet[more], bary[more], edge[more], 0.0, level)
-    return np.concatenate([x for x, _ in done]), np.concatenate([x for _, x in done]), len(done) > 1
+    return np.concatenate([x for x, _ in done]), np.concatenate([x for _, x in done])

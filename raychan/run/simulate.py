@@ -13,7 +13,7 @@ from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDop
 from raychan.run.clock import Clock, Progress
 from raychan.run.directions import beam_to
 from raychan.run.interferers import interference
-from raychan.run.labels import provenance
+from raychan.run.labels import Chains, chains, provenance
 from raychan.run.ledger import Entry
 from raychan.run.messages import counts, told
 from raychan.run.path_stream import Launched
@@ -31,6 +31,8 @@ from raychan.signal.delay_profile import profile_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
 from raychan.world.schema import PREVIEW
+
+Detected = tuple[RangeDoppler, Detections, MapError]
 
 _BELOW = 0.3  # of the amplitude of a cell's noise, a dB of tolerance: what tubes that no launch cuts may bring
 
@@ -60,19 +62,23 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     with clock.stage("synthesize"):
         quiet, launched = realized(scene, channel.geometry, channel.model, channel.quiet, channel.launched, seed)
         noise = radar.noise_power if radar.noise else 0.0
-        pdp = profile_of(launched.response, radar.waveform, noise, settings.range_window)
-        cube, heard = _received(scene, channel, launched, quiet, seed)
+        pdp, (cube, heard) = run_pair(
+            lambda: profile_of(launched.response, radar.waveform, noise, settings.range_window),
+            lambda: _received(scene, channel, launched, quiet, seed),
+        )
+    names = background(channel.geometry.facets)
     with clock.stage("detect"):
-        rdmap = map_of(cube, radar, settings)
-        detections = detections_in(rdmap, radar, settings)
+        # The chains of a preview take as long as its detection; those of other runs are found beside the ledger.
         preview = channel.model.mode == PREVIEW
-        error = preview_error(rdmap, radar, settings) if preview else _error_of(channel, radar, settings)
+        (rdmap, detections, error), (by_chain, warnings) = run_pair(
+            lambda: _detected(scene, channel, cube),
+            lambda: (chains(launched.paths, names) if preview else None, scene.warnings),
+        )
     channel = replace(channel, launched=launched)
     windows = settings.range_window, settings.rate_window
-    names = background(channel.geometry.facets)
     receiver = Receiver(radar.channel_waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
-        reasons, left_out = _explained(scene, channel, rdmap, detections, receiver, error)
+        reasons, left_out = _explained(scene, channel, (rdmap, detections, error), receiver, by_chain)
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
@@ -89,7 +95,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
         stats=channel.stats | counts(known, tolerance),
         warnings=(
-            *scene.warnings,
+            *warnings,
             *channel.launched.notes(),
             *channel.warnings,
             *heard,
@@ -112,16 +118,25 @@ def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, s
     return cube, said + notes(scene.radar, launched.whole, turned is not None)
 
 
+def _detected(scene: Scene, channel: Channel, cube: Cube) -> Detected:
+    """Return the map of samples, what the receiver detects in it, and how wrong it may be."""
+    radar, settings = scene.radar, scene.processing
+    rdmap = map_of(cube, radar, settings)
+    found, preview = detections_in(rdmap, radar, settings), channel.model.mode == PREVIEW
+    return rdmap, found, preview_error(rdmap, radar, settings) if preview else _error_of(channel, radar, settings)
+
+
 def _explained(
-    scene: Scene, channel: Channel, rdmap: RangeDoppler, found: Detections, receiver: Receiver, error: MapError
+    scene: Scene, channel: Channel, detected: Detected, receiver: Receiver, by_chain: Chains | None
 ) -> tuple[tuple[Explanation, ...], dict[str, Entry]]:
     """Return where each detection came from, and the ledger of what the run left out."""
     radar, settings, turned = scene.radar, scene.processing, channel.turned
+    rdmap, found, error = detected
     paths, model = channel.launched.paths, channel.model
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
 
     def explained() -> tuple[Explanation, ...]:
-        return provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths))
+        return provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths), by_chain)
 
     if model.mode == PREVIEW:
         return explained(), preview_ledger()

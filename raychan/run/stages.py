@@ -9,7 +9,7 @@ import numpy as np
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
-from raychan.run.preview import preview_rule
+from raychan.run.preview import preview_noise, preview_rule
 from raychan.run.preview_launch import preview_routes
 from raychan.run.received import received
 from raychan.run.receiver import detections_in, map_of, noise_amplitude, noise_equivalent_amplitude
@@ -68,8 +68,8 @@ def trace(
     if model.mode == PREVIEW and not check:
         rule = preview_rule(radar, settings, model)
         stats = Stats()
-        batches = tuple(preview_routes(geometry, points, rule, stats))
-        return SceneRoutes(geometry, rule, batches, stats, noise_amplitude(radar, settings))
+        batches = tuple(preview_routes(geometry, points, rule, stats, lambda batch: batch))
+        return SceneRoutes(geometry, rule, batches, stats, preview_noise(radar, settings))
     rule = (check_rule if check else fine_rule)(radar, settings, model)
     if not (check or needed(scene, model.retrace, rule.refinement.max_edge)):
         stats, launches = Stats(), list[list[Batch]]()

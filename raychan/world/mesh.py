@@ -115,14 +115,15 @@ class Mesh:
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @property
-    def planes(self) -> tuple[Floats, Floats]:
-        """A corner (f, 3) [m] of each face and its unit normal (f, 3), zero where it has no area; kept, 48 bytes a
-        face, of meshes that are small enough."""
+    def planes(self) -> tuple[Floats, Floats, Floats]:
+        """A corner (f, 3) [m] of each face, its unit normal (f, 3), zero where it has no area, and how far along it the
+        plane lies from the origin (f,) [m]; kept, 56 bytes a face, of meshes that are small enough."""
         if "planes" in self.memo:
-            kept: tuple[Floats, Floats] = self.memo["planes"]
+            kept: tuple[Floats, Floats, Floats] = self.memo["planes"]
             return kept
         corners = self.corners
-        found = np.ascontiguousarray(corners[:, 0]), planes_of(corners)[0]
+        first, normal = np.ascontiguousarray(corners[:, 0]), planes_of(corners)[0]
+        found = first, normal, np.einsum("ij,ij->i", first, normal)
         if len(corners) <= _KEPT:
             self.memo["planes"] = found
         return found

@@ -114,18 +114,25 @@ def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
     things = [b for b in bodies if b.resolved_role != MIRROR and not b.name.startswith("ego")]
     if not things:
         return ["no body is in view: the scene has none but ground and the radar's own car (bodies)"]
-    spread = [surface_sample(b) for b in things]
-    spread += [b.motion.to_world(b.target_point())[None] for b in things if b.rcs_dbsm is not None]
-    way = np.concatenate(spread) - radar.position
-    far = np.linalg.norm(way, axis=1)
-    gain = _two_way(radar, way[far > 0.0] / far[far > 0.0, None])
-    peak = float(np.max(_two_way(radar, _around() @ radar.axes.T)))
-    if not (gain > 0.0).any() and not (way @ radar.boresight > 0.0).any():
+    if unseen not in radar.kept:
+        radar.kept[unseen] = float(np.max(_two_way(radar, _around() @ radar.axes.T)))
+    peak, limit = radar.kept[unseen], radar.waveform.unambiguous_range
+    gain, nearest, ahead = 0.0, np.inf, False
+    for body in things:
+        points = surface_sample(body)
+        if body.rcs_dbsm is not None:
+            points = np.concatenate([points, body.motion.to_world(body.target_point())[None]])
+        way = points - radar.position
+        far = np.linalg.norm(way, axis=1)
+        gain = max(gain, float(_two_way(radar, way[far > 0.0] / far[far > 0.0, None]).max(initial=0.0)))
+        nearest, ahead = min(nearest, float(far.min())), ahead or bool((way @ radar.boresight > 0.0).any())
+        if gain > _BEAM * peak and nearest <= limit:
+            return []
+    if not gain > 0.0 and not ahead:
         return ["no body is in view: all are behind the antenna (radar.yaw_deg, radar.position, bodies.*.position)"]
-    if not (gain > _BEAM * peak).any():
+    if not gain > _BEAM * peak:
         return ["no body is in the beam: all are 60 dB or more under its peak (radar.yaw_deg, radar.antenna)"]
-    limit = radar.waveform.unambiguous_range
-    if far.min() > limit:
+    if nearest > limit:
         return [f"no body is within the unambiguous range of {limit:.4g} m (radar.waveform.samples, bandwidth_mhz)"]
     return []
 

@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 
 _ON = 1e-6  # m: a point nearer to a facet than this is on it
 _EDGE_ON = 1e-12  # of its distance: a point nearer to the plane of a facet lies in it
+_MAY_BE = 1e-11  # of the largest coordinates: a height that may be less than that, rounding included
 _WHOLE = 0.01  # deviation of a winding number from an integer: in an open body it is no integer
 
 
@@ -44,17 +45,19 @@ def place_of(corners: Floats, point: Floats) -> Place:
     return Place.INSIDE if abs(turns) > 0.5 and abs(turns - round(turns)) < _WHOLE else Place.OUTSIDE
 
 
-def in_plane_of(planes: tuple[Floats, Floats], point: Floats) -> int:
+def in_plane_of(planes: tuple[Floats, Floats, Floats], point: Floats) -> int:
     """Return the number of facets whose plane contains a point (3,) [m]: it sees them edge-on.
 
-    Args: planes, a corner (n, 3) [m] of each facet and its unit normal (n, 3), zero where it has no area.
+    Args: planes, a corner (n, 3) [m] of each facet, its unit normal (n, 3), zero where it has no area, and how far
+    along it the plane lies from the origin (n,) [m].
     """
-    first, normal = planes
-    off = np.asarray(point, float) - first
+    first, normal, level = planes
+    point = np.asarray(point, float)
+    # Few facets are left whose height is needed free of the rounding of large coordinates.
+    largest = np.abs(point).max() + np.abs(first).max(initial=0.0)
+    near = np.flatnonzero(np.abs(normal @ point - level) <= _MAY_BE * largest)
+    off, normal = point - first[near], normal[near]
     height = np.abs(np.einsum("ij,ij->i", off, normal))
-    # Few facets are left of which the distance is needed.
-    near = np.flatnonzero(height <= _EDGE_ON * np.abs(off).max(initial=0.0) * np.sqrt(3.0))
-    off, height, normal = off[near], height[near], normal[near]
     return int(((height <= _EDGE_ON * np.linalg.norm(off, axis=1)) & normal.any(axis=1)).sum())
 
 

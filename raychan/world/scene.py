@@ -108,8 +108,7 @@ class Scene(Fixed, Described):
 
         Raises: SceneError where file, syntax, key or value is wrong.
         """
-        text, file = scene_text(path)
-        return cls.from_text(text, file)
+        return cls.from_text(*scene_text(path))
 
     @classmethod
     def from_text(cls, text: str, path: str | Path | None = None) -> Scene:
@@ -243,16 +242,13 @@ class Scene(Fixed, Described):
         """Warnings: odd meshes, materials out of range, overlaps, bodies out of view, aliased targets."""
         said = [note for body in self.bodies for note in body.notes()]
         said += idle_keys(self._given, self.materials, self.radar_table)
-        used = {
-            m for body in self.bodies for m in body.part_materials() if isinstance(m, str) and m not in self.materials
-        }
+        used = {m for b in self.bodies for m in b.part_materials() if isinstance(m, str) and m not in self.materials}
         said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
-        opaque = [all(m.kind != LAYER for m in self._chosen(b)) for b in self.bodies]
+        opaque = [all(m.kind != LAYER for m in own) for own in self._own_materials]
         said += overlaps.overlaps(self.bodies, opaque, self._static.setdefault("overlaps", {}))
         if self.radar_table is None:
             return said
-        said += checks.edge_on(self.bodies, self.radar_table)
-        said += overlaps.unseen(self.bodies, self.radar)
+        said += checks.edge_on(self.bodies, self.radar_table) + overlaps.unseen(self.bodies, self.radar)
         return said + checks.aliases(self.bodies, self.radar_table, self.radar.waveform)
 
     def _chosen(self, body: Body) -> list[Material]:
@@ -267,9 +263,14 @@ class Scene(Fixed, Described):
         return found
 
     @cached_property
+    def _own_materials(self) -> list[list[Material]]:
+        """For each body the materials of its parts."""
+        return [self._chosen(b) for b in self.bodies]
+
+    @cached_property
     def _index(self) -> tuple[list[Material], list[str], list[tuple[Any, Any]]]:
         """All materials, all part names, and for each body the material and the part number of its parts."""
-        return index_of(self.bodies, [self._chosen(b) for b in self.bodies])
+        return index_of(self.bodies, self._own_materials)
 
     @property
     def static_geometry(self) -> StaticGeometry | None:
@@ -292,7 +293,7 @@ class Scene(Fixed, Described):
     @property
     def inner_spheres(self) -> tuple[Floats, Floats, NDArray[np.int32]]:
         """Centres (k, 3) [m], radii (k,) [m] and bodies (k,) of spheres inside bodies at time 0."""
-        return spheres_inside(self.bodies, [self._chosen(b) for b in self.bodies])
+        return spheres_inside(self.bodies, self._own_materials)
 
     def points(self, time: float = 0.0) -> Points:
         """Return the targets given by their RCS at a time [s]."""

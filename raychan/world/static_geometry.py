@@ -49,6 +49,10 @@ class StaticGeometry:
         self.rows = np.concatenate([np.zeros(0, np.int32), *self._rows.values()])
         self.small = np.flatnonzero(moving & (count < many))
         self.small_rows = np.concatenate([np.zeros(0, np.int32), *(self._rows[int(b)] for b in self.small)])
+        # First and last of the rows of neighbouring bodies that move, and where these begin among all that move.
+        ends = np.flatnonzero(np.diff(self.rows) != 1) + 1
+        begin, end = np.concatenate([[0], ends]), np.concatenate([ends, [len(self.rows)]])
+        self._runs = [(int(self.rows[i]), int(i), int(j - i)) for i, j in zip(begin, end, strict=True) if j > i]
         rest = np.ones(at[-1], bool)
         rest[self.rows] = False
         self.rest = np.flatnonzero(rest).astype(np.int32)
@@ -103,7 +107,8 @@ class StaticGeometry:
         """Return copies of the columns that are kept, with new rows for the facets that move."""
         out = tuple(s.copy() for s in self._columns[name])
         for column, part in zip(out, parts, strict=True):
-            column[self.rows] = part
+            for row, first, count in self._runs:
+                column[row : row + count] = part[first : first + count]
         return out
 
 

@@ -57,7 +57,8 @@ def test_a_body_turned_inside_out_still_has_an_inside():
 
 def test_facets_whose_plane_holds_a_point_are_counted():
     cube = box((-1, -1, -1), (1, 1, 1))
-    planes = np.array(cube.triangles)[:, 0], np.array(cube.face_normals)
+    first, normal = np.array(cube.triangles)[:, 0], np.array(cube.face_normals)
+    planes = first, normal, (first * normal).sum(axis=1)
     assert in_plane_of(planes, np.array([5.0, 1.0, 0.3])) == 2
     assert in_plane_of(planes, np.array([5.0, 1.1, 0.3])) == 0
 

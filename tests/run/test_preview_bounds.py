@@ -1,0 +1,58 @@
+"""What a preview prunes: whole facets by the bounds of the tubes that they would be, and no more than it may."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.places import SCENES
+
+import raychan as rc
+from raychan.run.preview import preview_rule
+from raychan.run.preview_bounds import facet_bounds
+from raychan.run.preview_launch import legs_over_ground, that_count
+from raychan.tracing.contributions import SHARE, Contributions
+from raychan.tracing.culling import seed_facets
+from raychan.tracing.radiation import phases_of
+from raychan.tracing.tubes import launch_tubes
+from raychan.world.geometry import geometry_of
+
+
+@pytest.mark.parametrize("name", ["urban", "living_street"])
+def test_the_bound_of_a_whole_facet_is_that_of_its_tube(name):
+    """On every leg in and out, over curved facets, metal and skin, within the beam and beside it."""
+    scene = rc.Scene.load(SCENES / f"{name}.toml").override(["model.mode=preview"])
+    geometry, rule = geometry_of(scene), preview_rule(scene.radar, scene.processing, scene.model)
+    refined = rule.refinement.for_depth(rule.bounces)
+    legs = legs_over_ground(geometry, scene.radar.position, 2, rule.beam)
+    for leg in legs:
+        allowed = np.ones(len(geometry.piece_role), bool)
+        allowed[leg.pieces(geometry)] = False
+        facet = seed_facets(geometry, leg, allowed)[::7]
+        tubes = launch_tubes(geometry, leg, facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy())
+        for out, (bound, length) in zip(
+            legs, facet_bounds(geometry, leg, legs, facet, refined.wavenumber), strict=True
+        ):
+            ph = phases_of(geometry, leg, out, tubes, refined)
+            np.testing.assert_allclose(bound, ph.bound, rtol=1e-9, atol=1e-12 * ph.bound.max())
+            np.testing.assert_allclose(length, ph.length, rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_pruned_adds_up_to_less_than_it_may_in_each_range_cell(seed):
+    """Sums over all that is pruned, in their phases and in unrelated ones, by a sum over each cell; and what alone is
+    more than that stays."""
+    rng = np.random.default_rng(seed)
+    scene = rc.Scene.load(SCENES / "urban.toml")
+    rule = replace(preview_rule(scene.radar, scene.processing, scene.model).refinement, cell=0.5)
+    found, n, weight = Contributions(rule), 4000, 2.0
+    length = rng.uniform(10.0, 14.0, n)
+    each = rule.floor * 10.0 ** rng.uniform(-5.0, 1.0, n) * np.exp(2j * np.pi * rng.random(n) * rng.integers(0, 2))
+    kept = that_count(found, each, length, weight)
+    most = SHARE * found.prune_threshold(length)
+    assert kept[weight * np.abs(each) > most].all() and 0 < kept.sum() < n
+    for cell in np.unique((length / rule.cell).astype(int)):
+        gone = ~kept & ((length / rule.cell).astype(int) == cell)
+        assert weight * abs(each[gone].sum()) <= most[0] * (1.0 + 1e-9)
+        assert weight * np.sqrt((np.abs(each[gone]) ** 2).sum()) <= most[0] * (1.0 + 1e-9)
