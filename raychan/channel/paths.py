@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.corner_places import corner_places
 from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import departures, rates, transfer
 from raychan.parallel import parallel_for
+from raychan.radar.array import reach
 from raychan.radar.dual_paths import columns_of
 from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Trajectories
 from raychan.units import C0
@@ -25,6 +27,9 @@ Floats = NDArray[np.float64]
 _SMALL = 1e-3
 """Of the noise in a map cell: by so much the samples may be off for each footprint that is long in range but is one
 path all the same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
+_TURN = 0.25
+"""rad: footprints over which the phase at the outermost elements differs by more from the centre's become one path for
+each corner. A path of its centre alone is too strong there by 1 - x^2 / 12 of such a phase x: 0.05 dB."""
 _MANY = 20_000  # trajectories from which on a second thread pays; not measured
 
 
@@ -51,11 +56,15 @@ def paths_of(
     corner = routes.lengths[:, :3]
     spans = np.maximum(np.maximum(corner[:, 0], corner[:, 1]), corner[:, 2])
     spans -= np.minimum(np.minimum(corner[:, 0], corner[:, 1]), corner[:, 2])
-    long = (routes.kind == SCATTER).any(axis=1) & (spans > APART)
+    scatters = (routes.kind == SCATTER).any(axis=1)
+    long = scatters & (spans > APART)
+    places, turn = _at_elements(routes, np.flatnonzero(scatters), facets, radar, frequency)
+    long[scatters] |= turn.max(axis=1, initial=0.0) > _TURN
     rows = np.flatnonzero(long)
+    places, turn = places[long[scatters]], turn[long[scatters]]
     corner_rate = 2.0 * corner_rates(routes, rows, facets, *speeds)
     apart = np.abs(corner[rows] - routes.length[rows, None]), np.abs(corner_rate - 2.0 * rate[rows, None])
-    split = _tells(radar, noise, np.abs(gains[rows]).max(axis=1), *apart)
+    split = _tells(radar, noise, np.abs(gains[rows]).max(axis=1), *apart, turn)
     long[rows[~split]] = False
     whole, rows, corner_rate = np.flatnonzero(~long), rows[split], corner_rate[split]
     received = {
@@ -67,23 +76,42 @@ def paths_of(
         facets,
         radar,
         length=np.concatenate([routes.length[whole], corner[rows].ravel()]),
+        aside=np.concatenate(
+            [
+                np.zeros((len(whole), *places.shape[2:]), np.float32),
+                places[split].reshape(3 * len(rows), *places.shape[2:]),
+            ]
+        ),
         **received,
         length_rate=np.concatenate([2.0 * rate[whole], corner_rate.ravel()]),
         trajectory=np.concatenate([whole, np.repeat(rows, 3)]).astype(np.int32),
     )
 
 
-def _tells(radar: Any, noise: float, size: Floats, length: Floats, rate: Floats) -> NDArray[np.bool_]:
+def _at_elements(
+    routes: Routes, rows: NDArray[np.int64], facets: Facets, radar: RadarEnds, frequency: float
+) -> tuple[NDArray[np.float32], Floats]:
+    """Return where the corners of footprints (r,) lie for elements, (r, 3, 2, 3) [m] as `corner_places` gives it, and
+    by how much (r, 3) [rad] the phase at the outermost elements differs there from the centre's; where no element
+    stands off the phase centres, (r, 3, 0, 3) and 0."""
+    far = reach(radar)
+    if not any(far):
+        return np.zeros((len(rows), 3, 0, 3), np.float32), np.zeros((len(rows), 3))
+    places, angles = corner_places(routes, rows, facets)
+    return places, 2.0 * np.pi * frequency / C0 * (angles @ np.array(far))
+
+
+def _tells(radar: Any, noise: float, size: Floats, length: Floats, rate: Floats, turned: Floats) -> NDArray[np.bool_]:
     """Tell of which footprints (r,) the corners need delays and rates of their own: what one of each, that of the
     centre, does to the samples is more than a small part of the noise.
 
     Args: noise and size (r, 3) of the corners as amplitudes; by how much their length [m] and its rate [m/s] (r, 3)
-    differ from those of the centre.
+    differ from those of the centre; turned (r, 3) [rad], by how much the phase at the outermost elements does.
     """
     if noise == 0.0:
         return np.ones(len(size), bool)
     wave = radar.waveform
-    turn = np.pi * (wave.bandwidth * length + wave.carrier * wave.frame_duration * rate) / C0
+    turn = np.pi * (wave.bandwidth * length + wave.carrier * wave.frame_duration * rate) / C0 + turned
     return np.asarray((size * np.minimum(turn, 2.0)).sum(axis=1) > _SMALL * noise)
 
 
@@ -152,12 +180,21 @@ def join(parts: Sequence[Paths], keep: Sequence[NDArray[np.bool_]] | None = None
     columns = {
         name: np.concatenate([getattr(p, name)[r] for p, r in zip(parts, some, strict=True)])
         for name in columns_of(parts[0])
+        if name != "aside"
     }
+    columns["aside"] = _asides(parts, some)
     return parts[0].rebuilt(
         **columns,
         trajectory=np.concatenate(number),
         trajectories=_joined([p.trajectories for p in parts], rows, parts[0].rx),
     )
+
+
+def _asides(parts: Sequence[Paths], some: list[Any]) -> NDArray[np.float32]:
+    """Return the column `aside` of some rows of several sets of paths; those without it lie where their centres do."""
+    held = [p.aside[r] for p, r in zip(parts, some, strict=True)]
+    ends = max(x.shape[1] for x in held)
+    return np.concatenate([x if x.shape[1] == ends else np.zeros((len(x), ends, 3), np.float32) for x in held])
 
 
 def _joined(parts: list[Trajectories], rows: list[NDArray[np.intp]], rx: Floats) -> Trajectories:
