@@ -128,9 +128,10 @@ def _pieces(noise: float, size: Floats, turned: Floats) -> NDArray[np.int64]:
 def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDArray[Any]) -> Paths:
     """Return the record of paths over routes for a radar that receives.
 
-    Args: columns of the paths: length, amplitude, cross where the radar has cross-polarised receivers, length_rate, and
-    trajectory, the number of each path's route.
+    Args: columns of the paths: length, amplitude, cross where the radar has cross-polarised receivers, length_rate,
+    trajectory, the number of each path's route, and aside, where some are of corners.
     """
+    columns.setdefault("aside", np.zeros((len(columns["length"]), 0, 3), np.float32))
     away, look = departures(routes)
     part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
     return paths_record(radar)(
