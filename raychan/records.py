@@ -148,8 +148,7 @@ class PropagationPaths(Record):
     """What all paths have, simulated or specular; a row a path, d the most interactions.
 
     `length` and `length_rate` are of the whole path from transmitter to receiver; half of them, `range` and
-    `range_rate`, is what a monostatic radar reads. Paths over the corners of one footprint share a row of
-    `trajectories`.
+    `range_rate`, is what a monostatic radar reads. Paths over corners of a footprint share a row of `trajectories`.
     """
 
     length: Floats = column("n", unit="m", doc="from transmitter to receiver, the whole path")
@@ -221,12 +220,13 @@ class Paths(PropagationPaths):
     amplitude: NDArray[np.complex128] = column(
         "n", np.complex128, doc="received over transmitted voltage wave, antennas in, carrier phase in"
     )
+    aside: NDArray[np.float32] = column("n e 3", np.float32, unit="m", doc="corner off centre, to tx and rx")
 
     @classmethod
     def of(cls, **columns: object) -> Paths:
         """Return paths of columns of which each has a row a path, those of `Trajectories` among them."""
         held: dict[str, Any] = {f.name: columns.pop(f.name) for f in fields(Trajectories)}
-        rows: dict[str, Any] = columns
+        rows: dict[str, Any] = {"aside": np.zeros((np.asarray(columns["length"]).size, 0, 3), np.float32)} | columns
         return cls(trajectory=np.arange(len(rows["length"]), dtype=np.int32), trajectories=Trajectories(**held), **rows)
 
 

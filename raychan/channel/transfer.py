@@ -9,13 +9,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.fields_along import coefficients_at, cosine, heading, incidence, over_mirrors, vec
 from raychan.compile.jit import njit
-from raychan.em.fresnel import coefficients
 from raychan.em.phase_integral import triangle_terms
 from raychan.em.physical_optics import huygens, reflected_wave, shadow_wave
-from raychan.em.polarization import reflect, transmit
 from raychan.parallel import parallel_for
-from raychan.records import POINT, TRANSMIT, Facets, Materials, Routes
+from raychan.records import LAYER, POINT, REFLECT, Facets, Materials, Routes
 from raychan.units import C0
 from raychan.vectors import copy_to, dot
 
@@ -65,7 +64,8 @@ def transfer(
     columns = (
         routes.vertices, routes.normals, routes.kind, material, routes.scatter, routes.lengths, routes.length,
         routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma, e_tx, e_rx,
-        np.zeros((len(out), 0, 3)) if elements is None else elements, out,
+        np.zeros((len(out), 0, 3)) if elements is None else elements, out, routes.points,
+        _by_corner(routes, facets, wave),
     )  # fmt: skip
 
     def some(at: slice) -> None:
@@ -79,25 +79,6 @@ def transfer(
     return out if corners else out[..., 0]
 
 
-@njit(cache=True)
-def _vec(a):  # type: ignore[no-untyped-def]
-    return a[0], a[1], a[2]
-
-
-@njit(cache=True)
-def _heading(a, b):  # type: ignore[no-untyped-def]
-    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    s = (x * x + y * y + z * z) ** 0.5
-    if s == 0.0:
-        return 1.0, 0.0, 0.0
-    return x / s, y / s, z / s
-
-
-@njit(cache=True)
-def _cosine(k, n):  # type: ignore[no-untyped-def]
-    return abs(k[0] * n[0] + k[1] * n[1] + k[2] * n[2])
-
-
 @njit(cache=True, nogil=True)
 def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-untyped-def]
     n, d = kind.shape
@@ -108,9 +89,9 @@ def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-unt
         if far:
             out, back = (-tx[0], -tx[1], -tx[2]), (-rx[0], -rx[1], -rx[2])
         elif used > 0:
-            out, back = _heading(tx, vertices[i, 0]), _heading(rx, vertices[i, used - 1])
+            out, back = heading(tx, vertices[i, 0]), heading(rx, vertices[i, used - 1])
         else:
-            out, back = _heading(tx, rx), _heading(rx, tx)
+            out, back = heading(tx, rx), heading(rx, tx)
         for c in range(3):
             away[i, c], look[i, c] = out[c], back[c]
 
@@ -118,14 +99,14 @@ def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-unt
 @njit(cache=True, nogil=True)
 def _transfer(  # type: ignore[no-untyped-def]
     ends, table, k, wave, vertices, normals, kind, material, scatter, lengths, length, taper, area, spread_in,
-    spread_out, caustics, sigma, e_tx, e_rx, elements, out,
+    spread_out, caustics, sigma, e_tx, e_rx, elements, out, points, by_corner,
 ):  # fmt: skip
     tx, rx, far = ends
     n, d = kind.shape
     ins, outs = e_tx.shape[1], e_rx.shape[1]
     terms, phases = np.empty(3, np.complex128), np.empty(6)
     arriving, leaving = np.empty((ins, 3), np.complex128), np.empty((outs, 3), np.complex128)
-    wavelength_4pi = 0.5 / k
+    wavelength_4pi, own = 0.5 / k, np.empty(0)
     for i in range(n):
         used = 0
         while used < d and kind[i, used] > 0:
@@ -134,61 +115,86 @@ def _transfer(  # type: ignore[no-untyped-def]
         # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
         k_in = (-tx[0], -tx[1], -tx[2])
         if not far:
-            k_in = _heading(tx, vertices[i, 0]) if used > 0 else _heading(tx, rx)
+            k_in = heading(tx, vertices[i, 0]) if used > 0 else heading(tx, rx)
         for p in range(ins):
             copy_to(arriving[p], e_tx[i, p])
-        k_in = _over_mirrors(
-            arriving, k_in, i, 0, at, 1, vertices, normals, kind, material, used, rx, table, k
+        k_in = over_mirrors(
+            arriving, k_in, i, 0, at, 1, vertices, normals, kind, material, used, rx, table, k, own
         )  # fmt: skip
         if at == used:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
             _couple(i, out, whole, e_rx[i], arriving)
             continue
         # Out: the receiver's field by reciprocity, over the rest of the route backwards.
-        k_out = (-rx[0], -rx[1], -rx[2]) if far else _heading(rx, vertices[i, used - 1])
+        k_out = (-rx[0], -rx[1], -rx[2]) if far else heading(rx, vertices[i, used - 1])
         for q in range(outs):
             copy_to(leaving[q], e_rx[i, q])
-        k_out = _over_mirrors(
-            leaving, k_out, i, used - 1, at, -1, vertices, normals, kind, material, used, rx, table, k
+        k_out = over_mirrors(
+            leaving, k_out, i, used - 1, at, -1, vertices, normals, kind, material, used, rx, table, k, own
         )  # fmt: skip
         if kind[i, at] == POINT:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
             whole *= (sigma[i] / (4.0 * np.pi)) ** 0.5 * spread_out[i]
             _couple(i, out, whole, leaving, arriving)
             continue
-        normal = _vec(normals[i, at])
-        ci = _coefficients(table, material[i, at], k_in, normal, k)
-        co = _coefficients(table, material[i, at], k_out, normal, k)
+        normal = vec(normals[i, at])
+        ci = coefficients_at(table, material[i, at], cosine(k_in, normal), k)
+        co = coefficients_at(table, material[i, at], cosine(k_out, normal), k)
         scale = wavelength_4pi * (-0.25j * k / np.pi) * spread_in[i] * spread_out[i]
         for _ in range(caustics[i]):
             scale *= 1j
         for c6 in range(6):
             phases[c6] = k * lengths[i, c6]
         triangle_terms(phases, _LINEAR, terms)
+        if by_corner[i]:
+            route, fields = (vertices, normals, kind, material), (e_tx, e_rx, arriving, leaving)
+            for c3 in range(3):
+                terms[c3] *= scale * area[i] * taper[i, c3]
+            _scatter_by_corner(i, out, terms, route, points[i], (tx, rx), (at, used), fields, (k_in, k_out), table, k)
+            continue
         _scatter(
             i, out, scale, terms, wave, arriving, leaving, (k_in, k_out), normal, (ci, co), area[i], taper, elements,
         )  # fmt: skip
 
 
-@njit(cache=True, forceinline=True)
-def _over_mirrors(  # type: ignore[no-untyped-def]
-    e, heading, i, first, stop, step, vertices, normals, kind, material, used, end, table, k
-):
-    """Send fields e (p, 3) of route i over mirrors and layers first, first + step, ... short of stop, in place; return
-    the direction in which they leave the last."""
-    for j in range(first, stop, step):
-        normal = _vec(normals[i, j])
-        c = _coefficients(table, material[i, j], heading, normal, k)
-        _passed(e, heading, normal, c, kind[i, j] == TRANSMIT)
-        heading = _heading(vertices[i, j], vertices[i, j + step] if j + step < used else end)
-    return heading
+def _by_corner(routes: Routes, facets: Facets, wave: int) -> NDArray[np.bool_]:
+    """Return of which routes (n,) each corner of the footprint has Fresnel coefficients of its own, for the ray that
+    leads to it: of those over layers and plane mirrors. In a layer waves interfere, and it turns quickly with angle."""
+    n, layer = len(routes.kind), facets.materials.kind == LAYER
+    if wave != HUYGENS or routes.far or not layer.any():
+        return np.zeros(n, bool)
+    met, at = routes.kind > 0, np.maximum(routes.facet, 0)
+    curved = (facets.normals != facets.normals[:, :1]).any(axis=(1, 2))
+    over = (met & layer[facets.material[at]]).any(axis=1)
+    return np.asarray(over & ~((routes.kind == REFLECT) & curved[at]).any(axis=1))
 
 
-@njit(cache=True, forceinline=True)
-def _coefficients(table, row, heading, normal, k):  # type: ignore[no-untyped-def]
-    """Return the Fresnel coefficients of a material for a wave that arrives along `heading`."""
-    kind, eps, thickness, roughness = table
-    return coefficients(kind[row], eps[row], thickness[row], roughness[row], _cosine(heading, normal), k)
+@njit(cache=True, nogil=True)
+def _scatter_by_corner(i, out, terms, route, points, ends, slots, fields, arrives, table, k):  # type: ignore[no-untyped-def]
+    """Add to gains (n, q, p, 1 or 3) of route i what its footprint scatters, each of its three terms with the currents
+    that the wave has by the Fresnel coefficients of the ray to its corner; directions are those of the centre."""
+    (vertices, normals, kind, material), (tx, rx), (at, used) = route, ends, slots
+    (e_tx, e_rx, arriving, leaving), (k_in, k_out) = fields, arrives
+    cosines, normal = np.empty(kind.shape[1]), vec(normals[i, at])
+    for c3 in range(3):
+        here = vec(points[c3])
+        c_in = cosine(incidence(here, tx, i, 0, at, 1, vertices, normals, kind, cosines), normal)
+        c_out = cosine(incidence(here, rx, i, used - 1, at, -1, vertices, normals, kind, cosines), normal)
+        arriving[:], leaving[:] = e_tx[i], e_rx[i]
+        over_mirrors(
+            arriving, heading(tx, vertices[i, 0]), i, 0, at, 1, vertices, normals, kind, material, used, rx, table, k,
+            cosines,
+        )  # fmt: skip
+        over_mirrors(
+            leaving, heading(rx, vertices[i, used - 1]), i, used - 1, at, -1, vertices, normals, kind, material, used,
+            rx, table, k, cosines,
+        )  # fmt: skip
+        ci, co = coefficients_at(table, material[i, at], c_in, k), coefficients_at(table, material[i, at], c_out, k)
+        for p in range(len(arriving)):
+            for q in range(len(leaving)):
+                e, g = vec(arriving[p]), vec(leaving[q])
+                couple = huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
+                out[i, q, p, c3 if out.shape[3] == 3 else 0] += couple * terms[c3]
 
 
 @njit(cache=True, forceinline=True)
@@ -196,7 +202,7 @@ def _couple(i, out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
     """Write gains (n, q, p, ...) of route i without a footprint: fields arriving (p, 3) onto receiving (q, 3)."""
     for p in range(len(arriving)):
         for q in range(len(receiving)):
-            out[i, q, p, 0] = whole * dot(_vec(receiving[q]), _vec(arriving[p]))
+            out[i, q, p, 0] = whole * dot(vec(receiving[q]), vec(arriving[p]))
 
 
 @njit(cache=True, forceinline=True)
@@ -214,25 +220,17 @@ def _scatter(  # type: ignore[no-untyped-def]
     to, mean = (-k_out[0], -k_out[1], -k_out[2]), 0j
     for p in range(len(arriving)):
         for q in range(len(leaving)):
-            e, g = _vec(arriving[p]), _vec(leaving[q])
+            e, g = vec(arriving[p]), vec(leaving[q])
             if wave == HUYGENS:
                 mean = area * huygens(e, k_in, g, k_out, normal, (ci[0], ci[1]), (co[0], co[1]))
             for c3 in range(3):
                 if wave == HUYGENS:
                     couple = mean * taper[i, c3]
                 elif wave == REFLECTED:
-                    couple = reflected_wave(e, k_in, to, _vec(elements[i, c3]), ci[0], ci[1], g)
+                    couple = reflected_wave(e, k_in, to, vec(elements[i, c3]), ci[0], ci[1], g)
                 else:
-                    couple = shadow_wave(e, k_in, to, _vec(elements[i, c3]), ci[2], ci[3], g)
+                    couple = shadow_wave(e, k_in, to, vec(elements[i, c3]), ci[2], ci[3], g)
                 out[i, q, p, c3 if apart else 0] += scale * couple * terms[c3]
-
-
-@njit(cache=True, forceinline=True)
-def _passed(e, k, normal, c, through):  # type: ignore[no-untyped-def]
-    """Send fields e (p, 3) that travel along k through a layer or off a mirror, in place."""
-    for p in range(len(e)):
-        after = transmit(_vec(e[p]), k, normal, c[2], c[3]) if through else reflect(_vec(e[p]), k, normal, c[0], c[1])
-        e[p, 0], e[p, 1], e[p, 2] = after
 
 
 def rates(routes: Routes, facets: Facets, tx_velocity: Floats, rx_velocity: Floats) -> Floats:
@@ -269,7 +267,7 @@ def _rates(  # type: ignore[no-untyped-def]
                 w[0] = velocity[b, 0] + s[1] * (y[2] - o[2]) - s[2] * (y[1] - o[1])
                 w[1] = velocity[b, 1] + s[2] * (y[0] - o[0]) - s[0] * (y[2] - o[2])
                 w[2] = velocity[b, 2] + s[0] * (y[1] - o[1]) - s[1] * (y[0] - o[0])
-            k = _heading(x, y)
+            k = heading(x, y)
             total += (w[0] - v[0]) * k[0] + (w[1] - v[1]) * k[1] + (w[2] - v[2]) * k[2]
             if last:
                 break

@@ -127,6 +127,14 @@ class Transmission:
         return Transmission(self.offset, (self.first - chirp) % self.step, self.step, self.turn)
 
 
+def reach(radar: Any) -> tuple[float, float]:
+    """Return how far [m] the transmitters and the receivers of a radar stand off its phase centres, at most."""
+    tx = [one.offset for one in getattr(radar, "transmissions", ())]
+    each = np.reshape(tx, (-1, 3)), np.reshape(getattr(radar, "elements_world", ()), (-1, 3))
+    sent, heard = (float(np.linalg.norm(x, axis=1).max(initial=0.0)) for x in each)
+    return sent, heard
+
+
 def excess(radius: Floats, look: Floats, offset: Floats) -> Floats:
     """Return how much longer (n,) [m] the way to spherical waves' sources is from `offset` (3,) [m] than from 0.
 
@@ -161,6 +169,16 @@ class Wavefronts:
         return Wavefronts(
             self.arrival[rows], self.radius[rows], self.departure[rows], self.tx_radius[rows], self.bare[rows]
         )
+
+    def moved(self, rows: NDArray[np.int64], aside: Floats) -> Wavefronts:
+        """Return the waves of which those in rows (r,) come from elsewhere: by `aside` (r, 2, 3) [m], seen from the
+        transmitter and from the receiver."""
+        looks, radii = (self.departure.copy(), self.arrival.copy()), (self.tx_radius.copy(), self.radius.copy())
+        for end, (look, radius) in enumerate(zip(looks, radii, strict=True)):
+            source = look[rows] * radius[rows, None] + aside[:, end]
+            radius[rows] = np.linalg.norm(source, axis=1)
+            look[rows] = source / np.maximum(radius[rows], 1e-300)[:, None]
+        return Wavefronts(looks[1], radii[1], looks[0], radii[0], self.bare)
 
     def longer(self, tx: Floats, rx: Floats) -> Floats:
         """Return how much longer (n,) [m] paths are between elements at tx and rx (3,) [m] off the phase centres."""

@@ -26,7 +26,7 @@ def amplitudes_of(paths: Paths) -> tuple[str, ...]:
 
 def columns_of(paths: Paths) -> tuple[str, ...]:
     """Return the names of the columns of numbers that have a row a path."""
-    return "length", "length_rate", *amplitudes_of(paths)
+    return "length", "length_rate", "aside", *amplitudes_of(paths)
 
 
 def scaled(paths: Paths, factor: NDArray[Any]) -> Paths:

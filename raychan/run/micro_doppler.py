@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from raychan.channel.paths import join
 from raychan.channel.slow_time import Poses, strengths
-from raychan.channel.transfer import departures
 from raychan.columns import take
-from raychan.radar.array import Transmission, Wavefronts, wavefronts
+from raychan.radar.array import Transmission
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.between_chirps import carried_between
-from raychan.run.segments import Keyframe, Retraced, Segment, Traced, echoes, joined, reach
+from raychan.run.segments import Keyframe, PartFronts, Retraced, Segment, Traced, echoes, joined, reach
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, check_radar
 from raychan.signal.baseband import synthesize
@@ -85,13 +84,6 @@ def stretches(
         part, first = work.segment(before, key), min(before.chirp, 1)
         yield part.blend().sum(axis=0)[:, first:], part.error().sum(axis=0)[:, first:]
         before = key
-
-
-def fronts_of_routes(routes: Routes) -> Wavefronts:
-    """Return the spherical waves of routes at both ends."""
-    ends = (np.broadcast_to(x, (len(routes.kind), 1, 3)) for x in (routes.tx, routes.rx))
-    stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
-    return wavefronts(stops, routes.scatter, *departures(routes), routes.length)
 
 
 class _Frame:
@@ -181,6 +173,7 @@ class _Frame:
             now,
             routes,
             tuple(strengths(r, geometry.facets, now.radar, carrier) for r in routes),
+            tuple(PartFronts.of(r, geometry.facets) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
         )
 
@@ -201,8 +194,7 @@ class _Frame:
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
         out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples
-        for routes, strength in zip(key.routes, key.strengths, strict=True):
-            fronts = fronts_of_routes(routes)
+        for routes, strength, fronts in zip(key.routes, key.strengths, key.fronts, strict=True):
             for start in range(first, last + 1, _AT_ONCE):
                 count = min(_AT_ONCE, last + 1 - start)
                 # One instant more than chirps: the rate is the change from chirp to chirp.
@@ -216,16 +208,17 @@ class _Frame:
         return out
 
     def add_ramps(
-        self, out: Samples, start: int, sent: Transmission, lengths: Floats, amplitudes: Complexes, fronts: Wavefronts
+        self, out: Samples, start: int, sent: Transmission, lengths: Floats, amplitudes: Complexes, fronts: PartFronts
     ) -> None:
         """Add to samples (antenna, chirp, sample) from chirp number `start` on what one transmitter brings over parts
         (chirp + 1, n, 3) of routes of these lengths [m]."""
         wave, chirps = self.radar.waveform, slice(sent.since(start).first, None, sent.step)
         code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
+        split = np.asarray((amplitudes[:, :, 1:] != 0.0).any(axis=(0, 2)))
         for layer, element in zip(out, self.radar.elements_world, strict=True):
-            longer = fronts.longer(sent.offset, element)
+            longer = fronts.longer(sent.offset, element, split)
             turn = np.sqrt(self.radar.power) * np.exp(-2j * np.pi / wave.wavelength * longer)
-            brought = self.ramps(lengths + longer[:, None], amplitudes * turn[:, None], chirps)
+            brought = self.ramps(lengths + longer, amplitudes * turn, chirps)
             layer[chirps] += brought if sent.turn == 0.0 else brought * code
 
     def ramps(self, lengths: Floats, amplitudes: Complexes, chirps: slice) -> Samples:

@@ -41,6 +41,7 @@ _AXES = {
     "p": "peak",
     "d": "vertex",
     "b": "azimuth",
+    "e": "end",
 }
 _ROWS = {"paths": "path", "detections": "detection"}
 _CALLED = {"rate": "range_rate", "true_rate": "true_range_rate"}
@@ -73,6 +74,7 @@ _COMMENTS = {
     "vertices": "places of the interactions, without tx and rx; unused slots repeat rx",
     "body": "row of the attribute body_names; -1 in unused slots",
     "part": "row of the attribute part_names; -1 in unused slots",
+    "aside": "image of a footprint's corner minus that of its centre, as the transmitter and as the receiver sees it",
 }
 _SCALARS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_resolution": "m s-1"} | {
     "unambiguous_range": "m",
@@ -113,6 +115,8 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
             kind = DualPaths
         for f in columns(kind):
             name = _CALLED.get(f.name, f.name)
+            if name == "aside" and name not in data:
+                continue  # a radar without an array, or an older file
             if name not in data and issubclass(kind, Paths) and name in _FORMER:
                 former, factor = _FORMER[name]
                 values[f.name] = factor * data[former].values
@@ -148,6 +152,8 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
     for f in columns(type(record)):
         value = record.trajectories.vertices[record.trajectory] if f.name == "vertices" else getattr(record, f.name)
         if "axes" in f.metadata:
+            if f.name == "aside" and not value.size:
+                continue
             if f.name == "cell":  # a column each, so that a table of detections has a row each
                 for k, axis in enumerate(_CELL):
                     about = {"units": "1", "long_name": f"index of the peak along {axis.split('_')[0]}"}

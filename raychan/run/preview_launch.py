@@ -21,7 +21,8 @@ from raychan.run.preview_bounds import facet_bounds
 from raychan.tracing.contributions import SHARE, Contributions, amplitudes
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.launch import write_leg
-from raychan.tracing.legs import Leg, Mirror, View, reachable
+from raychan.tracing.legs import Leg, View, reachable
+from raychan.tracing.mirrors import Mirror
 from raychan.tracing.radiation import FACING, Phases, phases_of, radiating
 from raychan.tracing.routes import routes_of
 from raychan.tracing.settings import PruneRule

@@ -1,7 +1,7 @@
 """Elements of an array at which levels are followed while a launch is refined.
 
-A tube reaches all elements from one place. Where it is large and near, that place, and so the phase across the array,
-is known less well than the level at the phase centre.
+A tube's corners, or its centre, reach all elements each from one place. Where a tube is large and near, the phase
+across the array is known less well than the level at the phase centre.
 """
 
 from __future__ import annotations

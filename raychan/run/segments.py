@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import Cube, DiffractedRoutes, Paths, Routes
+from raychan.channel.corner_places import corner_places
+from raychan.channel.transfer import departures
+from raychan.radar.array import Wavefronts, wavefronts
+from raychan.records import SCATTER, Cube, DiffractedRoutes, Facets, Paths, Routes
 from raychan.units import C0
 from raychan.world.scene import Scene
 
@@ -56,13 +59,41 @@ class Traced:
 
 
 @dataclass(frozen=True)
+class PartFronts:
+    """The waves of routes at both ends: of each whole (n,), and of its corners (3 n,)."""
+
+    whole: Wavefronts
+    corners: Wavefronts
+
+    @staticmethod
+    def of(routes: Routes, facets: Facets) -> PartFronts:
+        """Return the waves of routes; those without a footprint have the same at all corners."""
+        n = len(routes.kind)
+        ends = (np.broadcast_to(x, (n, 1, 3)) for x in (routes.tx, routes.rx))
+        stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
+        whole = wavefronts(stops, routes.scatter, *departures(routes), routes.length)
+        rows = np.flatnonzero((routes.kind == SCATTER).any(axis=1))
+        places = corner_places(routes, rows, facets)[0].reshape(-1, 2, 3).astype(float)
+        parts = (3 * rows[:, None] + np.arange(3)).ravel()
+        return PartFronts(whole, whole[np.repeat(np.arange(n), 3)].moved(parts, places))
+
+    def longer(self, tx: Floats, rx: Floats, split: NDArray[np.bool_]) -> Floats:
+        """Return how much longer (n, 3) [m] the parts are between elements at tx and rx (3,) [m] off the phase centres,
+        of routes of which some (n,) are `split` into their corners."""
+        corners = self.corners.longer(tx, rx).reshape(-1, 3)
+        return np.where(split[:, None], corners, self.whole.longer(tx, rx)[:, None])
+
+
+@dataclass(frozen=True)
 class Keyframe:
-    """One tracing at a chirp: the routes that meet turning bodies, with their strengths, and the paths that do not."""
+    """One tracing at a chirp: the routes that meet turning bodies, with their strengths and waves, and the other
+    paths."""
 
     chirp: int
     scene: Scene
     routes: tuple[Routes, ...]
     strengths: tuple[Complexes, ...]
+    fronts: tuple[PartFronts, ...]
     others: Paths
 
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from raychan.channel.transfer import departures, rates, transfer
 from raychan.poses import theta_phi
 from raychan.records import NONE, REFLECT, TRANSMIT, ExactTrajectories, Facets, Routes, SpecularPaths
-from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.legs import Leg
+from raychan.tracing.mirrors import Mirror
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.world.geometry import Geometry
 from raychan.world.point_in_body import Place, place_of

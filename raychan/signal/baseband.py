@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.parallel import threads
-from raychan.radar.array import Wavefronts, wavefronts
+from raychan.radar.array import Wavefronts, reach, wavefronts
 from raychan.radar.dual_paths import DualPaths
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform, Waveform
@@ -82,7 +82,7 @@ def synthesize(
 
 def stand_apart(radar: Radar) -> bool:
     """Tell whether elements stand off the radar's place, so that samples depend on where paths scatter."""
-    return bool(radar.elements_world.any() or any(one.offset.any() for one in radar.transmissions))
+    return any(reach(radar))
 
 
 def fronts_of(paths: Paths) -> Wavefronts:
@@ -95,7 +95,9 @@ def fronts_of(paths: Paths) -> Wavefronts:
     length = np.zeros(len(at))
     length[paths.trajectory] = paths.length
     fronts = wavefronts(stops, scatterer, np.asarray(met.departure, float), met.arrival, length)
-    return fronts[paths.trajectory]
+    every = fronts[paths.trajectory]
+    corners = np.flatnonzero(paths.aside.any(axis=(1, 2)))
+    return every.moved(corners, paths.aside[corners].astype(float)) if len(corners) else every
 
 
 def _fill(

@@ -20,7 +20,8 @@ from raychan.study.cases import Street
 from raychan.study.methods import ADAPTIVE, MIRRORS, POINT, POINTS, UNIFORM, Run, mean_rcs
 from raychan.study.ray_lattice import Echo, Window, echoes
 from raychan.study.specular_points import specular_points
-from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.legs import Leg
+from raychan.tracing.mirrors import Mirror
 from raychan.tracing.settings import refinement
 from raychan.units import C0
 from raychan.world.geometry import Geometry

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import MIRROR
-from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.legs import Leg
+from raychan.tracing.mirrors import Mirror
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,8 @@ from raychan.poses import theta_phi
 from raychan.run.rcs import rcs
 from raychan.run.rcs_refinement import refinements
 from raychan.run.single_body import facets_of
-from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.legs import Leg
+from raychan.tracing.mirrors import Mirror
 from raychan.tracing.shooting import tube_routes
 from raychan.world.geometry import Geometry
 

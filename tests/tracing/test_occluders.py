@@ -13,7 +13,8 @@ from raychan.geometry.closed_surfaces import clearance, winding
 from raychan.records import LAYER
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
-from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.legs import Leg
+from raychan.tracing.mirrors import Mirror
 from raychan.tracing.occluders import HidingSpheres, Occluders
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.shapes import build

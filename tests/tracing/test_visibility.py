@@ -8,7 +8,8 @@ import trimesh
 from support.facets import facets, ground, quad
 
 from raychan.geometry.lit_parts import lit_parts
-from raychan.tracing.legs import Leg, Mirror
+from raychan.tracing.legs import Leg
+from raychan.tracing.mirrors import Mirror
 from raychan.tracing.shadow_edges import shadow_edges_of
 from raychan.tracing.tubes import Refinement, launch_tubes
 from raychan.tracing.visibility import tube_visibility
