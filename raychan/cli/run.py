@@ -125,6 +125,7 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
 def _sequence(
     scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
 ) -> None:
+    from raychan.parallel import was_interrupted
     from raychan.run.messages import findings, marks
     from raychan.run.sequence import Store, frames
 
@@ -146,7 +147,9 @@ def _sequence(
                 plural = "" if found == 1 else "s"
                 marked = marks(frame.result.detections)
                 screen.print(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}{marked}  in {took:.2f} s")
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as stop:
+        if not (isinstance(stop, KeyboardInterrupt) or was_interrupted(stop)):
+            raise
         done = f"{store.count} of {count} frames are in {out}" if store.count else "nothing was written"
         raise show.Interrupted(f"interrupted; {done}") from None
     took = perf_counter() - start

@@ -16,7 +16,7 @@ from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.body import MeshLike
 from raychan.world.geometry import Geometry
-from raychan.world.limits import BOUNCES, CREASE, FREQUENCY, LENGTH, TOLERANCE_DB
+from raychan.world.limits import BOUNCES, CREASE, FREQUENCY, LENGTH, RAYS, TOLERANCE_DB
 from raychan.world.material import Material
 from raychan.world.point_in_body import refuse_within
 from raychan.world.simplified import traced_alone
@@ -89,11 +89,8 @@ def rcs(
         raise ValueError(f"rx_distance = {rx_distance!r} m: must be above 0, and inf where distance is")
     rx_az = azimuth_deg if rx_azimuth_deg is None else rx_azimuth_deg
     rx_el = elevation_deg if rx_elevation_deg is None else rx_elevation_deg
-    angles = np.broadcast_arrays(
-        *(np.radians(np.asarray(a, float)) for a in (azimuth_deg, elevation_deg, rx_az, rx_el))
-    )
-    if not all(np.isfinite(a).all() for a in angles):
-        raise ValueError("angles must be finite numbers of degrees")
+    RAYS.check("max_rays", max_rays, whole=True)
+    angles = _angles(azimuth_deg, elevation_deg, rx_az, rx_el)
     k = 2.0 * np.pi * frequency / C0
     body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None)
     topology = [body.mesh.topology] if body.merged else []
@@ -109,6 +106,18 @@ def rcs(
                 refuse_within(geometry.facets.vertices, end.end, "radar")
         found.append(refined(Case(geometry, other, leg, out, frequency, max_bounces, tolerance_db, max_rays, row, col)))
     return _collected(found, angles[0].shape, str(body.merged or ""))
+
+
+def _angles(*given: ArrayLike) -> list[Floats]:
+    """Return angles [rad] of the same shape. Raises: ValueError where there are none, or their shapes do not fit."""
+    each = [np.radians(np.asarray(a, float)) for a in given]
+    if not all(a.size and np.isfinite(a).all() for a in each):
+        raise ValueError("angles must be finite numbers of degrees, one at least")
+    try:
+        return list(np.broadcast_arrays(*each))
+    except ValueError:
+        shapes = ", ".join(dict.fromkeys(str(a.shape) for a in each))
+        raise ValueError(f"angles of shapes {shapes}: must be of one shape, or single numbers") from None
 
 
 def _collected(found: list[Value], shape: tuple[int, ...], merged: str) -> Rcs:

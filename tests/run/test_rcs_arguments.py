@@ -1,0 +1,27 @@
+"""Arguments of `rcs` that cannot be are refused in words that name them."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import raychan as rc
+
+PLATE = trimesh.creation.box((0.01, 0.3, 0.3))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"azimuth_deg": []}, "angles must be finite numbers of degrees, one at least"),
+        ({"azimuth_deg": [0.0, np.nan]}, "angles must be finite numbers of degrees, one at least"),
+        (
+            {"azimuth_deg": [0.0, 1.0, 2.0], "elevation_deg": [0.0, 1.0]},
+            r"angles of shapes \(3,\), \(2,\): must be of one shape",
+        ),
+        ({"azimuth_deg": 0.0, "max_rays": 0}, "max_rays"),
+        ({"azimuth_deg": 0.0, "max_rays": 10.5}, "max_rays"),
+    ],
+)
+def test_what_cannot_be_is_refused(given, said):
+    with pytest.raises(ValueError, match=said):
+        rc.rcs(PLATE, 77e9, **given)
