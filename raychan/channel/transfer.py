@@ -163,10 +163,13 @@ def _by_corner(routes: Routes, facets: Facets, wave: int) -> NDArray[np.bool_]:
     n, layer = len(routes.kind), facets.materials.kind == LAYER
     if wave != HUYGENS or routes.far or not layer.any():
         return np.zeros(n, bool)
-    met, at = routes.kind > 0, np.maximum(routes.facet, 0)
-    curved = (facets.normals != facets.normals[:, :1]).any(axis=(1, 2))
-    over = (met & layer[facets.material[at]]).any(axis=1)
-    return np.asarray(over & ~((routes.kind == REFLECT) & curved[at]).any(axis=1))
+    at = np.maximum(routes.facet, 0)
+    over = ((routes.kind > 0) & layer[facets.material[at]]).any(axis=1)
+    rows = np.flatnonzero(over)
+    normals = facets.normals[at[rows]]
+    curved = (normals != normals[:, :, :1]).any(axis=(2, 3))
+    over[rows] = ~((routes.kind[rows] == REFLECT) & curved).any(axis=1)
+    return np.asarray(over)
 
 
 @njit(cache=True, nogil=True)

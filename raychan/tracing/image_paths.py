@@ -100,19 +100,38 @@ def _clipped(left, count, toward, least, other):  # type: ignore[no-untyped-def]
     return k
 
 
+@njit(cache=True, forceinline=True)
+def _beyond_one(corners, image, at, normal, windows):  # type: ignore[no-untyped-def]
+    """Tell whether all corners of a triangle lie behind the last mirror, or beyond one of the planes of its windows."""
+    for k in range(-1, len(windows)):
+        n, base = (normal, at) if k < 0 else (windows[k], image)
+        out = True
+        for q in range(3):
+            out = out and dot(n, corners[q]) - dot(n, base) < -_BEYOND
+        if out:
+            return True
+    return False
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def may_leave(corners, images, at, normal, low, high, axes):  # type: ignore[no-untyped-def]
+def may_leave(corners, images, at, normal, low, high, axes, windows):  # type: ignore[no-untyped-def]
     """Tell of which triangles of corners (n, 3 or more, 3) [m] a ray may come to the end over the mirrors: of what lies
     in front of each mirror, and whose rays meet the rectangle about it, something is left.
 
-    Args: low, high (m, 2) [m] ends of the rectangles along their axes (m, 2, 3).
+    Args: low, high (m, 2) [m] ends of the rectangles along their axes (m, 2, 3); windows (k, 3) normals of the planes
+    through the image between which all rays run, inward.
     """
     m = len(at)
     ok = np.empty(len(corners), np.bool_)
     left, other = np.empty((2, 3 + 5 * m, 3))
     for i in range(len(corners)):
+        # Most lie beyond one of the planes.
+        ok[i] = not _beyond_one(corners[i], images[m], at[m - 1], normal[m - 1], windows)
+        if not ok[i]:
+            continue
         count = 3
-        left[:3] = corners[i, :3]
+        for q in range(3):
+            copy_to(left[q], corners[i, q])
         for j in range(m - 1, -1, -1):
             count = _clipped(left, count, normal[j], dot(at[j], normal[j]), other) if count else 0
             for q in range(count):

@@ -107,13 +107,14 @@ class Leg:
 
     @cached_property
     def windows(self) -> Floats:
-        """Normals (k, 3) of the planes through the image and the sides of the rectangles about the mirrors: all rays
-        over the mirrors run between them."""
+        """Normals (k, 3), inward, of the planes through the image and the sides of the rectangles about the mirrors:
+        all rays over the mirrors run between them."""
         found = np.zeros((0, 3))
         for m in self.mirrors:
             found = found - 2.0 * np.outer(found @ m.normal, m.normal)
             to = m.corners - self._chain[0][1 + len(found) // 4]
             sides = np.cross(to, np.roll(to, -1, axis=0))
+            sides *= np.sign(sides @ to.mean(axis=0))[:, None]
             found = np.concatenate([found, sides / np.linalg.norm(sides, axis=1)[:, None]])
         return found
 
@@ -160,7 +161,7 @@ class Leg:
     def may_leave(self, points: Floats) -> Bools:
         """Tell from which triangles of corners (n, 3 or more, 3) [m] a ray may come to the end, and to which from it,
         over the rectangle about each mirror."""
-        ok: Bools = may_leave(points, *self._chain[:3], *self._rectangles)
+        ok: Bools = may_leave(points, *self._chain[:3], *self._rectangles, self.windows)
         return ok
 
     def visible(
