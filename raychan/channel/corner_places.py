@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.fields_along import mirrored, vec
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
 from raychan.records import REFLECT, Facets, Routes
-from raychan.vectors import dot
+from raychan.vectors import cross, dot
 
 Floats = NDArray[np.float64]
 
@@ -45,11 +46,6 @@ def corner_places(routes: Routes, rows: NDArray[np.int64], facets: Facets) -> tu
 
 
 @njit(cache=True, forceinline=True)
-def _vec(a):  # type: ignore[no-untyped-def]
-    return a[0], a[1], a[2]
-
-
-@njit(cache=True, forceinline=True)
 def _less(a, b):  # type: ignore[no-untyped-def]
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
@@ -58,11 +54,6 @@ def _less(a, b):  # type: ignore[no-untyped-def]
 def _plus(a, s, b):  # type: ignore[no-untyped-def]
     """Return a + s b."""
     return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
-
-
-@njit(cache=True, forceinline=True)
-def _cross(a, b):  # type: ignore[no-untyped-def]
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True, forceinline=True)
@@ -86,12 +77,12 @@ def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[n
     """Write places (3, 2, 3) [m] and angles (3, 2) [rad] of route i as seen from one end."""
     vertices, normals, kind, facet, scatter, points, _ = routes
     d, at, step = kind.shape[1], scatter[i], 1 if end == 1 else -1
-    centre, here = _vec(vertices[i, at]), _vec(vertices[i, at])
+    centre, here = vec(vertices[i, at]), vec(vertices[i, at])
     # The way from the centre to the end: its length, its first and last stretch, and whether a mirror is curved.
     first, last, far, bent, j = (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0, False, at + step
     while True:
         over = j < 0 or j == d or kind[i, j] == 0
-        there = _vec(ends[end]) if over else _vec(vertices[i, j])
+        there = vec(ends[end]) if over else vec(vertices[i, j])
         stretch = _less(there, here)
         size = max(dot(stretch, stretch) ** 0.5, 1e-300)
         far += size
@@ -103,7 +94,7 @@ def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[n
         bent |= kind[i, j] == _REFLECT and facet[i, j] >= 0 and _curved(surface[1][facet[i, j]])
         here, j = there, j + step
     for c in range(3):
-        off = _less(_vec(points[i, c]), centre)
+        off = _less(vec(points[i, c]), centre)
         if bent and end == 0:
             source = _leaving_to(i, c, first, ends, routes, surface)
             off = _plus(source, far, last)
@@ -112,7 +103,7 @@ def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[n
             aside = _plus(off, -dot(off, first), first)
             for m in range(at + step, j, step):
                 if kind[i, m] == _REFLECT:
-                    n = _vec(normals[i, m])
+                    n = vec(normals[i, m])
                     off = _plus(off, -2.0 * dot(off, n), n)
         angles[c, end] = dot(aside, aside) ** 0.5 / far
         for x in range(3):
@@ -132,14 +123,14 @@ def _leaving_to(i, c, back, ends, routes, surface):  # type: ignore[no-untyped-d
     for j in range(scatter[i] - 1, -1, -1):
         if kind[i, j] != _REFLECT:
             continue
-        n, vertex = _vec(normals[i, j]), _vec(vertices[i, j])
+        n, vertex = vec(normals[i, j]), vec(vertices[i, j])
         steep = dot(k, n)
         if abs(steep) > _GRAZING:
             here = _plus(here, -dot(_less(here, vertex), n) / steep, k)
         if facet[i, j] >= 0:
             n = _normal_at(here, vertex, n, surface[0][facet[i, j]], surface[1][facet[i, j]])
         k = _plus(k, -2.0 * dot(k, n), n)
-    ray = _less(here, _vec(ends[0]))
+    ray = _less(here, vec(ends[0]))
     size = length / max(dot(ray, ray) ** 0.5, 1e-300)
     return ray[0] * size, ray[1] * size, ray[2] * size
 
@@ -152,32 +143,31 @@ def _arriving(i, c, back, rx, routes):  # type: ignore[no-untyped-def]
     It follows from the total lengths through corners and middles of edges, on which it is quadratic.
     """
     vertices, normals, kind, _, scatter, points, lengths = routes
-    image, m = _vec(rx), kind.shape[1] - 1
+    image, m = vec(rx), kind.shape[1] - 1
     while m > scatter[i]:
         if kind[i, m] == _REFLECT:
-            n = _vec(normals[i, m])
-            image = _plus(image, -2.0 * dot(_less(image, _vec(vertices[i, m])), n), n)
+            image = mirrored(image, vec(vertices[i, m]), vec(normals[i, m]))
         m -= 1
-    here = _vec(points[i, c])
+    here = vec(points[i, c])
     way = _less(here, image)
     length = lengths[i, c] - dot(way, way) ** 0.5
     slopes, edges = (0.0, 0.0), (way, way)
     for e in range(2):
         corner, middle = (c + 1 + e) % 3, 3 + (c if e == 0 else (c + 2) % 3)
-        way = _less(_vec(points[i, corner]), image)
+        way = _less(vec(points[i, corner]), image)
         there = lengths[i, corner] - dot(way, way) ** 0.5
-        way = _less(_vec(points[i, middle]), image)
+        way = _less(vec(points[i, middle]), image)
         slope = 4.0 * (lengths[i, middle] - dot(way, way) ** 0.5) - 3.0 * length - there
-        edge = _less(_vec(points[i, corner]), here)
+        edge = _less(vec(points[i, corner]), here)
         slopes, edges = (slopes[1], slope), (edges[1], edge)
     a, b = edges
-    n = _cross(a, b)
+    n = cross(a, b)
     square = dot(n, n)
     k = -back[0], -back[1], -back[2]
     if square > _SLIVER * dot(a, a) * dot(b, b):
         # The vector in the plane of a and b with these slopes along them, and what it lacks to 1 across.
-        flat = _plus((0.0, 0.0, 0.0), slopes[0] / square, _cross(b, n))
-        flat = _plus(flat, slopes[1] / square, _cross(n, a))
+        flat = _plus((0.0, 0.0, 0.0), slopes[0] / square, cross(b, n))
+        flat = _plus(flat, slopes[1] / square, cross(n, a))
         across = (max(1.0 - dot(flat, flat), 0.0) / square) ** 0.5
         k = _plus(flat, across if dot(k, n) > 0.0 else -across, n)
     else:
@@ -191,11 +181,11 @@ def _normal_at(here, vertex, normal, v, n):  # type: ignore[no-untyped-def]
     """Return the unit normal at a point beside a vertex, where it is `normal`, of a facet with corners v (3, 3) [m] and
     normals n (3, 3) there."""
     a, b = _less(v[1], v[0]), _less(v[2], v[0])
-    flat = _cross(a, b)
+    flat = cross(a, b)
     square = max(dot(flat, flat), 1e-300)
     off = _less(here, vertex)
-    s, t = dot(_cross(off, b), flat) / square, dot(_cross(a, off), flat) / square
-    side = 1.0 if dot(normal, _vec(n[0])) > 0.0 else -1.0
+    s, t = dot(cross(off, b), flat) / square, dot(cross(a, off), flat) / square
+    side = 1.0 if dot(normal, vec(n[0])) > 0.0 else -1.0
     turned = _plus(normal, side * s, _less(n[1], n[0]))
     turned = _plus(turned, side * t, _less(n[2], n[0]))
     size = max(dot(turned, turned) ** 0.5, 1e-300)

@@ -16,7 +16,7 @@ from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.pieces import Split, parts_of
 from raychan.channel.slow_time import APART, corner_rates
-from raychan.channel.transfer import departures, rates, transfer
+from raychan.channel.transfer import corner_gains, departures, rates
 from raychan.parallel import parallel_for
 from raychan.radar.array import reach
 from raychan.radar.dual_paths import columns_of
@@ -47,14 +47,7 @@ def paths_of(
     """
     if isinstance(routes, DiffractedRoutes):
         return diffracted_paths(routes, facets, radar, frequency)
-    gains = transfer(
-        routes,
-        facets,
-        frequency,
-        lambda d: np.asarray(radar.tx_field(d))[:, None],
-        lambda d: np.stack([np.asarray(f(d)) for f in rx_fields(radar)], axis=1),
-        corners=True,
-    )[:, :, 0]
+    gains = corner_gains(routes, facets, radar, frequency)
     speeds = ends_of(radar).tx_velocity, ends_of(radar).rx_velocity
     rate = rates(routes, facets, *speeds)
     corner = routes.lengths[:, :3]

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.ends import RadarEnds, rx_fields
-from raychan.channel.transfer import transfer
+from raychan.channel.ends import RadarEnds
+from raychan.channel.transfer import corner_gains
 from raychan.columns import take
 from raychan.compile.jit import njit
 from raychan.em.phase_integral import triangle_terms
@@ -90,14 +90,7 @@ def _in_pieces(routes: Routes, split: Split, count: Ints, facets: Facets, radar:
     n = len(rows)
     # Without phase and taper: what a footprint of a mean of one scatters, a third of it at each corner.
     bare: Any = take(routes, rows).replace(lengths=np.zeros((n, 6)), length=np.zeros(n), taper=np.ones((n, 3)))
-    strength = transfer(
-        bare,
-        facets,
-        frequency,
-        lambda d: np.asarray(radar.tx_field(d))[:, None],
-        lambda d: np.stack([np.asarray(f(d)) for f in rx_fields(radar)], axis=1),
-        corners=True,
-    )[:, :, 0]
+    strength = corner_gains(bare, facets, radar, frequency)
     if facets.attenuation:
         strength *= np.exp(-facets.attenuation * routes.length[rows])[:, None, None]
     rate = np.einsum("pc,pc->p", bary, split.rate[row])

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.ends import RadarEnds, rx_fields
 from raychan.channel.fields_along import coefficients_at, cosine, heading, incidence, over_mirrors, vec
 from raychan.compile.jit import njit
 from raychan.em.phase_integral import triangle_terms
@@ -77,6 +78,18 @@ def transfer(
     if facets.attenuation:
         out *= np.exp(-facets.attenuation * routes.length)[:, None, None, None]
     return out if corners else out[..., 0]
+
+
+def corner_gains(routes: Routes, facets: Facets, radar: RadarEnds, frequency: float) -> Complexes:
+    """Return the gains (n, q, 3) of routes for a radar's q receivers, the parts that belong to the three corners."""
+    return transfer(
+        routes,
+        facets,
+        frequency,
+        lambda d: np.asarray(radar.tx_field(d))[:, None],
+        lambda d: np.stack([np.asarray(f(d)) for f in rx_fields(radar)], axis=1),
+        corners=True,
+    )[:, :, 0]
 
 
 @njit(cache=True, nogil=True)

@@ -18,7 +18,7 @@ from raychan.poses import sizes
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
-from raychan.tracing.legs import Leg, View
+from raychan.tracing.legs import ON_PLANE, Leg, View
 from raychan.tracing.radiation import OBLIQUE, phases_of, radiating
 from raychan.tracing.subdivide import subdivide
 from raychan.tracing.tubes import CENTRE, MOST_BEND, Refinement, Tubes, launch_tubes, unit
@@ -30,7 +30,6 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 OBLIQUE_SHARE = 0.1  # of their sum in phase that tubes facing away from an end are taken to add up to; not measured
-_ON_PLANE = 1e-6  # m: corners so near to the plane of an antenna lie on it
 GAP_LEVELS = 1  # subdivisions of a hidden tube in search of a part that is seen; not measured
 
 
@@ -70,7 +69,7 @@ def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) 
     for end in [leg] if out is leg else [leg, out]:
         for normal in end.gain_ends:
             side = (tubes.points[:, :CENTRE] - end.image) @ normal
-            across = (side.min(axis=1) < -_ON_PLANE) & (side.max(axis=1) > _ON_PLANE)
+            across = (side.min(axis=1) < -ON_PLANE) & (side.max(axis=1) > ON_PLANE)
             if across.any():
                 parts, _ = subdivide(geometry, leg, tubes, np.flatnonzero(across), side, True, 0.0)
                 tubes = Tubes.join([tubes.take(~across), parts])

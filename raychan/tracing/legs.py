@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-_ON_PLANE = 1e-6  # m: corners so near to a plane lie on it
+ON_PLANE = 1e-6  # m: corners of tubes so near to a plane lie on it
 _LEAST_AREA = 0.5  # m^2 of a mirror; at street distances smaller faces lie within a few Fresnel zones
 _MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not measured
 
@@ -127,7 +127,7 @@ class Leg:
         planes = [(last.point, last.normal), *((self.image, normal) for normal in self.windows)]
         for point, normal in planes if len(rows) else []:
             side = (points[rows, :3] - point) @ normal
-            across = (side.min(axis=1) < -_ON_PLANE) & (side.max(axis=1) > _ON_PLANE) & ~found[rows].any(axis=1)
+            across = (side.min(axis=1) < -ON_PLANE) & (side.max(axis=1) > ON_PLANE) & ~found[rows].any(axis=1)
             found[rows[across]] = side[across]
         return found
 
