@@ -14,6 +14,9 @@ import numpy as np
 from raychan.compile.jit import njit
 from raychan.vectors import distance, dot, largest, length_to
 
+_STEPS, _CLOSE = 12, 1e-9  # most steps from a plane to its patch, and the m by which the last one moves at most
+_BESIDE = 0.5  # of a facet's barycentric range: so far beside the facet its patch goes on; not measured
+
 
 @njit(cache=True, forceinline=True)
 def copy_corners(out, w):  # type: ignore[no-untyped-def]
@@ -28,6 +31,65 @@ def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
     xy, yz, zx = x * y, y * z, z * x
     for c in range(3):
         p[c] = x * v[0, c] + y * v[1, c] + z * v[2, c] - xy * b[0, c] - yz * b[1, c] - zx * b[2, c]
+
+
+@njit(cache=True, forceinline=True)
+def weights_at(v, x, y, z):  # type: ignore[no-untyped-def]
+    """Return the barycentric coordinates of a point (x, y, z) [m] above or below a facet of corners v (3, 3)."""
+    ax, ay, az = v[1, 0] - v[0, 0], v[1, 1] - v[0, 1], v[1, 2] - v[0, 2]
+    bx, by, bz = v[2, 0] - v[0, 0], v[2, 1] - v[0, 1], v[2, 2] - v[0, 2]
+    x, y, z = x - v[0, 0], y - v[0, 1], z - v[0, 2]
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    twice = nx * nx + ny * ny + nz * nz
+    one = (x * (by * nz - bz * ny) + y * (bz * nx - bx * nz) + z * (bx * ny - by * nx)) / twice
+    two = (x * (ny * az - nz * ay) + y * (nz * ax - nx * az) + z * (nx * ay - ny * ax)) / twice
+    return 1.0 - one - two, one, two
+
+
+@njit(cache=True, forceinline=True)
+def distance_to_patch(v, b, normal, o, k, flat):  # type: ignore[no-untyped-def]
+    """Return the distance [m] at which a ray from o along k meets the patch over a facet (v, b: corners, curvatures),
+    whose plane it meets after `flat`; that distance where it passes beside the patch, or almost along it."""
+    t, slope = flat, dot(k, normal)
+    before, missed_before = flat, 0.0
+    off = 0.0, 0.0, 0.0
+    for step in range(_STEPS):
+        # Moved back by the patch's offset there, the ray meets the plane.
+        x, y, z = weights_at(
+            v, o[0] + t * k[0] - off[0], o[1] + t * k[1] - off[1], o[2] + t * k[2] - off[2]
+        )  # fmt: skip
+        if min(x, min(y, z)) < -_BESIDE or max(x, max(y, z)) > 1.0 + _BESIDE:
+            break
+        xy, yz, zx = -x * y, -y * z, -z * x
+        off = (
+            xy * b[0, 0] + yz * b[1, 0] + zx * b[2, 0],
+            xy * b[0, 1] + yz * b[1, 1] + zx * b[2, 1],
+            xy * b[0, 2] + yz * b[1, 2] + zx * b[2, 2],
+        )
+        missed = flat + dot(off, normal) / slope - t
+        if abs(missed) < _CLOSE:
+            return t
+        # By the secant of what the last two steps missed it by.
+        bend = missed_before - missed
+        last, ahead = t, missed
+        if step > 0 and abs(bend) > 1e-3 * abs(missed):
+            ahead = missed * (t - before) / bend
+        t, before, missed_before = t + ahead, last, missed
+    return flat
+
+
+@njit(cache=True, forceinline=True)
+def rise_off_chord(a, b, at_a, at_b, t, out):  # type: ignore[no-untyped-def]
+    """Write how far (3,) [m] a curved surface lies off the chord from a to b (3,) at the share t of it, by the unit
+    normals at_a, at_b (3,) at its ends; return whether it does."""
+    rise, size = 0.0, 0.0
+    for c in range(3):
+        rise += 0.5 * t * (1.0 - t) * (at_b[c] - at_a[c]) * (b[c] - a[c])
+        size += (at_a[c] + at_b[c]) ** 2
+    scale = rise / math.sqrt(size) if size > 0.0 else 0.0
+    for c in range(3):
+        out[c] = scale * (at_a[c] + at_b[c])
+    return scale != 0.0
 
 
 @njit(cache=True, forceinline=True)

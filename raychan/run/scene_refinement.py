@@ -37,7 +37,7 @@ from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Batch, Launch, Stats
-from raychan.tracing.sources import EXACT, Sources, launches, neighbours
+from raychan.tracing.sources import EXACT, Rings, Sources, launches
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -229,8 +229,8 @@ class SceneRefinement:
         """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why."""
         feeding, facets = _feeding(held, response, cells), len(self.geometry.facets.body)
         budget, steps, ended = Budget(self.model, self.stats), 0, ""
-        beside = neighbours(self.geometry)
-        by = list(launches(_united(feeding), facets, beside))
+        rings = Rings(self.geometry)
+        by = list(rings.with_those_beside(launches(_united(feeding), facets)))
         while by and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
             rule = step_rule(self.radar, self.settings, self.model, steps + 1)
@@ -242,7 +242,7 @@ class SceneRefinement:
                 cells.changed(i, own, change)
             steps += 1
             cells.give_up(steps, STEPS - steps)
-            before, by = by, list(launches(_united(_wanted(cells)), facets))
+            before, by = by, list(rings.with_those_beside(launches(_united(_wanted(cells)), facets)))
             if by:
                 ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))
         for i in range(len(cells)):

@@ -34,7 +34,7 @@ from raychan.tracing.resolve_hits import (
 from raychan.tracing.shared_work import all_of
 from raychan.tracing.silhouette_crossings import silhouette_crossings_of
 from raychan.tracing.subdivide import bisect, edge_of_spread, subdivide
-from raychan.tracing.tubes import CENTRE, Refinement, Tubes, slices
+from raychan.tracing.tubes import CENTRE, Refinement, Tubes, clearance, slices
 from raychan.tracing.visibility import on_facets
 from raychan.world.geometry import Geometry
 
@@ -108,7 +108,8 @@ def _flown(step: _Bounce, tubes: Tubes) -> tuple[list[Tubes], list[Floats]]:
     """Return the tubes where they land, and what they could contribute from there."""
     tubes = _narrowed(step, tubes)
     n, layers, landed = len(tubes), step.rule.layers, list[Tubes]()
-    flight = _Flight(tubes, np.zeros((n, 4)), np.full((n, layers), -1, np.int32), np.zeros((2, n), np.int8))
+    start = np.zeros((n, 4)) if step.first else clearance(step.geometry, tubes)
+    flight = _Flight(tubes, start, np.full((n, layers), -1, np.int32), np.zeros((2, n), np.int8))
     while len(flight.tubes):
         flight = _cast_and_subdivide(step, flight, landed)
     return landed, [_contribution_bounds(step, t) for t in landed]
@@ -145,15 +146,15 @@ def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> 
     points = on_facets(geometry, tubes) if step.first else tubes.points
     mid, ahead = geometry.cast(points[:, CENTRE], directions[:, CENTRE], tubes.facet, flight.start[:, CENTRE])
     matters = _matters(step, tubes, directions, mid, ahead)
-    # Where the centre ray meets nothing no corner is cast: a silhouette edge found below clips such a tube.
     hit, reach = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     one_surface = mid >= 0
-    rows = np.flatnonzero(matters & one_surface)
+    # Where the centre ray meets nothing, but the fan of a curved surface is wide, a corner may meet something.
+    rows = np.flatnonzero(matters & (one_surface | ~_flat(step, tubes)))
     facets, distances = geometry.cast(*corner_rays(rows, points, directions, tubes.facet, flight.start))
     hit[rows, :3], reach[rows, :3] = facets.reshape(-1, 3), distances.reshape(-1, 3)
     on_one_surface(rows, hit, geometry.plane, geometry.smooth, geometry.normal, rule.patch, one_surface)
     side = _edges_within(step, tubes, points, directions, hit, reach, np.flatnonzero(matters))
-    mixed = (~one_surface & (mid >= 0)) | side.any(axis=1)
+    mixed = (~one_surface & (hit >= 0).any(axis=1)) | side.any(axis=1)
     split = found.budget.affords(
         geometry, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _BUDGET_SHARE
     )
@@ -165,6 +166,11 @@ def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> 
     cut = _Flight(parts, start, flight.through[rows], flight.count[:, rows] + np.array([[1], [0]], np.int8))
     behind = ready[geometry.is_layer[mid[ready]] & (flight.count[1, ready] < rule.layers)]
     return _with_tubes_behind_layers(flight, behind, mid, reach, cut) if len(behind) else cut
+
+
+def _flat(step: _Bounce, tubes: Tubes) -> Bools:
+    """Tell of which tubes (n,) all mirrors up to the present one are planes."""
+    return np.asarray(tubes.flat & ~step.geometry.curved[tubes.facet])
 
 
 def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: Floats) -> Bools:
@@ -229,8 +235,7 @@ def _edges_within(
 ) -> Floats:
     """Return signed distances (n, 3) [m] of corners from an edge that runs through each of the tubes `rows`; zeros
     where none does."""
-    geometry = step.geometry
-    flat = tubes.flat & ~geometry.curved[tubes.facet]
+    geometry, flat = step.geometry, _flat(step, tubes)
     side = np.zeros((len(tubes), 3))
     rays = TubeRays(points, directions, tubes.length, flat, hit, reach)
     planes = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
@@ -251,7 +256,9 @@ def _landed_tubes(
     meets where these are not of one surface; the reflection is written into their history."""
     geometry = step.geometry
     planes = geometry.first, geometry.normal
-    rows, facet, reach = resolve_hits(rows, tubes.points, directions, hit, one_surface, *planes)
+    f = geometry.facets
+    patches = f.vertices, geometry.edge_curvature, geometry.curved
+    rows, facet, reach = resolve_hits(rows, tubes.points, directions, hit, one_surface, *planes, patches)
     n = len(rows)
     before = IncidentTubes(
         tubes.points, directions, tubes.length, tubes.normals, tubes.facet, tubes.spread, tubes.strength, tubes.flat,
@@ -261,7 +268,6 @@ def _landed_tubes(
         np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4)), np.empty((n, 4, 3)), np.empty(n), np.empty(n),
         np.empty(n, bool), np.empty_like(tubes.caustics, shape=n),
     )  # fmt: skip
-    f = geometry.facets
     facets = ReflectingFacets(f.vertices, f.normals, geometry.curved, *geometry.material_columns)
 
     def some(part: slice) -> None:

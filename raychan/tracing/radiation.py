@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
-from raychan.geometry.curved_patches import place_on
+from raychan.geometry.curved_patches import place_on, rise_off_chord
 from raychan.parallel import parallel_for
 from raychan.tracing.image_paths import weight
 from raychan.tracing.legs import Leg
@@ -120,20 +120,22 @@ def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refine
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
-def _length_at_middle(c, points, k, length, bary, v, b, image, far, middle):  # type: ignore[no-untyped-def]
+def _length_at_middle(c, points, k, length, normals, bary, v, b, image, far, middle):  # type: ignore[no-untyped-def]
     """Write the middle of edge c of a tube; return the length there [m]: straight to the curved surface on the first
-    facet, later on the chord by the cubic Hermite rule."""
+    facet, later by the cubic Hermite rule on the chord, and along the rays from there to the surface."""
     d = (c + 1) % 3
     if len(bary) == 3:
         w = bary
         x, y, z = 0.5 * (w[c, 0] + w[d, 0]), 0.5 * (w[c, 1] + w[d, 1]), 0.5 * (w[c, 2] + w[d, 2])
         place_on(v, b, x, y, z, middle)
         return length_to(middle, image, far)
-    turned = 0.0
+    turned, risen = 0.0, 0.0
+    rise_off_chord(points[c], points[d], normals[c], normals[d], 0.5, middle)
     for x in range(3):
-        middle[x] = 0.5 * (points[c, x] + points[d, x])
         turned += (k[c, x] - k[d, x]) * (points[d, x] - points[c, x])
-    return 0.5 * (length[c] + length[d]) + 0.125 * turned
+        risen += 0.5 * (k[c, x] + k[d, x]) * middle[x]
+        middle[x] += 0.5 * (points[c, x] + points[d, x])
+    return 0.5 * (length[c] + length[d]) + 0.125 * turned + risen
 
 
 @njit(cache=True, forceinline=True, error_model="numpy")
@@ -185,7 +187,8 @@ def phases(tubes, facets, image, far, antenna, wavenumber, limits, out):  # type
         span = high - low
         whole[i] = (six[0] + six[1] + six[2]) / 3.0 / wavenumber
         for c in range(3):
-            there = _length_at_middle(c, points, k, length, bary[i], vertices[f], edge_curvature[f], image, far, middle)
+            shape = vertices[f], edge_curvature[f]
+            there = _length_at_middle(c, points, k, length, normals[i], bary[i], *shape, image, far, middle)
             six[3 + c] = wavenumber * (there + length_to(middle, out_image, out_far))
             bend[c] = six[3 + c] - 0.5 * (six[c] + six[(c + 1) % 3])
             low, high = min(low, six[3 + c]), max(high, six[3 + c])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
+from raychan.geometry.curved_patches import distance_to_patch, weights_at
 from raychan.vectors import length_to
 
 Floats = NDArray[np.float64]
@@ -211,13 +212,16 @@ def on_one_surface(rows, hit, plane, smooth, normal, least_cosine, out):  # type
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def resolve_hits(rows, points, directions, hit, one_surface, first, normal):  # type: ignore[no-untyped-def]
-    """Return the tubes (m,) of `rows` that land, the facet (m, 4) on whose plane each ray lands, and after how far
-    (m, 4) [m]. Tubes with a ray that misses or grazes the centre's plane are slivers, and are dropped.
+def resolve_hits(rows, points, directions, hit, one_surface, first, normal, patches):  # type: ignore[no-untyped-def]
+    """Return the tubes (m,) of `rows` that land, the facet (m, 4) on whose curved patch each ray lands, and after how
+    far (m, 4) [m]. Tubes with a ray that misses or grazes the centre's plane are slivers, and are dropped.
 
     Where two surfaces run into each other, or a curved patch bulges over its facet, a corner lies behind the surface
     beside it: of a tube all rays of which meet one surface they may land as far behind as that.
+
+    Args: patches vertices, edge curvature (f, 3, 3) and curved (f,) of the facets.
     """
+    vertices, edge_curvature, curved = patches
     m = len(rows)
     kept, facet, reach = np.empty(m, np.int64), np.empty((m, 4), hit.dtype), np.empty((m, 4))
     count = 0
@@ -230,6 +234,8 @@ def resolve_hits(rows, points, directions, hit, one_surface, first, normal):  # 
             for c in range(3):
                 height += normal[f, c] * (first[f, c] - points[i, q, c])
             t = height / slope if slope != 0.0 else np.inf
+            if curved[f] and slope != 0.0:
+                t = distance_to_patch(vertices[f], edge_curvature[f], normal[f], points[i, q], directions[i, q], t)
             facet[count, q], reach[count, q] = f, t
             least = _BULGE if one_surface[i] else _BEHIND
             lands &= t > least and t < _GRAZING_REACH * abs(reach[count, 3]) + 1.0
@@ -243,14 +249,8 @@ def resolve_hits(rows, points, directions, hit, one_surface, first, normal):  # 
 def _normal_at(v, n, p, out):  # type: ignore[no-untyped-def]
     """Write the unit normal of the curved surface behind p, a point of the plane of a facet (v, n: corners, normals):
     corner normals weighted by barycentric coordinates."""
-    ax, ay, az = v[1, 0] - v[0, 0], v[1, 1] - v[0, 1], v[1, 2] - v[0, 2]
-    bx, by, bz = v[2, 0] - v[0, 0], v[2, 1] - v[0, 1], v[2, 2] - v[0, 2]
-    x, y, z = p[0] - v[0, 0], p[1] - v[0, 1], p[2] - v[0, 2]
-    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    twice = nx * nx + ny * ny + nz * nz
-    one = (x * (by * nz - bz * ny) + y * (bz * nx - bx * nz) + z * (bx * ny - by * nx)) / twice
-    two = (x * (ny * az - nz * ay) + y * (nz * ax - nx * az) + z * (nx * ay - ny * ax)) / twice
-    none = min(max(1.0 - one - two, -0.5), 1.5)
+    none, one, two = weights_at(v, p[0], p[1], p[2])
+    none = min(max(none, -0.5), 1.5)
     one, two = min(max(one, -0.5), 1.5), min(max(two, -0.5), 1.5)
     for c in range(3):
         out[c] = none * n[0, c] + one * n[1, c] + two * n[2, c]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,13 +53,10 @@ def _legs_of(source: Sources) -> tuple[Ints, Ints]:
     return source >> (_LEG + _DEPTH + _FACET), (source >> (_DEPTH + _FACET)) & ((1 << _LEG) - 1)
 
 
-def launches(
-    source: Sources, facets: int, beside: Callable[[Bools], Bools] | None = None
-) -> Iterator[tuple[int, Wanted]]:
+def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
     """Give the launches that trace sources (n,) again: numbers of legs in, and what is wanted there, one depth each.
 
-    From each facet of a launch all its outgoing legs are traced: see `covered`. Args: beside tells of facets (f,) those
-    to launch from beside them (see `neighbours`).
+    From each facet of a launch all its outgoing legs are traced: see `covered`.
     """
     own = source[source != EXACT]
     (leg, out), depth = _legs_of(own), depth_of(own)
@@ -66,25 +64,36 @@ def launches(
         mine = (leg == i) & (depth == d)
         wanted = np.zeros(facets, bool)
         wanted[facet_of(own[mine])] = True
-        yield int(i), Wanted(beside(wanted) if beside else wanted, int(d), frozenset(map(int, out[mine])))
+        yield int(i), Wanted(wanted, int(d), frozenset(map(int, out[mine])))
 
 
-def neighbours(geometry: Geometry) -> Callable[[Bools], Bools]:
-    """Return a function of facets (f,) that adds the rest of their planes, and the facets across their edges.
+class Rings:
+    """Facets beside those that further launches start from: the rest of their planes, and those across their edges.
 
-    A coarse launch sees nothing of a facet that meets or shows a surface with a small part of it only.
+    A coarse launch may see nothing of a facet that meets or shows a surface with a small part of it only, or that
+    spreads its rays widely. Each is traced once, beside what is known by then.
     """
-    plane, across = geometry.plane, geometry.scene_topology.beside
 
-    def beside(wanted: Bools) -> Bools:
-        of_plane = np.zeros(int(plane.max(initial=-1)) + 1, bool)
-        of_plane[plane[wanted]] = True
-        every = wanted | of_plane[plane]
-        met = across[wanted]
+    def __init__(self, geometry: Geometry) -> None:
+        self._plane, self._across = geometry.plane, geometry.scene_topology.beside
+        self._traced: dict[tuple[int, int], Bools] = {}
+
+    def with_those_beside(self, launches: Iterable[tuple[int, Wanted]]) -> Iterator[tuple[int, Wanted]]:
+        """Give launches that start also from the facets beside theirs that none before did."""
+        for leg, wanted in launches:
+            before = self._traced.get((leg, wanted.depth), np.zeros_like(wanted.facets))
+            every = wanted.facets | (self._beside(wanted.facets) & ~before)
+            self._traced[leg, wanted.depth] = before | every
+            yield leg, replace(wanted, facets=every)
+
+    def _beside(self, wanted: Bools) -> Bools:
+        """Return the facets (f,) of the same planes, and across the edges, of some (f,)."""
+        of_plane = np.zeros(int(self._plane.max(initial=-1)) + 1, bool)
+        of_plane[self._plane[wanted]] = True
+        every = of_plane[self._plane]
+        met = self._across[wanted]
         every[met[met >= 0]] = True
-        return every
-
-    return beside
+        return np.asarray(every)
 
 
 def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
+from raychan.geometry.curved_patches import rise_off_chord
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import CENTRE, Tubes, first_rays
 from raychan.vectors import distance, largest
@@ -219,12 +220,24 @@ def _length_on(w, p, k, length):  # type: ignore[no-untyped-def]
     return h
 
 
+@njit(cache=True, forceinline=True)
+def _rise(w, p, n, out):  # type: ignore[no-untyped-def]
+    """Write how far (3,) [m] a corner of weights w (3,) on the parent's edges lies off their chords; return whether it
+    does."""
+    for a in range(3):
+        b = (a + 1) % 3
+        if w[a] > 0.0 and w[b] > 0.0:
+            return rise_off_chord(p[a], p[b], n[a], n[b], w[b], out)
+    return False
+
+
 @njit(cache=True, nogil=True)
 def part_rays(  # type: ignore[no-untyped-def]
     weights, parent, points, k, length, normals, out_points, out_k, out_length, out_normals
 ):  # fmt: skip
-    """Write the rays of parts of parents (m,) on a plane footprint: points, directions and normals are weighted means,
-    lengths follow the cubic Hermite rule, the centre's is the mean of parabolas along the three medians."""
+    """Write the rays of parts of parents (m,): points, directions and normals are weighted means, points raised to the
+    curved surface; lengths follow the cubic Hermite rule, the centre's is the mean of parabolas along the medians."""
+    offset = np.empty(3)
     for i in range(len(parent)):
         j = parent[i]
         p, direction, normal = out_points[i], out_k[i], out_normals[i]
@@ -238,12 +251,21 @@ def part_rays(  # type: ignore[no-untyped-def]
             _to_unit(direction[q])
             _to_unit(normal[q])
             out_length[i, q] = _length_on(w, points[j], k[j], length[j])
+            if _rise(w, points[j], normals[j], offset):
+                for c in range(3):
+                    p[q, c] += offset[c]
+                    out_length[i, q] += offset[c] * direction[q, c]
             for c in range(3):
                 p[3, c] += p[q, c] / 3.0
                 direction[3, c] += direction[q, c]
                 normal[3, c] += normal[q, c]
         _to_unit(direction[3])
         _to_unit(normal[3])
+        for q in range(3):
+            d = (q + 1) % 3
+            if rise_off_chord(p[q], p[d], normal[q], normal[d], 0.5, offset):
+                for c in range(3):
+                    p[3, c] += 4.0 / 9.0 * offset[c]
         total = 0.0
         for q in range(3):
             reach = 0.0

@@ -26,6 +26,7 @@ Bools = NDArray[np.bool_]
 
 CENTRE = 3
 MOST_BEND = 4.0  # rad that an edge may bend: the phase integral divides tubes that bend more itself; not measured
+_CLEAR, _STEEP = 1.5, 0.05  # times a hollow patch's depth, the least slope: what rays that leave it pass; not measured
 _MOST_SLOTS = 120  # of a history: their number is kept in a byte
 
 
@@ -184,7 +185,23 @@ def edge_middles(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> tup
     p, k, length = tubes.points[:, :3], tubes.k[:, :3], tubes.length[:, :3]
     d = np.roll(p, -1, axis=1) - p
     bend = np.einsum("nij,nij->ni", k - np.roll(k, -1, axis=1), d)
-    return p + 0.5 * d, 0.5 * (length + np.roll(length, -1, axis=1)) + 0.125 * bend
+    n, next_n = tubes.normals[:, :3], np.roll(tubes.normals[:, :3], -1, axis=1)
+    rise = (0.125 * np.einsum("nij,nij->ni", next_n - n, d))[:, :, None] * unit(n + next_n)
+    along = np.einsum("nij,nij->ni", 0.5 * (k + np.roll(k, -1, axis=1)), rise)
+    return p + 0.5 * d + rise, 0.5 * (length + np.roll(length, -1, axis=1)) + 0.125 * bend + along
+
+
+def clearance(geometry: Geometry, tubes: Tubes) -> Floats:
+    """Return the distance (n, 4) [m] from which on hits of rays count that leave points of curved patches: hollow ones
+    lie behind the facets that rays meet."""
+    clear, rows = np.zeros((len(tubes), 4)), np.flatnonzero(geometry.curved[tubes.facet])
+    facet = tubes.facet[rows]
+    normal, lit = geometry.normal[facet], tubes.normals[rows, CENTRE]
+    bulge = -0.25 * np.einsum("nec,nc->ne", geometry.edge_curvature[facet], normal)
+    depth = (-bulge * np.sign(np.einsum("nc,nc->n", normal, lit))[:, None]).max(axis=1)
+    slope = np.abs(np.einsum("nc,nc->n", normal, tubes.k[rows, CENTRE]))
+    clear[rows] = (_CLEAR * np.maximum(depth, 0.0) / np.maximum(slope, _STEEP))[:, None]
+    return clear
 
 
 def slices(columns: tuple[Any, ...], rows: slice) -> Any:

@@ -12,8 +12,9 @@ import raychan as rc
 from raychan.channel.paths import join, paths_of
 from raychan.run.rules import fine_rule
 from raychan.signal.baseband import synthesize
+from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Launch, Stats
-from raychan.tracing.sources import EXACT, covered, depth_of, facet_of, launches, neighbours
+from raychan.tracing.sources import EXACT, Rings, covered, depth_of, facet_of, launches
 from raychan.world.geometry import geometry_of
 
 
@@ -100,7 +101,7 @@ def test_uncut_deep_tubes_cost_fewer_rays(whole):
 def test_beside_facets_lie_the_rest_of_their_plane_and_what_shares_an_edge(whole):
     _, launch, *_ = whole
     geometry = launch.geometry
-    beside, rng = neighbours(geometry), np.random.default_rng(1)
+    rng = np.random.default_rng(1)
     corners = [[tuple(np.round(p, 6)) for p in v] for v in geometry.facets.vertices]
     for chosen in rng.choice(len(corners), 5, replace=False):
         wanted = np.zeros(len(corners), bool)
@@ -111,4 +112,12 @@ def test_beside_facets_lie_the_rest_of_their_plane_and_what_shares_an_edge(whole
             and (geometry.plane[i] == geometry.plane[chosen] or len(set(corners[i]) & set(corners[chosen])) >= 2)
             for i in range(len(corners))
         ]
-        assert beside(wanted).tolist() == slow
+        rings = Rings(geometry)
+        own = [(0, Wanted(wanted, 2, frozenset([0])))]
+        ((_, first),) = rings.with_those_beside(own)
+        assert first.facets.tolist() == slow
+        # Each is traced once beside what is wanted, at each bounce.
+        ((_, second),) = rings.with_those_beside(own)
+        assert second.facets.tolist() == wanted.tolist()
+        ((_, other),) = rings.with_those_beside([(0, Wanted(wanted, 3, frozenset([0])))])
+        assert other.facets.tolist() == slow
