@@ -28,7 +28,8 @@ class Net(NamedTuple):
     """A mesh that is being simplified: vertices v (k, 3) [m], normals n (3 m, 3) by corner of the original facets, and
     by facet its vertices and corners (m, 3), -1 where it went; mate (3 m,) the half edge on the other side, -1 where
     the smooth patch ends; half (k,) a half edge from each vertex; heir (m,) the facet in whose place one that went is
-    looked for; locked, gone (k,); reach (k,) [m] the longest edge that may come at each vertex."""
+    looked for; locked, gone (k,); reach (k,) [m] the longest edge that may come at each vertex; the last round, from 1
+    on, in which facets changed that each vertex touched (k,), and in which it was tried (k,) and could not go."""
 
     v: Floats
     n: Floats
@@ -40,6 +41,8 @@ class Net(NamedTuple):
     locked: Bools
     gone: Bools
     reach: Floats
+    touched: Ints
+    tried: Ints
 
     def copied(self) -> Net:
         """Return a net that can be changed by itself."""
@@ -104,22 +107,17 @@ def _height(v, faces, f, d):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def lock_pinched(net):  # type: ignore[no-untyped-def]
     """Lock the vertices about which facets make no single closed fan; give each vertex a half edge."""
-    count = np.zeros(len(net.half), np.int64)
-    for f in range(len(net.faces)):
+    faces, mate, half, locked = net.faces, net.mate, net.half, net.locked
+    count = np.zeros(len(half), np.int32)
+    for f in range(len(faces)):
         for k in range(3):
-            net.half[net.faces[f, k]] = 3 * f + k
-            count[net.faces[f, k]] += 1
-    fan = np.empty(MOST, np.int32)
-    for a in range(len(net.half)):
-        if not net.locked[a]:
-            size = fan_of(net, a, fan)
-            net.locked[a] = size == 0 or size != count[a]
-
-
-@njit(cache=True, forceinline=True)
-def end_of(net, h):  # type: ignore[no-untyped-def]
-    """Return the vertex at which a half edge ends."""
-    return net.faces[h // 3, (h % 3 + 1) % 3]
+            half[faces[f, k]] = 3 * f + k
+            count[faces[f, k]] += 1
+    fan, ring = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
+    for a in range(len(half)):
+        if not locked[a]:
+            size = fan_of(faces, mate, half[a], fan, ring)
+            locked[a] = size == 0 or size != count[a]
 
 
 @njit(cache=True, forceinline=True)
@@ -128,15 +126,16 @@ def before(h):  # type: ignore[no-untyped-def]
     return h + 2 if h % 3 == 0 else h - 1
 
 
-@njit(cache=True, nogil=True)
-def fan_of(net, a, out):  # type: ignore[no-untyped-def]
-    """Write the half edges that leave a vertex, in order, into out; return how many, 0 where they close no fan."""
-    start = net.half[a]
-    h, m = start, 0
+@njit(cache=True, forceinline=True)
+def fan_of(faces, mate, start, out, ring):  # type: ignore[no-untyped-def]
+    """Write the half edges that leave a vertex, in order from `start` on, into out, and where they end into ring; return
+    how many, 0 where they close no fan."""
+    h, m = np.int64(start), 0
     while m < len(out):
-        out[m] = h
+        f, k = h // 3, h % 3
+        out[m], ring[m] = h, faces[f, (k + 1) % 3]
         m += 1
-        h = net.mate[before(h)]
+        h = np.int64(mate[3 * f + (k + 2) % 3])
         if h < 0:
             return 0
         if h == start:

@@ -128,6 +128,8 @@ def _net(mesh: Mesh, fixed: Bools) -> tuple[Net, float]:
         locked=~inside,
         gone=np.zeros(count, bool),
         reach=np.full(count, _LONGEST),
+        touched=np.zeros(count, np.int32),
+        tried=np.zeros(count, np.int32),
     )
     lock_pinched(net)
     return net, float(height)
@@ -138,7 +140,6 @@ class _Rounds:
 
     def __init__(self, mesh: Mesh, limits: Limits) -> None:
         self.limits, self.stage, self.turn, self.far = limits, 0, 0, True
-        self._touched = np.zeros(len(mesh.vertices), np.int32)
         self._slabs = []
         for place in mesh.vertices.T:
             ends = np.quantile(place[:: max(1, len(place) // 10_000)], np.arange(1, _SLABS) / _SLABS)
@@ -155,8 +156,9 @@ class _Rounds:
             # The same slabs in every redo, so that it differs only where edges were shortened.
             for i in range(_MANY_ROUNDS if self.far else _ROUNDS):
                 self._remove(now, self.stage + i)
+            live = np.flatnonzero(now.faces[:, 0] >= 0)
             for i in range(_FLIPS):
-                self._flip(now, self.stage + i)
+                self._flip(now, live, self.stage + i)
             facet, off, excess = check(now, self.limits)
             most = excess.max(initial=0.0)
             if not most > 1.0:
@@ -177,17 +179,17 @@ class _Rounds:
 
         def some(slabs: slice) -> None:
             for i in range(slabs.start, slabs.stop):
-                remove_vertices(net, self.limits, self._touched, self.turn, rows[first[i] : first[i + 1]], slab)
+                remove_vertices(net, self.limits, self.turn, rows[first[i] : first[i + 1]], slab)
 
         parallel_for(_SLABS, some, 2)
 
-    def _flip(self, net: Net, axis: int) -> None:
-        """Flip edges over which facets bend against the surface in one pass, by slabs across an axis."""
+    def _flip(self, net: Net, rows: NDArray[np.int64], axis: int) -> None:
+        """Flip edges of facets (r,) over which they bend against the surface in one pass, by slabs across an axis."""
         slab = self._slabs[axis % 3][0]
 
         def some(slabs: slice) -> None:
             for i in range(slabs.start, slabs.stop):
-                flip_edges(net, self.limits, slab, i)
+                flip_edges(net, self.limits, self.turn, rows, slab, i)
 
         parallel_for(_SLABS, some, 2)
 
