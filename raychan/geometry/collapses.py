@@ -2,8 +2,8 @@
 (numba kernels).
 
 Everywhere: half edge 3 f + k runs from corner k of facet f to the next; columns are arrays of a `Net`, taken out of it
-once, since each access counts a reference; points and normals are three numbers. Source: Hoppe et al., Mesh optimization, Proc.
-SIGGRAPH 1993 (edge collapse and when it keeps the topology).
+once, since each access counts a reference; points and normals are three numbers. Source: Hoppe et al., Mesh
+optimization, Proc. SIGGRAPH 1993 (edge collapse and when it keeps the topology).
 """
 
 from __future__ import annotations
@@ -120,10 +120,10 @@ def _joins(faces, mate, half, locked, ring, m, i):  # type: ignore[no-untyped-de
     """Tell whether vertex i of a ring (m,) shares an edge with another than the two beside it."""
     b = ring[i]
     if locked[b]:
+        found = False
         for step in range(2, m - 1):
-            if joined(faces, mate, half, locked, b, ring[(i + step) % m]):
-                return True
-        return False
+            found |= joined(faces, mate, half, locked, b, ring[(i + step) % m])
+        return found
     start = np.int64(half[b])
     h = start
     while m > 3:

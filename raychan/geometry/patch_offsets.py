@@ -123,3 +123,22 @@ def offsets(place, normal, facet, patches, mate, number, off, turned):  # type: 
         else:
             m = number[f]
             off[i], turned[i] = _offset(p, up, _corners(v, m), _corners(n, m), _corners(b, m), s, t)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def centres(v, faces, n, rows, place, normal):  # type: ignore[no-untyped-def]
+    """Write the centres of the curved patches of some facets (r,) into place (r, 3) [m], and their normals there into
+    normal (r, 3).
+
+    Args: v (k, 3) [m]; faces (m, 3); n (3 m, 3) corner normals.
+    """
+    for i in range(len(rows)):
+        f = rows[i]
+        p, q, r = row(v, faces[f, 0]), row(v, faces[f, 1]), row(v, faces[f, 2])
+        a, b, c = row(n, 3 * f), row(n, 3 * f + 1), row(n, 3 * f + 2)
+        e, g, h = edge_curvature(p, q, a, b), edge_curvature(q, r, b, c), edge_curvature(r, p, c, a)
+        up = a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]
+        size = math.sqrt(up[0] ** 2 + up[2] ** 2 + up[1] ** 2)
+        for x in range(3):
+            place[i, x] = (p[x] + q[x] + r[x]) / 3.0 - (e[x] + g[x] + h[x]) / 9.0
+            normal[i, x] = up[x] / size
