@@ -74,6 +74,22 @@ class Net(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
+def by_first_use(v, faces):  # type: ignore[no-untyped-def]
+    """Return numbers (k,) of vertices v (k, 3) [m] in the order in which faces (m, 3) use them, all of them, and vertices
+    and faces so numbered: neighbours then lie near each other in memory."""
+    number, there, own, count = np.full(len(v), -1, np.int32), np.empty_like(v), np.empty_like(faces), 0
+    for f in range(len(faces)):
+        for k in range(3):
+            a = faces[f, k]
+            if number[a] < 0:
+                number[a] = count
+                there[count, 0], there[count, 1], there[count, 2] = row(v, a)
+                count += 1
+            own[f, k] = number[a]
+    return number, there, own
+
+
+@njit(cache=True, nogil=True)
 def leaving(faces, count):  # type: ignore[no-untyped-def]
     """Return the half edges (3 m,) of faces (m, 3) by the vertex that they leave, ascending, where those of each vertex
     begin (count + 1,), and the vertex (3 m,) at which each ends."""
@@ -91,6 +107,16 @@ def leaving(faces, count):  # type: ignore[no-untyped-def]
             half[at], end[at] = 3 * f + k, faces[f, (k + 1) % 3]
             fill[faces[f, k]] += 1
     return half, first, end
+
+
+@njit(cache=True, nogil=True)
+def followed(heir):  # type: ignore[no-untyped-def]
+    """Return for each facet the last of its heirs."""
+    out = heir.copy()
+    for f in range(len(out)):
+        while out[out[f]] != out[f]:
+            out[f] = out[out[f]]
+    return out
 
 
 @njit(cache=True, nogil=True)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from raychan.geometry.collapses import Limits, remove_vertices
 from raychan.geometry.flips import flip_edges
-from raychan.geometry.half_edges import Net, leaving, lock, pair_up
+from raychan.geometry.half_edges import Net, by_first_use, followed, leaving, lock, pair_up
 from raychan.parallel import parallel_for
 from raychan.world.mesh import Mesh
-from raychan.world.surface_check import Check, followed
+from raychan.world.surface_check import Check
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -108,23 +108,24 @@ def _net(mesh: Mesh, fixed: Bools) -> tuple[Net, float]:
     and how far facets rise over their neighbours' planes [m]."""
     faces, count, n = np.ascontiguousarray(mesh.faces, np.int32), len(mesh.vertices), len(mesh.faces)
     normals, mate, heights = mesh.normals.reshape(-1, 3), np.full(3 * n, -1, np.int32), list[float]()
-    left = leaving(faces, count)
+    number, v, own = by_first_use(mesh.vertices, faces)
+    left = leaving(own, count)
     half, locked = left[0][left[1][1:] - 1], np.empty(count, bool)
 
     def paired(r: slice) -> None:
-        heights.append(pair_up(mesh.vertices, faces, normals, mesh.part, fixed, left, r.start, r.stop, mate))
+        heights.append(pair_up(v, own, normals, mesh.part, fixed, left, r.start, r.stop, mate))
 
     parallel_for(n, paired)
-    parallel_for(count, lambda r: lock(faces, mate, half, left[1], r.start, r.stop, locked))
+    parallel_for(count, lambda r: lock(own, mate, half, left[1], r.start, r.stop, locked))
     net = Net(
         v=mesh.vertices,
         n=normals,
         faces=faces,
         corner=np.arange(3 * n, dtype=np.int32).reshape(-1, 3),
         mate=mate,
-        half=half,
+        half=half[number],
         heir=np.arange(n, dtype=np.int32),
-        locked=locked,
+        locked=locked[number],
         gone=np.zeros(count, bool),
         reach=np.full(count, _LONGEST),
         touched=np.zeros(count, np.int32),
@@ -161,19 +162,17 @@ class _Rounds:
             # The same slabs in every redo, so that it differs only where edges were shortened.
             for i in range(_MANY_ROUNDS if self._far else _ROUNDS):
                 self._remove(now, slabs[(self._stage + i) % 3])
-            live = np.flatnonzero(now.faces[:, 0] >= 0)
+            live, heir = np.flatnonzero(now.faces[:, 0] >= 0), followed(now.heir)
             for i in range(_FLIPS):
                 self._flip(now, live, slabs[(self._stage + i) % 3][0])
-            every = self._few if self._far else 1
-            facet, off, excess = self._check(every)(now, self._limits)
-            most = excess.max(initial=0.0)
-            if every > 1 and _FAR <= most <= 1.0:
-                every = 1
-                facet, off, excess = self._check(every)(now, self._limits)
+            for every in (self._few, 1) if self._far else (1,):
+                facet, off, excess = self._check(every)(now, heir, self._limits)
                 most = excess.max(initial=0.0)
+                if most < _FAR or most > 1.0:
+                    break
             if not most > 1.0:
                 self._far, self.deviation = most < _FAR, float(off.max(initial=0.0))
-                self._take(now, every, facet)
+                self._take(now, heir, every, facet)
                 return True
             if self._far:
                 self._far = False
@@ -187,7 +186,7 @@ class _Rounds:
         """Tell whether all points are within the limits; find the deviation and the home of each facet."""
         check = self._check(1)
         if not self._checked:
-            check.facet, off, excess = check(self.net, self._limits)
+            check.facet, off, excess = check(self.net, self.net.heir, self._limits)
             if excess.max(initial=0.0) > 1.0:
                 return False
             self.deviation = float(off.max(initial=0.0))
@@ -200,12 +199,13 @@ class _Rounds:
             self._checks[every] = Check(self._whole, self.home, every)
         return self._checks[every]
 
-    def _take(self, now: Net, every: int, facet: Ints) -> None:
-        """Go on with a net, after a check that found the facet (s,) of each of its points."""
+    def _take(self, now: Net, heir: Ints, every: int, facet: Ints) -> None:
+        """Go on with a net of which the last heirs (m,) are given, after a check that found the facet (s,) of each of
+        its points."""
         self.net, live, stays = now.packed()
         number = np.zeros(len(now.faces), np.int32)
         number[live] = np.arange(len(live))
-        then = number[followed(now.heir)]
+        then = number[heir]
         for check in self._checks.values():
             check.facet = then[check.facet]
         self._checks[every].facet, self._checked = number[facet], every == 1
@@ -234,9 +234,10 @@ class _Rounds:
 
     def _flip(self, net: Net, rows: NDArray[np.intp], slab: NDArray[np.int8]) -> None:
         """Flip edges of facets (r,) over which they bend against the surface in one pass, by slabs."""
+        mine = slab[net.faces[rows, 0]]
 
         def some(r: slice) -> None:
             for i in range(r.start, r.stop):
-                flip_edges(net, self._limits, self._turn, rows, slab, i)
+                flip_edges(net, self._limits, self._turn, rows[mine == i], slab, i)
 
         parallel_for(_SLABS, some, 2)

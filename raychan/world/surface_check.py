@@ -43,15 +43,15 @@ class Check:
 
         parallel_for(len(self.rows), some)
 
-    def __call__(self, net: Net, limits: Limits) -> tuple[Ints, Floats, Floats]:
+    def __call__(self, net: Net, heir: Ints, limits: Limits) -> tuple[Ints, Floats, Floats]:
         """Return the facet of each point, how far points about it may be off [m], and how far off they are in place or
-        normal over the limit."""
+        normal over the limit; heir (m,) the last heir of each facet of the net."""
         live = np.flatnonzero(net.faces[:, 0] >= 0)
         number = np.zeros(len(net.faces), np.int32)
         number[live] = np.arange(len(live))
         v, n = net.v[net.faces[live]], net.n[net.corner[live]]
         patches = v, n, edge_curvatures(v, n)[0]
-        facet = followed(net.heir)[self.facet]
+        facet = heir[self.facet]
         off, turned = np.empty(len(facet)), np.empty(len(facet))
 
         def some(r: slice) -> None:
@@ -85,11 +85,3 @@ class Check:
         _, at, own = np.intersect1d(vertex, self.vertex, assume_unique=True, return_indices=True)
         net.reach[at] = np.minimum(net.reach[at], allowed[facet[own]])
 
-
-def followed(heir: Ints) -> Ints:
-    """Return for each facet the last of its heirs."""
-    while True:
-        then = heir[heir]
-        if np.array_equal(then, heir):
-            return then
-        heir = then
