@@ -75,8 +75,8 @@ class Net(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def by_first_use(v, faces):  # type: ignore[no-untyped-def]
-    """Return numbers (k,) of vertices v (k, 3) [m] in the order in which faces (m, 3) use them, all of them, and vertices
-    and faces so numbered: neighbours then lie near each other in memory."""
+    """Return numbers (k,) of vertices v (k, 3) [m] in the order in which faces (m, 3) use them, all of them, and
+    vertices and faces so numbered: neighbours then lie near each other in memory."""
     number, there, own, count = np.full(len(v), -1, np.int32), np.empty_like(v), np.empty_like(faces), 0
     for f in range(len(faces)):
         for k in range(3):
@@ -131,11 +131,11 @@ def corners_at(faces, count):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def pair_up(v, faces, n, part, fixed, left, begin, stop, mate):  # type: ignore[no-untyped-def]
-    """Write the half edge on the other side of each of some facets into mate (3 m,), where both are of one smooth patch;
+    """Write the other side of each half edge of some facets into mate (3 m,), where both are of one smooth patch;
     return how far these facets rise over the planes of their neighbours at most [m], inf where the mesh is open.
 
-    Args: v (k, 3) [m]; faces (m, 3); n (3 m, 3) corner normals; part (m,); fixed (m,) facets that stay as they are; left
-    as `leaving` returns it; begin, stop: which facets.
+    Args: v (k, 3) [m]; faces (m, 3); n (3 m, 3) corner normals; part (m,); fixed (m,) facets that stay as they are;
+    left as `leaving` returns it; begin, stop: which facets.
     """
     half, first, end = left
     height = -np.inf

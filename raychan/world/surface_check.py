@@ -84,4 +84,3 @@ class Check:
             np.minimum.at(net.reach, corners[:, k], reach)
         _, at, own = np.intersect1d(vertex, self.vertex, assume_unique=True, return_indices=True)
         net.reach[at] = np.minimum(net.reach[at], allowed[facet[own]])
-
