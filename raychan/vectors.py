@@ -27,6 +27,18 @@ def cross(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
+def row(a, i):  # type: ignore[no-untyped-def]
+    """Return row i of a (n, 3) as three numbers: a view of it would count a reference."""
+    return a[i, 0], a[i, 1], a[i, 2]
+
+
+@njit(cache=True, forceinline=True)
+def less(a, b):  # type: ignore[no-untyped-def]
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(cache=True, forceinline=True)
 def copy_to(out, a):  # type: ignore[no-untyped-def]
     """Write a into out, one axis; numba compiles `out[:] = a` into much code, for an error message."""
     for c in range(len(out)):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.vectors import dot
+from raychan.vectors import cross, dot, less, row
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -28,7 +28,8 @@ class Net(NamedTuple):
     """A mesh that is being simplified: vertices v (k, 3) [m], normals n (3 m, 3) by corner of the original facets, and
     by facet its vertices and corners (m, 3), -1 where it went; mate (3 m,) the half edge on the other side, -1 where
     the smooth patch ends; half (k,) a half edge from each vertex; heir (m,) the facet in whose place one that went is
-    looked for; locked, gone (k,); reach (k,) [m] the longest edge that may come at each vertex."""
+    looked for; locked, gone (k,); reach (k,) [m] the longest edge that may come at each vertex; the last round, from 1
+    on, in which facets changed that each vertex touched (k,), and in which it was tried (k,) and could not go."""
 
     v: Floats
     n: Floats
@@ -40,86 +41,144 @@ class Net(NamedTuple):
     locked: Bools
     gone: Bools
     reach: Floats
+    touched: Ints
+    tried: Ints
 
     def copied(self) -> Net:
         """Return a net that can be changed by itself."""
         return Net(self.v, self.n, *(x.copy() for x in self[2:]))  # type: ignore[arg-type]
 
+    def packed(self) -> tuple[Net, NDArray[np.int64], NDArray[np.int64]]:
+        """Return the net without what went, and which facets and vertices of this one it has; its corners are numbered
+        as its facets have them."""
+        live, stays = np.flatnonzero(self.faces[:, 0] >= 0), np.flatnonzero(~self.gone)
+        facet, vertex = np.full(len(self.faces), -1, np.int32), np.zeros(len(self.v), np.int32)
+        facet[live], vertex[stays] = np.arange(len(live)), np.arange(len(stays))
+        corner = self.corner[live]
+        mate, half = self.mate.reshape(-1, 3)[live].ravel(), self.half[stays]
+        net = Net(
+            v=self.v[stays],
+            n=self.n[corner.ravel()],
+            faces=vertex[self.faces[live]],
+            corner=np.arange(corner.size, dtype=np.int32).reshape(-1, 3),
+            mate=np.where(mate < 0, np.int32(-1), 3 * facet[mate // 3] + mate % 3),
+            half=3 * facet[half // 3] + half % 3,
+            heir=np.arange(len(live), dtype=np.int32),
+            locked=self.locked[stays],
+            gone=np.zeros(len(stays), bool),
+            reach=self.reach[stays],
+            touched=self.touched[stays],
+            tried=self.tried[stays],
+        )
+        return net, live, stays
+
 
 @njit(cache=True, nogil=True)
-def mates(v, faces, n, part, fixed):  # type: ignore[no-untyped-def]
-    """Return the half edge (3 m,) on the other side of each, -1 where a smooth patch ends, which vertices (k,) lie
-    inside one, and how far facets rise over the planes of their neighbours at most [m], inf where the mesh is open.
+def by_first_use(v, faces):  # type: ignore[no-untyped-def]
+    """Return numbers (k,) of vertices v (k, 3) [m] in the order in which faces (m, 3) use them, all of them, and
+    vertices and faces so numbered: neighbours then lie near each other in memory."""
+    number, there, own, count = np.full(len(v), -1, np.int32), np.empty_like(v), np.empty_like(faces), 0
+    for f in range(len(faces)):
+        for k in range(3):
+            a = faces[f, k]
+            if number[a] < 0:
+                number[a] = count
+                there[count, 0], there[count, 1], there[count, 2] = row(v, a)
+                count += 1
+            own[f, k] = number[a]
+    return number, there, own
 
-    Args: v (k, 3) [m]; faces (m, 3); n (m, 3, 3) corner normals; part (m,); fixed (m,) facets that stay as they are.
-    """
-    m, count, height = len(faces), len(v), -np.inf
+
+@njit(cache=True, nogil=True)
+def leaving(faces, count):  # type: ignore[no-untyped-def]
+    """Return the half edges (3 m,) of faces (m, 3) by the vertex that they leave, ascending, where those of each vertex
+    begin (count + 1,), and the vertex (3 m,) at which each ends."""
+    m = len(faces)
     first = np.zeros(count + 1, np.int64)
     for f in range(m):
         for k in range(3):
             first[faces[f, k] + 1] += 1
     for a in range(count):
         first[a + 1] += first[a]
-    fill, leaving = first[:-1].copy(), np.empty(3 * m, np.int32)
-    for h in range(3 * m):
-        a = faces[h // 3, h % 3]
-        leaving[fill[a]] = h
-        fill[a] += 1
-    mate, inside = np.full(3 * m, -1, np.int32), np.ones(count, np.bool_)
-    for h in range(3 * m):
-        f, k = h // 3, h % 3
-        a, b = faces[f, k], faces[f, (k + 1) % 3]
-        alike, found = 0, -1
-        for i in range(first[a], first[a + 1]):
-            g = leaving[i]
-            alike += faces[g // 3, (g % 3 + 1) % 3] == b
-        for i in range(first[b], first[b + 1]):
-            g = leaving[i]
-            if faces[g // 3, (g % 3 + 1) % 3] == a:
-                alike, found = alike + 1, g
-        if alike == 2 and found >= 0:
-            g, c = found // 3, found % 3
-            height = max(height, _height(v, faces, f, faces[g, (c + 2) % 3]))
-            soft = dot(n[f, k], n[g, (c + 1) % 3]) > _SOFT and dot(n[f, (k + 1) % 3], n[g, c]) > _SOFT
-            if soft and part[f] == part[g] and not fixed[f] and not fixed[g]:
-                mate[h] = found
-        else:
-            height = np.inf
-        if mate[h] < 0:
-            inside[a], inside[b] = False, False
-    return mate, inside, height
+    fill, half, end = first[:-1].copy(), np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
+    for f in range(m):
+        for k in range(3):
+            at = fill[faces[f, k]]
+            half[at], end[at] = 3 * f + k, faces[f, (k + 1) % 3]
+            fill[faces[f, k]] += 1
+    return half, first, end
+
+
+@njit(cache=True, nogil=True)
+def followed(heir):  # type: ignore[no-untyped-def]
+    """Return for each facet the last of its heirs."""
+    out = heir.copy()
+    for f in range(len(out)):
+        while out[out[f]] != out[f]:
+            out[f] = out[out[f]]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def corners_at(faces, count):  # type: ignore[no-untyped-def]
+    """Return a corner 3 f + k of faces (m, 3) at each of `count` vertices: the last of the highest k."""
+    out = np.empty(count, np.int32)
+    for k in range(3):
+        for f in range(len(faces)):
+            out[faces[f, k]] = 3 * f + k
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pair_up(v, faces, n, part, fixed, left, begin, stop, mate):  # type: ignore[no-untyped-def]
+    """Write the other side of each half edge of some facets into mate (3 m,), where both are of one smooth patch;
+    return how far these facets rise over the planes of their neighbours at most [m], inf where the mesh is open.
+
+    Args: v (k, 3) [m]; faces (m, 3); n (3 m, 3) corner normals; part (m,); fixed (m,) facets that stay as they are;
+    left as `leaving` returns it; begin, stop: which facets.
+    """
+    half, first, end = left
+    height = -np.inf
+    for f in range(begin, stop):
+        for k in range(3):
+            a, b = faces[f, k], faces[f, (k + 1) % 3]
+            alike, found = 0, -1
+            for i in range(first[a], first[a + 1]):
+                alike += end[i] == b
+            for i in range(first[b], first[b + 1]):
+                if end[i] == a:
+                    alike, found = alike + 1, i
+            if alike != 2 or found < 0:
+                height = np.inf
+            elif a < b:
+                h, g, c = 3 * f + k, half[found] // 3, half[found] % 3
+                d, e = faces[f, (k + 2) % 3], faces[g, (c + 2) % 3]
+                height = max(height, _height(v, faces, f, e), _height(v, faces, g, d))
+                one = dot(row(n, h), row(n, 3 * g + (c + 1) % 3))
+                two = dot(row(n, 3 * f + (k + 1) % 3), row(n, half[found]))
+                if min(one, two) > _SOFT and part[f] == part[g] and not fixed[f] and not fixed[g]:
+                    mate[h], mate[half[found]] = half[found], h
+    return height
 
 
 @njit(cache=True, forceinline=True)
 def _height(v, faces, f, d):  # type: ignore[no-untyped-def]
     """Return how far a vertex lies over the plane of a facet [m]."""
-    p, q, r = v[faces[f, 0]], v[faces[f, 1]], v[faces[f, 2]]
-    x0, y0, z0 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    x1, y1, z1 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    x, y, z = y0 * z1 - z0 * y1, z0 * x1 - x0 * z1, x0 * y1 - y0 * x1
-    up = (v[d, 0] - p[0]) * x + (v[d, 1] - p[1]) * y + (v[d, 2] - p[2]) * z
-    return up / max(math.sqrt(x * x + y * y + z * z), 1e-300)
+    p = row(v, faces[f, 0])
+    up = cross(less(row(v, faces[f, 1]), p), less(row(v, faces[f, 2]), p))
+    return dot(less(row(v, d), p), up) / max(math.sqrt(dot(up, up)), 1e-300)
 
 
 @njit(cache=True, nogil=True)
-def lock_pinched(net):  # type: ignore[no-untyped-def]
-    """Lock the vertices about which facets make no single closed fan; give each vertex a half edge."""
-    count = np.zeros(len(net.half), np.int64)
-    for f in range(len(net.faces)):
-        for k in range(3):
-            net.half[net.faces[f, k]] = 3 * f + k
-            count[net.faces[f, k]] += 1
-    fan = np.empty(MOST, np.int32)
-    for a in range(len(net.half)):
-        if not net.locked[a]:
-            size = fan_of(net, a, fan)
-            net.locked[a] = size == 0 or size != count[a]
+def lock(faces, mate, half, first, begin, stop, locked):  # type: ignore[no-untyped-def]
+    """Write into locked (k,) about which of some vertices facets make no single closed fan.
 
-
-@njit(cache=True, forceinline=True)
-def end_of(net, h):  # type: ignore[no-untyped-def]
-    """Return the vertex at which a half edge ends."""
-    return net.faces[h // 3, (h % 3 + 1) % 3]
+    Args: half (k,) a half edge from each vertex; first (k + 1,) as `leaving` returns it; begin, stop: which vertices.
+    """
+    fan, ring = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
+    for a in range(begin, stop):
+        size = fan_of(faces, mate, half[a], fan, ring)
+        locked[a] = size == 0 or size != first[a + 1] - first[a]
 
 
 @njit(cache=True, forceinline=True)
@@ -128,15 +187,16 @@ def before(h):  # type: ignore[no-untyped-def]
     return h + 2 if h % 3 == 0 else h - 1
 
 
-@njit(cache=True, nogil=True)
-def fan_of(net, a, out):  # type: ignore[no-untyped-def]
-    """Write the half edges that leave a vertex, in order, into out; return how many, 0 where they close no fan."""
-    start = net.half[a]
-    h, m = start, 0
+@njit(cache=True, forceinline=True)
+def fan_of(faces, mate, start, out, ring):  # type: ignore[no-untyped-def]
+    """Write the half edges that leave a vertex, in order from `start` on, into out, and where they end into ring;
+    return how many, 0 where they close no fan."""
+    h, m = np.int64(start), 0
     while m < len(out):
-        out[m] = h
+        f, k = h // 3, h % 3
+        out[m], ring[m] = h, faces[f, (k + 1) % 3]
         m += 1
-        h = net.mate[before(h)]
+        h = np.int64(mate[3 * f + (k + 2) % 3])
         if h < 0:
             return 0
         if h == start:

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
+from raychan.vectors import dot, less
 
 _SHARP = 0.95  # cosine of corner normals across an edge above which it is round, not a wedge; not measured
 
@@ -58,7 +59,25 @@ def planes_of(v):  # type: ignore[no-untyped-def]
     return normal, area
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, forceinline=True)
+def edge_curvature(p, q, m, n):  # type: ignore[no-untyped-def]
+    """Return the curvature (3,) [m] of the edge from corner p with normal m to corner q with normal n (see
+    `edge_curvatures`)."""
+    d = less(q, p)
+    a = dot(m, n)
+    det = 1.0 - a * a
+    if not det > 1e-12:
+        return 0.0, 0.0, 0.0
+    here, there = dot(d, m), -dot(d, n)
+    s, t = (here - a * there) / det, (there - a * here) / det
+    c = s * m[0] + t * n[0], s * m[1] + t * n[1], s * m[2] + t * n[2]
+    # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it straight.
+    if not math.sqrt(dot(c, c)) < math.sqrt(max(2.0 * (1.0 - a), 0.0)) * math.sqrt(dot(d, d)):
+        return 0.0, 0.0, 0.0
+    return c
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def edge_curvatures(v, n):  # type: ignore[no-untyped-def]
     """Return the edge curvatures c (m, 3, 3) [m] of the quadratic patches x = sum l_i x_i - sum c_ij l_i l_j through
     corners and corner normals, and which facets (m,) are curved.
@@ -66,33 +85,22 @@ def edge_curvatures(v, n):  # type: ignore[no-untyped-def]
     Source: Nagata (2005), Computer Aided Geometric Design 22(4), eq. 10.
     """
     m = len(v)
-    out, curved = np.zeros((m, 3, 3)), np.zeros(m, np.bool_)
+    out, curved = np.empty((m, 3, 3)), np.zeros(m, np.bool_)
     for f in range(m):
         for i in range(3):
-            j = (i + 1) % 3
-            a, p, q, dd = 0.0, 0.0, 0.0, 0.0
-            for c in range(3):
-                d = v[f, j, c] - v[f, i, c]
-                a += n[f, i, c] * n[f, j, c]
-                p += d * n[f, i, c]
-                q -= d * n[f, j, c]
-                dd += d * d
-            det = 1.0 - a * a
-            if not det > 1e-12:
-                continue
-            s, t = (p - a * q) / det, (q - a * p) / det
-            cc = 0.0
-            for c in range(3):
-                cc += (s * n[f, i, c] + t * n[f, j, c]) ** 2
-            # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it
-            # straight.
-            turn = math.sqrt(max(2.0 * (1.0 - a), 0.0))
-            if not math.sqrt(cc) < turn * math.sqrt(dd):
-                continue
-            for c in range(3):
-                out[f, i, c] = s * n[f, i, c] + t * n[f, j, c]
-                curved[f] |= abs(out[f, i, c]) > 1e-9
+            p, q = facet_edge(v, f, i)
+            a, b = facet_edge(n, f, i)
+            c = edge_curvature(p, q, a, b)
+            out[f, i, 0], out[f, i, 1], out[f, i, 2] = c
+            curved[f] |= max(abs(c[0]), abs(c[1]), abs(c[2])) > 1e-9
     return out, curved
+
+
+@njit(cache=True, forceinline=True)
+def facet_edge(v, f, i):  # type: ignore[no-untyped-def]
+    """Return what facet f of v (m, 3, 3) has at both ends of its edge i, as two vectors."""
+    j = (i + 1) % 3
+    return (v[f, i, 0], v[f, i, 1], v[f, i, 2]), (v[f, j, 0], v[f, j, 1], v[f, j, 2])
 
 
 @njit(cache=True, nogil=True)

@@ -8,6 +8,7 @@ uncertain smooth folds as edges, and uncertain edges as smooth folds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,30 +113,48 @@ def uncertain_facets(mesh: Mesh) -> Bools:
     return found
 
 
+class _Folds(NamedTuple):
+    """Folds of a mesh that are smooth and those above the crease angle that may be: half edges (e, 2) and angles (e,)
+    [rad]; which of the smooth ones may be edges, None where none is bent."""
+
+    smooth: Ints
+    fold: Floats
+    uncertain: Bools | None
+    hard: Ints
+    hard_fold: Floats
+
+
+def _kept_folds(mesh: Mesh) -> _Folds:
+    """Return the folds of a mesh, kept with it."""
+    if "folds" not in mesh.memo:
+        pair, fold = _all_folds(mesh)
+        crease = crease_angle(mesh.crease_deg or 0.0)
+        soft, hard = fold < crease, np.zeros(len(pair), bool)
+        if mesh.crease_deg and len(pair):
+            hard = rounded(mesh.topology, mesh.corners, pair, _outward(mesh, pair) * fold, crease)
+        one, its = pair[soft], fold[soft]
+        bent = its > _BEND
+        uncertain = bent & _may_be_edges(mesh, one, np.where(bent, its, 0.0)) if bent.any() else None
+        mesh.memo["folds"] = _Folds(one, its, uncertain, pair[hard], fold[hard])
+    found: _Folds = mesh.memo["folds"]
+    return found
+
+
 def _folds(mesh: Mesh) -> tuple[Ints, Floats, Bools]:
-    """Return the smooth folds of a mesh as half edges (e, 2), their angles (e,) [rad] and which of them may be
-    edges."""
-    pair, fold = _smooth_folds(mesh)
-    bent = fold > _BEND
-    if not bent.any():
-        return pair[:0], fold[:0], bent[:0]
-    return pair, fold, bent & _may_be_edges(mesh, pair, np.where(bent, fold, 0.0))
+    """Return the smooth folds of a mesh as half edges (e, 2), their angles (e,) [rad] and which of them may be edges;
+    none where none is bent."""
+    pair, fold, uncertain, _, _ = _kept_folds(mesh)
+    return (pair[:0], fold[:0], np.zeros(0, bool)) if uncertain is None else (pair, fold, uncertain)
 
 
 def _smooth_folds(mesh: Mesh) -> tuple[Ints, Floats]:
     """Return the half edges (e, 2) over which a mesh was smoothed, and their angles (e,) [rad]."""
-    pair, fold = _all_folds(mesh)
-    soft = fold < crease_angle(mesh.crease_deg or 0.0)
-    return pair[soft], fold[soft]
+    return _kept_folds(mesh)[:2]
 
 
 def _uncertain_edges(mesh: Mesh) -> tuple[Ints, Floats]:
     """Return the half edges (e, 2) of folds above the crease angle that may be smooth, and their angles (e,) [rad]."""
-    pair, fold = _all_folds(mesh)
-    if not mesh.crease_deg or not len(pair):
-        return pair[:0], fold[:0]
-    smooth = rounded(mesh.topology, mesh.corners, pair, _outward(mesh, pair) * fold, crease_angle(mesh.crease_deg))
-    return pair[smooth], fold[smooth]
+    return _kept_folds(mesh)[3:]
 
 
 def _all_folds(mesh: Mesh) -> tuple[Ints, Floats]:
@@ -196,12 +215,17 @@ def _one_way(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> 
     span = _spans(mesh, pair)
     length = np.linalg.norm(span, axis=1)
     along = span / np.maximum(length, 1e-300)[:, None]
-    tensor = np.zeros((len(mesh.faces), 3, 3))
+    weight, facet, across, v = fold * length, pair.T.ravel() // 3, [], mesh.corners
     for half in pair.T:
-        corners = mesh.corners[half // 3]
+        corners = v[half // 3]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        across = np.cross(along, normal / np.linalg.norm(normal, axis=1, keepdims=True))
-        np.add.at(tensor, half // 3, (fold * length)[:, None, None] * across[:, :, None] * across[:, None, :])
+        across.append(np.cross(along, normal / np.linalg.norm(normal, axis=1, keepdims=True)))
+    tensor = np.zeros((len(mesh.faces), 3, 3))
+    for i, j in np.argwhere(np.tri(3)):
+        # Of a symmetric matrix the lower half is read.
+        tensor[:, i, j] = np.bincount(
+            facet, np.concatenate([weight * x[:, i] * x[:, j] for x in across]), len(mesh.faces)
+        )
     bends = np.linalg.eigvalsh(tensor)
     most, least = (np.bincount(patch, bends[:, i]) for i in (2, 1))
     return np.asarray(least < _ONE_WAY * most)

@@ -27,8 +27,8 @@ def near_surfaces(mesh: Mesh, distance: float) -> Bools:
     near, own = np.zeros(n, bool), np.arange(n, dtype=np.int32)
     for point in np.einsum("pk,fkc->pfc", share, mesh.corners):
         for way in (normal, -normal):
-            hit, t = caster.cast(np.ascontiguousarray(point), way, own)
-            rows = np.flatnonzero((hit >= 0) & (t < distance))
+            hit = caster.within(np.ascontiguousarray(point), way, own, distance)
+            rows = np.flatnonzero(hit >= 0)
             apart = (mesh.faces[rows, :, None] != mesh.faces[hit[rows], None, :]).all(axis=(1, 2))
             near[rows[apart]] = True
             near[hit[rows[apart]]] = True

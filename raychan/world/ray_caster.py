@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from raychan.geometry.embree_packet import new_packet
 from raychan.geometry.intersect import EDGE, OFFSET, CastRays, FacetGroups, FacetShapes, plane_distances
+from raychan.geometry.near_rays import first_within
 from raychan.geometry.shadow_rays import MetFacets, ShadowSurfaces, ShadowTargets, follow_rays
 from raychan.geometry.triangles import extents, planes_of
 from raychan.parallel import cached, parallel_for
@@ -168,6 +169,19 @@ class RayCaster:
         at_nothing = ShadowTargets(_NO_LIMIT, _NO_LIMIT, _NO_FACET, _NO_BODY)
         self._follow(_rays(origin, direction, skip, start), at_nothing, met)
         return facet, distance
+
+    def within(self, origin: Floats, direction: Floats, own: Ints, reach: float) -> Ints:
+        """Return the first facet (n,; -1: none) that each ray meets within a reach [m]; no facet may be a layer.
+
+        Args: origin (n, 3) [m], direction (n, 3) unit, own (n,) facet that each leaves and cannot meet.
+        """
+        found, fixed = np.full(len(origin), _MISS, np.int32), (reach, self._facet_groups, self._shapes)
+
+        def some(r: slice) -> None:
+            first_within(origin[r], direction[r], own[r], *fixed, new_packet(), found[r])
+
+        parallel_for(len(origin), some, _PARALLEL_FROM)
+        return found
 
     def walk(
         self,

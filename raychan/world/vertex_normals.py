@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from raychan.geometry.normal_fits import eliminated
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
 Bools = NDArray[np.bool_]
@@ -102,22 +104,9 @@ def _corrected(place: Floats, first: Floats, rows: Ints, near: csr_matrix, power
 
 def _least_squares(basis: Floats, weight: Floats, z: Floats, at: Ints, n: int) -> tuple[Floats, Bools]:
     """Return the weighted least-squares fits (n, k) of z (m,) in a basis (m, k), grouped by at (m,), and which of them
-    are determined; by Cholesky factorisation, all fits at once."""
+    are determined; by elimination."""
+    m, y, size, able = eliminated(basis, weight, z, at, n, _LEAST_PIVOT)
     k = basis.shape[1]
-    m, scaled = np.empty((n, k, k)), basis * weight[:, None]
-    for i in range(k):
-        m[:, i:, i] = m[:, i, i:] = _sums(at, scaled[:, i : i + 1] * basis[:, i:], n)
-    size = np.sqrt(np.maximum(np.einsum("nii->ni", m), 1e-300))
-    m /= size[:, :, None] * size[:, None, :]
-    y = _sums(at, scaled * z[:, None], n) / size
-    able = np.ones(n, bool)
-    for i in range(k):
-        able &= m[:, i, i] > _LEAST_PIVOT
-        pivot = np.where(able, m[:, i, i], 1.0)
-        factor = m[:, i + 1 :, i] / pivot[:, None]
-        m[:, i + 1 :, i:] -= factor[:, :, None] * m[:, i : i + 1, i:]
-        y[:, i + 1 :] -= factor * y[:, i : i + 1]
-    m[~able], y[~able] = np.eye(k), 0.0
     for i in reversed(range(k)):
         y[:, i] = (y[:, i] - np.einsum("nj,nj->n", m[:, i, i + 1 :], y[:, i + 1 :])) / m[:, i, i]
     return y / size, able
