@@ -196,7 +196,10 @@ def _scatter_by_corner(i, out, terms, route, points, ends, slots, fields, arrive
         here = vec(points[c3])
         c_in = cosine(incidence(here, tx, i, 0, at, 1, vertices, normals, kind, cosines), normal)
         c_out = cosine(incidence(here, rx, i, used - 1, at, -1, vertices, normals, kind, cosines), normal)
-        arriving[:], leaving[:] = e_tx[i], e_rx[i]
+        for p in range(len(arriving)):
+            copy_to(arriving[p], e_tx[i, p])
+        for q in range(len(leaving)):
+            copy_to(leaving[q], e_rx[i, q])
         over_mirrors(
             arriving, heading(tx, vertices[i, 0]), i, 0, at, 1, vertices, normals, kind, material, used, rx, table, k,
             cosines,

@@ -9,6 +9,7 @@ import numpy as np
 
 from raychan.compile.jit import njit
 from raychan.em.phasor import unit_phasor
+from raychan.vectors import copy_to
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -139,7 +140,7 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
             wave = turn * _answer(at_range, rate[i], cells[c, 0], cells[c, 1], ramp, sizes, across, along)
             _count(c, group[i], i, wave, at_range, rate[i], total, size, strongest, most)
     for c in range(len(cells)):
-        size[c, 0] = count
+        copy_to(size[c, 0], count)
 
 
 @njit(cache=True, nogil=True)
