@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
+from raychan.vectors import dot
 
 
 @njit(cache=True, nogil=True)
@@ -76,10 +77,9 @@ def clearance(v, point):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _distance(a, b, c, p):  # type: ignore[no-untyped-def]
     """Return the distance from p to triangle a, b, c. Source: Ericson (2005), Real-Time Collision Detection, 5.1.5."""
-    ab, ac, ap = b - a, c - a, p - a
-    d1, d2 = np.sum(ab * ap), np.sum(ac * ap)
-    bp, cp = p - b, p - c
-    d3, d4, d5, d6 = np.sum(ab * bp), np.sum(ac * bp), np.sum(ab * cp), np.sum(ac * cp)
+    ab, ac, ap, bp, cp = _minus(b, a), _minus(c, a), _minus(p, a), _minus(p, b), _minus(p, c)
+    d1, d2 = dot(ab, ap), dot(ac, ap)
+    d3, d4, d5, d6 = dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
     if d1 <= 0.0 and d2 <= 0.0:
         s, t = 0.0, 0.0
@@ -96,5 +96,12 @@ def _distance(a, b, c, p):  # type: ignore[no-untyped-def]
         s = 1.0 - t
     else:
         s, t = vb / (va + vb + vc), vc / (va + vb + vc)
-    off = p - (a + s * ab + t * ac)
-    return math.sqrt(np.sum(off * off))
+    off = 0.0
+    for i in range(3):
+        off += (p[i] - (a[i] + s * ab[i] + t * ac[i])) ** 2
+    return math.sqrt(off)
+
+
+@njit(cache=True, forceinline=True)
+def _minus(a, b):  # type: ignore[no-untyped-def]
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from raychan.compile.jit import njit
+from raychan.vectors import copy_to
 
 
 @njit(cache=True, forceinline=True)
@@ -35,7 +36,8 @@ def silhouette_edges(faces, point, normal, image, far):  # type: ignore[no-untyp
         if not _is_silhouette(faces[e, 0], faces[e, 1], point, normal, image, far):
             continue
         if count == len(out):
-            out = np.append(out, np.empty_like(out))
+            before, out = out, np.empty(2 * count, np.int64)
+            copy_to(out[:count], before)
         out[count] = e
         count += 1
     return out[:count].copy()

@@ -196,8 +196,9 @@ def counting_sort(box, count):  # type: ignore[no-untyped-def]
     start = np.zeros(count + 1, np.int64)
     for i in range(box.size):
         start[box[i] + 1] += 1
-    most = start.max()
+    most = 0
     for b in range(count):
+        most = max(most, start[b + 1])
         start[b + 1] += start[b]
     order = np.empty(box.size, np.int64)
     for i in range(box.size):

@@ -158,7 +158,10 @@ def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped
             if last != at:
                 last = at
                 if count == len(cells):
-                    cells, owner = np.append(cells, np.empty_like(cells)), np.append(owner, np.empty_like(owner))
+                    few, theirs = cells, owner
+                    cells, owner = np.empty(2 * count, few.dtype), np.empty(2 * count, theirs.dtype)
+                    copy_to(cells[:count], few)
+                    copy_to(owner[:count], theirs)
                 cells[count], owner[count] = at, e
                 count += 1
                 first[at + 1] += 1
@@ -234,8 +237,10 @@ def _covered_cells(points, shadows, x, least, most, cells):  # type: ignore[no-u
         for c in range(3):
             least[c], most[c] = min(least[c], x[c]), max(most[c], x[c])
     # On the sphere of directions a tube's sides bulge by an eighth of their square.
-    bulge = 0.0 if shadows.far else 0.125 * np.sum((most - least) ** 2)
-    margin = 0.5 * shadows.cell + bulge
+    square = 0.0
+    for c in range(3):
+        square += (most[c] - least[c]) ** 2
+    margin = 0.5 * shadows.cell + (0.0 if shadows.far else 0.125 * square)
     for j in range(2):
         axis = shadows.axes[j]
         begin = (least[axis] - margin - shadows.low[j]) / shadows.cell

@@ -180,7 +180,9 @@ def shadow_rays(points, curved_points, facet, first, normal, image, far, centres
     """
     n = len(facet)
     at = n if centres else 0
-    r = at + 3 * np.count_nonzero(corners)
+    r = at
+    for i in range(n):
+        r += 3 if corners[i] else 0
     aim, target, near, slack = np.empty((r, 3)), np.empty(r, np.int32), np.empty(r), np.empty(n)
     for i in range(n):
         f = facet[i]
@@ -231,7 +233,9 @@ def gather_partly_visible(search, points, facet, rays, plane, image, far):  # ty
     -1 for the tube's own surface; planes (k, 4) of these, -1 unknown; source (k, 3) [m], back (k, 3) the direction
     towards it; own (k, 3) unit normals of the tubes.
     """
-    k = np.count_nonzero(search)
+    k = 0
+    for i in range(len(search)):
+        k += 1 if search[i] else 0
     rows, at = np.empty(k, np.int64), np.empty((k, 4, 3))
     met, planes = np.empty((k, 4), np.int32), np.empty((k, 4), np.int32)
     source, back, own = np.empty((k, 3)), np.empty((k, 3)), np.empty((k, 3))
