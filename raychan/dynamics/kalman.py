@@ -15,6 +15,7 @@ MEASURED = np.array(
 )
 """Sensors (p, r, phi, psi) of the state (v, p, r, phi, psi): gyros, inclinometer, compass; none for sway."""
 MEASURED.setflags(write=False)
+_DECAY = 1e-8  # of an error a step, at least: less is rounding of a double eigenvalue at one
 
 
 @dataclass(frozen=True)
@@ -114,10 +115,15 @@ def kalman_filter(ship: LinearShip, noise: Noise, dt: float) -> KalmanFilter:
     """
     step = exact_step(ship, dt)
     sensed = np.diag(noise.sensors**2)
+    lost = "the filter has no steady state: something neither decays nor is disturbed"
     try:
         predicted = solve_discrete_are(step.state.T, MEASURED.T, disturbance_covariance(ship, noise, dt), sensed)
     except np.linalg.LinAlgError as error:
-        raise ValueError("the filter has no steady state: something neither decays nor is disturbed") from error
+        raise ValueError(lost) from error
     innovation = MEASURED @ predicted @ MEASURED.T + sensed
     gain = np.linalg.solve(innovation, MEASURED @ predicted).T
+    # Not every build of LAPACK notices: a filter that keeps an error for ever is none.
+    kept = np.abs(np.linalg.eigvals(step.state @ (np.eye(len(gain)) - gain @ MEASURED))).max()
+    if not kept < 1.0 - _DECAY:
+        raise ValueError(lost)
     return KalmanFilter(step=step, gain=gain, predicted=predicted, innovation=innovation)

@@ -75,10 +75,10 @@ def rcs(
     """Return the RCS and scattering matrix of a mesh, in the near or far field, monostatic or bistatic.
 
     Args: mesh trimesh, Mesh or file; frequency [Hz]; angles [deg] from the target to the radar in the target's frame,
-    which broadcast; polarization receive then transmit (V theta-hat, H phi-hat); distance [m] from the origin, inf for
-    plane waves; tolerance_db [dB] wanted; rx_* of the receiver, where it is elsewhere; max_rays an angle, about; folds
-    under crease_deg [deg] are smooth (None: 20, or as the Mesh was made), unless the mesh knows its normals; simplify
-    finely tessellated smooth surfaces, as near to them as the tolerance asks for.
+    which broadcast; polarization receive then transmit (V, H of a wave that leaves the antenna); distance [m] from the
+    origin, inf for plane waves; tolerance_db [dB] wanted; rx_* of the receiver, where it is elsewhere; max_rays an
+    angle, about; folds under crease_deg [deg] are smooth (None: 20, or as the Mesh was made), unless the mesh knows its
+    normals; simplify finely tessellated smooth surfaces, as near to them as the tolerance asks for.
     A near-field value is that of the point target at the origin that returns as much: 4 pi D^4 |E_s|^2 for unit field
     at 1 m. Raises: ValueError for arguments out of range.
     Source: Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5.

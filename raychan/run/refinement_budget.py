@@ -11,8 +11,8 @@ STEPS = 8
 """Launches, each half as coarse as the one before. Rays against cells reached: of the detections at 0.5 dB of nine
 scenes hard to converge (`bench.detections`, seeds 18 to 128) six bring 58 % within it, eight 73 % for 1.6 times the
 rays."""
-_RAYS = 2.0  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
-_LEAST = 1_500_000
+_RAYS = 3.0  # times the rays of the first launch: what all further launches may cast unless model.max_rays is given
+_LEAST = 2_500_000
 """Rays that further launches may cast however few the first one did: a second of one core. Seeds 0 to 59 bring 79 % of
 their detections at 0.5 dB within it with 600,000, 85 % with this and twice _RAYS, for 1.4 times the rays."""
 _LOOKS = 4.5

@@ -47,6 +47,7 @@ _DEEPER = 2.0  # fans that a tube may spread its rays by after its first bounce;
 _BUDGET_SHARE = 0.1  # of a cut for visibility: what a cut between bounces takes of the budget; not measured
 _PARALLEL_FROM = 2000  # tubes from which on a second thread pays; not measured
 _PART = 16384  # tubes that one thread follows at once; not measured
+_WIDE = 0.05  # rad between the centre ray and a corner's; silhouettes clip narrower fans; not measured
 _PAST_LAYER = 1e-6  # m behind a layer from which on hits count
 
 
@@ -148,12 +149,14 @@ def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> 
     matters = _matters(step, tubes, directions, mid, ahead)
     hit, reach = np.repeat(mid, 4).reshape(-1, 4), np.repeat(ahead, 4).reshape(-1, 4)
     one_surface = mid >= 0
-    # Where the centre ray meets nothing, but the fan of a curved surface is wide, a corner may meet something.
-    rows = np.flatnonzero(matters & (one_surface | ~_flat(step, tubes)))
+    # Where the centre ray meets nothing, but the fan is wide, a corner may meet something.
+    flat = tubes.flat & ~geometry.curved[tubes.facet]
+    rows = np.flatnonzero(matters & (one_surface | (_wide(rule, directions) & ~flat)))
     facets, distances = geometry.cast(*corner_rays(rows, points, directions, tubes.facet, flight.start))
     hit[rows, :3], reach[rows, :3] = facets.reshape(-1, 3), distances.reshape(-1, 3)
     on_one_surface(rows, hit, geometry.plane, geometry.smooth, geometry.normal, rule.patch, one_surface)
-    side = _edges_within(step, tubes, points, directions, hit, reach, np.flatnonzero(matters))
+    rays = TubeRays(points, directions, tubes.length, flat, hit, reach)
+    side = _edges_within(step, rays, np.flatnonzero(matters))
     mixed = (~one_surface & (hit >= 0).any(axis=1)) | side.any(axis=1)
     split = found.budget.affords(
         geometry, tubes.facet, mixed & matters & (flight.count[0] < rule.levels), _BUDGET_SHARE
@@ -168,9 +171,13 @@ def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> 
     return _with_tubes_behind_layers(flight, behind, mid, reach, cut) if len(behind) else cut
 
 
-def _flat(step: _Bounce, tubes: Tubes) -> Bools:
-    """Tell of which tubes (n,) all mirrors up to the present one are planes."""
-    return np.asarray(tubes.flat & ~step.geometry.curved[tubes.facet])
+def _wide(rule: Refinement, directions: Floats) -> Bools:
+    """Tell of which tubes (n,), where the rule leaves them so, corner rays spread too far from the centre's for
+    silhouettes to be found between them."""
+    if rule.fan < np.inf:
+        return np.zeros(len(directions), bool)
+    off = np.linalg.norm(directions[:, :CENTRE] - directions[:, CENTRE:], axis=2)
+    return np.asarray(off.max(axis=1, initial=0.0) > _WIDE)
 
 
 def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: Floats) -> Bools:
@@ -230,14 +237,10 @@ def _contribution_bounds(step: _Bounce, tubes: Tubes) -> Floats:
     return bounds
 
 
-def _edges_within(
-    step: _Bounce, tubes: Tubes, points: Floats, directions: Floats, hit: Ints, reach: Floats, rows: Rows
-) -> Floats:
+def _edges_within(step: _Bounce, rays: TubeRays, rows: Rows) -> Floats:
     """Return signed distances (n, 3) [m] of corners from an edge that runs through each of the tubes `rows`; zeros
     where none does."""
-    geometry, flat = step.geometry, _flat(step, tubes)
-    side = np.zeros((len(tubes), 3))
-    rays = TubeRays(points, directions, tubes.length, flat, hit, reach)
+    geometry, side = step.geometry, np.zeros((len(rays.hit), 3))
     planes = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
     edges = geometry.first_edge, geometry.plane_edges
 
