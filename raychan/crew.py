@@ -131,8 +131,8 @@ class Crew:
                 return loop
         return None
 
-    def _help(self, loop: Loop) -> None:
-        """Do tasks of a loop that was taken."""
+    def _help(self, loop: Loop, serving: bool = False) -> None:
+        """Do tasks of a loop that was taken; a thread that serves is free once the loop has one helper less."""
         try:
             loop.work()
         except BaseException as error:
@@ -140,6 +140,7 @@ class Crew:
         finally:
             with self._changed:
                 loop.running -= 1
+                self._busy -= serving
                 self._changed.notify_all()
 
     def _serve(self) -> None:
@@ -152,11 +153,7 @@ class Crew:
                         return
                     self._changed.wait()
                 self._busy += 1
-            try:
-                self._help(loop)
-            finally:
-                with self._changed:
-                    self._busy -= 1
+            self._help(loop, serving=True)
             del loop  # and with it the arrays of its tasks
 
 
