@@ -9,12 +9,14 @@ import numpy as np
 from raychan.records import MIRROR
 from raychan.run.result import DIRECT, Result
 
+_MOSTLY = 2.0 / 3.0  # of an echo's power: a preview has no bounces
+
 
 @dataclass(frozen=True)
 class Beside:
-    """Direct detections of a fine run, of echoes that one body scattered once, beside those of a preview: by how many
-    resolution cells the nearest is off, by how many dB, and what the preview states [dB], all (n,); `snr` (n,) [dB] of
-    the fine run's and `error` (n,) [dB] that it states, NaN where unknown."""
+    """Direct detections of a fine run, of echoes of which one body scattered most once, beside those of a preview: by
+    how many resolution cells the nearest is off, by how many dB, and what the preview states [dB], all (n,); `snr` (n,)
+    [dB] of the fine run's and `error` (n,) [dB] that it states, NaN where unknown."""
 
     cells: np.ndarray
     level: np.ndarray
@@ -30,7 +32,7 @@ def beside(fine: Result, coarse: Result) -> Beside:
     sizes = wave.range_resolution, 0.5 * wave.wavelength / wave.frame_duration
     d, p, rows = fine.detections, coarse.detections, []
     for i, why in enumerate(fine.provenance):
-        if why.label != DIRECT or not _once(fine, why.contributions[0].chain):
+        if why.label != DIRECT or sum(c.share for c in why.contributions if _once(fine, c.chain)) < _MOSTLY:
             continue
         off = np.maximum(np.abs(p.range - d.range[i]) / sizes[0], np.abs(p.rate - d.rate[i]) / sizes[1])
         if not len(off):
