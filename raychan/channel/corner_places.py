@@ -13,7 +13,7 @@ from raychan.channel.fields_along import mirrored, vec
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
 from raychan.records import REFLECT, Facets, Routes
-from raychan.vectors import cross, dot
+from raychan.vectors import cross, dot, less
 
 Floats = NDArray[np.float64]
 
@@ -43,11 +43,6 @@ def corner_places(routes: Routes, rows: NDArray[np.int64], facets: Facets) -> tu
 
     parallel_for(len(rows), some)
     return places, angles
-
-
-@njit(cache=True, forceinline=True)
-def _less(a, b):  # type: ignore[no-untyped-def]
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit(cache=True, forceinline=True)
@@ -83,7 +78,7 @@ def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[n
     while True:
         over = j < 0 or j == d or kind[i, j] == 0
         there = vec(ends[end]) if over else vec(vertices[i, j])
-        stretch = _less(there, here)
+        stretch = less(there, here)
         size = max(dot(stretch, stretch) ** 0.5, 1e-300)
         far += size
         last = stretch[0] / size, stretch[1] / size, stretch[2] / size
@@ -94,7 +89,7 @@ def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[n
         bent |= kind[i, j] == _REFLECT and facet[i, j] >= 0 and _curved(surface[1][facet[i, j]])
         here, j = there, j + step
     for c in range(3):
-        off = _less(vec(points[i, c]), centre)
+        off = less(vec(points[i, c]), centre)
         if bent and end == 0:
             source = _leaving_to(i, c, first, ends, routes, surface)
             off = _plus(source, far, last)
@@ -126,11 +121,11 @@ def _leaving_to(i, c, back, ends, routes, surface):  # type: ignore[no-untyped-d
         n, vertex = vec(normals[i, j]), vec(vertices[i, j])
         steep = dot(k, n)
         if abs(steep) > _GRAZING:
-            here = _plus(here, -dot(_less(here, vertex), n) / steep, k)
+            here = _plus(here, -dot(less(here, vertex), n) / steep, k)
         if facet[i, j] >= 0:
             n = _normal_at(here, vertex, n, surface[0][facet[i, j]], surface[1][facet[i, j]])
         k = _plus(k, -2.0 * dot(k, n), n)
-    ray = _less(here, vec(ends[0]))
+    ray = less(here, vec(ends[0]))
     size = length / max(dot(ray, ray) ** 0.5, 1e-300)
     return ray[0] * size, ray[1] * size, ray[2] * size
 
@@ -149,16 +144,16 @@ def _arriving(i, c, back, rx, routes):  # type: ignore[no-untyped-def]
             image = mirrored(image, vec(vertices[i, m]), vec(normals[i, m]))
         m -= 1
     here = vec(points[i, c])
-    way = _less(here, image)
+    way = less(here, image)
     length = lengths[i, c] - dot(way, way) ** 0.5
     slopes, edges = (0.0, 0.0), (way, way)
     for e in range(2):
         corner, middle = (c + 1 + e) % 3, 3 + (c if e == 0 else (c + 2) % 3)
-        way = _less(vec(points[i, corner]), image)
+        way = less(vec(points[i, corner]), image)
         there = lengths[i, corner] - dot(way, way) ** 0.5
-        way = _less(vec(points[i, middle]), image)
+        way = less(vec(points[i, middle]), image)
         slope = 4.0 * (lengths[i, middle] - dot(way, way) ** 0.5) - 3.0 * length - there
-        edge = _less(vec(points[i, corner]), here)
+        edge = less(vec(points[i, corner]), here)
         slopes, edges = (slopes[1], slope), (edges[1], edge)
     a, b = edges
     n = cross(a, b)
@@ -180,13 +175,13 @@ def _arriving(i, c, back, rx, routes):  # type: ignore[no-untyped-def]
 def _normal_at(here, vertex, normal, v, n):  # type: ignore[no-untyped-def]
     """Return the unit normal at a point beside a vertex, where it is `normal`, of a facet with corners v (3, 3) [m] and
     normals n (3, 3) there."""
-    a, b = _less(v[1], v[0]), _less(v[2], v[0])
+    a, b = less(v[1], v[0]), less(v[2], v[0])
     flat = cross(a, b)
     square = max(dot(flat, flat), 1e-300)
-    off = _less(here, vertex)
+    off = less(here, vertex)
     s, t = dot(cross(off, b), flat) / square, dot(cross(a, off), flat) / square
     side = 1.0 if dot(normal, vec(n[0])) > 0.0 else -1.0
-    turned = _plus(normal, side * s, _less(n[1], n[0]))
-    turned = _plus(turned, side * t, _less(n[2], n[0]))
+    turned = _plus(normal, side * s, less(n[1], n[0]))
+    turned = _plus(turned, side * t, less(n[2], n[0]))
     size = max(dot(turned, turned) ** 0.5, 1e-300)
     return turned[0] / size, turned[1] / size, turned[2] / size

@@ -18,7 +18,8 @@ the first launch the living street brings 11 of 17 detections within 0.5 dB, wit
 `bench.detections` bring 92 % within 0.5 dB."""
 _LOOKS = 4.5
 """Times the rays of a look that a run may cast unless model.max_rays is given: less than a fixed model may, which is
-5.0 to 8.6 times a look (urban, living street, occluded pedestrian at 0.5 and 1 dB; command not noted)."""
+5.0 to 8.6 times a look (urban, living street, occluded pedestrian at 0.5 and 1 dB, while it could cast three times its
+first launch; command not noted)."""
 _GROWTH = 2.0  # rays and seconds of a step over those of the one before on the same facets, about
 _BYTES = 400.0  # a path
 
