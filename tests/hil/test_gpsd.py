@@ -70,9 +70,11 @@ def test_gpsd_has_fixes_and_headings_with_the_values_of_the_track(tmp_path):
     print(f"{len(fixes)} fixes, {len(right)} right, {len(headings)} headings in {SECONDS:g} s; {numbers['scans']}")
     first, last = (datetime.fromisoformat(fixes[k]["time"]) for k in (0, -1))
     due = round(10.0 * (last - first).total_seconds()) + 1
+    # A pause of the machine leaves sentences out: not missing, where the session itself says so.
+    due -= numbers["sentences"]["missed"]
     # What gpsd had not yet told when the time was over is not missing.
     assert due > 5.0 * SECONDS and len(headings) > SHARE * due - 10
-    assert len(right) >= SHARE * due
+    assert len(fixes) - len(right) <= 1 and len(right) >= SHARE * due
     wanted = [float(row["heading_deg"]) for row in track.values()]
     assert min(wanted) - 1e-3 <= min(headings) and max(headings) <= max(wanted) + 1e-3
 

@@ -82,7 +82,7 @@ def test_scans_are_those_of_the_loop_one_after_another(session):
     session.run(1.0, lambda: False)
     again = ScannedShip(ship_scene(tomllib.loads(SCENE)))
     found = [decode_scan(t.payload).range_m for t in frames(session)]
-    assert len(found) > 10 and session.ticks.missed < 30
+    assert len(found) > 10
     wanted = [again.step_scan().scan.range for _ in range(80)]
     # A pause of the machine may leave scans out, never change one or its place.
     at = 0
