@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from raychan.processing.angles import Scan
 from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
-from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, training
+from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, training
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
 from raychan.processing.peaks import SideLobes, refine
 from raychan.radar.aperture import Aperture
@@ -20,6 +20,7 @@ from raychan.records import Detections, RangeDoppler
 from raychan.units import C0, db, undb
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _TINY = 1e-300
 METHODS = ("bartlett", "capon", "music", "esprit")
@@ -40,6 +41,35 @@ class Array:
         for name, value, known in (("beams", self.beams, BEAMS), ("doa", self.doa, METHODS)):
             if value not in known:
                 raise ValueError(f"{name} = {value!r}: must be one of {', '.join(known)}")
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """What the power of a cell is held against: `factor` times the level of its training cells, of a false alarm
+    probability."""
+
+    seen: DetectorMap
+    ring: Training
+    method: str
+    factor: float
+
+    @classmethod
+    def of(cls, map: RangeDoppler, bank: BeamBank | None, pfa: float, method: str, ring: Training) -> _Bar:
+        """Return the bar of a map as a bank of beams sees it, or of the mean power of its receivers."""
+        seen: DetectorMap = StrongestBeam(map, bank) if bank else MeanPower(map)
+        return cls(seen, ring, method, factor(seen.single(pfa), ring.worth, method, seen.looks))
+
+    def local(self, cells: Ints) -> Floats:
+        """Return the level (c,) of the training cells around map cells (c, 2)."""
+        return self.seen.level(cells, self.ring, self.method)
+
+    def estimate(self, local: Floats) -> Floats:
+        """Return the noise (c,) [W] of a cell by the level of its training cells."""
+        return local / bias(self.ring.worth, self.method, self.seen.looks)
+
+    def noise(self, local: Floats) -> Floats:
+        """Return the thermal noise (c,) [W] of a cell, as estimated where it is unknown."""
+        return np.full(len(local), self.seen.noise) if self.seen.noise > 0.0 else self.estimate(local)
 
 
 def detect(
@@ -66,20 +96,17 @@ def detect(
     these are used.
     Raises: ValueError on bad arguments.
     """
-    grid = Grid.of(map)
-    ring = training(grid, guard, train, windows)
-    array, aperture = array or Array(), _aperture(map, waveform, elements)
+    grid, array, aperture = Grid.of(map), array or Array(), _aperture(map, waveform, elements)
     bank = BeamBank(aperture, array.beam_window) if aperture else None
-    seen: DetectorMap = StrongestBeam(map, bank) if bank and array.beams == "coherent" else MeanPower(map)
-    threshold = factor(seen.single(pfa), ring.worth, method, seen.looks)
+    bar = _Bar.of(map, bank if array.beams == "coherent" else None, pfa, method, training(grid, guard, train, windows))
+    seen = bar.seen
 
     cells = seen.maxima(seen.dip * float(undb(min_snr_db)) * seen.noise)
-    local = seen.level(cells, ring, method)
-    over = seen.power[tuple(cells.T)] > threshold * local
+    local = bar.local(cells)
+    over = seen.power[tuple(cells.T)] > bar.factor * local
     cells, local = cells[over], local[over]
     shift, power = refine(seen.power, cells)
-    seen_noise = local / bias(ring.worth, method, seen.looks)
-    noise = np.full(len(cells), seen.noise) if seen.noise > 0.0 else seen_noise
+    noise = bar.noise(local)
     # The SNR of an echo with a direction is known when that is found; here it may be the dip lower.
     strong = np.flatnonzero(db(power / np.maximum(noise, _TINY)) >= min_snr_db + (db(seen.dip) if aperture else 0.0))
     strong = strong[np.argsort(-power[strong], kind="stable")]
@@ -93,15 +120,42 @@ def detect(
         kept = lobes.own((cells + shift) / np.array(grid.pad), power, smear)
         return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
     # A beam of a cell is noise below the threshold of the bank; the mean power of several looks has another one.
-    beam, level = threshold, local
+    beam, level = bar.factor, local
     if not isinstance(seen, StrongestBeam):
-        beam, level = factor(bank.single(pfa), ring.worth, method), seen_noise[strong] * bank.noise_gain
+        beam, level = factor(bank.single(pfa), bar.ring.worth, method), bar.estimate(local) * bank.noise_gain
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, beam * level, smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
     return _reported(map, grid, echoes.take(loud), ego_speed, aperture)
+
+
+def least_power(
+    map: RangeDoppler,
+    cells: Ints,
+    *,
+    pfa: float = 1e-7,
+    min_snr_db: float = 20.0,
+    method: str = "os",
+    guard: tuple[int, int] = GUARD,
+    train: tuple[int, int] = TRAIN,
+    windows: tuple[str, str] = ("hann", "hann"),
+    waveform: Waveform | None = None,
+    elements: Floats | None = None,
+    array: Array | None = None,
+) -> Floats:
+    """Return the power (c,) [W] that local maxima in map cells (c, 2) need to become detections, side lobes or not.
+
+    Args and errors as for `detect`.
+    """
+    array, aperture = array or Array(), _aperture(map, waveform, elements)
+    bank = BeamBank(aperture, array.beam_window) if aperture and array.beams == "coherent" else None
+    bar = _Bar.of(map, bank, pfa, method, training(Grid.of(map), guard, train, windows))
+    local, (_, peak) = bar.local(cells), refine(bar.seen.power, cells)
+    above = peak / np.maximum(bar.seen.power[tuple(cells.T)], _TINY)
+    loud = float(undb(min_snr_db)) * bar.noise(local) * (bar.seen.dip if aperture else 1.0) / above
+    return np.asarray(np.maximum(bar.factor * local, loud))
 
 
 def _aperture(map: RangeDoppler, waveform: Waveform | None, elements: Floats | None) -> Aperture | None:

@@ -111,7 +111,7 @@ class MapCells:
     def __init__(self, place: Floats, level: Complexes, tolerance_db: float) -> None:
         level = np.atleast_2d(level)
         self.place, self.level = place, level.ravel()
-        self.left, self._least = np.zeros(len(self.level), complex), 0.0
+        self.left, self._least = np.zeros(len(self.level), complex), np.zeros(len(self.level))
         self.tolerance = np.full(len(self.level), 1.0 - 10.0 ** (-tolerance_db / 20.0))
         if len(level) > 1:
             mean = np.sqrt((np.abs(level) ** 2).mean(axis=0))
@@ -134,9 +134,9 @@ class MapCells:
         self.tolerance = np.maximum(self.tolerance, np.tile(speckle, len(self) // max(len(speckle), 1)))
         return count
 
-    def spare(self, least: float) -> None:
-        """Let levels below an amplitude, from which on detections come, be wrong by what keeps them from one."""
-        self._least = least
+    def spare(self, least: Floats) -> None:
+        """Let levels below amplitudes (c,), from which on cells are detections, be wrong by what keeps them from it."""
+        self._least = np.tile(least, len(self) // max(len(least), 1))
 
     @property
     def allowed(self) -> Floats:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from raychan.poses import direction
 from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Grid, fitting_guard
-from raychan.processing.detection import Array, detect
+from raychan.processing.detection import Array, detect, least_power
 from raychan.processing.mimo import virtual_range_doppler
 from raychan.processing.staggered import hypotheses, unfolded
 from raychan.radar.aperture import Aperture
@@ -42,25 +42,33 @@ def channel(cube: Cube, radar: Radar, cross: bool = False) -> Cube:
 
 def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detections:
     """Return what the receiver detects in its map; it sees nothing else of the scene."""
+    found = detect(rdmap, ego_speed=radar.ego_speed, **_detector(rdmap, radar, settings))
+    return unfolded(rdmap, found, radar)
+
+
+def least_in(rdmap: RangeDoppler, cells: NDArray[np.int64], radar: Radar, settings: Any) -> Floats:
+    """Return the power (c,) [W] that map cells (c, 2) need to become detections."""
+    return least_power(rdmap, cells, **_detector(rdmap, radar, settings))
+
+
+def _detector(rdmap: RangeDoppler, radar: Radar, settings: Any) -> dict[str, Any]:
+    """Return the arguments of `detect` by the settings of a scene file's [processing]."""
     # The scene file names range before rate; a map's axes are rate, then range.
     sizes = {name: cells[::-1] for name in ("guard", "train") if (cells := getattr(settings, name)) is not None}
     guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
     if guard is not None:
         sizes["guard"] = guard
-    # Each fold that is tested in a cell is one more chance of a false alarm.
-    found = detect(
-        rdmap,
-        pfa=settings.pfa / hypotheses(radar),
-        min_snr_db=settings.min_snr_db,
-        method=settings.cfar,
-        ego_speed=radar.ego_speed,
-        windows=(settings.rate_window, settings.range_window),
-        waveform=radar.waveform,
-        elements=receivers(radar),
-        array=Array(settings.beams, settings.doa, settings.beam_window),
+    return {
+        # Each fold that is tested in a cell is one more chance of a false alarm.
+        "pfa": settings.pfa / hypotheses(radar),
+        "min_snr_db": settings.min_snr_db,
+        "method": settings.cfar,
+        "windows": (settings.rate_window, settings.range_window),
+        "waveform": radar.waveform,
+        "elements": receivers(radar),
+        "array": Array(settings.beams, settings.doa, settings.beam_window),
         **sizes,
-    )
-    return unfolded(rdmap, found, radar)
+    }
 
 
 def receivers(radar: Radar) -> Floats:

@@ -24,11 +24,11 @@ from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
 from raychan.run.map_cells import Classes, MapCells, class_of, feeding_sources
-from raychan.run.mechanisms import QUIET, choose, least_detection, needed
+from raychan.run.mechanisms import QUIET, choose, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.probes import probes_of
-from raychan.run.receiver import detections_in, map_of, noise_amplitude
+from raychan.run.receiver import detections_in, least_in, map_of, noise_amplitude
 from raychan.run.refinement_budget import STEPS, Budget, within
 from raychan.run.rules import first_rule, look_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
@@ -185,8 +185,6 @@ class SceneRefinement:
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
         cells = self._cells(rough, response, first.paths)
         steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", 0
-        if first.chosen is not None:
-            cells.spare(QUIET * math.sqrt(least_detection(radar, self.settings) / radar.power))
         if len(cells.place) and self.model.speckle:
             speckled = cells.loosened(
                 spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.carrier)
@@ -221,7 +219,9 @@ class SceneRefinement:
         place, level = place[fed], level[fed]
         place[:, 2] = np.abs(level)
         others = (changes(response, p.seen(paths), alike, place).sum(axis=1) for p in self._probes)
-        return MapCells(place, np.stack([level, *others]), self.model.tolerance_db)
+        cells = MapCells(place, np.stack([level, *others]), self.model.tolerance_db)
+        cells.spare(QUIET * np.sqrt(least_in(rdmap, at[fed], radar, settings) / radar.power))
+        return cells
 
     def _refined(
         self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from support.echoes import SMALL, WIDE, echoes, make_radar
 
+from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import GUARD, TRAIN, Grid, bias, factor, full_count, least_snr_db, level, training
-from raychan.processing.detection import detect
+from raychan.processing.detection import Array, detect, least_power
+from raychan.processing.detector_map import StrongestBeam
 from raychan.processing.range_doppler import range_doppler
+from raychan.radar.aperture import Aperture
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube
 from raychan.signal.baseband import synthesize
-from raychan.units import db
+from raychan.units import C0, db
 
 
 def rdmap(paths, wave=SMALL, seed=0, window="hann", pad=(2, 2), **changes):
@@ -242,3 +245,38 @@ def test_the_least_snr_is_what_a_lone_echo_needs_over_the_mean_threshold_of_nois
 @pytest.mark.parametrize(("guard", "train"), [((2, 2), (3, 3)), ((3, 5), (2, 1)), ((0, 0), (1, 4))])
 def test_a_map_with_room_has_all_training_cells(count, guard, train):
     assert len(training(Grid((1, 1), count), guard, train).offsets) == full_count(guard, train)
+
+
+def peak_near(m, place):
+    """Return the strongest cell (1, 2) near a range [m] and a rate [m/s]."""
+    near = np.array([np.abs(m.rate - place[1]).argmin(), np.abs(m.range - place[0]).argmin()]) - 2
+    window = m.power[near[0] : near[0] + 5, near[1] : near[1] + 5]
+    return (near + np.unravel_index(window.argmax(), window.shape))[None]
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("pad", [(1, 1), (2, 2)])
+@pytest.mark.parametrize(("method", "min_snr_db"), [("os", 20.0), ("ca", 20.0), ("os", 5.0), ("ca", 5.0)])
+def test_a_lone_echo_is_detected_exactly_from_the_least_power_of_its_cell_on(method, min_snr_db, pad, known):
+    settings, said = {"method": method, "min_snr_db": min_snr_db, "pfa": 1e-6}, []
+    for k, amplitude in enumerate(np.geomspace(3e-8, 5e-7, 60)):
+        m = rdmap(echoes([6.03], 2.1, amplitude), seed=k % 3, noise=True, pad=pad)
+        m = m if known else m.replace(noise=0.0)
+        cell = peak_near(m, (6.03, 2.1))
+        enough = m.power[tuple(cell[0])] > least_power(m, cell, **settings)[0]
+        said.append((enough, (detect(m, **settings).cell == cell).all(axis=1).any()))
+    assert all(a == b for a, b in said) and 10 < sum(a for a, _ in said) < 55
+
+
+def test_of_arrays_no_echo_below_the_least_power_is_detected():
+    at, count = np.arange(8.0)[:, None] * [0.0, 0.5 * C0 / SMALL.middle, 0.0], []
+    bank = BeamBank(Aperture(at, C0 / SMALL.middle), "rect")
+    for k, amplitude in enumerate(np.geomspace(2e-8, 5e-7, 20)):
+        radar = make_radar(SMALL, elements=at, noise=True)
+        m = range_doppler(synthesize(echoes([6.03], 2.1, amplitude), radar, np.random.default_rng(k)), SMALL)
+        for array, power in ((Array("mean"), m.power), (Array(), StrongestBeam(m, bank).power)):
+            settings = {"waveform": SMALL, "elements": at, "array": array}
+            found = detect(m, **settings).cell
+            assert (power[tuple(found.T)] > least_power(m, found, **settings)).all()
+            count.append(len(found))
+    assert 5 < np.count_nonzero(count) < 35

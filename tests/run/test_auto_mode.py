@@ -90,7 +90,7 @@ def test_levels_below_detection_may_be_wrong_by_what_they_lack_and_others_by_the
     cells = MapCells(place, np.array([0.1, 0.5, 2.0], complex), 0.5)
     strict = cells.allowed
     np.testing.assert_allclose(strict, 1.0 - 10.0 ** (-0.5 / 20.0))
-    cells.spare(1.0)
+    cells.spare(np.ones(3))
     assert cells.allowed[0] > cells.allowed[1] > strict[1]
     assert cells.allowed[2] == strict[2]
     assert (np.abs(cells.level[:2]) * (1.0 + cells.allowed[:2]) <= 1.0 + 1e-12).all()
