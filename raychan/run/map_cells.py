@@ -117,7 +117,7 @@ class MapCells:
             mean = np.sqrt((np.abs(level) ** 2).mean(axis=0))
             self.tolerance *= (mean / np.maximum(np.abs(level), 1e-300)).ravel()
         self._changes = [_Changes.none() for _ in self.level]
-        self._given_up = np.zeros(len(self.level), bool)
+        self._given_up, self._before = np.zeros(len(self.level), bool), np.full(len(self.level), np.inf)
 
     def __len__(self) -> int:
         return len(self.level)
@@ -184,8 +184,10 @@ class MapCells:
 
     def give_up(self, steps: int, left: int) -> None:
         """Refine cells no more whose tolerance is out of reach, after some steps and before those that are left."""
+        before, self._before = self._before, self.over
         if steps >= _SURE:
-            self._given_up |= self.over * _SHRINK**left > 1.0
+            # The change of one step may be large by chance.
+            self._given_up |= np.minimum(before, self._before) * _SHRINK**left > 1.0
 
     @property
     def to_refine(self) -> Bools:

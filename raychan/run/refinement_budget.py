@@ -16,19 +16,8 @@ _LEAST = 2_500_000
 """Rays that further launches may cast however few the first one did: two seconds of one core. With 1,500,000 and twice
 the first launch the living street brings 11 of 17 detections within 0.5 dB, with these 17; seeds 9600 to 9659 of
 `bench.detections` bring 92 % within 0.5 dB."""
-_LOOKS = 4.5
-"""Times the rays of a look that a run may cast unless model.max_rays is given: less than a fixed model may, which is
-5.0 to 8.6 times a look (urban, living street, occluded pedestrian at 0.5 and 1 dB, while it could cast three times its
-first launch; command not noted)."""
 _GROWTH = 2.0  # rays and seconds of a step over those of the one before on the same facets, about
 _BYTES = 400.0  # a path
-
-
-def within(model: Any, stats: Stats) -> Any:
-    """Return the settings of a model chosen by a look: without a budget of rays of its own it has that of the finer
-    first launch that a fixed model takes."""
-    most = round(max(_LOOKS * stats.rays, stats.rays + _LEAST))
-    return model.model_copy(update={"max_rays": most}) if model.max_rays == "auto" else model
 
 
 class Budget:

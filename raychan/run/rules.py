@@ -36,9 +36,9 @@ _LONG = 60.0  # s from which the time is announced
 _CGROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 _COARSE = 3.0  # times half the noise: a corner of three faces returns by six tubes, some 10 times the noise if detected
 _COARSER = 3.0  # times the tolerance: the check launch
-_PHASE, _TURN, _EDGE = 0.5, 0.5, 1.0  # rad, rad, m: a look's tubes: rays against later steps; command not noted
-# Times half the noise: a look's uncut tube. At 4 frames take 4 to 26 % less CPU, but three levels in place of one lie
-# beyond the errors stated (`make bench BENCH="--only auto"`, docs/measurements.md).
+_PHASE, _TURN, _EDGE = 0.5, 0.5, 1.0  # rad, rad, m: tubes of the first launch: rays against later steps
+# Times half the noise: uncut tubes of the first launch. At 4 frames of mode `auto` take 4 to 26 % less CPU, but three
+# levels in place of one lie beyond the errors stated (`make bench BENCH="--only auto"`, docs/measurements.md).
 _FLOOR = 2.0
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
@@ -67,18 +67,13 @@ def check_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
 
 
 def first_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
-    """Return the prune rule of the launch that tells what feeds detections: tubes that bounced are cut only where one
-    alone may bring about what a detection needs, or as much of what is found there."""
+    """Return the prune rule of the launch that tells what a model needs and what feeds detections: coarse, and tubes
+    that bounced are cut only where one alone may bring about what a detection needs, or as much of what is found
+    there."""
     rule = step_rule(radar, settings, model, 0)
-    return replace(rule, refinement=replace(rule.refinement, coarse=_COARSE))
-
-
-def look_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
-    """Return the prune rule of the launch that tells what a model needs: coarser yet than the first launch."""
-    rule = first_rule(radar, settings, model)
     refined = rule.refinement
-    seen = replace(refined, phase=_PHASE, turn=_TURN, max_edge=_EDGE, floor=_FLOOR * refined.floor)
-    return replace(rule, refinement=seen)
+    coarse = replace(refined, phase=_PHASE, turn=_TURN, max_edge=_EDGE, floor=_FLOOR * refined.floor, coarse=_COARSE)
+    return replace(rule, refinement=coarse)
 
 
 def step_rule(radar: Radar, settings: Any, model: Any, step: int) -> PruneRule:

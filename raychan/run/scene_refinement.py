@@ -1,9 +1,9 @@
 """A launch that converges: coarse first, then finer where detections need it.
 
-The first launch cuts tubes on their first surface for the tolerance, and deep tubes, those that bounced, only where
-one alone may make a detection. The map of its paths tells which cells may become detections, and the sources of tubes
-that feed these. They are traced again, each time half as coarse, until the last change of a cell's level is within the
-tolerance, or a budget ends.
+The first launch cuts tubes for phases of half a radian, and deep tubes, those that bounced, only where one alone may
+make a detection. The map of its paths tells which cells may become detections, and the sources of tubes that feed
+these. They are traced again, each time half as coarse, until the last change of a cell's level is within the tolerance,
+or a budget ends.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.probes import probes_of
 from raychan.run.receiver import detections_in, least_in, map_of, noise_amplitude
-from raychan.run.refinement_budget import STEPS, Budget, within
-from raychan.run.rules import first_rule, look_rule, step_rule
+from raychan.run.refinement_budget import STEPS, Budget
+from raychan.run.rules import first_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
@@ -136,8 +136,7 @@ class SceneRefinement:
         # Diffraction is modelled for a receiver beside the transmitter only.
         over = self.radar.rx_position is None or self.model.diffraction
         asked = self.model.model_copy(update={"diffraction": over}) if auto else self.model
-        rule = (look_rule if auto else first_rule)(self.radar, self.settings, asked)
-        launch = Launch(self.geometry, self.points, rule, lit=auto)
+        launch = Launch(self.geometry, self.points, first_rule(self.radar, self.settings, asked), lit=auto)
         batches = launch.whole(self.stats, self._carried, lambda _, share: self.tell("trace", 0.5 * share))
         found = self._paths(batches, MOST)
         if found is None:
@@ -148,7 +147,7 @@ class SceneRefinement:
         # The first launch, with all mechanisms, tells which of them are needed.
         chosen = choose(paths, self.radar, self.settings, self.model.tolerance_db)
         chosen = chosen.over(len(launch.legs), len(launch.every[0]))
-        self.model = within(chosen.applied_to(self.model), self.stats)
+        self.model = chosen.applied_to(self.model)
         keep = needed(paths, chosen)
         if self.launches is not None:
             self.launches[0] = counting(self.launches[0], keep)

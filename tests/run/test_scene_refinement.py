@@ -153,6 +153,14 @@ def test_a_cell_out_of_reach_is_given_up_after_three_steps():
     assert cells.open[0, 0] and not cells.to_refine[0, 0]
 
 
+def test_a_cell_that_was_in_reach_a_step_before_is_not_given_up():
+    cells = one_cell()
+    for steps, change in ((1, 0.5), (2, -0.1), (3, 0.5)):
+        cells.changed(0, np.array([SHALLOW]), np.array([change + 0j]))
+        cells.give_up(steps, 3)
+    assert cells.open[0, 0] and cells.to_refine[0, 0]
+
+
 def test_doubtful_paths_bring_at_least_what_a_cell_may_be_wrong_by():
     """Echoes at the place of each cell raise the sums there to the rms sums, and nothing elsewhere."""
     of = scene_of(2)
