@@ -2,8 +2,8 @@
 
 Numba compiles one function at a time in a process, and a run compiles stage after stage as it comes to them. The second
 process starts from the last stage backwards; neither compiles what the other is compiling (`compile.code_cache`).
-What a run needs is listed in `signatures.txt` (written by `make signatures`): a kernel that is missing there is
-compiled by the run itself, so an old list costs time only.
+What a run calls is listed in `signatures.txt` (written by `make signatures`; what these kernels call is compiled with
+them): a kernel that is missing there is compiled by the run itself, so an old list costs time only.
 """
 
 from __future__ import annotations
