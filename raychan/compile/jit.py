@@ -22,6 +22,7 @@ from numba.core.sigutils import normalize_signature
 
 from raychan.compile.code_cache import CodeCache, unkept
 from raychan.compile.linked import machine_code_where_called
+from raychan.compile.typing_memo import remembered_typing
 
 _CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
 _CONSTANTS = int, float, complex, str, tuple
@@ -57,6 +58,7 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
             self.kept.held(callee),
             _uncollected(),
             machine_code_where_called(self.targetctx),
+            remembered_typing(),
         ):
             arguments, _ = normalize_signature(sig)
             if not callee and arguments in self.overloads and not _wrapped(self.overloads[arguments]):

@@ -1,8 +1,8 @@
 """Code that is only linked into the code of others: no machine code is made of it until something asks for it.
 
 Numba makes machine code of every function at once, also of those that only compiled functions call, and copies the
-code of these into each caller anyway. This rests on how numba's `JITCodeLibrary` is built; where it is built otherwise,
-numba makes machine code of everything.
+code of these into each caller anyway. This rests on how numba's `JITCodeLibrary` is built; with a version of numba that
+it was not tested with, numba makes machine code of everything.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
+import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import lookup_environment
 
-_NEEDED = (
-    "_finalize_final_module", "_finalize_dynamic_globals", "_verify_declare_only_symbols", "_unserialize",
-    "serialize_using_bitcode", "serialize_using_object_code", "get_pointer_to_function",
-)  # fmt: skip
-_FITS = all(hasattr(JITCodeLibrary, name) for name in _NEEDED)
+_TESTED = "0.68."  # to raise it: tests/compile with the new version, and code of a cold run that keeps its results
+FITS = numba.__version__.startswith(_TESTED)  # this and `compile.typing_memo` may reach into numba
 _ENVIRONMENT = "_ZN08NumbaEnv"
 
 
@@ -74,14 +72,20 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc,no-any-unimported]
 
 @contextlib.contextmanager
 def machine_code_where_called(target: Any) -> Iterator[None]:
-    """Compile for a target, within the block, to machine code only what is called from outside compiled code."""
-    codegen = target.codegen()
-    usual = getattr(codegen, "_library_class", None)
-    if not _FITS or usual is not JITCodeLibrary:
+    """Compile for a target, within the block, to machine code only what is called from outside compiled code; numba's
+    own functions get no wrapper for calls from C."""
+    if not FITS or target.codegen()._library_class is LinkedLibrary:
         yield
         return
+    codegen, usual = target.codegen(), target.codegen()._library_class
     codegen._library_class = LinkedLibrary
+    target.create_cfunc_wrapper = _no_wrapper
     try:
         yield
     finally:
         codegen._library_class = usual
+        del target.create_cfunc_wrapper
+
+
+def _no_wrapper(*_: Any) -> None:
+    """Nothing calls compiled code by its address from C."""

@@ -77,5 +77,5 @@ def test_a_caller_is_compiled_from_a_callee_on_disk(tmp_path: Path):
 
 
 def test_where_numba_is_built_otherwise_all_becomes_machine_code(tmp_path: Path):
-    otherwise = "from raychan.compile import linked\nlinked._FITS = False\n"
+    otherwise = "from raychan.compile import linked\nlinked.FITS = False\n"
     assert run(tmp_path, otherwise + _WHOLE + _PART)[:-1] == run(tmp_path, _WHOLE + _PART)[:-1]
