@@ -8,6 +8,7 @@ them): a kernel that is missing there is compiled by the run itself, so an old l
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import subprocess
@@ -86,5 +87,6 @@ def _end_with_parent() -> None:
 
 
 if __name__ == "__main__":
+    gc.disable()  # takes 7 % of the time (1.9 of 26 s for 60 kernels); without it 585 instead of 372 MB until the end
     threading.Thread(target=_end_with_parent, daemon=True).start()
     compile_list(lists().get(sys.argv[1], []))
