@@ -123,7 +123,7 @@ def may_leave(corners, images, at, normal, low, high, axes, windows):  # type: i
     """
     m = len(at)
     ok = np.empty(len(corners), np.bool_)
-    left, other = np.empty((2, 3 + 5 * m, 3))
+    left, other = np.empty((3 + 5 * m, 3)), np.empty((3 + 5 * m, 3))  # halves of one array are compiled for apart
     for i in range(len(corners)):
         # Most lie beyond one of the planes.
         ok[i] = not _beyond_one(corners[i], images[m], at[m - 1], normal[m - 1], windows)
