@@ -1,4 +1,5 @@
-"""PYTHONPATH=tests python -m signatures: write anew which kernels a cold run compiles, and for which types."""
+"""PYTHONPATH=tests python -m signatures: write anew which kernels a cold run calls, and for which types; what these
+call is compiled with them."""
 
 from __future__ import annotations
 
@@ -21,18 +22,21 @@ Row = tuple[str, str, str]
 
 
 class Recorder(event.Listener):
-    """Notes the kernels of this process as they are compiled."""
+    """Notes the kernels of this process as they are compiled for a call from Python."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
+        self._depth = 0
 
     def on_start(self, event: Any) -> None:
-        """Do nothing: types are known at the end."""
+        """Count the kernels that are being compiled, each for the one before it."""
+        self._depth += isinstance(event.data["dispatcher"], Kernel)
 
     def on_end(self, event: Any) -> None:
         """Note the module, name and argument types of a kernel that was compiled."""
         kernel = event.data["dispatcher"]
-        if isinstance(kernel, Kernel):
+        self._depth -= isinstance(kernel, Kernel)
+        if isinstance(kernel, Kernel) and self._depth == 0:
             with suppress(ValueError):
                 arguments = ", ".join(map(write_type, event.data["args"]))
                 self.rows.append((kernel.py_func.__module__, kernel.py_func.__name__, arguments))

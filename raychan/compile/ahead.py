@@ -2,12 +2,13 @@
 
 Numba compiles one function at a time in a process, and a run compiles stage after stage as it comes to them. The second
 process starts from the last stage backwards; neither compiles what the other is compiling (`compile.code_cache`).
-What a run needs is listed in `signatures.txt` (written by `make signatures`): a kernel that is missing there is
-compiled by the run itself, so an old list costs time only.
+What a run calls is listed in `signatures.txt` (written by `make signatures`; what these kernels call is compiled with
+them): a kernel that is missing there is compiled by the run itself, so an old list costs time only.
 """
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import subprocess
@@ -86,5 +87,6 @@ def _end_with_parent() -> None:
 
 
 if __name__ == "__main__":
+    gc.disable()  # takes 7 % of the time (1.9 of 26 s for 60 kernels); without it 585 instead of 372 MB until the end
     threading.Thread(target=_end_with_parent, daemon=True).start()
     compile_list(lists().get(sys.argv[1], []))

@@ -56,7 +56,7 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
         how = _digest(numba.__version__, llvmlite.__version__, platform.python_version(), switches)
         self._base = f"{self._impl.filename_base}.{how.hex()[:8]}"
         self.stamped(_digest(self.source))
-        self._locks: list[contextlib.ExitStack] = []
+        self._locks: list[tuple[contextlib.ExitStack, bool]] = []
 
     def stamped(self, stamp: bytes) -> bytes:
         """Set the digest of all that the code is compiled from, and return it; code with another one is removed."""
@@ -73,21 +73,25 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
         return self.folder / f"{self._prefix}.{_digest(key).hex()[:16]}.code"
 
     @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
-        """Release at the end the lock that was taken to compile within the block."""
+    def held(self, callee: bool) -> Iterator[None]:
+        """Release at the end the lock that was taken to compile within the block; code for a callee is linked into
+        callers only, and kept by itself."""
         with contextlib.ExitStack() as lock:
-            self._locks.append(lock)
+            self._locks.append((lock, callee))
             try:
                 yield
             finally:
                 self._locks.pop()
 
+    def _key(self, sig: Any, codegen: Any) -> tuple[Any, bool]:
+        return self._index_key(sig, codegen), bool(self._locks) and self._locks[-1][1]
+
     def _load_overload(self, sig: Any, target_context: Any) -> Any:
-        key = self._index_key(sig, target_context.codegen())
+        key = self._key(sig, target_context.codegen())
         code = self._read(key, target_context)
         if code is None and self._locks:
             with contextlib.suppress(OSError):
-                self._locks[-1].enter_context(_alone(self._file(key).with_suffix(".lock")))
+                self._locks[-1][0].enter_context(_alone(self._file(key).with_suffix(".lock")))
                 code = self._read(key, target_context)  # another process may have compiled it meanwhile
         return code
 
@@ -104,7 +108,7 @@ class CodeCache(FunctionCache):  # type: ignore[no-any-unimported]
     def _save_overload(self, sig: Any, data: Any) -> None:
         if not self._impl.check_cachable(data):
             return
-        key = self._index_key(sig, data.codegen)
+        key = self._key(sig, data.codegen)
         try:
             reduced = self._impl.reduce(data)
         except RuntimeError:

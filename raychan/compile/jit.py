@@ -18,13 +18,17 @@ import numpy as np
 from numba.core import config
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 
 from raychan.compile.code_cache import CodeCache, unkept
+from raychan.compile.linked import machine_code_where_called
+from raychan.compile.typing_memo import remembered_typing
 
 _CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
 _CONSTANTS = int, float, complex, str, tuple
 
 KERNELS: list[Kernel] = []  # all that are cached on disk, as their modules are imported
+_compiling: list[Kernel] = []  # those being compiled, each for the one before it
 
 
 class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
@@ -43,9 +47,48 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
         return super().__call__(*args) if _CHECKED else super().__call__(*map(_open, args))
 
     def compile(self, sig: Any) -> Any:
-        """Compile the kernel for these argument types, or wait for the process that does and take its code."""
-        with global_compiler_lock, self.kept.held(), _uncollected():
+        """Compile the kernel for these argument types, or wait for the process that does and take its code.
+
+        What a compiled function calls is compiled without the wrapper that takes arguments from Python; if Python calls
+        it too, it is compiled once more.
+        """
+        with (
+            global_compiler_lock,
+            self._begun() as callee,
+            self.kept.held(callee),
+            _uncollected(),
+            machine_code_where_called(self.targetctx),
+            remembered_typing(),
+        ):
+            arguments, _ = normalize_signature(sig)
+            if not callee and arguments in self.overloads and not _wrapped(self.overloads[arguments]):
+                del self.overloads[arguments]
             return super().compile(sig)
+
+    @contextlib.contextmanager
+    def _begun(self) -> Iterator[bool]:
+        """Tell whether the compilation within the block is for a caller that is being compiled."""
+        callee = bool(_compiling)
+        _compiling.append(self)
+        if callee:
+            self.targetoptions["no_cpython_wrapper"] = True
+        try:
+            yield callee
+        finally:
+            self.targetoptions.pop("no_cpython_wrapper", None)
+            _compiling.pop()
+
+    def add_overload(self, compiled: Any) -> None:
+        """Add compiled code, for calls from Python if it has a wrapper."""
+        if _wrapped(compiled):
+            super().add_overload(compiled)
+        else:
+            self.overloads[tuple(compiled.signature.args)] = compiled
+
+
+def _wrapped(compiled: Any) -> bool:
+    """Tell whether Python can call compiled code."""
+    return bool(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cpython_wrapper_name))
 
 
 @contextlib.contextmanager

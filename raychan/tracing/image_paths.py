@@ -123,13 +123,13 @@ def may_leave(corners, images, at, normal, low, high, axes, windows):  # type: i
     """
     m = len(at)
     ok = np.empty(len(corners), np.bool_)
-    left, other = np.empty((2, 3 + 5 * m, 3))
+    left, other = np.empty((3 + 5 * m, 3)), np.empty((3 + 5 * m, 3))  # halves of one array are compiled for apart
     for i in range(len(corners)):
         # Most lie beyond one of the planes.
         ok[i] = not _beyond_one(corners[i], images[m], at[m - 1], normal[m - 1], windows)
         if not ok[i]:
             continue
-        count = 3
+        count = np.int64(3)  # as a bare 3 it would be a type of its own to compile for
         for q in range(3):
             copy_to(left[q], corners[i, q])
         for j in range(m - 1, -1, -1):

@@ -28,7 +28,7 @@ def test_the_lists_name_kernels_that_are_there_and_types_that_read_back():
 @pytest.mark.skipif(bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="frozen arrays are compiled for by themselves")
 def test_what_the_second_process_compiled_the_first_only_loads(tmp_path: Path):
     file = tmp_path / "list.txt"
-    rows = [row for row in LISTS["run"] if row[0] == "raychan.em.fresnel"]
+    rows = [row for row in LISTS["run"] if row[0] == "raychan.geometry.triangles"]
     assert len(rows) > 3
     file.write_text("[few]\n" + "\n".join(" ".join(row) for row in rows))
     compiles = f"""
@@ -36,10 +36,9 @@ from pathlib import Path
 from raychan.compile import ahead
 rows = ahead.lists(Path({str(file)!r}))["few"]
 lost = ahead.compile_list(rows)
-import raychan.em.fresnel as fresnel
-hits = sum(getattr(fresnel, row[1]).stats.cache_hits.total() for row in rows)
-misses = sum(getattr(fresnel, row[1]).stats.cache_misses.total() for row in rows)
-print(lost, misses > 0, misses + hits)
+from raychan.compile.jit import KERNELS
+misses = sum(kernel.stats.cache_misses.total() for kernel in KERNELS)
+print(lost, misses > 0, misses)
 """
     env = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
     first, second = (
@@ -48,7 +47,7 @@ print(lost, misses > 0, misses + hits)
     )
     assert first.split()[:2] == ["0", "True"]
     assert second.split()[:2] == ["0", "False"]
-    assert len(list((tmp_path / "cache").rglob("*.code"))) == len(rows)
+    assert len(list((tmp_path / "cache").rglob("*.code"))) == int(first.split()[2]) >= len(rows)
     assert not list((tmp_path / "cache").rglob("*.lock"))
 
 
