@@ -133,15 +133,15 @@ def may_leave(corners, images, at, normal, low, high, axes, windows):  # type: i
         for q in range(3):
             copy_to(left[q], corners[i, q])
         for j in range(m - 1, -1, -1):
-            count = _clipped(left, count, normal[j], dot(at[j], normal[j]), other) if count else 0
+            count = _clipped(left, count, normal[j], dot(at[j], normal[j]), other) if count else count
             for q in range(count):
                 p = other[q]
                 left[q, 0], left[q, 1], left[q, 2] = _mirror_point(p[0], p[1], p[2], images[j + 1], at[j], normal[j])
             for side in range(2):
                 along = axes[j, side]
                 back = -along[0], -along[1], -along[2]
-                count = _clipped(left, count, along, low[j, side] - _BEYOND, other) if count else 0
-                count = _clipped(other, count, back, -high[j, side] - _BEYOND, left) if count else 0
+                count = _clipped(left, count, along, low[j, side] - _BEYOND, other) if count else count
+                count = _clipped(other, count, back, -high[j, side] - _BEYOND, left) if count else count
         ok[i] = count > 0
     return ok
 

@@ -1,14 +1,11 @@
-"""What numba answered once about types is taken for the same question only; a numba that was not tested is told of."""
+"""What numba answered once about types is taken for the same question only."""
 
 import os
 import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import pytest
-
-from raychan.compile.linked import FITS
 
 pytestmark = pytest.mark.compiled(reason="it is about compiled code")
 
@@ -38,10 +35,6 @@ for kernel in (strict, numpy_like, mild, shared):
         except ZeroDivisionError:
             print("zero")
 """
-
-
-def test_this_numba_is_one_that_the_reach_into_it_was_tested_with():
-    assert FITS, f"numba {numba.__version__}: see compile/linked.py; a cold run takes a third longer meanwhile"
 
 
 def test_kernels_with_other_options_keep_their_own_answers(tmp_path: Path):
