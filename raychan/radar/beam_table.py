@@ -40,14 +40,17 @@ class Beam:
 
     def outside_beam(self, look: Floats, around: Floats) -> NDArray[np.bool_]:
         """Tell about which unit directions (n, 3) the field is zero everywhere within angles (n,) [rad]."""
-        out = around < _NARROW
-        rows = np.flatnonzero(out)
-        if self._lit is None or not len(rows):
-            return np.zeros(len(look), bool)
-        reach = 2.0 * np.sin(0.5 * (around[rows] + _CELL))
-        # Without a bound the tree is searched through and through for what lies opposite.
-        out[rows] = self._lit.query(look[rows], distance_upper_bound=reach.max() + 1e-6)[0] > reach
-        return np.asarray(out)
+        out = np.zeros(len(look), bool)
+        if self._lit is None:
+            return out
+        # Where there is some field itself, nothing needs to be searched.
+        rows = np.flatnonzero(around < _NARROW)
+        rows = rows[self(look[rows]) == 0.0]
+        if len(rows):
+            reach = 2.0 * np.sin(0.5 * (around[rows] + _CELL))
+            # Without a bound the tree is searched through and through for what lies opposite.
+            out[rows] = self._lit.query(look[rows], distance_upper_bound=reach.max() + 1e-6)[0] > reach
+        return out
 
     @cached_property
     def _lit(self) -> Any:

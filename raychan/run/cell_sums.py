@@ -44,6 +44,18 @@ def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
     return 0.5 * light * then, complex(cosine, sine)
 
 
+@njit(cache=True, nogil=True, forceinline=True)
+def _times(x, z):  # type: ignore[no-untyped-def]
+    """Return the real number x times z: numba multiplies both as complex numbers, three times the work."""
+    return complex(x * z.real, x * z.imag)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _between(a, b, share):  # type: ignore[no-untyped-def]
+    """Return the complex number at a share of the way from a to b."""
+    return a + _times(share, b - a)
+
+
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
     """Return the response of both windows to an echo at a range [m] at mid frame."""
@@ -61,12 +73,12 @@ def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along): 
     for k in range(len(middles)):
         # Within a part of the frame the range response is linear.
         at, part, turned = _place(samples, fine, away + moved * (middles[k] - 0.5 * (chirps - 1)))
-        held = tables[k, low, 0] + share * (tables[k, low + 1, 0] - tables[k, low, 0])
-        late = tables[k, low, 1] + share * (tables[k, low + 1, 1] - tables[k, low, 1])
-        level = across[at, 0] + part * (across[at + 1, 0] - across[at, 0])
-        lean = across[at, 1] + part * (across[at + 1, 1] - across[at, 1])
-        total += turned * (level * held + moved * lean * late)
-    return sign * total
+        held = _between(tables[k, low, 0], tables[k, low + 1, 0], share)
+        late = _between(tables[k, low, 1], tables[k, low + 1, 1], share)
+        level = _between(across[at, 0], across[at + 1, 0], part)
+        lean = _between(across[at, 1], across[at + 1, 1], part)
+        total += _times(turned, level * held + _times(moved, lean) * late)
+    return _times(sign, total)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

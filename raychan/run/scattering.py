@@ -14,7 +14,7 @@ from raychan.records import Routes
 from raychan.run.first_surface import first_surface
 from raychan.tracing.contributions import Budget, Contributions
 from raychan.tracing.legs import Leg
-from raychan.tracing.shooting import Wanted, numbered_routes
+from raychan.tracing.shooting import Images, Wanted, numbered_routes
 from raychan.tracing.sources import Sources, depth_of, launches, source_of, sources_of
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.units import C0
@@ -141,8 +141,8 @@ def _gains(
         gains = transfer(routes, geometry.facets, frequency, _basis, _basis)
         return sources_of(routes, way, 0, 0, depth), scale * gains
 
-    own = first if bistatic else None
-    for one in numbered_routes(geometry, leg, ([out], [out]), every, bounces, found, each, own, wanted):
+    own, images = first if bistatic else None, Images.of(geometry, [out], [out])
+    for one in numbered_routes(geometry, leg, [out], images, every, bounces, found, each, own, wanted):
         yield from firsts
         firsts.clear()
         yield one

@@ -202,9 +202,9 @@ def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     used = body >= 0
     body = np.maximum(body, 0)
     used &= facets.role[body] != MIRROR
-    relative = facets.velocity[body] - np.asarray(radar.velocity)
-    along = np.einsum("ndi,ni->nd", relative, away)
-    across = np.einsum("ndi,ndi->nd", relative, relative) - along**2
+    relative = facets.velocity - np.asarray(radar.velocity)
+    along = np.einsum("ndi,ni->nd", relative[body], away)
+    across = np.einsum("bi,bi->b", relative, relative)[body] - along**2
     turning = np.linalg.norm(facets.spin, axis=1)[body]
     # Lever arm of turning bodies: 2.5 m, of a vehicle (not measured).
     bend = np.where(used, across / nearest[taken, None] + turning**2 * 2.5, 0.0).max(axis=1)

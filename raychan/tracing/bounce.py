@@ -151,7 +151,10 @@ def _cast_and_subdivide(step: _Bounce, flight: _Flight, landed: list[Tubes]) -> 
     one_surface = mid >= 0
     # Where the centre ray meets nothing, but the fan is wide, a corner may meet something.
     flat = tubes.flat & ~geometry.curved[tubes.facet]
-    rows = np.flatnonzero(matters & (one_surface | (_wide(rule, directions) & ~flat)))
+    beside = np.flatnonzero(matters & ~one_surface & ~flat)
+    followed = matters & one_surface
+    followed[beside] = _wide(rule, directions[beside])
+    rows = np.flatnonzero(followed)
     facets, distances = geometry.cast(*corner_rays(rows, points, directions, tubes.facet, flight.start))
     hit[rows, :3], reach[rows, :3] = facets.reshape(-1, 3), distances.reshape(-1, 3)
     on_one_surface(rows, hit, geometry.plane, geometry.smooth, geometry.normal, rule.patch, one_surface)

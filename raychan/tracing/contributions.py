@@ -69,8 +69,9 @@ class Budget:
     def take_back(self, part: Budget) -> None:
         """Count what a part was spent for."""
         self._tubes, self._cuts = self._tubes + part._tubes, self._cuts + part._cuts
-        n = max(len(self.uncut), len(part.uncut))
-        self.uncut = np.pad(self.uncut, (0, n - len(self.uncut))) + np.pad(part.uncut, (0, n - len(part.uncut)))
+        if len(part.uncut):
+            n = max(len(self.uncut), len(part.uncut))
+            self.uncut = np.pad(self.uncut, (0, n - len(self.uncut))) + np.pad(part.uncut, (0, n - len(part.uncut)))
 
     def _within(self, geometry: Geometry, facet: Ints, wanted: Bools, spent: bool) -> Bools:
         if not spent or not wanted.any():
@@ -113,9 +114,10 @@ class Contributions:
     def joined(self, others: Iterable[Contributions]) -> None:
         """Add what copies found, and take their budgets back."""
         for other in others:
-            n = max(len(self._level), len(other._level))
-            level = (np.pad(x._level, (0, n - len(x._level))) for x in (self, other))
-            self._level = np.maximum(*level)
+            own, its = self._level, other._level
+            self._level = np.zeros(max(len(own), len(its)))
+            self._level[: len(own)] = own
+            np.maximum(self._level[: len(its)], its, out=self._level[: len(its)])
             self.budget.take_back(other.budget)
 
     def frozen(self, budget: Budget) -> Contributions:

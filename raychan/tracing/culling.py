@@ -1,8 +1,8 @@
 """Culling: which facets a leg may light at all.
 
-Facets are dropped by clusters of neighbours, each with a bounding sphere: clusters that no ray over the leg's mirror
-reaches, that an occluder (a wall or a solid body) hides, or that lie outside the antenna's beam. Of the others each
-facet is dropped that turns away.
+Facets are dropped by clusters of neighbours, each with a bounding sphere: clusters that lie beyond all rays over the
+leg's mirrors, that an occluder (a wall or a solid body) hides, or that lie outside the antenna's beam. Of the others
+each facet is dropped that turns away.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ Bools = NDArray[np.bool_]
 
 _PARALLEL_FROM = 1000  # clusters from which on a second thread pays; not measured
 _ROUNDING = 1e-6  # rad: what grazes within it is kept
+_BESIDE = 1e-3  # m beyond the planes between which rays run: more than `image_paths.may_leave` leaves
 
 
 class _Clusters(NamedTuple):
@@ -40,16 +41,13 @@ class _Clusters(NamedTuple):
 
 
 class _Source(NamedTuple):
-    """Where rays come from: the image (3,) [m] (a unit direction when far), and, if mirrored, the last mirror: a point
-    on it, its normal, and the centre and radius [m] of a sphere about it."""
+    """Where rays come from: the image (3,) [m] (a unit direction when far), and the planes between which those over
+    mirrors run: normals (k, 3), inward, and their offsets (k,) [m]."""
 
     image: Floats
     far: bool
-    mirrored: bool
-    point: Floats
-    normal: Floats
-    centre: Floats
-    radius: float
+    inward: Floats
+    offset: Floats
 
 
 def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
@@ -60,12 +58,13 @@ def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     c = geometry.clusters
     occluders = cache_of(geometry).single("occluders", lambda: Occluders(geometry))
     walls, spheres = occluders.walls_over(leg), occluders.spheres_over(leg)
-    mirror = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+    image = np.asarray(leg.image, float)
+    inward, offset = np.zeros((0, 3)), np.zeros(0)
     if leg.mirrors and not leg.far:
         m = leg.mirrors[-1]
-        mirror = m.point, m.normal, m.centre, m.radius
-    image = np.asarray(leg.image, float)
-    source = _Source(image, leg.far, bool(leg.mirrors) and not leg.far, *mirror)
+        inward = np.concatenate([m.normal[None], leg.windows])
+        offset = np.append(m.normal @ m.point, leg.windows @ image)
+    source = _Source(image, leg.far, inward, offset)
     lead = c.order[c.first[:-1]]
     of, piece = f.body[lead], geometry.scene_topology.cluster_piece
     # Of clusters of several pieces each facet is tested below.
@@ -84,15 +83,8 @@ def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     if not pieces.all():
         rows = rows[pieces[geometry.piece[rows]]]
     if leg.mirrors:
-        rows = rows[leg.may_leave(f.vertices[rows])]
+        rows = rows[leg.may_leave(f.vertices, rows)]
     return rows
-
-
-@njit(cache=True, forceinline=True)
-def _angle(a, b):  # type: ignore[no-untyped-def]
-    """Return the angle [rad] between two vectors."""
-    size = math.sqrt(dot(a, a) * dot(b, b))
-    return math.acos(min(max(dot(a, b) / size, -1.0), 1.0)) if size > 0.0 else 0.0
 
 
 @njit(cache=True, forceinline=True)
@@ -102,18 +94,12 @@ def _half_width(radius, distance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _reached_over_mirror(centre, radius, d, source, work):  # type: ignore[no-untyped-def]
-    """Tell whether a ray over the source's mirror may reach a sphere whose centre lies at d (3,) [m] from the image."""
-    height = 0.0
-    for c in range(3):
-        height += (centre[c] - source.point[c]) * source.normal[c]
-        work[c] = source.centre[c] - source.image[c]
-    # A facet in the sphere has a sphere of its own, of up to twice the radius, that may lie across.
-    if height < -3.0 * radius:
-        return False
-    widest = _half_width(source.radius + 2.0 * radius, math.sqrt(dot(work, work)))
-    widest += _half_width(radius, math.sqrt(dot(d, d)))
-    return _angle(work, d) <= widest + _ROUNDING
+def _depth(centre, source):  # type: ignore[no-untyped-def]
+    """Return how far [m] a point lies within the planes between which rays run, below 0 beyond one of them."""
+    depth = np.inf
+    for k in range(len(source.offset)):
+        depth = min(depth, dot(source.inward[k], centre) - source.offset[k])
+    return depth
 
 
 @njit(cache=True, forceinline=True)
@@ -170,15 +156,12 @@ def _eclipsed(centre, radius, body, image, far, spheres):  # type: ignore[no-unt
 @njit(cache=True, nogil=True)
 def _may_be_lit(clusters, source, walls, spheres, out):  # type: ignore[no-untyped-def]
     """Write which clusters (k,) may hold a facet that the source lights; named tuples as their types say."""
-    d, work = np.empty(3), np.empty(3)
     image, far = source.image, source.far
     for i in range(len(clusters.radius)):
         if not clusters.wanted[i]:
             continue
         centre, radius = clusters.centre[i], clusters.radius[i]
-        for c in range(3):
-            d[c] = -image[c] if far else centre[c] - image[c]
-        if source.mirrored and not _reached_over_mirror(centre, radius, d, source, work):
+        if _depth(centre, source) < -radius - _BESIDE:
             continue
         swell = 1.001 * radius + walls.touch
         if _behind_wall(centre, swell, clusters.body[i], walls):

@@ -12,7 +12,7 @@ import numpy as np
 
 from raychan.compile.jit import njit
 from raychan.radar.beam_kernels import field_towards
-from raychan.vectors import copy_to, dot, length_to
+from raychan.vectors import copy_to, dot, length_to, row
 
 _ROUNDING = 1e-9  # rad, and m
 _BEYOND = 1e-4  # m about a mirror, for rounding: a ray too many does no harm
@@ -101,33 +101,37 @@ def _clipped(left, count, toward, least, other):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _beyond_one(corners, image, at, normal, windows):  # type: ignore[no-untyped-def]
-    """Tell whether all corners of a triangle lie behind the last mirror, or beyond one of the planes of its windows."""
-    for k in range(-1, len(windows)):
-        n, base = (normal, at) if k < 0 else (windows[k], image)
-        out = True
-        for q in range(3):
-            out = out and dot(n, corners[q]) - dot(n, base) < -_BEYOND
-        if out:
+def _beyond_one(triangle, normals, offsets):  # type: ignore[no-untyped-def]
+    """Tell whether all corners of a triangle lie beyond one of some planes."""
+    p, q, r = row(triangle, 0), row(triangle, 1), row(triangle, 2)
+    for k in range(len(offsets)):
+        n = row(normals, k)
+        out = dot(n, p) - offsets[k] < -_BEYOND
+        if out and dot(n, q) - offsets[k] < -_BEYOND and dot(n, r) - offsets[k] < -_BEYOND:
             return True
     return False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def may_leave(corners, images, at, normal, low, high, axes, windows):  # type: ignore[no-untyped-def]
-    """Tell of which triangles of corners (n, 3 or more, 3) [m] a ray may come to the end over the mirrors: of what lies
-    in front of each mirror, and whose rays meet the rectangle about it, something is left.
+def may_leave(corners, rows, images, at, normal, low, high, axes, windows):  # type: ignore[no-untyped-def]
+    """Tell of which triangles `rows` (k,) of corners (n, 3 or more, 3) [m] a ray may come to the end over the mirrors:
+    of what lies in front of each mirror, and whose rays meet the rectangle about it, something is left.
 
-    Args: low, high (m, 2) [m] ends of the rectangles along their axes (m, 2, 3); windows (k, 3) normals of the planes
+    Args: low, high (m, 2) [m] ends of the rectangles along their axes (m, 2, 3); windows (w, 3) normals of the planes
     through the image between which all rays run, inward.
     """
-    m = len(at)
-    ok = np.empty(len(corners), np.bool_)
+    m, w = len(at), len(windows)
+    ok = np.empty(len(rows), np.bool_)
     left, other = np.empty((3 + 5 * m, 3)), np.empty((3 + 5 * m, 3))  # halves of one array are compiled for apart
-    for i in range(len(corners)):
+    normals, offsets = np.empty((1 + w, 3)), np.empty(1 + w)
+    for k in range(-1, w):
+        copy_to(normals[k + 1], normal[m - 1] if k < 0 else windows[k])
+        offsets[k + 1] = dot(normals[k + 1], at[m - 1] if k < 0 else images[m])
+    for o in range(len(rows)):
+        i = rows[o]
         # Most lie beyond one of the planes.
-        ok[i] = not _beyond_one(corners[i], images[m], at[m - 1], normal[m - 1], windows)
-        if not ok[i]:
+        ok[o] = not _beyond_one(corners[i], normals, offsets)
+        if not ok[o]:
             continue
         count = np.int64(3)  # as a bare 3 it would be a type of its own to compile for
         for q in range(3):
@@ -142,7 +146,7 @@ def may_leave(corners, images, at, normal, low, high, axes, windows):  # type: i
                 back = -along[0], -along[1], -along[2]
                 count = _clipped(left, count, along, low[j, side] - _BEYOND, other) if count else count
                 count = _clipped(other, count, back, -high[j, side] - _BEYOND, left) if count else count
-        ok[i] = count > 0
+        ok[o] = count > 0
     return ok
 
 

@@ -124,11 +124,12 @@ class Leg:
         or rays over a side of a mirror's rectangle."""
         found = np.zeros((len(points), 3))
         rows, last = np.flatnonzero(self.may_leave(points)), self.mirrors[-1]
-        planes = [(last.point, last.normal), *((self.image, normal) for normal in self.windows)]
-        for point, normal in planes if len(rows) else []:
-            side = (points[rows, :3] - point) @ normal
-            across = (side.min(axis=1) < -ON_PLANE) & (side.max(axis=1) > ON_PLANE) & ~found[rows].any(axis=1)
-            found[rows[across]] = side[across]
+        at = np.stack([last.point, *([self.image] * len(self.windows))])
+        normal = np.concatenate([last.normal[None], self.windows])
+        side = ((points[rows, :3] - at[:, None, None]) @ normal[:, None, :, None])[..., 0]
+        across = (side.min(axis=2) < -ON_PLANE) & (side.max(axis=2) > ON_PLANE)
+        cut = np.flatnonzero(across.any(axis=0))
+        found[rows[cut]] = side[across[:, cut].argmax(axis=0), cut]
         return found
 
     def outside_beam(self, points: Floats, radius: Floats) -> Bools:
@@ -158,10 +159,11 @@ class Leg:
         ok: Bools = may_reach(points, size, *self._chain)
         return ok
 
-    def may_leave(self, points: Floats) -> Bools:
-        """Tell from which triangles of corners (n, 3 or more, 3) [m] a ray may come to the end, and to which from it,
-        over the rectangle about each mirror."""
-        ok: Bools = may_leave(points, *self._chain[:3], *self._rectangles, self.windows)
+    def may_leave(self, points: Floats, rows: NDArray[np.signedinteger] | None = None) -> Bools:
+        """Tell from which triangles of corners (n, 3 or more, 3) [m], or of these from which `rows` (k,), a ray may
+        come to the end, and to which from it, over the rectangle about each mirror."""
+        every = np.arange(len(points)) if rows is None else rows.astype(np.int64, copy=False)
+        ok: Bools = may_leave(points, every, *self._chain[:3], *self._rectangles, self.windows)
         return ok
 
     def visible(

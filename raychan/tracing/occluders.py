@@ -76,21 +76,22 @@ class Occluders:
         height = self.normal @ image if leg.far else np.einsum("ij,ij->i", image - self.point, self.normal)
         away = np.ones(len(height)) if leg.far else np.linalg.norm(image - self.point, axis=1)
         view = self.area * np.abs(height) / away**3
-        if leg.mirrors:
+        if leg.mirrors and len(view):
             m = leg.mirrors[-1]
-            over = (self.edge - m.point) @ m.normal > self.touch
-            behind = np.add.reduceat(~over.all(axis=1), self.first[:-1]) if len(view) else view
-            view = np.where(behind, 0.0, view)
+            over = self.edge.reshape(-1, 3) @ m.normal - m.point @ m.normal
+            view = np.where(np.minimum.reduceat(over, 2 * self.first[:-1]) > self.touch, view, 0.0)
         pick = np.argsort(-view, kind="stable")[:_MOST]
         pick = pick[view[pick] > 0.0]
         count = np.diff(self.first)[pick]
-        edge = np.concatenate([np.zeros(0, int), *(np.arange(self.first[w], self.first[w + 1]) for w in pick)])
+        first = np.concatenate([[0], np.cumsum(count)])
+        edge = np.repeat(self.first[pick] - first[:-1], count) + np.arange(first[-1])
         a, b = self.edge[edge, 0], self.edge[edge, 1]
         side = np.repeat(np.sign(height[pick]), count)
-        inward = np.cross(image, b - a) if leg.far else np.cross(b - image, a - image)
+        p, q = (image[None], b - a) if leg.far else (b - image, a - image)
+        # The cross product of p and q; numpy's own takes as long as all else here.
+        inward = p[:, [1, 2, 0]] * q[:, [2, 0, 1]] - p[:, [2, 0, 1]] * q[:, [1, 2, 0]]
         size = np.linalg.norm(inward, axis=1, keepdims=True)
         inward *= side[:, None] / np.where(size > 0.0, size, 1.0)
-        first = np.concatenate([[0], np.cumsum(count)])
         normal = self.normal[pick] * np.sign(height[pick])[:, None]
         return HidingWalls(self.point[pick], normal, self.owner[pick], first, a, inward, self.touch)
 

@@ -68,13 +68,15 @@ def tube_routes(
     surface, whose own routes are then not yielded.
     """
     found = so_far or Contributions(rule.for_depth(bounces))
-    yield from numbered_routes(geometry, leg, (outs, outs), pieces, bounces, found, lambda routes, *_: routes, first)
+    images = Images.of(geometry, outs, outs)
+    yield from numbered_routes(geometry, leg, outs, images, pieces, bounces, found, lambda routes, *_: routes, first)
 
 
 def numbered_routes(
     geometry: Geometry,
     leg: Leg,
-    legs: tuple[list[Leg], list[Leg]],
+    outs: list[Leg],
+    images: Images,
     pieces: Bools,
     bounces: int,
     found: Contributions,
@@ -85,11 +87,9 @@ def numbered_routes(
     """Yield what `each` makes of the routes that `tube_routes` yields, of the number of the bounce at which they
     scatter, from 1 on, and of that of the leg over which they leave; it is called by any thread.
 
-    Args: legs in and out; wanted, if not all; else as for `tube_routes`.
+    Args: images of all legs in and out; wanted, if not all; else as for `tube_routes`.
     """
-    ins, outs = legs
     more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone and (wanted is None or wanted.depth > 1)
-    images = _Images.of(geometry, ins, outs)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
     only = None if wanted is None else wanted.facets
     for tubes in launch(geometry, leg, outs[0], pieces, found, more, others, only):
@@ -106,7 +106,7 @@ class _Wave(Generic[T]):
     geometry: Geometry
     leg: Leg
     outs: list[Leg]
-    images: _Images
+    images: Images
     bounces: int
     each: Callable[[Routes, int, int], T]
     wanted: Wanted | None
@@ -179,7 +179,7 @@ def _returned(
     may[out.pieces(geometry)] = False
     rows = np.flatnonzero(own & may[piece])
     if out.mirrors:
-        rows = rows[out.may_leave(tubes.points[rows])]
+        rows = rows[out.may_leave(tubes.points, rows)]
     if not len(rows):
         return
     some = tubes.take(rows)
@@ -257,7 +257,7 @@ def resolve_return_leg(
 
 
 @dataclass(frozen=True)
-class _Images:
+class Images:
     """Returns that legs over mirrors carry already and tubes must not carry again; `planes` (p,) are the mirrors of
     legs in, `outward` (p,) those of legs out.
 
@@ -269,10 +269,12 @@ class _Images:
     outward: Bools
 
     @staticmethod
-    def of(geometry: Geometry, ins: list[Leg], outs: list[Leg]) -> _Images:
+    def of(geometry: Geometry, ins: list[Leg], outs: list[Leg]) -> Images:
         """Return the mirrors of legs in and out."""
-        used = [{int(geometry.plane[m.facet]) for leg in legs for m in leg.mirrors} for legs in (ins, outs)]
-        return _Images(*(np.isin(np.arange(geometry.plane.max(initial=-1) + 1), list(some)) for some in used))
+        planes, outward = np.zeros((2, int(geometry.plane.max(initial=-1)) + 1), bool)
+        for used, legs in ((planes, ins), (outward, outs)):
+            used[geometry.plane[[m.facet for leg in legs for m in leg.mirrors]]] = True
+        return Images(planes, outward)
 
     def over(self, geometry: Geometry, out: Leg) -> bool:
         """Tell whether an outgoing leg has a mirror that also scatters (the ground does not)."""

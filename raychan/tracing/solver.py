@@ -20,7 +20,7 @@ from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.shared_work import all_of
-from raychan.tracing.shooting import Wanted, numbered_routes
+from raychan.tracing.shooting import Images, Wanted, numbered_routes
 from raychan.tracing.sources import EXACT, Sources, sources_of
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
@@ -87,6 +87,7 @@ class Launch:
             self.outs = self.legs
             if rule.rx is not None:
                 self.outs = list(compress(self.every[1], lit_legs(geometry, self.every[1], layers)))
+        self._images = Images.of(geometry, self.legs, self.outs)
         self._found: dict[int, Contributions] = {}
 
     def whole(
@@ -151,7 +152,7 @@ class Launch:
     def _over(
         self, i: int, found: Contributions, stats: Stats, each: Callable[[Batch], T], wanted: Wanted | None = None
     ) -> Iterator[tuple[T, Sources]]:
-        leg, legs = self.legs[i], (self.legs, self.outs)
+        leg = self.legs[i]
         pieces = reachable(self.geometry, leg)
         if not pieces.any():
             return
@@ -160,7 +161,7 @@ class Launch:
             return len(routes.kind), each(routes), sources_of(routes, i, len(leg.mirrors), out, depth)
 
         for tubes, *one in numbered_routes(
-            self.geometry, leg, legs, pieces, self.rule.bounces, found, made, wanted=wanted
+            self.geometry, leg, self.outs, self._images, pieces, self.rule.bounces, found, made, wanted=wanted
         ):
             stats.tubes += tubes
             yield one[0], one[1]
