@@ -34,6 +34,7 @@ from raychan.run.rules import first_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
+from raychan.run.unreached import Unreached, unreached_notes, unreached_of
 from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Batch, Launch, Stats
@@ -48,17 +49,6 @@ _MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may brin
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
 _SLOW = "changes that shrink too slowly for more steps to help"
-_NAMED = 3  # cells that a line names
-
-
-@dataclass(frozen=True)
-class Unreached:
-    """A cell that a budget left above the tolerance: range [m], rate [m/s], and whether it is `deep` tubes, those that
-    bounced, that change most."""
-
-    range: float
-    rate: float
-    deep: bool
 
 
 @dataclass(frozen=True)
@@ -85,19 +75,7 @@ class Converged:
                 f"{self.speckled} cells of the map are speckle (model.speckle): displacing bodies by 0.05 deg and 1 mm "
                 f"moves them by more than {self.model.tolerance_db:g} dB, and they are refined to that only"
             )
-        if not self.unreached:
-            return said
-        told = [
-            f"{u.range:.2f} m, {u.rate:+.2f} m/s ({'tubes that bounced' if u.deep else 'first surfaces'})"
-            for u in self.unreached[:_NAMED]
-        ]
-        more = f" and {len(self.unreached) - _NAMED} more" if len(self.unreached) > _NAMED else ""
-        steps = "once" if self.steps == 1 else f"{self.steps} times"
-        return [
-            *said,
-            f"refined {steps}, ended by {self.ended}: the level still changes by more than "
-            f"{self.model.tolerance_db:g} dB at {'; '.join(told)}{more}",
-        ]
+        return said + unreached_notes(self.unreached, self.steps, self.ended, self.model.tolerance_db)
 
 
 @dataclass(frozen=True)
@@ -246,7 +224,7 @@ class SceneRefinement:
                 ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))
         for i in range(len(cells)):
             held.doubt(*cells.slowness(i))
-        unreached = tuple(_unreached(cells))
+        unreached = tuple(unreached_of(cells))
         return steps, unreached, ended or (_SLOW if unreached else "")
 
 
@@ -281,11 +259,3 @@ def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
     """Return batches of routes with those that `keep` (w,), over all of them, tells."""
     ends = np.cumsum([0, *(len(b.kind) for b in batches)])
     return [take(b, keep[i:j]) for b, i, j in zip(batches, ends, ends[1:], strict=False)]
-
-
-def _unreached(cells: MapCells) -> Iterator[Unreached]:
-    """Give the cells of which a class of tubes is still to be refined."""
-    change, last = cells.change, np.flatnonzero(cells.open.any(axis=1))
-    for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
-        (shallow, deep), place = change[i], cells.cell_of(i)
-        yield Unreached(float(place[0]), float(place[1]), bool(deep > shallow))

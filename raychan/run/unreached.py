@@ -1,0 +1,52 @@
+"""Cells of a map whose error a run leaves above the tolerance, and the lines that say so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from raychan.run.map_cells import MapCells
+
+_NAMED = 3  # cells that a line names
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """A cell that a budget left above the tolerance: range [m], rate [m/s], whether it is `deep` tubes, those that
+    bounced, that change most, and whether it is `weak`: below the detector's threshold, and may still rise above."""
+
+    range: float
+    rate: float
+    deep: bool
+    weak: bool = False
+
+    @property
+    def text(self) -> str:
+        """Where the cell lies, and what changes there."""
+        return f"{self.range:.2f} m, {self.rate:+.2f} m/s ({'tubes that bounced' if self.deep else 'first surfaces'})"
+
+
+def unreached_of(cells: MapCells) -> Iterator[Unreached]:
+    """Give the cells of which a class of tubes is still to be refined."""
+    change, last = cells.change, np.flatnonzero(cells.open.any(axis=1))
+    weak = cells.allowed > cells.tolerance
+    for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
+        (shallow, deep), place = change[i], cells.cell_of(i)
+        yield Unreached(float(place[0]), float(place[1]), bool(deep > shallow), bool(weak[i]))
+
+
+def unreached_notes(unreached: tuple[Unreached, ...], steps: int, ended: str, tolerance_db: float) -> list[str]:
+    """Return a line on the detections whose levels are not within the tolerance [dB], and one on cells that may still
+    become detections, with what ended the refinement after so many steps."""
+    said, how = [], f"refined {'once' if steps == 1 else f'{steps} times'}, ended by {ended}"
+    for weak, what in (
+        (False, f"the level still changes by more than {tolerance_db:g} dB at"),
+        (True, "below the detector's threshold, what may still change reaches it at"),
+    ):
+        some = [u.text for u in unreached if u.weak == weak]
+        if some:
+            more = f" and {len(some) - _NAMED} more" if len(some) > _NAMED else ""
+            said.append(f"{how}: {what} {'; '.join(some[:_NAMED])}{more}")
+    return said

@@ -1,0 +1,30 @@
+"""Lines on cells that a budget left above the tolerance: detections, and what may still become one."""
+
+import numpy as np
+
+from raychan.run.map_cells import MapCells
+from raychan.run.unreached import Unreached, unreached_notes, unreached_of
+
+SHALLOW, DEEP = 1 << 31, 2 << 31  # sources of facet 0: bounces 1 and 2
+
+
+def test_weak_cells_are_told_apart_from_detections():
+    place = np.array([[10.0, 1.0, 1.0], [20.0, -2.0, 0.5], [30.0, 0.0, 1.0]])
+    cells = MapCells(place, np.array([1.0, 0.5, 1.0], complex), 0.5)
+    cells.spare(np.full(3, 0.8))
+    cells.changed(0, np.array([SHALLOW]), np.array([0.2 + 0j]))
+    cells.changed(1, np.array([DEEP]), np.array([0.01 + 0.4j]))
+    found = list(unreached_of(cells))
+    assert found == [Unreached(10.0, 1.0, deep=False), Unreached(20.0, -2.0, deep=True, weak=True)]
+    strong, weak = unreached_notes(tuple(found), 2, "8 steps", 0.5)
+    assert strong == (
+        "refined 2 times, ended by 8 steps: the level still changes by more than 0.5 dB at 10.00 m, +1.00 m/s "
+        "(first surfaces)"
+    )
+    assert "below the detector's threshold" in weak and "20.00 m, -2.00 m/s (tubes that bounced)" in weak
+
+
+def test_nothing_is_said_where_all_is_reached_and_three_cells_are_named():
+    assert unreached_notes((), 1, "8 steps", 1.0) == []
+    (line,) = unreached_notes(tuple(Unreached(float(k), 0.0, True) for k in range(5)), 1, "8 steps", 1.0)
+    assert line.startswith("refined once, ") and line.endswith("2.00 m, +0.00 m/s (tubes that bounced) and 2 more")
