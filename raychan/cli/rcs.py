@@ -57,6 +57,14 @@ def rcs(
     max_bounces: Annotated[
         int, typer.Option(help="Most bounces along a path.", metavar="N", callback=within(limits.BOUNCES, True))
     ] = 3,
+    max_rays: Annotated[
+        int,
+        typer.Option(
+            help="Rays an angle may take, about, to reach the tolerance.",
+            metavar="N",
+            callback=within(limits.RAYS, True),
+        ),
+    ] = 1_000_000,
     threads: Threads = None,
     unit: Annotated[str, typer.Option(help="Unit of the mesh file: m, cm, mm, inch, ft.")] = "m",
     up: Annotated[
@@ -105,6 +113,7 @@ def rcs(
         "material": material,
         "tolerance_db": tolerance,
         "max_bounces": max_bounces,
+        "max_rays": max_rays,
     }
     with show.progress(kernels="rcs") as tell:
         found = _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell)

@@ -81,5 +81,7 @@ def uncertainties(mesh: Mesh, found: Rcs, tolerance: float) -> list[str]:
             f"{int(nothing.sum())} of {count} angles return nothing in physical optics: their error is unknown"
         )
     if lost := int((~known & ~nothing).sum()):
-        lines.append(f"{lost} of {count} angles did not converge: their error is unknown")
+        lines.append(
+            f"{lost} of {count} angles did not converge: their error is unknown; more rays (--max-rays) may help"
+        )
     return lines

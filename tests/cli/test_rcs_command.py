@@ -138,6 +138,7 @@ def test_many_elevations_are_drawn_as_a_map(plate, tmp_path):
         (["--shape", "plate", "--tolerance", "0"], "between 0.001 and 40 dB"),
         (["--shape", "plate", "--max-bounces", "0"], "between 1 and 12"),
         (["--shape", "plate", "--max-bounces", "99"], "between 1 and 12"),
+        (["--shape", "plate", "--max-rays", "0"], "between 1 and"),
         (["--shape", "plate", "--tolerance", "inf"], "between 0.001 and 40 dB"),
         (["--shape", "plate", "--azimuth", "1e30"], "ten turns"),
         (["--shape", "plate", "--material", "pecc"], "pec"),
@@ -250,3 +251,16 @@ def test_a_corner_of_three_faces_that_may_return_by_two_bounces_tells_of_the_thi
     if angles == (0.0, 0.0):
         assert float(two.further_db) == pytest.approx(brought, abs=0.5)
     assert float(rcs(build("dihedral"), 77e9, *angles).further_db) == 0.0
+
+
+def test_more_rays_make_an_unknown_error_known(tmp_path):
+    said = []
+    for rays in ("5000", "2000000"):
+        out = tmp_path / f"{rays}.csv"
+        view = ["--azimuth", "20", "--elevation", "10", "--tolerance", "0.5", "--out", str(out)]
+        assert invoke(["rcs", "--shape", "car", *view, "--max-rays", rays]) == 0
+        with out.open() as file:
+            said.append(next(csv.DictReader(file)))
+    few, many = said
+    assert (few["converged"], few["error_db"], many["converged"]) == ("false", "", "true")
+    assert float(many["error_db"]) < 3.0 and 20 * int(few["rays"]) < int(many["rays"])
