@@ -76,10 +76,7 @@ def path_counts(quick: bool) -> Outcome:
 
 
 def _copies(paths: Paths, times: int) -> Paths:
-    made: Paths = paths.replace(
-        length=np.tile(paths.length, times), length_rate=np.tile(paths.length_rate, times),
-        amplitude=np.tile(paths.amplitude, times), trajectory=np.tile(paths.trajectory, times),
-    )  # fmt: skip
+    made: Paths = take(paths, np.tile(np.arange(len(paths.length)), times))
     return made
 
 

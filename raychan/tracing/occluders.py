@@ -93,6 +93,8 @@ class Occluders:
         size = np.linalg.norm(inward, axis=1, keepdims=True)
         inward *= side[:, None] / np.where(size > 0.0, size, 1.0)
         normal = self.normal[pick] * np.sign(height[pick])[:, None]
+        # Columns picked from an array lie one after the other; kernels are compiled for rows.
+        inward = np.ascontiguousarray(inward)
         return HidingWalls(self.point[pick], normal, self.owner[pick], first, a, inward, self.touch)
 
     def spheres_over(self, leg: Leg) -> HidingSpheres:

@@ -15,7 +15,7 @@ from raychan.channel.transfer import departures
 from raychan.radar.array import wavefronts
 from raychan.records import REFLECT, SCATTER, Routes
 from raychan.run.micro_doppler import retraced
-from raychan.run.rules import first_rule, step_rule
+from raychan.run.rules import fine_rule, step_rule
 from raychan.signal.baseband import synthesize
 from raychan.tracing.solver import Stats, launch_routes
 from raychan.units import C0
@@ -157,7 +157,7 @@ def test_the_first_chirp_of_a_turning_plate_is_that_of_its_paths_at_every_elemen
     """So far off that no footprint is divided into pieces."""
     turning = replace(plate(150.0), position=(20.0, 0.2, 0.3), spin_dps=(0.0, 0.0, 1.0))
     of = scene(turning, retrace=2)
-    rule = first_rule(of.radar, of.processing, of.model)
+    rule = fine_rule(of.radar, of.processing, of.model)
     geometry = geometry_of(of, of.model.tolerance_db)
     batches = launch_routes(geometry, of.points(0.0), rule, Stats())
     paths = join([paths_of(b, geometry.facets, of.radar, WAVE.carrier) for b in batches])

@@ -72,6 +72,8 @@ def test_gpsd_has_fixes_and_headings_with_the_values_of_the_track(tmp_path):
     due = round(10.0 * (last - first).total_seconds()) + 1
     # A pause of the machine leaves sentences out: not missing, where the session itself says so.
     due -= numbers["sentences"]["missed"]
+    # Of two sentences that a pause brought together gpsd may tell one.
+    due -= int(numbers["scans"]["behind_most"] > 0)
     # What gpsd had not yet told when the time was over is not missing.
     assert due > 5.0 * SECONDS and len(headings) > SHARE * due - 10
     assert len(fixes) - len(right) <= 1 and len(right) >= SHARE * due

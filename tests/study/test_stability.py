@@ -102,6 +102,12 @@ def test_regimes_with_an_exact_truth_stand(key):
     assert tried.outcome.rows
 
 
+def test_any_number_of_paths_is_summed_within_bounded_memory():
+    (tried,) = study.stability(quick=True, only=["paths"])
+    sums = [r for r in tried.outcome.rows if "time" not in r.name]
+    assert len(sums) == 12 and all(r.passed for r in sums)
+
+
 def test_edges_do_not_leak_and_vertices_are_counted_apart():
     (tried,) = study.stability(quick=True, only=["leaks"])
     edges = [r for r in tried.outcome.rows if "vertices" not in r.name]
