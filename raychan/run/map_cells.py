@@ -35,6 +35,10 @@ _SLOWEST = 3.0  # factor on a last change: beyond, the error is as good as unkno
 _BETTER = math.sqrt(0.5)
 """Factor on a last change from the second on. It is made by the errors of two launches, and that of the newer one is at
 most the other's: half of its power. Covers 96.8 % of 1209 levels of the same detections, 1.0 97.9 %."""
+_FIRM, _HELD = 0.7, 0.5
+"""A doubt that has not shrunk by _FIRM is one of errors that come by chance, and the next one may be small by chance:
+_HELD of it counts on. With it 73 of 76 levels of `bench.detections`, seeds 9700 to 9759 at 1 dB, lie within what is
+stated, without 72."""
 _SURE, _SHRINK = 3, 0.7
 """From so many steps on a cell is given up whose error would not be within the tolerance after all STEPS if it shrank
 by this factor a step. Of 38 cells above it after three of six steps (seeds 0 to 93) the 10 by 0.7^-3 or more were not
@@ -118,6 +122,7 @@ class MapCells:
             self.tolerance *= (mean / np.maximum(np.abs(level), 1e-300)).ravel()
         self._changes = [_Changes.none() for _ in self.level]
         self._given_up, self._before = np.zeros(len(self.level), bool), np.full(len(self.level), np.inf)
+        self._held, self._older = np.zeros(len(self.level)), np.full(len(self.level), np.inf)
 
     def __len__(self) -> int:
         return len(self.level)
@@ -150,8 +155,14 @@ class MapCells:
 
     @property
     def doubt(self) -> Floats:
-        """What may be wrong of each level (c,), as an amplitude: the sum of what may still change and of what was never
-        cut, or, where that cancels, their rms sum."""
+        """What may be wrong of each level (c,), as an amplitude: what may still change, and a share of what that was a
+        step before where it had not shrunk then."""
+        return np.maximum(self._open_doubt, self._held * _ROOM * np.abs(self.level) * self.allowed)
+
+    @property
+    def _open_doubt(self) -> Floats:
+        """The sum of what may still change of each level (c,) and of what was never cut, or, where that cancels, their
+        rms sum."""
         found = np.zeros(len(self))
         for i, changes in enumerate(self._changes):
             whole, rms = changes.sums()
@@ -173,7 +184,7 @@ class MapCells:
     @property
     def over(self) -> Floats:
         """What may be wrong of each level over what is allowed of it (c,)."""
-        return self.doubt / np.maximum(_ROOM * np.abs(self.level) * self.allowed, 1e-300)
+        return self._open_doubt / np.maximum(_ROOM * np.abs(self.level) * self.allowed, 1e-300)
 
     @property
     def open(self) -> Bools:
@@ -184,7 +195,8 @@ class MapCells:
 
     def give_up(self, steps: int, left: int) -> None:
         """Refine cells no more whose tolerance is out of reach, after some steps and before those that are left."""
-        before, self._before = self._before, self.over
+        before, self._before, old = self._before, self.over, self._older
+        self._held, self._older = np.where(before > _FIRM * old, _HELD * before, 0.0), before
         if steps >= _SURE:
             # The change of one step may be large by chance.
             self._given_up |= np.minimum(before, self._before) * _SHRINK**left > 1.0

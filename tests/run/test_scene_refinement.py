@@ -161,6 +161,20 @@ def test_a_cell_that_was_in_reach_a_step_before_is_not_given_up():
     assert cells.open[0, 0] and cells.to_refine[0, 0]
 
 
+def test_a_small_change_after_some_that_did_not_shrink_is_not_believed():
+    """Half of the doubt before it counts on: launches on alternate lattices may agree by chance."""
+    doubts = []
+    for history in ((0.4, -0.39, 0.001), (0.4, -0.1, 0.001)):
+        cells = one_cell()
+        for steps, change in enumerate(history, 1):
+            before = float(cells.doubt[0])
+            cells.changed(0, np.array([SHALLOW]), np.array([change + 0j]))
+            cells.give_up(steps, 5)
+        doubts.append((float(cells.doubt[0]), before))
+    (held, before), (believed, _) = doubts
+    assert held == pytest.approx(0.5 * before, rel=0.05) and believed < 0.01
+
+
 def test_doubtful_paths_bring_at_least_what_a_cell_may_be_wrong_by():
     """Echoes at the place of each cell raise the sums there to the rms sums, and nothing elsewhere."""
     of = scene_of(2)
