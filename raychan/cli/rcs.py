@@ -76,7 +76,8 @@ def rcs(
     crease: Annotated[
         float | None,
         typer.Option(
-            help="Crease angle in degrees: folds of the mesh below it are smooth; 20 if not given.",
+            help="Crease angle in degrees: folds of the mesh below it are smooth, others edges. If not given it is 20, "
+            "a guess that the stated error includes.",
             metavar="DEG",
             callback=within(limits.CREASE),
         ),
@@ -114,6 +115,7 @@ def rcs(
         "tolerance_db": tolerance,
         "max_bounces": max_bounces,
         "max_rays": max_rays,
+        "crease_deg": crease,
     }
     with show.progress(kernels="rcs") as tell:
         found = _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell)
@@ -129,7 +131,7 @@ def rcs(
         show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
     show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
     show.warn(further_bounces(found, max_bounces, tolerance))
-    show.warn(uncertainties(mesh, found, tolerance))
+    show.warn(uncertainties(mesh, found, tolerance, crease is not None))
     if files:
         screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from raychan.cli import show
@@ -12,8 +13,9 @@ if TYPE_CHECKING:
     from raychan.run.rcs import Rcs
     from raychan.world.mesh import Mesh
 
-Row = tuple[float, float, float, float, float, int, int, bool]
-"""Azimuth [deg], elevation [deg], RCS [m^2], RCS [dBsm], error [dB], rays, bounces, converged."""
+Row = tuple[float, float, float, float, float, float, int, int, bool]
+"""Azimuth [deg], elevation [deg], RCS [m^2], RCS [dBsm], error [dB], its numerical part [dB], rays,
+bounces, converged."""
 
 
 def rows(az: Any, el: Any, found: Rcs) -> list[Row]:
@@ -22,16 +24,17 @@ def rows(az: Any, el: Any, found: Rcs) -> list[Row]:
 
     with np.errstate(divide="ignore"):
         dbsm = 10.0 * np.log10(found.sigma)
-    columns = (az, el, found.sigma, dbsm, found.error_db, found.rays, found.bounces, found.converged)
-    return list(zip(*(c.tolist() for c in columns), strict=True))
+    levels = (az, el, found.sigma, dbsm, found.error_db, found.numerical_db)
+    columns = [c.tolist() for c in (*levels, found.rays, found.bounces, found.converged)]
+    return list(zip(*columns, strict=True))
 
 
 def csv_text(rows: list[Row]) -> str:
     """Return the rows as the text of a CSV file."""
-    head = "azimuth_deg,elevation_deg,sigma_m2,rcs_dbsm,error_db,rays,bounces,converged"
+    head = "azimuth_deg,elevation_deg,sigma_m2,rcs_dbsm,error_db,numerical_db,rays,bounces,converged"
     lines = [
-        f"{a:.10g},{e:.10g},{s:.8g},{d:.6g},{f'{x:.4g}' if c else ''},{r},{b},{str(c).lower()}"
-        for a, e, s, d, x, r, b, c in rows
+        f"{a:.10g},{e:.10g},{s:.8g},{d:.6g},{_known(x, '.4g', '')},{_known(n, '.4g', '')},{r},{b},{str(c).lower()}"
+        for a, e, s, d, x, n, r, b, c in rows
     ]
     return "\n".join([head, *lines, ""])
 
@@ -39,10 +42,13 @@ def csv_text(rows: list[Row]) -> str:
 def table_of(title: str, rows: list[Row]) -> Table:
     """Return the rows as a table for the terminal."""
     cells = [
-        (f"{a:g}", f"{e:g}", f"{d:.2f}" if s else "no return", f"{x:.3f}" if c else "unknown", f"{r}", f"{b}")
-        for a, e, s, d, x, r, b, c in rows
+        (
+            *(f"{a:g}", f"{e:g}", f"{d:.2f}" if s else "no return"),
+            *(_known(x, ".3f", "unknown"), _known(n, ".3f", "unknown"), f"{r}", f"{b}"),
+        )
+        for a, e, s, d, x, n, r, b, _ in rows
     ]
-    heads = ("azimuth deg", "elevation deg", "RCS dBsm", "error dB", "rays", "bounces")
+    heads = ("azimuth deg", "elevation deg", "RCS dBsm", "error dB", "numerical dB", "rays", "bounces")
     return show.table(title, heads, cells, left=())
 
 
@@ -63,11 +69,18 @@ def further_bounces(found: Rcs, most: int, tolerance: float) -> list[str]:
     return [f"at {last} of {found.bounces.size} angles {beyond}: {estimate}"]
 
 
-def uncertainties(mesh: Mesh, found: Rcs, tolerance: float) -> list[str]:
-    """Return a line each on folds of the mesh that may be edges, and on angles that missed the tolerance."""
+def _known(number: float, form: str, unknown: str) -> str:
+    return format(number, form) if math.isfinite(number) else unknown
+
+
+def uncertainties(mesh: Mesh, found: Rcs, tolerance: float, sure: bool) -> list[str]:
+    """Return a line each on folds of the mesh that may be edges, unless these are sure, and on angles that missed the
+    tolerance."""
+    import numpy as np
+
     from raychan.world.creases import uncertain_folds
 
-    lines = [text for text in [uncertain_folds(mesh, "--crease")] if text]
+    lines = [text for text in ["" if sure else uncertain_folds(mesh, "--crease")] if text]
     known, count = found.converged, found.error_db.size
     over = int((found.error_db > tolerance).sum())
     if over:
@@ -80,8 +93,13 @@ def uncertainties(mesh: Mesh, found: Rcs, tolerance: float) -> list[str]:
         lines.append(
             f"{int(nothing.sum())} of {count} angles return nothing in physical optics: their error is unknown"
         )
-    if lost := int((~known & ~nothing).sum()):
+    if lost := int((np.isnan(found.numerical_db) & ~nothing).sum()):
         lines.append(
             f"{lost} of {count} angles did not converge: their error is unknown; more rays (--max-rays) may help"
+        )
+    if open_ := int((~known & np.isfinite(found.numerical_db)).sum()):
+        lines.append(
+            f"{open_} of {count} angles are converged, but the mesh does not tell their level: other surfaces that it "
+            "may stand for return far more or less; finer facets or a mesh with normals of its own would tell"
         )
     return lines

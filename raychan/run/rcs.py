@@ -34,7 +34,10 @@ class Rcs:
     sigma: Floats
     """[m^2]"""
     error_db: Floats
-    """Stated error [dB]; NaN where the launches do not agree well enough to state one."""
+    """Stated error [dB]; NaN where the launches do not agree well enough to state one, or the mesh leaves it open."""
+    numerical_db: Floats
+    """The part of it [dB] that more rays reduce, NaN where they did not suffice to state it; the mesh and physical
+    optics leave the rest open."""
     rays: NDArray[np.int64]
     """Rays cast."""
     bounces: NDArray[np.int64]
@@ -51,7 +54,7 @@ class Rcs:
 
     @property
     def converged(self) -> NDArray[np.bool_]:
-        """Whether the launches agree well enough for the stated error to be a figure."""
+        """Whether the stated error is a figure."""
         return np.isfinite(self.error_db)
 
 
@@ -77,8 +80,9 @@ def rcs(
     Args: mesh trimesh, Mesh or file; frequency [Hz]; angles [deg] from the target to the radar in the target's frame,
     which broadcast; polarization receive then transmit (V, H of a wave that leaves the antenna); distance [m] from the
     origin, inf for plane waves; tolerance_db [dB] wanted; rx_* of the receiver, where it is elsewhere; max_rays an
-    angle, about; folds under crease_deg [deg] are smooth (None: 20, or as the Mesh was made), unless the mesh knows its
-    normals; simplify finely tessellated smooth surfaces, as near to them as the tolerance asks for.
+    angle, about; folds under crease_deg [deg] are smooth and others edges, unless the mesh knows its normals (None: 20,
+    or as the Mesh was made, and the error includes that this is a guess); simplify finely tessellated smooth surfaces,
+    as near to them as the tolerance asks for.
     A near-field value is that of the point target at the origin that returns as much: 4 pi D^4 |E_s|^2 for unit field
     at 1 m. Raises: ValueError for arguments out of range.
     Source: Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5.
@@ -92,7 +96,8 @@ def rcs(
     RAYS.check("max_rays", max_rays, whole=True)
     angles = _angles(azimuth_deg, elevation_deg, rx_az, rx_el)
     k = 2.0 * np.pi * frequency / C0
-    body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None)
+    # A crease angle that is given is the caller's word on what is an edge; the default is a guess.
+    body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None, crease_deg is not None)
     topology = [body.mesh.topology] if body.merged else []
     geometry = Geometry(facets_of(body.mesh, material, frequency), topology, merged=body.merged)
     other = mesh_error(geometry, body.alternatives, k)
@@ -129,6 +134,7 @@ def _collected(found: list[Value], shape: tuple[int, ...], merged: str) -> Rcs:
     return Rcs(
         sigma=column("sigma", float),
         error_db=column("error_db", float),
+        numerical_db=column("numerical_db", float),
         rays=column("rays", np.int64),
         bounces=column("bounces", np.int64),
         amplitude=np.array([one.matrix for one in found], complex).reshape(*shape, 2, 2),

@@ -29,6 +29,11 @@ class Doubt:
     waves: tuple[float, float]
     _others: dict[int, complex] = field(default_factory=dict)
 
+    def numerical_db(self, value: complex, off: float) -> float:
+        """Return the error [dB] of an amplitude that launches leave open by `off` [m]; NaN: unknown."""
+        db = stated_error(value, off, 1.0)
+        return np.nan if value == 0.0 or db > LARGEST_DB else db
+
     def error_db(self, value: complex, off: float) -> float:
         """Return the error [dB] to state of an amplitude that launches leave open by `off` [m]; NaN: unknown.
 

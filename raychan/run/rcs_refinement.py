@@ -78,11 +78,12 @@ class Case:
 
 @dataclass(frozen=True)
 class Value:
-    """A cross-section: sigma [m^2], error [dB] (NaN: unknown), rays cast, most bounces that counted, change [dB] by a
-    further bounce, scattering matrix (2, 2) [m]."""
+    """A cross-section: sigma [m^2], error [dB] and the part of it that more rays reduce (NaN: unknown), rays cast, most
+    bounces that counted, change [dB] by a further bounce, scattering matrix (2, 2) [m]."""
 
     sigma: float
     error_db: float
+    numerical_db: float
     rays: int
     bounces: int
     further_db: float
@@ -96,13 +97,13 @@ def refined(case: Case) -> Value:
         replace(step, max_tubes=_most_tubes(i, case.max_rays), max_rays=case.max_rays)
         for i, step in enumerate(refinements(case.geometry, case.frequency, max_rays=case.max_rays))
     ]
-    sums, error_db = _launched(case, rules)
+    sums, error_db, numerical_db = _launched(case, rules)
     amplitudes = sums.sums.by_bounce(case.bounces)
     by_bounce = amplitudes[:, case.row, case.col]
     counted = np.flatnonzero(np.abs(by_bounce) > _COUNTS * np.abs(by_bounce).max(initial=0.0))
     most, further = int(counted.max(initial=-1)) + 1, _further(case, rules[0], by_bounce)
     sigma = 4.0 * np.pi * abs(sums.value) ** 2
-    return Value(sigma, error_db, case.rays - rays, most, further, amplitudes.sum(axis=0))
+    return Value(sigma, error_db, numerical_db, case.rays - rays, most, further, amplitudes.sum(axis=0))
 
 
 def _terminator(case: Case) -> float:
@@ -116,9 +117,9 @@ def _terminator(case: Case) -> float:
     return _TERMINATOR / k + (terminator_error(area, *ends, k, case.row, case.col) if case.out != case.leg else 0.0)
 
 
-def _launched(case: Case, rules: list[Refinement]) -> tuple[SourceSums, float]:
+def _launched(case: Case, rules: list[Refinement]) -> tuple[SourceSums, float, float]:
     """Launch the whole body twice, then trace the sources again that leave the sum open, until it is within the
-    tolerance or rays run out; return the sums, and the error to state [dB]."""
+    tolerance or rays run out; return the sums, the error to state [dB], and the part of it that launches leave open."""
     launch = BodyLaunch(case.geometry, (case.leg, case.out), case.frequency, case.bounces)
     start, within = case.geometry.rays, 1.0 - 10.0 ** (-case.tolerance_db / 20.0)
     sums, first, known = _whole(case, launch, rules)
@@ -140,7 +141,7 @@ def _launched(case: Case, rules: list[Refinement]) -> tuple[SourceSums, float]:
             # Rays ran out before it was known what hides what.
             break
         sums = sums.joined(rows, parts)
-    return sums, doubt.error_db(sums.value, off)
+    return sums, doubt.error_db(sums.value, off), doubt.numerical_db(sums.value, off)
 
 
 def _doubt(case: Case, rule: Refinement, first: complex) -> Doubt:

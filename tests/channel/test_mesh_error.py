@@ -71,6 +71,18 @@ def test_of_bodies_that_bend_one_way_both_readings_are_stated(build, sides):
     assert alternatives(from_trimesh(trimesh.creation.icosphere(3))).creased is None
 
 
+def test_folds_are_in_no_doubt_where_the_caller_tells_edges():
+    """By a crease angle below its folds a tube of 37 sides is the prism, by one above them the cylinder."""
+    mesh = trimesh.creation.cylinder(0.08, 0.15, sections=37)
+    guessed, told, flat = (rcs(mesh, F, 11.0, tolerance_db=0.1, crease_deg=c) for c in (None, 20.0, 5.0))
+    assert guessed.sigma == told.sigma and guessed.numerical_db == told.numerical_db < told.error_db
+    # Broadside of a cylinder: Knott, Shaeffer, Tuley, 2004, table 6.1.
+    assert abs(db(told.sigma / (K * 0.08 * 0.15**2))) <= told.error_db < 0.5
+    prism = shapes.flat(mesh, shapes.po.direction(np.radians(11.0), 0.0))
+    assert abs(db(flat.sigma / prism)) <= flat.error_db < 0.1
+    assert abs(db(told.sigma / prism)) > 0.5 and guessed.error_db > abs(db(told.sigma / prism))
+
+
 def test_a_mesh_that_knows_its_normals_is_in_no_doubt():
     ball = trimesh.creation.icosphere(2, 0.1)
     mesh = make_mesh(ball.vertices, ball.faces, normals=np.asarray(ball.vertices)[ball.faces] / 0.1)

@@ -170,9 +170,12 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(plate, tmp_path, monkeypatch, c
     assert "interrupted" in capsys.readouterr().err
 
 
-def made(*errors):
+def made(*errors, numerical=None):
     n = len(errors)
-    return Rcs(np.ones(n), np.array(errors), np.full(n, 10), np.ones(n, int), np.zeros((n, 2, 2), complex), np.zeros(n))
+    return Rcs(
+        sigma=np.ones(n), error_db=np.array(errors), numerical_db=np.array(numerical or errors), rays=np.full(n, 10),
+        bounces=np.ones(n, int), amplitude=np.zeros((n, 2, 2), complex), further_db=np.zeros(n),
+    )  # fmt: skip
 
 
 def test_missed_tolerance_is_told(capsys, monkeypatch):
@@ -192,12 +195,20 @@ def test_an_unknown_error_is_never_a_figure(errors, tmp_path, capsys, monkeypatc
     out, png = tmp_path / "a.csv", tmp_path / "a.png"
     assert invoke(["rcs", "--shape", "plate", "--azimuth", "0:2:1", "--out", str(out), "--plot", str(png)]) == 0
     said = capsys.readouterr()
-    assert said.out.split("written:")[0].count("unknown") == (~known).sum()
+    assert said.out.split("written:")[0].count("unknown") == 2 * (~known).sum()
     assert f"{(~known).sum()} of 3 angles did not converge: their error is unknown" in said.err
-    assert [(r["error_db"], r["converged"]) for r in rows(out)] == [
-        (f"{e:g}", "true") if np.isfinite(e) else ("", "false") for e in errors
+    assert [(r["error_db"], r["numerical_db"], r["converged"]) for r in rows(out)] == [
+        (f"{e:g}", f"{e:g}", "true") if np.isfinite(e) else ("", "", "false") for e in errors
     ]
     assert png.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_only_the_mesh_leaves_open_is_not_said_to_want_rays(capsys, monkeypatch):
+    monkeypatch.setattr("raychan.run.rcs.rcs", lambda *_, **__: made(np.nan, numerical=[0.2]))
+    assert invoke(["rcs", "--shape", "plate"]) == 0
+    said = capsys.readouterr()
+    assert "1 of 1 angles are converged, but the mesh does not tell their level" in said.err
+    assert "--max-rays" not in said.err and said.out.count("unknown") == 1 and "0.200" in said.out
 
 
 def test_the_crease_angle_decides_and_doubtful_folds_are_told(tmp_path, capsys):
@@ -205,12 +216,15 @@ def test_the_crease_angle_decides_and_doubtful_folds_are_told(tmp_path, capsys):
     file, out = tmp_path / "prism.ply", tmp_path / "a.csv"
     trimesh.creation.cylinder(0.05, 0.05, sections=24).export(file)
     found = []
-    for crease in ("20", "10"):
-        assert invoke(["rcs", str(file), "--azimuth", "7.5", "--crease", crease, "--out", str(out)]) == 0
-        found.append(float(rows(out)[0]["rcs_dbsm"]))
+    for crease in ([], ["--crease", "20"], ["--crease", "10"]):
+        assert invoke(["rcs", str(file), "--azimuth", "7.5", *crease, "--out", str(out)]) == 0
+        found.append(rows(out)[0])
         told = "24 folds of up to 15 deg are taken for smooth; 24 of them may be edges: --crease decides"
-        assert (told in capsys.readouterr().err) == (crease == "20")
-    assert abs(found[0] - found[1]) > 1.0
+        assert (told in capsys.readouterr().err) == (not crease)
+    guessed, smooth, flat = (float(one["rcs_dbsm"]) for one in found)
+    assert guessed == smooth and abs(smooth - flat) > 1.0
+    # What is said to be smooth is in no doubt to be so.
+    assert float(found[0]["error_db"]) > abs(smooth - flat) > float(found[1]["error_db"])
     assert invoke(["info", str(file)]) == 0
     assert "24 folds of up to 15 deg" in " ".join(capsys.readouterr().err.split())
 
