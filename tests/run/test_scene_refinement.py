@@ -175,6 +175,17 @@ def test_a_small_change_after_some_that_did_not_shrink_is_not_believed():
     assert held == pytest.approx(0.5 * before, rel=0.05) and believed < 0.01
 
 
+def test_a_small_change_after_some_that_did_not_shrink_is_confirmed_by_another():
+    cells = one_cell()
+    for steps, change in enumerate((0.4, -0.39, 0.001), 1):
+        cells.changed(0, np.array([SHALLOW]), np.array([change + 0j]))
+        cells.give_up(steps, 5)
+    assert cells.to_refine[0, 0] and cells.wanted(0)[0].tolist() == [SHALLOW]
+    cells.changed(0, np.array([SHALLOW]), np.array([0.001 + 0j]))
+    cells.give_up(4, 4)
+    assert cells.doubt[0] < 0.01 and not cells.to_refine.any()
+
+
 def test_doubtful_paths_bring_at_least_what_a_cell_may_be_wrong_by():
     """Echoes at the place of each cell raise the sums there to the rms sums, and nothing elsewhere."""
     of = scene_of(2)
