@@ -37,7 +37,8 @@ LegsFrom = Callable[[Geometry, Floats, int, Beam | None], list[Leg]]
 _TUBES = 10_000_000  # cut for phase: a quarter of a minute of one core; urban streets at 0.1 dB take a million
 _CUTS, _CUTS_A_FACET = 40_000, 4  # cuts for visibility; urban streets at 0.1 dB take 13,000
 _SHARES = 16  # parts of what the direct leg leaves of a budget that each other leg gets; not measured
-_GROUP = 12  # legs traced at once at most, and their facets in all: bounds the memory; not measured
+_GROUP = 64  # legs traced at once at most, and their facets in all: bounds the memory; threads wait for each other
+# after each
 _HELD = 1 << 21
 _PART = 4096  # first facets from which tubes are traced again at once; not measured
 
@@ -122,9 +123,9 @@ class Launch:
         `tracing.sources`). What is too weak to be cut is judged by what the whole launch found.
         """
         before, budgets = self.geometry.rays, list[Budget]()
-        # Deep tubes, of which a launch takes longest, first.
-        deepest = sorted(wanted, key=lambda one: -one[1].depth)
-        parts = [(i, part) for i, what in deepest for part in what.parts(_PART)]
+        # Those that take longest first: at the end threads wait for the last one.
+        longest = sorted(wanted, key=lambda one: (-one[1].depth, -np.count_nonzero(one[1].facets)))
+        parts = [(i, part) for i, what in longest for part in what.parts(_PART)]
         for group in self._groups(range(len(parts))):
             jobs: list[tuple[int, Contributions, Wanted | None]] = []
             for i, what in (parts[j] for j in group):
