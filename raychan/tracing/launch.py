@@ -61,7 +61,9 @@ def launch(
         tubes = _clip_where_gains_end(geometry, leg, out, launch_tubes(geometry, leg, part, bary))
         if leg.mirrors:
             tubes = _prune_facing_away(geometry, leg, out, others, tubes, found)
-        yield _clip_at_shadows(geometry, leg, out, tubes, found, more)
+        # A launch of some facets is for what their tubes bring where they bounce next.
+        carries = more and (only is not None or found.rule.fan < np.inf)
+        yield _clip_at_shadows(geometry, leg, out, tubes, found, more, carries)
 
 
 def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -> Tubes:
@@ -142,8 +144,11 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
     return np.concatenate([f for f, _ in parts]), np.concatenate([b for _, b in parts])
 
 
-def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, more: bool) -> Tubes:
-    """Return the tubes that are seen; those of which only some rays are seen are subdivided while they matter."""
+def _clip_at_shadows(
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, more: bool, carries: bool
+) -> Tubes:
+    """Return the tubes that are seen; those of which only some rays are seen are subdivided while they matter: by what
+    they return, or with `carries` by what they may carry to the next bounce."""
     parts: list[Tubes] = []
     rule = found.rule
 
@@ -161,7 +166,6 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     view = centre_visibility(geometry, leg, tubes, True, rule)
     found.add(ph.take(view.seen))
     ready = geometry.convex_alone or found.budget.spent(geometry)
-    carries = more and rule.fan < np.inf
     matters = ((ph.in_phase if carries else ph.bound) > found.prune_threshold(ph.length)) & (not ready)
     take_seen(view, view.seen & ~matters)
     known: View | None = view.take(matters)
