@@ -69,6 +69,17 @@ def further_bounces(found: Rcs, most: int, tolerance: float) -> list[str]:
     return [f"at {last} of {found.bounces.size} angles {beyond}: {estimate}"]
 
 
+def beyond_budget(found: Rcs, most: int) -> list[str]:
+    """Return a line where angles took more than twice the rays they may."""
+    over, took = int((found.rays > 2 * most).sum()), int(found.rays.max(initial=0))
+    if not over:
+        return []
+    return [
+        f"{over} of {found.rays.size} angles took more rays than --max-rays ({most:,}), up to {took:,}: the whole body "
+        "is launched twice whatever it costs, for an error to state"
+    ]
+
+
 def _known(number: float, form: str, unknown: str) -> str:
     return format(number, form) if math.isfinite(number) else unknown
 
@@ -100,6 +111,6 @@ def uncertainties(mesh: Mesh, found: Rcs, tolerance: float, sure: bool) -> list[
     if open_ := int((~known & np.isfinite(found.numerical_db)).sum()):
         lines.append(
             f"{open_} of {count} angles are converged, but the mesh does not tell their level: other surfaces that it "
-            "may stand for return far more or less; finer facets or a mesh with normals of its own would tell"
+            "may stand for return far more or less; --crease says which folds are edges, --crease 0 that all are"
         )
     return lines

@@ -96,7 +96,8 @@ def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
     body = f"body '{facets.body_names[worst]}': {int(left[worst]):,} tubes on its {area:.3g} m2"
     return (
         f"{body} are coarser than the tolerance asks for: too many are partly hidden or too large. Errors may exceed "
-        "those stated; check the mesh for spikes, for faces that cross or lie on each other, and its unit",
+        "those stated; a larger tolerance asks for fewer, and a mesh file may have spikes, faces that cross or lie on "
+        "each other, or another unit",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -96,11 +96,13 @@ def rcs(
     RAYS.check("max_rays", max_rays, whole=True)
     angles = _angles(azimuth_deg, elevation_deg, rx_az, rx_el)
     k = 2.0 * np.pi * frequency / C0
-    # A crease angle that is given is the caller's word on what is an edge; the default is a guess.
-    body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None, crease_deg is not None)
+    body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None)
     topology = [body.mesh.topology] if body.merged else []
     geometry = Geometry(facets_of(body.mesh, material, frequency), topology, merged=body.merged)
     other = mesh_error(geometry, body.alternatives, k)
+    if crease_deg is not None:
+        # The caller's word on what is an edge; the default is a guess.
+        other = replace(other, creased=None, rounded=None, rounded_halved=None)
     row, col = _POLARIZATIONS[polarization.upper()]
     found = []
     for az, el, raz, rel in zip(*(a.ravel() for a in angles), strict=True):

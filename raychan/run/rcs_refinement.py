@@ -41,6 +41,7 @@ _CURVED = 0.01  # of the value, a radian of a rule's `phase`: error that launche
 _TERMINATOR = 0.25  # of 1 / k: PO's abrupt terminator on a sphere of any radius, against Mie's series
 _TUBES = 30_000  # tubes that a launch may always subdivide, if max_rays allow
 _NULL = 1e-4  # of the strongest polarisation, -80 dB: a change below it does not count
+_ROUNDING = 1e-12  # of the strongest: what is left where an amplitude is zero
 _COUNTS = 1e-3  # of the strongest bounce, -60 dB: one below it does not count
 _LEFT = 0.3  # of the tolerance: what the last changes of sources that are not traced again may add up to; not measured
 _HALF = 0.5  # of the tolerance: launches within it are refined no further for what the mesh leaves open; not measured
@@ -102,8 +103,11 @@ def refined(case: Case) -> Value:
     by_bounce = amplitudes[:, case.row, case.col]
     counted = np.flatnonzero(np.abs(by_bounce) > _COUNTS * np.abs(by_bounce).max(initial=0.0))
     most, further = int(counted.max(initial=-1)) + 1, _further(case, rules[0], by_bounce)
-    sigma = 4.0 * np.pi * abs(sums.value) ** 2
-    return Value(sigma, error_db, numerical_db, case.rays - rays, most, further, amplitudes.sum(axis=0))
+    matrix = amplitudes.sum(axis=0)
+    if abs(sums.value) <= _ROUNDING * np.abs(amplitudes).max(initial=0.0):
+        matrix[case.row, case.col], error_db, numerical_db = 0.0, np.nan, np.nan
+    sigma = 4.0 * np.pi * abs(matrix[case.row, case.col]) ** 2
+    return Value(sigma, error_db, numerical_db, case.rays - rays, most, further, matrix)
 
 
 def _terminator(case: Case) -> float:

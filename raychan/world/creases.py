@@ -50,8 +50,8 @@ class Alternatives:
     """Facets (f,) whose curved surface was checked against that of a finer mesh; None where there is no finer one."""
 
 
-def alternatives(mesh: Mesh, sure: bool = False) -> Alternatives:
-    """Return the other surfaces that a mesh may stand for; sure: its crease angle tells edges from smooth folds.
+def alternatives(mesh: Mesh) -> Alternatives:
+    """Return the other surfaces that a mesh may stand for.
 
     Smooth folds may be edges on patches that turn by more than half the crease angle from facet to facet (an eighth on
     singly curved ones: a prism of 36 sides is as plausible as a cylinder), and where the facets are no regular
@@ -59,20 +59,17 @@ def alternatives(mesh: Mesh, sure: bool = False) -> Alternatives:
     hull of points are not. Folds above the crease angle may be smooth where they look like a tessellation (see
     world.tessellation).
     """
-    name = f"alternatives {sure}"
-    if name not in mesh.memo:
-        mesh.memo[name] = _alternatives(mesh, sure)
-    found: Alternatives = mesh.memo[name]
+    if "alternatives" not in mesh.memo:
+        mesh.memo["alternatives"] = _alternatives(mesh)
+    found: Alternatives = mesh.memo["alternatives"]
     return found
 
 
-def _alternatives(mesh: Mesh, sure: bool) -> Alternatives:
+def _alternatives(mesh: Mesh) -> Alternatives:
     if mesh.crease_deg is None:
         return Alternatives()
     pair, _, uncertain = _folds(mesh)
     hard, _ = _uncertain_edges(mesh)
-    if sure:
-        uncertain, hard = np.zeros_like(uncertain), hard[:0]
     round_ = smoothed(mesh.vertices, mesh.faces, np.concatenate([_smooth_folds(mesh)[0], hard])) if len(hard) else None
     if not len(pair):
         return Alternatives(rounded=round_)

@@ -113,10 +113,10 @@ def traced_mesh(mesh: Mesh, wavenumber: float, tolerance_db: float) -> Simplifie
     return _kept(mesh, wavenumber, tolerance_db, None)
 
 
-def traced_alone(mesh: Mesh, wavenumber: float, tolerance_db: float | None, sure: bool = False) -> Traced:
+def traced_alone(mesh: Mesh, wavenumber: float, tolerance_db: float | None) -> Traced:
     """Return the mesh that is traced in place of that of a body by itself, and its alternatives; args as for
-    `traced_mesh`, but for a tolerance of None, where no mesh is simplified; sure: see `alternatives`."""
-    found = alternatives(mesh, sure)
+    `traced_mesh`, but for a tolerance of None, where no mesh is simplified."""
+    found = alternatives(mesh)
     coarse = None if tolerance_db is None else _kept(mesh, wavenumber, tolerance_db, found)
     if coarse is None:
         return Traced(mesh, found)

@@ -278,3 +278,14 @@ def test_more_rays_make_an_unknown_error_known(tmp_path):
     few, many = said
     assert (few["converged"], few["error_db"], many["converged"]) == ("false", "", "true")
     assert float(many["error_db"]) < 3.0 and 20 * int(few["rays"]) < int(many["rays"])
+
+
+def test_rays_beyond_the_budget_and_zeros_are_told(capsys, monkeypatch):
+    """A plate returns nothing in the other polarisation: zero, not what rounding leaves of it."""
+    assert invoke(["rcs", "--shape", "plate", "--polarization", "VH", "--azimuth", "10"]) == 0
+    said = capsys.readouterr()
+    assert "no return" in said.out and "1 of 1 angles return nothing in physical optics" in said.err
+    monkeypatch.setattr("raychan.run.rcs.rcs", lambda *_, **__: made(0.1))
+    for most, told in (("4", True), ("5", False)):
+        assert invoke(["rcs", "--shape", "plate", "--max-rays", most]) == 0
+        assert ("1 of 1 angles took more rays than --max-rays (4), up to 10" in capsys.readouterr().err) == told
