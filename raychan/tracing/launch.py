@@ -61,8 +61,8 @@ def launch(
         tubes = _clip_where_gains_end(geometry, leg, out, launch_tubes(geometry, leg, part, bary))
         if leg.mirrors:
             tubes = _prune_facing_away(geometry, leg, out, others, tubes, found)
-        # A launch of some facets is for what their tubes bring where they bounce next.
-        carries = more and (only is not None or found.rule.fan < np.inf)
+        # A coarse launch leaves what hidden tubes carry to those that follow it.
+        carries = more and found.rule.coarse == 1.0
         yield _clip_at_shadows(geometry, leg, out, tubes, found, more, carries)
 
 
