@@ -110,7 +110,7 @@ def uncertainties(mesh: Mesh, found: Rcs, tolerance: float, sure: bool) -> list[
         )
     if open_ := int((~known & np.isfinite(found.numerical_db)).sum()):
         lines.append(
-            f"{open_} of {count} angles are converged, but the mesh does not tell their level: other surfaces that it "
-            "may stand for return far more or less; --crease says which folds are edges, --crease 0 that all are"
+            f"{open_} of {count} angles are converged, but their level is open: other surfaces that the mesh may stand "
+            "for, or waves that creep around the body, may change it by more than it is"
         )
     return lines

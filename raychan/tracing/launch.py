@@ -61,9 +61,7 @@ def launch(
         tubes = _clip_where_gains_end(geometry, leg, out, launch_tubes(geometry, leg, part, bary))
         if leg.mirrors:
             tubes = _prune_facing_away(geometry, leg, out, others, tubes, found)
-        # A coarse launch leaves what hidden tubes carry to those that follow it.
-        carries = more and found.rule.coarse == 1.0
-        yield _clip_at_shadows(geometry, leg, out, tubes, found, more, carries)
+        yield _clip_at_shadows(geometry, leg, out, tubes, found, more)
 
 
 def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -> Tubes:
@@ -144,11 +142,9 @@ def _joined(parts: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
     return np.concatenate([f for f, _ in parts]), np.concatenate([b for _, b in parts])
 
 
-def _clip_at_shadows(
-    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, more: bool, carries: bool
-) -> Tubes:
+def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, more: bool) -> Tubes:
     """Return the tubes that are seen; those of which only some rays are seen are subdivided while they matter: by what
-    they return, or with `carries` by what they may carry to the next bounce."""
+    they return, or, where they bounce again, by what they may carry there."""
     parts: list[Tubes] = []
     rule = found.rule
 
@@ -166,6 +162,8 @@ def _clip_at_shadows(
     view = centre_visibility(geometry, leg, tubes, True, rule)
     found.add(ph.take(view.seen))
     ready = geometry.convex_alone or found.budget.spent(geometry)
+    # A coarse launch leaves what hidden tubes carry to those that follow it.
+    carries = more and rule.coarse == 1.0
     matters = ((ph.in_phase if carries else ph.bound) > found.prune_threshold(ph.length)) & (not ready)
     take_seen(view, view.seen & ~matters)
     known: View | None = view.take(matters)

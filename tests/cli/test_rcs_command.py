@@ -207,7 +207,7 @@ def test_what_only_the_mesh_leaves_open_is_not_said_to_want_rays(capsys, monkeyp
     monkeypatch.setattr("raychan.run.rcs.rcs", lambda *_, **__: made(np.nan, numerical=[0.2]))
     assert invoke(["rcs", "--shape", "plate"]) == 0
     said = capsys.readouterr()
-    assert "1 of 1 angles are converged, but the mesh does not tell their level" in said.err
+    assert "1 of 1 angles are converged, but their level is open: other surfaces that the mesh may" in said.err
     assert "--max-rays" not in said.err and said.out.count("unknown") == 1 and "0.200" in said.out
 
 
