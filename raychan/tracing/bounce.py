@@ -93,7 +93,7 @@ def bounce(
     """
     has_room = tubes.slots < found.rule.slots - 2
     tubes = tubes if has_room.all() else tubes.take(has_room)
-    parts = [tubes.take(rows) for rows in np.array_split(np.arange(len(tubes)), max(1, len(tubes) // _PART))]
+    parts = [tubes.only(rows) for rows in np.array_split(np.arange(len(tubes)), max(1, len(tubes) // _PART))]
     budgets = [found.forked(geometry, len(part) / max(len(tubes), 1)) for part in parts]
     steps = [_Bounce(geometry, leg, out, first, last, own) for own in budgets]
     flown = all_of(geometry, [partial(_flown, step, part) for step, part in zip(steps, parts, strict=True)])

@@ -197,6 +197,8 @@ def write_layers(geometry: Geometry, tubes: Tubes, point: Floats, k: Floats, pas
     """Write the layers (n, l) that the rays through `point` (n, 3) along k (n, 3) passed into the history."""
     for j in range(passed.shape[1]):
         rows = np.flatnonzero(passed[:, j] >= 0)
+        if not len(rows):
+            break  # layers are written from the first column on
         facet = passed[rows, j]
         t = geometry.distance(facet, point[rows], k[rows])
         tubes.append(rows, point[rows] + t[:, None] * k[rows], geometry.normal[facet], facet, TRANSMIT)

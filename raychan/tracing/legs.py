@@ -265,3 +265,14 @@ def reachable(geometry: Geometry, leg: Leg) -> Bools:
         return ok
 
     return cache_of(geometry).by_leg("reachable pieces", leg, found)
+
+
+def returning(geometry: Geometry, leg: Leg) -> Bools:
+    """Return from which pieces (p,) a leg can carry a return: those that it can reach but its own mirrors."""
+
+    def found() -> Bools:
+        ok = reachable(geometry, leg).copy()
+        ok[leg.pieces(geometry)] = False
+        return ok
+
+    return cache_of(geometry).by_leg("returning pieces", leg, found)

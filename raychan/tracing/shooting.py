@@ -16,7 +16,7 @@ from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.launch import GAP_LEVELS, OBLIQUE_SHARE, launch
-from raychan.tracing.legs import Leg, View, reachable
+from raychan.tracing.legs import Leg, View, returning
 from raychan.tracing.radiation import FACING, LIT, OBLIQUE, Phases, phases_of, radiating
 from raychan.tracing.routes import leg_of_arrival, routes_of
 from raychan.tracing.shared_work import all_of
@@ -125,6 +125,10 @@ class _Wave(Generic[T]):
             ends = count >= self.bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth)
             # Mirrors such as the ground return by their exact foot points, not by tubes.
             scatters = geometry.facets.role[geometry.facets.body[tubes.facet]] != MIRROR
+            present = np.zeros(len(geometry.piece_role), bool)
+            present[geometry.piece[tubes.facet[scatters]]] = True
+            share = 1.0 / min(max(len(outs), 1), _SHARES)
+            outs = [i for i in outs if (returning(geometry, self.outs[i]) & present).any()]
             left = partial(self._left, tubes, scatters, self.images.returns(geometry, self.leg, tubes, first), depth)
             # What returns by the leg that it came by counts first, and the others against that.
             same = [i for i in outs if first and self.outs[i] is self.leg]
@@ -132,7 +136,7 @@ class _Wave(Generic[T]):
                 yield from left(i, found)
             tasks, parts = [], list[Contributions]()
             for i in (i for i in outs if i not in same):
-                parts.append(found.forked(geometry, 1.0 / min(len(outs), _SHARES)))
+                parts.append(found.forked(geometry, share))
                 tasks.append(partial(left, i, parts[-1]))
             landed: list[Tubes] = []
             if not ends:
@@ -174,15 +178,13 @@ def _returned(
 ) -> Iterator[Routes]:
     """Yield the routes of tubes, of those chosen by `own` (n,), that an outgoing leg sees; `behind`: only those that
     it sees through a layer."""
-    rule, piece = found.rule, geometry.piece[tubes.facet]
-    may = reachable(geometry, out).copy()
-    may[out.pieces(geometry)] = False
-    rows = np.flatnonzero(own & may[piece])
+    rule = found.rule
+    rows = np.flatnonzero(own & returning(geometry, out)[geometry.piece[tubes.facet]])
     if out.mirrors:
         rows = rows[out.may_leave(tubes.points, rows)]
     if not len(rows):
         return
-    some = tubes.take(rows)
+    some = tubes.only(rows)
     if first and out == leg and not behind:
         corners, passed = leg_of_arrival(some, len(leg.mirrors), rule.layers)
         if not geometry.convex_alone:
@@ -217,14 +219,14 @@ def resolve_return_leg(
     for level in range(rule.levels + 1):
         share, facing = radiating(out, tubes, which)
         rows = np.flatnonzero(share > 0.0)
-        tubes, share, facing = tubes.take(rows), share[rows], facing[rows]
+        tubes, share, facing = tubes.only(rows), share[rows], facing[rows]
         ph = phases_of(geometry, leg, out, tubes, rule)
         if which == OBLIQUE and not facing.all():
             # Beyond the horizon tubes are mostly out of phase with their neighbours, and few count.
             weak = np.flatnonzero(~facing)
             left = found.that_count(OBLIQUE_SHARE * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
-            tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
+            tubes, ph, facing = tubes.only(rows), ph.take(rows), facing[rows]
         least = found.prune_threshold(ph.length) if first else found.deep_threshold(ph.length)
         matters = (ph.bound > least) & (not found.budget.spent(geometry))
         # In a scene currents beyond the horizon are weak: their visibility is tested by their centres alone.

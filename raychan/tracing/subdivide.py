@@ -35,6 +35,8 @@ def bisect(
 
     Args: first whether they stand on their first surface; jitter share of the edge by which cuts lie off its middle.
     """
+    if not len(rows):
+        return tubes.take(rows)
     parent = np.concatenate([rows, rows])
     return _parts(geometry, leg, tubes, parent, bisection_weights(edge, jitter), first, len(parent))[0]
 
@@ -48,6 +50,8 @@ def subdivide(
     Args: side (n, 3) of all tubes, signed distances [m] of the corners from that edge, zeros where none is known; first
     and jitter as for `bisect`.
     """
+    if not len(rows):
+        return tubes.take(rows), rows
     known = side[rows].any(axis=1)
     bisected, clipped = rows[~known], rows[known]
     parent = np.concatenate([bisected, bisected, clipped, clipped, clipped])

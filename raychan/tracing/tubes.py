@@ -110,6 +110,10 @@ class Tubes:
         rows = row_numbers(index)
         return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _ROWS}, history=self.history)
 
+    def only(self, rows: NDArray[np.intp]) -> Tubes:
+        """Return the tubes `rows`, in order and each once; these tubes themselves, not a copy, if it is all of them."""
+        return self if len(rows) == len(self) else self.take(rows)
+
     @staticmethod
     def join(parts: list[Tubes], kept: NDArray[np.intp] | None = None) -> Tubes:
         """Return all tubes of several sets of one launch as one, or of all these those `kept`, in order."""
