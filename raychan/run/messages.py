@@ -1,10 +1,10 @@
 """Lines that a run prints and stores: on detections that are not converged or folded, on the tolerance, and on
-unmodelled effects above the weakest detection."""
+unmodelled effects that matter to the weakest detection."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -70,10 +70,12 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
         within = n - over - stated["not_converged"]
         worst = f"; the largest error stated is {stated['reached_db']:.1f} dB" if over else ""
         said.append(f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{worst}")
-    above = sorted(_above(ledger), reverse=True)
-    if above:
-        listed = ", ".join(f"{name} {bound}{level:+.0f} dB" for level, name, bound in above)
-        said.append(f"left out, above the weakest detection: {listed} (see summary.json)")
+    if above := _listed(ledger, _LEAST_DB, math.inf):
+        said.append(f"left out, above the weakest detection: {above} (see summary.json)")
+    # What adds in phase to the weakest detection moves it by so much.
+    moves_db = 20.0 * math.log10(10.0 ** (tolerance_db / 20.0) - 1.0) if tolerance_db < math.inf else math.inf
+    if n and (below := _listed(ledger, moves_db, _LEAST_DB)):
+        said.append(f"left out, below the weakest detection but may move it by over {tolerance_db:g} dB: {below}")
     return said
 
 
@@ -123,11 +125,12 @@ def marks(found: ExplainedDetections) -> str:
     return "".join(f", {n} {word}" for word, n in counted.items() if n)
 
 
-def _above(ledger: Mapping[str, Entry]) -> Iterable[tuple[float, str, str]]:
-    """Give the level [dB] and name of each mechanism that the ledger puts above the weakest detection."""
-    for name, entry in ledger.items():
-        if isinstance(entry.level_db, float) and entry.level_db >= _LEAST_DB:
-            yield entry.level_db, name, "at most " if entry.kind == "bound" else ""
+def _listed(ledger: Mapping[str, Entry], least: float, below: float) -> str:
+    """Return names and levels of the mechanisms that the ledger puts from `least` to `below` [dB] over the weakest
+    detection, the strongest first."""
+    found = [(e.level_db, name, e.kind) for name, e in ledger.items() if isinstance(e.level_db, float)]
+    found = sorted((x for x in found if least <= x[0] < below), reverse=True)
+    return ", ".join(f"{name} {'at most ' if kind == 'bound' else ''}{level:+.0f} dB" for level, name, kind in found)
 
 
 def _of(chosen: Any) -> str:

@@ -177,15 +177,26 @@ class Body:
 
         A table is linear in dB between its azimuths and wraps around; it is resampled every degree.
         """
-        ends = np.array([-np.pi, np.pi])
         if isinstance(self.rcs_dbsm, (int, float)):
-            return ends, np.full(2, float(undb(self.rcs_dbsm)))
-        pairs = np.asarray(self.rcs_dbsm, float).reshape(-1, 2)
-        wrapped = (pairs[:, 0] + 180.0) % 360.0 - 180.0
-        order = np.argsort(wrapped)
+            return np.array([-np.pi, np.pi]), np.full(2, float(undb(self.rcs_dbsm)))
+        azimuth, dbsm = self.rcs_table.T
         knots = np.radians(np.arange(-180.0, 181.0))
-        level = np.interp(np.degrees(knots), wrapped[order], pairs[order, 1], period=360.0)
-        return knots, np.asarray(undb(level))
+        return knots, np.asarray(undb(np.interp(np.degrees(knots), azimuth, dbsm, period=360.0)))
+
+    @property
+    def rcs_table(self) -> Floats:
+        """Azimuths [deg] from -180 on and RCS [dBsm] there (n, 2), none where one figure or none is given; SceneError
+        for two values at one azimuth."""
+        if self.rcs_dbsm is None or isinstance(self.rcs_dbsm, (int, float)):
+            return np.zeros((0, 2))
+        pairs = np.array(self.rcs_dbsm, float).reshape(-1, 2)
+        pairs[:, 0] = (pairs[:, 0] + 180.0) % 360.0 - 180.0
+        pairs = pairs[np.argsort(pairs[:, 0])]
+        twice = np.flatnonzero(pairs[1:, 0] == pairs[:-1, 0])
+        if len(twice):
+            problem = f"two values for the azimuth {pairs[twice[0], 0]:g} deg"
+            raise SceneError(problem, key=f"{self.name}.rcs_dbsm", allowed="one value for each azimuth")
+        return pairs
 
     def target_point(self) -> Floats:
         """Return where the point target stands in the body frame (3,) [m]."""

@@ -186,7 +186,7 @@ class Scene(Fixed, Described):
         for body in self.bodies:
             try:
                 self._chosen(body)
-                _ = body.motion, body.resolved_role, body.fluctuates
+                _ = body.motion, body.resolved_role, body.fluctuates, body.rcs_table
             except SceneError as e:
                 raise e.at(key="bodies") from None
         self.__dict__["bodies"] = over_seams(self.bodies)

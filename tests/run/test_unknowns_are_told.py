@@ -116,11 +116,20 @@ def test_only_what_the_ledger_puts_above_the_weakest_detection_is_listed(half):
         "range migration": Entry("none", "exact", ""),
         "intra-frame motion": Entry(UNKNOWN, "none", ""),
     }
-    (line,) = noted(half.detections.replace(error_db=[0.0, 0.0], converged=[True, True]), 3.0, ledger)
-    assert line == (
+    known = half.detections.replace(error_db=[0.0, 0.0], converged=[True, True])
+    above, below = noted(known, 3.0, ledger)
+    assert above == (
         "left out, above the weakest detection: diffuse scattering +38 dB, further bounces +19 dB, "
         "diffraction at most +2 dB (see summary.json)"
     )
+    assert below == "left out, below the weakest detection but may move it by over 3 dB: transmission -3 dB"
+
+
+def test_what_may_move_the_weakest_detection_by_more_than_the_tolerance_is_listed(half):
+    known = half.detections.replace(error_db=[0.0, 0.0], converged=[True, True])
+    # An echo 24.5 dB weaker that adds in phase moves a level by 0.5 dB: 20 log10(1 + 10^(-24.5 / 20)) = 0.503.
+    for level, count in ((-24.4, 1), (-24.6, 0)):
+        assert len(noted(known, 0.5, {"diffraction": Entry(level, "bound", "")})) == count
 
 
 def test_the_table_lists_apart_what_is_not_converged_and_numbers_all(half, capsys):

@@ -196,3 +196,12 @@ def test_a_scene_that_is_made_is_not_changed_by_an_assignment(name):
         with pytest.raises(AttributeError, match=rf"Scene\.{name} cannot be set again: .*override"):
             setattr(one, name, None)
         assert getattr(one, name) is before
+
+
+def test_an_rcs_table_has_one_value_for_each_azimuth():
+    pairs = [(0.0, 0.85), (90.0, 0.35), (-90.0, 0.35), (270.0, 1.0)]
+    with pytest.raises(rc.SceneError, match="two values for the azimuth -90 deg"):
+        Scene([Body(name="man", shape="pedestrian", rcs_dbsm=pairs)])
+    kept = np.array(pairs[:3])
+    Scene([Body(name="man", shape="pedestrian", rcs_dbsm=kept)])
+    assert kept.tolist() == [list(pair) for pair in pairs[:3]]
