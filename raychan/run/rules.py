@@ -42,6 +42,9 @@ _PHASE, _TURN = 0.5, 0.5
 # Times half the noise: uncut tubes of the first launch. At 4 frames of mode `auto` take 4 to 26 % less CPU, but three
 # levels in place of one lie beyond the errors stated (`make bench BENCH="--only auto"`, docs/measurements.md).
 _FLOOR = 2.0
+# rad: without, echoes over two cylinders, 22 dB over the noise, come out 10 dB weaker and are lost. The three scenes at
+# 0.5 dB cast 0.90 times the rays, and one echo more of the occluded pedestrian is found at 3 dB.
+_FAN = 0.1
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
 
@@ -74,7 +77,7 @@ def first_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
     there."""
     rule = step_rule(radar, settings, model, 0)
     refined = rule.refinement
-    coarse = replace(refined, phase=_PHASE, turn=_TURN, floor=_FLOOR * refined.floor, coarse=_COARSE)
+    coarse = replace(refined, phase=_PHASE, turn=_TURN, floor=_FLOOR * refined.floor, coarse=_COARSE, fan=_FAN)
     return replace(rule, refinement=coarse)
 
 

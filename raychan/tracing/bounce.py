@@ -117,18 +117,23 @@ def _flown(step: _Bounce, tubes: Tubes) -> tuple[list[Tubes], list[Floats]]:
 
 
 def _narrowed(step: _Bounce, tubes: Tubes) -> Tubes:
-    """Return the tubes, those on curved surfaces bisected until each spreads its rays by `_DEEPER` fans at most; on
-    first surfaces the launch does so."""
-    rule, done = step.rule, list[Tubes]()
-    if step.first or rule.fan == np.inf:
+    """Return the tubes, those on curved surfaces bisected until each spreads its rays by one fan at most on its first
+    surface, by `_DEEPER` fans later; where the rule is coarse, only those that matter. Where it is not, the launch
+    does so on first surfaces."""
+    rule, done, coarse = step.rule, list[Tubes](), step.rule.coarse != 1.0
+    if rule.fan == np.inf or (step.first and not coarse):
         return tubes
+    fan = rule.fan if step.first else _DEEPER * rule.fan
     for _ in range(rule.levels):
-        edge = edge_of_spread(tubes.k, tubes.normals, tubes.facet, step.geometry.curved, _DEEPER * rule.fan)
+        edge = edge_of_spread(tubes.k, tubes.normals, tubes.facet, step.geometry.curved, fan)
         wide = edge >= 0
+        if coarse:
+            in_phase, _, length = _contribution_bounds(step, tubes)
+            wide &= in_phase > step.found.deep_threshold(length)
         if not wide.any():
             break
         done.append(tubes.take(~wide))
-        tubes = bisect(step.geometry, step.leg, tubes, np.flatnonzero(wide), edge[wide], False, rule.jitter)
+        tubes = bisect(step.geometry, step.leg, tubes, np.flatnonzero(wide), edge[wide], step.first, rule.jitter)
     return Tubes.join([tubes, *done])
 
 
@@ -190,7 +195,7 @@ def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: 
     """
     geometry, out, found = step.geometry, step.out, step.found
     in_phase, _, length = _contribution_bounds(step, tubes)
-    if step.rule.fan < np.inf:
+    if step.rule.fan < np.inf and step.rule.coarse == 1.0:
         grown = np.empty(len(tubes))
         spread_at_hits(tubes.points, directions, mid, ahead, grown)
         in_phase *= grown

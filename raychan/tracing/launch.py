@@ -114,7 +114,7 @@ def _bisect_for_phase(
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
         edge = edge_to_cut(facet, bary, *(*shape, *images, *limits))
-        if rule.fan < np.inf and not across:
+        if rule.fan < np.inf and rule.coarse == 1.0 and not across:
             edge = np.where(edge < 0, edge_of_fan(facet, bary, shape[1], rule.fan), edge)
         if level < rule.least:
             edge = np.where((edge < 0) & (geometry.curved[facet] | (not across)), _longest(facet, bary, shape[0]), edge)
