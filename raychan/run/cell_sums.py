@@ -50,15 +50,15 @@ def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _in_cells(at_range, rate, ramp, chirps):  # type: ignore[no-untyped-def]
-    """Return where an echo, or a cell, stands along range and along rate, and how far it moves in a ramp, in cells.
+def _scales(ramp, chirps):  # type: ignore[no-untyped-def]
+    """Return the range [m] by which a m/s shifts an echo, and the cells of range in a metre, of rate in a m/s, and
+    that an echo of a m/s moves in a ramp.
 
     Doppler is measured at the middle sample of the sweep. Each row of the map is corrected for its own Doppler within
     the ramp; other rates keep the difference.
     """
     _, slope, _, _, middle, repetition, resolution, light = ramp
-    along = (at_range + rate * (middle / slope)) / resolution
-    return along, rate * (2.0 * middle / light * chirps * repetition), rate * (repetition / resolution)
+    return middle / slope, 1.0 / resolution, 2.0 * middle / light * chirps * repetition, repetition / resolution
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -91,16 +91,19 @@ def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # typ
 
     Args: cell range [m] and rate [m/s]; ramp carrier, slope, time of the frame's middle, swept half [Hz], middle
     frequency [Hz], repetition, range resolution [m], speed of light; sizes samples, chirps, fine; across (., 2) the
-    range response, which is real, and its derivative by cells; along (parts, ., 2) the rate response of each part of the frame with
-    weights 1 and with weights of the chirp number from its middle, and these middles (parts,).
+    range response, which is real, and its derivative by cells; along (parts, ., 2) the rate response of each part of
+    the frame with weights 1 and with weights of the chirp number from its middle, and these middles (parts,).
     """
     waves, ranges = np.empty(delay.size, np.complex128), np.empty(delay.size)
     tables, middles = along
-    here, own, _ = _in_cells(cell[0], cell[1], ramp, sizes[1])
+    shift, per_range, per_rate, per_ramp = _scales(ramp, sizes[1])
     for i in range(delay.size):
         ranges[i], turn = _stands(delay[i], rate[i], ramp)
-        there, fast, moved = _in_cells(ranges[i], rate[i], ramp, sizes[1])
-        waves[i] = amplitude[i] * turn * _answer(there - here, fast - own, moved, sizes, across, tables, middles)
+        off = rate[i] - cell[1]
+        away = (ranges[i] - cell[0] + off * shift) * per_range
+        waves[i] = (
+            amplitude[i] * turn * _answer(away, off * per_rate, rate[i] * per_ramp, sizes, across, tables, middles)
+        )
     return waves, ranges
 
 
@@ -134,11 +137,12 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
     cells from the peak; else as for `cell_waves` and `cell_sums`.
     """
     samples, chirps, _ = sizes
+    shift, per_range, per_rate, per_ramp = _scales(ramp, chirps)
     # Taken out of the tuples once: each access counts a reference.
     (over_ranges, over_rates), (tables, middles) = beyond, along
     total[:], size[:], strongest[:], most[:] = 0.0, 0.0, -1, -1.0
     count, place, waves = np.zeros(total.shape[1]), np.empty((5, _BLOCK)), np.empty(_BLOCK, np.complex128)
-    ranges, there, fast, moved, weight = place
+    ranges, away, apart, moved, weight = place
     near = np.empty(_BLOCK, np.int64)
     for first in range(0, delay.size, _BLOCK):
         some = min(_BLOCK, delay.size - first)
@@ -146,24 +150,24 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
             i = first + j
             count[group[i]] += 1.0
             ranges[j], turn = _stands(delay[i], rate[i], ramp)
-            there[j], fast[j], moved[j] = _in_cells(ranges[j], rate[i], ramp, chirps)
+            moved[j] = rate[i] * per_ramp
             waves[j] = amplitude[i] * turn
             weight[j] = math.sqrt(amplitude[i].real * amplitude[i].real + amplitude[i].imag * amplitude[i].imag)
         for c in range(len(cells)):
-            here, own, _ = _in_cells(cells[c, 0], cells[c, 1], ramp, chirps)
             # Those that count first, without a branch that nothing foretells.
             found, enough = 0, least[c]
             for j in range(some):
-                drift = abs(moved[j])
-                far = int(max(_apart(there[j] - here, samples) - 0.5 * drift * chirps, 0.0))
-                slow = int(_apart(fast[j] - own, chirps))
+                off, drift = rate[first + j] - cells[c, 1], abs(moved[j])
+                away[j], apart[j] = (ranges[j] - cells[c, 0] + off * shift) * per_range, off * per_rate
+                far = int(max(_apart(away[j], samples) - 0.5 * drift * chirps, 0.0))
+                slow = int(_apart(apart[j], chirps))
                 near[found] = j
                 bound = weight[j] * over_ranges[far] * (over_rates[0, slow] + drift * over_rates[1, slow])
                 found += 1 if bound >= enough else 0
             for k in range(found):
                 j = near[k]
                 i = first + j
-                wave = waves[j] * _answer(there[j] - here, fast[j] - own, moved[j], sizes, across, tables, middles)
+                wave = waves[j] * _answer(away[j], apart[j], moved[j], sizes, across, tables, middles)
                 _count(c, group[i], i, wave, ranges[j], rate[i], total, size, strongest, most)
     for c in range(len(cells)):
         copy_to(size[c, 0], count)
