@@ -59,13 +59,13 @@ def paths_of(
     places, turn = _at_elements(routes, np.flatnonzero(scatters), facets, radar, frequency)
     long[scatters] |= turn.max(axis=1, initial=0.0) > _TURN
     rows = np.flatnonzero(long)
-    places, turn = places[long[scatters]], turn[long[scatters]]
+    places, turn, size = places[long[scatters]], turn[long[scatters]], np.abs(gains[rows]).max(axis=1)
     corner_rate = 2.0 * corner_rates(routes, rows, facets, *speeds)
     apart = np.abs(corner[rows] - routes.length[rows, None]), np.abs(corner_rate - 2.0 * rate[rows, None])
-    split = _tells(radar, noise, np.abs(gains[rows]).max(axis=1), *apart, turn)
+    split = _tells(radar, noise, size, *apart, turn)
     long[rows[~split]] = False
     whole, rows = np.flatnonzero(~long), rows[split]
-    count = _pieces(noise, np.abs(gains[rows]).max(axis=1), turn[split])
+    count = _pieces(noise, size[split], turn[split])
     several = Split(rows, gains[rows], corner_rate[split], places[split])
     parts = parts_of(routes, several, count, facets, radar, frequency)
     received = {

@@ -38,6 +38,7 @@ def _over(a: complex, b: complex) -> complex:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _by_root(cos_i: float, eps: complex, root: complex) -> tuple[complex, complex]:
+    """Return what `half_space` does, given `_root`."""
     within = times(cos_i, eps)
     return _over(cos_i - root, cos_i + root), _over(within - root, within + root)
 
