@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.fields_along import mirrored, vec
+from raychan.channel.fields_along import curved, mirrored, vec
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
 from raychan.records import REFLECT, Facets, Routes
@@ -51,15 +51,6 @@ def _plus(a, s, b):  # type: ignore[no-untyped-def]
     return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
 
 
-@njit(cache=True, forceinline=True)
-def _curved(n):  # type: ignore[no-untyped-def]
-    """Tell whether the normals (3, 3) at the corners of a facet differ."""
-    apart = 0.0
-    for c in range(3):
-        apart += abs(n[0, c] - n[1, c]) + abs(n[0, c] - n[2, c])
-    return apart > 0.0
-
-
 @njit(cache=True, nogil=True)
 def _corner_places(rows, ends, routes, surface, places, angles):  # type: ignore[no-untyped-def]
     for r in range(len(rows)):
@@ -86,7 +77,7 @@ def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[n
             first = last
         if over:
             break
-        bent |= kind[i, j] == _REFLECT and facet[i, j] >= 0 and _curved(surface[1][facet[i, j]])
+        bent |= kind[i, j] == _REFLECT and facet[i, j] >= 0 and curved(surface[1], facet[i, j])
         here, j = there, j + step
     for c in range(3):
         off = less(vec(points[i, c]), centre)

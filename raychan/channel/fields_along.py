@@ -5,17 +5,19 @@ from __future__ import annotations
 
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
-from raychan.em.polarization import reflect, transmit
+from raychan.em.physical_optics import incident
+from raychan.em.polarization import made_of, onto
 from raychan.records import TRANSMIT
+from raychan.vectors import row
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def vec(a):  # type: ignore[no-untyped-def]
     """Return the vector of an array (3,)."""
     return a[0], a[1], a[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def heading(a, b):  # type: ignore[no-untyped-def]
     """Return the unit vector from a to b; x where they are one point."""
     x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -25,59 +27,70 @@ def heading(a, b):  # type: ignore[no-untyped-def]
     return x / s, y / s, z / s
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def cosine(k, n):  # type: ignore[no-untyped-def]
     """Return the cosine between a ray along k and the normal n, on whichever side."""
     return abs(k[0] * n[0] + k[1] * n[1] + k[2] * n[2])
 
 
 @njit(cache=True, forceinline=True)
-def over_mirrors(  # type: ignore[no-untyped-def]
-    e, ahead, i, first, stop, step, vertices, normals, kind, material, used, end, table, k, cosines
-):
-    """Send fields e (p, 3) of route i that travel along `ahead` over mirrors and layers first, first + step, ... short
-    of stop, in place; return the direction in which they leave the last. Their coefficients are those at cosines of
-    incidence (d,), or at those of the way itself where there are none."""
-    for j in range(first, stop, step):
-        normal = vec(normals[i, j])
-        at = cosines[j] if len(cosines) > 0 else cosine(ahead, normal)
-        c = coefficients_at(table, material[i, j], at, k)
-        passed(e, ahead, normal, c, kind[i, j] == TRANSMIT)
-        ahead = heading(vertices[i, j], vertices[i, j + step] if j + step < used else end)
-    return ahead
-
-
-@njit(cache=True, forceinline=True)
-def coefficients_at(table, row, cos_i, k):  # type: ignore[no-untyped-def]
-    """Return the Fresnel coefficients of a material at a cosine of incidence."""
-    kind, eps, thickness, roughness = table
-    return coefficients(kind[row], eps[row], thickness[row], roughness[row], cos_i, k)
-
-
-@njit(cache=True, forceinline=True)
-def passed(e, k, normal, c, through):  # type: ignore[no-untyped-def]
-    """Send fields e (p, 3) that travel along k through a layer or off a mirror, in place."""
-    for p in range(len(e)):
-        after = transmit(vec(e[p]), k, normal, c[2], c[3]) if through else reflect(vec(e[p]), k, normal, c[0], c[1])
-        e[p, 0], e[p, 1], e[p, 2] = after
+def slot(a, i, j):  # type: ignore[no-untyped-def]
+    """Return the vector in slot j of route i of a (n, d, 3): a view of it would count a reference."""
+    return a[i, j, 0], a[i, j, 1], a[i, j, 2]
 
 
 @njit(cache=True)
-def incidence(point, end, i, first, stop, step, vertices, normals, kind, out):  # type: ignore[no-untyped-def]
-    """Write the cosines of incidence (d,) on mirrors and layers first, first + step, ... short of stop of route i for
-    the ray that comes from `end` over the same planes to a point; return its direction there."""
+def over_mirrors(  # type: ignore[no-untyped-def]
+    e, ways, ahead, i, first, stop, step, vertices, normals, kind, facet, material, used, end, table, k, cosines
+):
+    """Send fields e (p, 3) of route i that travel along `ahead` over mirrors and layers first, first + step, ... short
+    of stop, in place; return the direction in which they leave the last.
+
+    Their coefficients are those of the way itself; of three ways, an equal part of the fields for each, those at
+    cosines of incidence (3, d).
+    """
+    kinds, eps, thickness, roughness = table
+    part = len(e) // 3
+    for j in range(first, stop, step):
+        normal, m, through = slot(normals, i, j), material[facet[i, j]], kind[i, j] == TRANSMIT
+        s, p_in, p_out, _ = incident(ahead, normal)
+        p = p_in if through else p_out
+        for c in range(ways):
+            at = cosines[c, j] if ways == 3 else cosine(ahead, normal)
+            r_s, r_p, t_s, t_p = coefficients(kinds[m], eps[m], thickness[m], roughness[m], at, k)
+            by_s, by_p = (t_s, t_p) if through else (r_s, r_p)
+            for f in range(c * part, (c + 1) * part):
+                one = row(e, f)
+                e[f, 0], e[f, 1], e[f, 2] = made_of(s, p, by_s * onto(one, s), by_p * onto(one, p_in))
+        ahead = heading(slot(vertices, i, j), slot(vertices, i, j + step) if j + step < used else vec(end))
+    return ahead
+
+
+@njit(cache=True)
+def incidences(points, end, i, first, stop, step, vertices, normals, kind, out):  # type: ignore[no-untyped-def]
+    """Write the cosines of incidence (3, d) on the surfaces first, first + step, ... up to the footprint in slot
+    `stop` of route i for the rays that come from `end` over the same planes to its corners, points (n, 6, 3)."""
     image = vec(end)
     for j in range(first, stop, step):
         if kind[i, j] != TRANSMIT:
-            image = mirrored(image, vec(vertices[i, j]), vec(normals[i, j]))
-    arriving = heading(image, point)
-    ahead = arriving
-    for j in range(stop - step, first - step, -step):
-        n = vec(normals[i, j])
-        out[j] = cosine(ahead, n)
-        if kind[i, j] != TRANSMIT:
-            ahead = mirrored(ahead, (0.0, 0.0, 0.0), n)
-    return arriving
+            image = mirrored(image, slot(vertices, i, j), slot(normals, i, j))
+    for c in range(3):
+        ahead = heading(image, slot(points, i, c))
+        out[c, stop] = cosine(ahead, slot(normals, i, stop))
+        for j in range(stop - step, first - step, -step):
+            n = slot(normals, i, j)
+            out[c, j] = cosine(ahead, n)
+            if kind[i, j] != TRANSMIT:
+                ahead = mirrored(ahead, (0.0, 0.0, 0.0), n)
+
+
+@njit(cache=True, forceinline=True)
+def curved(n, f):  # type: ignore[no-untyped-def]
+    """Tell whether the normals at the corners of facet f differ, n (f, 3, 3)."""
+    apart = 0.0
+    for c in range(3):
+        apart += abs(n[f, 0, c] - n[f, 1, c]) + abs(n[f, 0, c] - n[f, 2, c])
+    return apart > 0.0
 
 
 @njit(cache=True, forceinline=True)

@@ -15,8 +15,9 @@ from raychan.channel.corner_places import corner_places
 from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.pieces import Split, parts_of
+from raychan.channel.rates import rates
 from raychan.channel.slow_time import APART, corner_rates
-from raychan.channel.transfer import corner_gains, departures, rates
+from raychan.channel.transfer import corner_gains, departures
 from raychan.parallel import parallel_for
 from raychan.radar.array import reach
 from raychan.radar.dual_paths import columns_of
@@ -58,13 +59,13 @@ def paths_of(
     places, turn = _at_elements(routes, np.flatnonzero(scatters), facets, radar, frequency)
     long[scatters] |= turn.max(axis=1, initial=0.0) > _TURN
     rows = np.flatnonzero(long)
-    places, turn = places[long[scatters]], turn[long[scatters]]
+    places, turn, size = places[long[scatters]], turn[long[scatters]], np.abs(gains[rows]).max(axis=1)
     corner_rate = 2.0 * corner_rates(routes, rows, facets, *speeds)
     apart = np.abs(corner[rows] - routes.length[rows, None]), np.abs(corner_rate - 2.0 * rate[rows, None])
-    split = _tells(radar, noise, np.abs(gains[rows]).max(axis=1), *apart, turn)
+    split = _tells(radar, noise, size, *apart, turn)
     long[rows[~split]] = False
     whole, rows = np.flatnonzero(~long), rows[split]
-    count = _pieces(noise, np.abs(gains[rows]).max(axis=1), turn[split])
+    count = _pieces(noise, size[split], turn[split])
     several = Split(rows, gains[rows], corner_rate[split], places[split])
     parts = parts_of(routes, several, count, facets, radar, frequency)
     received = {

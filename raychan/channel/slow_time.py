@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.fields_along import mirrored, slot
 from raychan.channel.transfer import transfer
 from raychan.compile.jit import njit
 from raychan.em.phase_integral import triangle_terms
 from raychan.parallel import parallel_for
 from raychan.records import REFLECT, SCATTER, Facets, Routes
 from raychan.units import C0
+from raychan.vectors import copy_to, distance, less, row
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -112,57 +114,48 @@ def extrapolated(routes: Routes, strength: Complexes, poses: Poses, frequency: f
 
 
 @njit(cache=True, forceinline=True)
-def _moved(x, b, turn, origin, place):  # type: ignore[no-untyped-def]
-    """Return the place of a point that moves with body b."""
-    u, v, w = x[0] - origin[b, 0], x[1] - origin[b, 1], x[2] - origin[b, 2]
+def _moved(x, b, t, origin, turn, place):  # type: ignore[no-untyped-def]
+    """Return where a point that moves with body b is at instant t."""
+    x = _turned_by(less(x, row(origin, b)), t, b, turn)
+    return x[0] + place[t, b, 0], x[1] + place[t, b, 1], x[2] + place[t, b, 2]
+
+
+@njit(cache=True, forceinline=True)
+def _turned_by(x, t, b, turn):  # type: ignore[no-untyped-def]
+    """Return a vector of body b at instant t."""
     return (
-        turn[b, 0, 0] * u + turn[b, 0, 1] * v + turn[b, 0, 2] * w + place[b, 0],
-        turn[b, 1, 0] * u + turn[b, 1, 1] * v + turn[b, 1, 2] * w + place[b, 1],
-        turn[b, 2, 0] * u + turn[b, 2, 1] * v + turn[b, 2, 2] * w + place[b, 2],
+        turn[t, b, 0, 0] * x[0] + turn[t, b, 0, 1] * x[1] + turn[t, b, 0, 2] * x[2],
+        turn[t, b, 1, 0] * x[0] + turn[t, b, 1, 1] * x[1] + turn[t, b, 1, 2] * x[2],
+        turn[t, b, 2, 0] * x[0] + turn[t, b, 2, 1] * x[1] + turn[t, b, 2, 2] * x[2],
     )
 
 
 @njit(cache=True, forceinline=True)
-def _image(source, vertex, normal, b, turn, origin, place):  # type: ignore[no-untyped-def]
-    """Return the image of a point in the plane of a vertex that has moved with body b."""
-    p = _moved(vertex, b, turn, origin, place)
-    x = turn[b, 0, 0] * normal[0] + turn[b, 0, 1] * normal[1] + turn[b, 0, 2] * normal[2]
-    y = turn[b, 1, 0] * normal[0] + turn[b, 1, 1] * normal[1] + turn[b, 1, 2] * normal[2]
-    z = turn[b, 2, 0] * normal[0] + turn[b, 2, 1] * normal[1] + turn[b, 2, 2] * normal[2]
-    h = 2.0 * ((source[0] - p[0]) * x + (source[1] - p[1]) * y + (source[2] - p[2]) * z)
-    return source[0] - h * x, source[1] - h * y, source[2] - h * z
-
-
-@njit(cache=True, forceinline=True)
-def _apart(a, b):  # type: ignore[no-untyped-def]
-    return ((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2) ** 0.5
-
-
-@njit(cache=True)
-def _part_lengths(vertices, normals, kind, body, at, used, points, turn, origin, place, tx, rx, out):  # type: ignore[no-untyped-def]
-    """Write the lengths (p + 1,) [m] of one route through p points of its footprint, and through its vertex."""
-    forth, back = (tx[0], tx[1], tx[2]), (rx[0], rx[1], rx[2])
+def _part_lengths(vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, tx, rx, out):  # type: ignore[no-untyped-def]
+    """Write the lengths (p + 1,) [m] at instant t of route i, which has `used` slots, through the first p points of its
+    footprint in slot `at`, and through its vertex there."""
+    forth, back = row(tx, t), row(rx, t)
+    last = len(out) - 1
     for j in range(at):
-        if kind[j] == REFLECT:
-            forth = _image(forth, vertices[j], normals[j], body[j], turn, origin, place)
+        if kind[i, j] == REFLECT:
+            n = _turned_by(slot(normals, i, j), t, body[i, j], turn)
+            forth = mirrored(forth, _moved(slot(vertices, i, j), body[i, j], t, origin, turn, place), n)
     if at == used:
         for c in range(len(out)):
-            out[c] = _apart(forth, back)
+            out[c] = distance(forth, back)
         return
     for j in range(used - 1, at, -1):
-        if kind[j] == REFLECT:
-            back = _image(back, vertices[j], normals[j], body[j], turn, origin, place)
-    b = body[at]
-    centre = _moved(vertices[at], b, turn, origin, place)
-    last = len(points)
-    out[last] = _apart(forth, centre) + _apart(back, centre)
-    if kind[at] != SCATTER:
-        for c in range(last):
-            out[c] = out[last]
-        return
+        if kind[i, j] == REFLECT:
+            n = _turned_by(slot(normals, i, j), t, body[i, j], turn)
+            back = mirrored(back, _moved(slot(vertices, i, j), body[i, j], t, origin, turn, place), n)
+    b = body[i, at]
+    centre = _moved(slot(vertices, i, at), b, t, origin, turn, place)
+    out[last] = distance(forth, centre) + distance(back, centre)
     for c in range(last):
-        p = _moved(points[c], b, turn, origin, place)
-        out[c] = _apart(forth, p) + _apart(back, p)
+        out[c] = out[last]
+        if kind[i, at] == SCATTER:
+            p = _moved(slot(points, i, c), b, t, origin, turn, place)
+            out[c] = distance(forth, p) + distance(back, p)
 
 
 @njit(cache=True, nogil=True)
@@ -176,14 +169,12 @@ def _corner_rates(  # type: ignore[no-untyped-def]
         used = 0
         while used < d and kind[i, used] > 0:
             used += 1
-        at = scatter[i]
-        corners = points[i, :3]
-        _part_lengths(
-            vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[0], origin, place[0], tx[0], rx[0], then
-        )
-        _part_lengths(
-            vertices[i], normals[i], kind[i], body[i], at, used, corners, turn[1], origin, place[1], tx[1], rx[1], now
-        )
+        for t in range(2):
+            _part_lengths(
+                vertices, normals, kind, body, points, i, scatter[i], used, t, origin, turn, place, tx, rx, now
+            )
+            if t == 0:
+                copy_to(then, now)
         for c in range(3):
             out[r, c] = 0.5 * (now[c] - then[c]) / _SOON
 
@@ -197,9 +188,10 @@ def _carry(  # type: ignore[no-untyped-def]
     k, out_lengths, out,
 ):  # fmt: skip
     n, d = kind.shape
-    still = np.zeros((origin.shape[0], 3, 3))
+    still = np.zeros((1, origin.shape[0], 3, 3))
     for b in range(origin.shape[0]):
-        still[b, 0, 0] = still[b, 1, 1] = still[b, 2, 2] = 1.0
+        still[0, b, 0, 0] = still[0, b, 1, 1] = still[0, b, 2, 2] = 1.0
+    here, end = origin.reshape((1, *origin.shape)), tx.reshape((1, 3))
     now, then, phases, terms = np.empty(7), np.empty(7), np.empty(6), np.empty(3, np.complex128)
     for i in range(n):
         used = 0
@@ -207,24 +199,12 @@ def _carry(  # type: ignore[no-untyped-def]
             used += 1
         at = scatter[i] if scatter[i] >= 0 else used
         _part_lengths(
-            vertices[i], normals[i], kind[i], body[i], at, used, points[i], still, origin, origin, tx, tx, then
-        )
+            vertices, normals, kind, body, points, i, at, used, 0, origin, still, here, end, end, then
+        )  # fmt: skip
         for t in range(radar.shape[0]):
             _part_lengths(
-                vertices[i],
-                normals[i],
-                kind[i],
-                body[i],
-                at,
-                used,
-                points[i],
-                turn[t],
-                origin,
-                place[t],
-                radar[t],
-                radar[t],
-                now,
-            )
+                vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, radar, radar, now
+            )  # fmt: skip
             centre = length[i] + now[6] - then[6]
             out_lengths[t, i, :] = centre
             out[t, i, :] = 0.0

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.em.phasor import mean_parts, points_for, unit_phasor
+from raychan.em.phasor import even_phasor, mean_parts, points_for, times, times_j, unit_phasor
 
 _TURN = 0.5 / math.pi
 
@@ -24,16 +24,16 @@ def _exp_minus_j(phase: float) -> complex:
     return complex(cosine, sine)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _edge(a: float, b: float, ea: complex, eb: complex) -> complex:
     """Return the mean of exp(-j phi) along a line on which phi runs from a to b, given exp(-j a) and exp(-j b)."""
     gap = b - a
     if abs(gap) < 1e-3:
         return ea * complex(1.0 - gap * gap / 6.0, gap * (gap * gap / 24.0 - 0.5))
-    return 1j * (eb - ea) / gap
+    return times_j(1.0 / gap, eb - ea)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _with_first_moment(
     p0: float, p1: float, p2: float, t0: complex, t1: complex, t2: complex, lost: complex
 ) -> tuple[complex, complex, complex]:
@@ -45,11 +45,11 @@ def _with_first_moment(
     """
     mean = (p0 + p1 + p2) / 3.0
     a, b, c = p0 - mean, p1 - mean, p2 - mean
-    shift = -1j * lost / (a * a + b * b + c * c)
-    return t0 + shift * a, t1 + shift * b, t2 + shift * c
+    shift = times_j(-1.0 / (a * a + b * b + c * c), lost)
+    return t0 + times(a, shift), t1 + times(b, shift), t2 + times(c, shift)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _corner_terms(
     p0: float, p1: float, p2: float, e0: complex, e1: complex, e2: complex
 ) -> tuple[complex, complex, complex]:
@@ -75,33 +75,33 @@ def _corner_terms(
             real = 1.0 - (xx + xy + yy) / 12.0 + (xx * xx + xx * xy + xx * yy + xy * yy + yy * yy) / 360.0
             whole = e0 * complex(real, -(x + span) / 3.0 + (x + span) * (xx + yy) / 60.0)
         else:
-            whole = 2j * (_edge(p1, p2, e1, e2) - _edge(p0, p1, e0, e1)) / span
+            whole = times_j(2.0 / span, _edge(p1, p2, e1, e2) - _edge(p0, p1, e0, e1))
         # First order in the phase: the mean of l_i phi over a triangle is (phi_i - mean) / 12.
         mean = (x + span) / 3.0
         t0 = whole * complex(1.0 / 3.0, mean / 12.0)
         t1 = whole * complex(1.0 / 3.0, (mean - x) / 12.0)
         t2 = whole * complex(1.0 / 3.0, (mean - span) / 12.0)
     else:
-        scale = 2j / span
+        scale = 2.0 / span
         gap = p2 - p1
         # Each division by a phase leaves out of the first moment what _with_first_moment puts back.
         if gap < 2.0:
-            upper = scale * _edge(p1, p2, e1, e2)
+            upper = times_j(scale, _edge(p1, p2, e1, e2))
             t1, t2 = upper * complex(0.5, gap / 12.0), upper * complex(0.5, -gap / 12.0)
             lost = upper
         else:
-            t1, t2 = scale * e1 / (1j * gap), -scale * e2 / (1j * gap)
-            lost = 2.0 * (t1 + t2)
+            t1, t2 = times(scale / gap, e1), times(-scale / gap, e2)
+            lost = times(2.0, t1 + t2)
         if x < 2.0:
-            lower = scale * _edge(p0, p1, e0, e1)
+            lower = times_j(scale, _edge(p0, p1, e0, e1))
             t0 = -lower * complex(0.5, x / 12.0)
             t1 -= lower * complex(0.5, -x / 12.0)
             lost -= lower
         else:
-            first, last = -scale * e0 / (1j * x), scale * e1 / (1j * x)
+            first, last = times(-scale / x, e0), times(scale / x, e1)
             t0 = first
             t1 += last
-            lost += 2.0 * (first + last)
+            lost += times(2.0, first + last)
         t0, t1, t2 = _with_first_moment(p0, p1, p2, t0, t1, t2, lost)
     r0 = t0 if i0 == 0 else (t1 if i1 == 0 else t2)
     r1 = t0 if i0 == 1 else (t1 if i1 == 1 else t2)
@@ -114,18 +114,20 @@ _NEGLIGIBLE = 1e-5  # share of the mean over a triangle in phase that may be lef
 _PANEL = 6.0  # rad that the Gauss rule along an edge follows to 1e-6
 _ALWAYS_GAUSS = 18.0  # rad of phase up to which pieces are never used; not measured
 _POINTS_PER_PIECE = 16  # points of a Gauss rule that take as long as a piece; not measured
-_SIX_POINTS = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
+_SIX_POINTS = np.zeros((2, 8))  # of a Gauss rule, and two without weight: whole vector units
+_SIX_POINTS[:, :6] = np.stack(np.polynomial.legendre.leggauss(6)) * 0.5 + np.array([[0.5], [0.0]])
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _end_term(w: float, c: float) -> complex:
     """Return the term of one end, over exp(-j phi) there, of the integral of exp(-j phi) along a line: phi' = w,
     phi'' = c."""
-    x = c / (w * w)
-    return 1j / w * complex(1.0 - 3.0 * x * x, x)
+    short = 1.0 / w
+    x = c * short * short
+    return complex(-x * short, short * (1.0 - 3.0 * x * x))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
     """Integrate `_end_term` times exp(-j phi) along an edge; return the parts of its two ends, and by how many phases
     they were divided.
@@ -136,29 +138,40 @@ def _along_edge(pa, pm, pb, wa, wb, c):  # type: ignore[no-untyped-def]
     sa, sb = s + 4.0 * d, s - 4.0 * d
     if sa * sb > 0.0 and min(abs(sa), abs(sb)) > 4.0:
         # The phase runs: the ends alone count (stationary phase), here to second order.
-        ga, gb, turn = _end_term(wa, c), _end_term(wb, c), wb - wa
-        xa, xb = -turn / (wa * sa) + 8.0 * d / (sa * sa), -turn / (wb * sb) + 8.0 * d / (sb * sb)
-        worst = max(abs(turn / (wa * sa)), abs(turn / (wb * sb))) + 8.0 * abs(d) / min(sa * sa, sb * sb)
+        turn, ra, rb = wb - wa, 1.0 / sa, 1.0 / sb
+        ya, yb, za, zb = turn * ra / wa, turn * rb / wb, 8.0 * d * ra * ra, 8.0 * d * rb * rb
+        worst = max(abs(ya), abs(yb)) + max(abs(za), abs(zb))
         if 12.0 * worst * worst < _NEGLIGIBLE * min(abs(sa * wa), abs(sb * wb)):
-            first = -1j * ga / sa * complex(1.0, -xa) * _exp_minus_j(pa)
-            last = 1j * gb / sb * complex(1.0, -xb) * _exp_minus_j(pb)
+            first = times_j(-ra, _end_term(wa, c) * complex(1.0, ya - za) * _exp_minus_j(pa))
+            last = times_j(rb, _end_term(wb, c) * complex(1.0, yb - zb) * _exp_minus_j(pb))
             return first, last, 2.0
-    panels = 1 + int((abs(s) + 4.0 * abs(d)) / _PANEL)
-    first, last = 0j, 0j
+    first, last = _by_panels(pa, s, 4.0 * d, wa, wb - wa, c)
+    return first, last, 1.0
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def _by_panels(begin, run, bend, slope, turn, c):  # type: ignore[no-untyped-def]
+    """Return the parts of both ends of the integral of `_end_term` times exp(-j phi) along an edge, panel by panel,
+    phi = begin + t run + t (1 - t) bend, its slope across the edge slope + t turn."""
+    panels = 1 + int((abs(run) + abs(bend)) / _PANEL)
+    share = 1.0 / panels
+    first_re, first_im, last_re, last_im = 0.0, 0.0, 0.0, 0.0
     for i in range(panels):
-        for q in range(6):
-            t = (i + _SIX_POINTS[0, q]) / panels
-            g = (
-                _SIX_POINTS[1, q]
-                * _end_term(wa + t * (wb - wa), c)
-                * _exp_minus_j(pa + t * s + 4.0 * d * t * (1.0 - t))
-            )
-            first += (1.0 - t) * g
-            last += t * g
-    return first / panels, last / panels, 1.0
+        for q in range(8):
+            t = (i + _SIX_POINTS[0, q]) * share
+            short = 1.0 / (slope + t * turn)
+            x = c * short * short
+            e_re, e_im = even_phasor(_TURN * (begin + t * (run + bend * (1.0 - t))), short * _SIX_POINTS[1, q])
+            level = 1.0 - 3.0 * x * x
+            re, im = -x * e_re - level * e_im, level * e_re - x * e_im
+            last_re += t * re
+            last_im += t * im
+            first_re += (1.0 - t) * re
+            first_im += (1.0 - t) * im
+    return complex(share * first_re, share * first_im), complex(share * last_re, share * last_im)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _by_stationary_phase(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
     """Write the mean's parts where the phase runs fast along all lines parallel to one edge: only the ends of these
     lines count, which lie on the two other edges. Return False where it runs in no such direction.
@@ -183,10 +196,9 @@ def _by_stationary_phase(phases, d, out) -> bool:  # type: ignore[no-untyped-def
     wk = wi + 4.0 * (d[j] - d[i] - d[k])
     j_part, k_part, ahead = _along_edge(phases[j], phases[3 + j], phases[k], wj, wk, c)
     i_part, other, behind = _along_edge(phases[i], phases[3 + k], phases[k], wi, wk, c)
-    lost = 2.0 * (ahead * (j_part + k_part) - behind * (i_part + other))
-    out[i], out[j], out[k] = _with_first_moment(
-        phases[i], phases[j], phases[k], -2.0 * i_part, 2.0 * j_part, 2.0 * (k_part - other), lost
-    )
+    lost = times(2.0 * ahead, j_part + k_part) - times(2.0 * behind, i_part + other)
+    parts = times(-2.0, i_part), times(2.0, j_part), times(2.0, k_part - other)
+    out[i], out[j], out[k] = _with_first_moment(phases[i], phases[j], phases[k], *parts, lost)
     return True
 
 
@@ -203,7 +215,7 @@ def _by_pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped
     it."""
     h = 1.0 / m
     # The mean of a piece's own bend: a third of the sum of its edges' bends, alike for all pieces.
-    shift = _exp_minus_j((d01 + d12 + d20) * h * h / 3.0) * h * h
+    shift = times(h * h, _exp_minus_j((d01 + d12 + d20) * h * h / 3.0))
     p, e = np.empty((2, m + 1)), np.empty((2, m + 1), np.complex128)
     total, s1, s2 = 0j, 0j, 0j
     # Along a row the phase is a parabola, so its exponential follows from two running factors.
@@ -229,15 +241,16 @@ def _by_pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped
             p0, p1, p2 = p[low, j], p[row, j], p[low, j + 1]
             t0, t1, t2 = _corner_terms(p0, p1, p2, e[low, j], e[row, j], e[low, j + 1])
             total += t0 + t1 + t2
-            s1 += t0 * (i - 1) + t1 * i + t2 * (i - 1)
-            s2 += t0 * j + t1 * j + t2 * (j + 1)
+            s1 += times(i - 1.0, t0 + t2) + times(float(i), t1)
+            s2 += times(float(j), t0 + t1) + times(j + 1.0, t2)
             if j < m - i:
                 p0, p1, p2 = p[row, j + 1], p[low, j + 1], p[row, j]
                 t0, t1, t2 = _corner_terms(p0, p1, p2, e[row, j + 1], e[low, j + 1], e[row, j])
                 total += t0 + t1 + t2
-                s1 += t0 * i + t1 * (i - 1) + t2 * i
-                s2 += t0 * (j + 1) + t1 * (j + 1) + t2 * j
-    out[0], out[1], out[2] = shift * (total - (s1 + s2) * h), shift * s1 * h, shift * s2 * h
+                s1 += times(float(i), t0 + t2) + times(i - 1.0, t1)
+                s2 += times(j + 1.0, t0 + t1) + times(float(j), t2)
+    s1, s2 = times(h, s1), times(h, s2)
+    out[0], out[1], out[2] = shift * (total - (s1 + s2)), shift * s1, shift * s2
     return m * m
 
 

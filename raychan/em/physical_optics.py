@@ -5,21 +5,31 @@ from __future__ import annotations
 import math
 
 from raychan.compile.jit import njit
-from raychan.em.polarization import mirror, reflect, transmit
+from raychan.em.phasor import times
+from raychan.em.polarization import mirror, onto, s_vector, transmit
 from raychan.vectors import Vec, cross, dot
 
 
-@njit(cache=True)
-def radiated(e: Vec, k: Vec, s: Vec, n: Vec, r_s: complex, r_p: complex, g: Vec) -> complex:
-    """Return the field, projected on g, that the currents of the reflected wave of (e, k) radiate towards s.
+@njit(cache=True, forceinline=True)
+def incident(k: Vec, n: Vec) -> tuple[Vec, Vec, Vec, Vec]:
+    """Return of a wave along k on a surface the vectors s and p, p of the reflected wave, and its direction."""
+    s, ahead = s_vector(k, n), mirror(k, n)
+    return s, cross(s, k), cross(s, ahead), ahead
 
+
+@njit(cache=True, forceinline=True)
+def radiated(e: Vec, wave: tuple[Vec, Vec, Vec, Vec], to: Vec, n: Vec, r_s: complex, r_p: complex, g: Vec) -> complex:
+    """Return the field, projected on g, that the currents of the reflected wave of e radiate in the direction `to`.
+
+    Args: wave as `incident` gives it. The currents n x H, -n x E of the reflected wave (E, H = k x E) radiate
+    to x (n x E) + n x H, here by the rule for two cross products.
     Source: Stratton-Chu; Balanis, Advanced Engineering Electromagnetics, 2012, sec. 7.10.
     """
-    er = reflect(e, k, n, r_s, r_p)
-    hr = cross(mirror(k, n), er)
-    magnetic = cross(s, cross(n, er))
-    electric = cross(n, hr)
-    return dot(g, magnetic) + dot(g, electric)
+    s, p_in, p, k = wave
+    along, ahead, over = onto(g, n), onto(g, k), dot(to, n) + dot(n, k)
+    by_s = times(dot(to, s), along) - times(over, onto(g, s))
+    by_p = times(dot(to, p), along) + times(dot(n, p), ahead) - times(over, onto(g, p))
+    return r_s * onto(e, s) * by_s + r_p * onto(e, p_in) * by_p
 
 
 @njit(cache=True)
@@ -33,11 +43,16 @@ def huygens(
     (equal to classic physical optics for monostatic scattering). Multiply by -j k / 4 pi and the
     phase integral. Source: Stratton-Chu, reflected field only; Balanis, Advanced EE, 2012, sec. 7.10.
     """
-    to_rx = (-k_out[0], -k_out[1], -k_out[2])
-    to_tx = (-k_in[0], -k_in[1], -k_in[2])
-    forward = radiated(e_in, k_in, to_rx, n, r_in[0], r_in[1], e_out)
-    backward = radiated(e_out, k_out, to_tx, n, r_out[0], r_out[1], e_in)
-    return 0.5 * (forward + backward)
+    return coupled(e_in, k_in, incident(k_in, n), e_out, k_out, incident(k_out, n), n, r_in, r_out)
+
+
+@njit(cache=True, forceinline=True)
+def coupled(e_in, k_in, wave_in, e_out, k_out, wave_out, n, r_in, r_out):  # type: ignore[no-untyped-def]
+    """Return what `huygens` returns, of two waves with their vectors as `incident` gives them."""
+    to_rx, to_tx = (-k_out[0], -k_out[1], -k_out[2]), (-k_in[0], -k_in[1], -k_in[2])
+    forward = radiated(e_in, wave_in, to_rx, n, r_in[0], r_in[1], e_out)
+    backward = radiated(e_out, wave_out, to_tx, n, r_out[0], r_out[1], e_in)
+    return times(0.5, forward + backward)
 
 
 @njit(cache=True)
@@ -48,7 +63,7 @@ def reflected_wave(e: Vec, k: Vec, to: Vec, element: Vec, r_s: complex, r_p: com
     if size == 0.0:
         return 0j
     n = (element[0] / size, element[1] / size, element[2] / size)
-    return size * radiated(e, k, to, n, r_s, r_p, g)
+    return times(size, radiated(e, incident(k, n), to, n, r_s, r_p, g))
 
 
 @njit(cache=True)

@@ -11,15 +11,20 @@ from raychan.compile.jit import njit
 from raychan.em.phasor import unit_phasor
 from raychan.vectors import copy_to
 
+_BLOCK = 512  # echoes whose places are held at once, in a processor's nearest cache; others not measured
+_NEXT = np.uint64(1)
+
 
 @njit(cache=True, nogil=True, forceinline=True)
 def _place(n, fine, cell):  # type: ignore[no-untyped-def]
     """Return the table index below `cell`, the weight of the next entry, and the sign."""
-    period = math.floor(cell / n)
+    period = np.floor(cell * (1.0 / n))
     at = (cell - period * n) * fine
-    low = min(int(at), n * fine - 1)
+    low = max(min(int(at), n * fine - 1), 0)
     # One period on, the response of an even window, with its phase counted from the middle, changes sign.
-    return low, at - low, 1.0 - 2.0 * ((int(period) * (n - 1)) & 1)
+    sign = 1.0 if n & 1 else 1.0 - 2.0 * (period - 2.0 * np.floor(0.5 * period))
+    # Without a sign, an index is not looked at from the table's end.
+    return np.uint64(low), at - low, sign
 
 
 @njit(cache=True, nogil=True)
@@ -31,7 +36,7 @@ def periodic(table, n, fine, cells):  # type: ignore[no-untyped-def]
     out = np.empty(len(cells), np.complex128)
     for i in range(len(cells)):
         low, share, sign = _place(n, fine, cells[i])
-        out[i] = sign * (table[low] + share * (table[low + 1] - table[low]))
+        out[i] = sign * (table[low] + share * (table[low + _NEXT] - table[low]))
     return out
 
 
@@ -44,41 +49,40 @@ def _stands(delay, rate, ramp):  # type: ignore[no-untyped-def]
     return 0.5 * light * then, complex(cosine, sine)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
-def _times(x, z):  # type: ignore[no-untyped-def]
-    """Return the real number x times z: numba multiplies both as complex numbers, three times the work."""
-    return complex(x * z.real, x * z.imag)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _scales(ramp, chirps):  # type: ignore[no-untyped-def]
+    """Return the range [m] by which a m/s shifts an echo, and the cells of range in a metre, of rate in a m/s, and
+    that an echo of a m/s moves in a ramp.
 
-
-@njit(cache=True, nogil=True, forceinline=True)
-def _between(a, b, share):  # type: ignore[no-untyped-def]
-    """Return the complex number at a share of the way from a to b."""
-    return a + _times(share, b - a)
+    Doppler is measured at the middle sample of the sweep. Each row of the map is corrected for its own Doppler within
+    the ramp; other rates keep the difference.
+    """
+    _, slope, _, _, middle, repetition, resolution, light = ramp
+    return middle / slope, 1.0 / resolution, 2.0 * middle / light * chirps * repetition, repetition / resolution
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _answer(at_range, rate, cell_range, cell_rate, ramp, sizes, across, along):  # type: ignore[no-untyped-def]
-    """Return the response of both windows to an echo at a range [m] at mid frame."""
-    _, slope, _, _, middle, repetition, resolution, light = ramp
+def _answer(away, apart, moved, sizes, across, tables, middles):  # type: ignore[no-untyped-def]
+    """Return the response of both windows to an echo so many cells away in range and apart in rate, which moves by so
+    many range cells in a ramp."""
     samples, chirps, fine = sizes
-    tables, middles = along
-    off = rate - cell_rate
-    # Doppler is measured at the middle sample of the sweep.
-    apart = 2.0 * middle / light * off * chirps * repetition
-    # Each row of the map is corrected for its own Doppler within the ramp; other rates keep the difference.
-    away = (at_range - cell_range + off * middle / slope) / resolution
-    moved = rate * repetition / resolution
-    total = 0j
+    # Real and imaginary parts apart: numba multiplies real by complex numbers as two complex ones.
+    re, im = 0.0, 0.0
     low, share, sign = _place(chirps, fine, apart)
     for k in range(len(middles)):
         # Within a part of the frame the range response is linear.
         at, part, turned = _place(samples, fine, away + moved * (middles[k] - 0.5 * (chirps - 1)))
-        held = _between(tables[k, low, 0], tables[k, low + 1, 0], share)
-        late = _between(tables[k, low, 1], tables[k, low + 1, 1], share)
-        level = _between(across[at, 0], across[at + 1, 0], part)
-        lean = _between(across[at, 1], across[at + 1, 1], part)
-        total += _times(turned, level * held + _times(moved, lean) * late)
-    return _times(sign, total)
+        level, next_level = across[at, 0].real, across[at + _NEXT, 0].real
+        lean, next_lean = across[at, 1].real, across[at + _NEXT, 1].real
+        held, next_held = tables[k, low, 0], tables[k, low + _NEXT, 0]
+        late, next_late = tables[k, low, 1], tables[k, low + _NEXT, 1]
+        level = turned * (level + part * (next_level - level))
+        lean = turned * moved * (lean + part * (next_lean - lean))
+        re += level * (held.real + share * (next_held.real - held.real))
+        re += lean * (late.real + share * (next_late.real - late.real))
+        im += level * (held.imag + share * (next_held.imag - held.imag))
+        im += lean * (late.imag + share * (next_late.imag - late.imag))
+    return complex(sign * re, sign * im)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -87,13 +91,19 @@ def cell_waves(amplitude, delay, rate, cell, ramp, sizes, across, along):  # typ
 
     Args: cell range [m] and rate [m/s]; ramp carrier, slope, time of the frame's middle, swept half [Hz], middle
     frequency [Hz], repetition, range resolution [m], speed of light; sizes samples, chirps, fine; across (., 2) the
-    range response and its derivative by cells; along (parts, ., 2) the rate response of each part of the frame with
-    weights 1 and with weights of the chirp number from its middle, and these middles (parts,).
+    range response, which is real, and its derivative by cells; along (parts, ., 2) the rate response of each part of
+    the frame with weights 1 and with weights of the chirp number from its middle, and these middles (parts,).
     """
     waves, ranges = np.empty(delay.size, np.complex128), np.empty(delay.size)
+    tables, middles = along
+    shift, per_range, per_rate, per_ramp = _scales(ramp, sizes[1])
     for i in range(delay.size):
         ranges[i], turn = _stands(delay[i], rate[i], ramp)
-        waves[i] = amplitude[i] * turn * _answer(ranges[i], rate[i], cell[0], cell[1], ramp, sizes, across, along)
+        off = rate[i] - cell[1]
+        away = (ranges[i] - cell[0] + off * shift) * per_range
+        waves[i] = (
+            amplitude[i] * turn * _answer(away, off * per_rate, rate[i] * per_ramp, sizes, across, tables, middles)
+        )
     return waves, ranges
 
 
@@ -110,10 +120,10 @@ def _count(c, g, i, wave, at_range, rate, total, size, strongest, most):  # type
 
 @njit(cache=True, forceinline=True)
 def _apart(cells, n):  # type: ignore[no-untyped-def]
-    """Return the distance in cells from the nearest peak of a response of period n cells."""
-    if cells > n:
-        cells -= n * math.floor(cells / n)
-    return min(cells, n - cells)
+    """Return the distance in cells, 0 or more, from the nearest peak of a response of period n cells."""
+    cells = abs(cells)
+    cells -= n * math.floor(cells * (1.0 / n))
+    return max(min(cells, n - cells), 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -127,30 +137,38 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
     cells from the peak; else as for `cell_waves` and `cell_sums`.
     """
     samples, chirps, _ = sizes
-    _, slope, centre, _, middle, repetition, resolution, light = ramp
-    over_ranges, over_rates = beyond
-    per_rate = 2.0 * middle / light * chirps * repetition
+    shift, per_range, per_rate, per_ramp = _scales(ramp, chirps)
+    # Taken out of the tuples once: each access counts a reference.
+    (over_ranges, over_rates), (tables, middles) = beyond, along
     total[:], size[:], strongest[:], most[:] = 0.0, 0.0, -1, -1.0
-    count = np.zeros(total.shape[1])
-    for i in range(delay.size):
-        count[group[i]] += 1.0
-        at_range, moved = 0.5 * light * delay[i] + rate[i] * centre, abs(rate[i]) * repetition / resolution
-        weight, largest, turn = abs(amplitude[i]), over_rates[0, 0] + moved * over_rates[1, 0], 0j
+    count, place, waves = np.zeros(total.shape[1]), np.empty((5, _BLOCK)), np.empty(_BLOCK, np.complex128)
+    ranges, away, apart, moved, weight = place
+    near = np.empty(_BLOCK, np.int64)
+    for first in range(0, delay.size, _BLOCK):
+        some = min(_BLOCK, delay.size - first)
+        for j in range(some):
+            i = first + j
+            count[group[i]] += 1.0
+            ranges[j], turn = _stands(delay[i], rate[i], ramp)
+            moved[j] = rate[i] * per_ramp
+            waves[j] = amplitude[i] * turn
+            weight[j] = math.sqrt(amplitude[i].real * amplitude[i].real + amplitude[i].imag * amplitude[i].imag)
         for c in range(len(cells)):
-            off = rate[i] - cells[c, 1]
-            near = _apart(abs(at_range - cells[c, 0] + off * middle / slope) / resolution, samples)
-            near = max(near - 0.5 * moved * chirps, 0.0)
-            # Most are too far in range alone.
-            if weight * over_ranges[int(near)] * largest < least[c]:
-                continue
-            slow = _apart(abs(off) * per_rate, chirps)
-            held, late = over_rates[0, int(slow)], over_rates[1, int(slow)]
-            if weight * over_ranges[int(near)] * (held + moved * late) < least[c]:
-                continue
-            if turn == 0j:
-                turn = amplitude[i] * _stands(delay[i], rate[i], ramp)[1]
-            wave = turn * _answer(at_range, rate[i], cells[c, 0], cells[c, 1], ramp, sizes, across, along)
-            _count(c, group[i], i, wave, at_range, rate[i], total, size, strongest, most)
+            # Those that count first, without a branch that nothing foretells.
+            found, enough = 0, least[c]
+            for j in range(some):
+                off, drift = rate[first + j] - cells[c, 1], abs(moved[j])
+                away[j], apart[j] = (ranges[j] - cells[c, 0] + off * shift) * per_range, off * per_rate
+                far = int(max(_apart(away[j], samples) - 0.5 * drift * chirps, 0.0))
+                slow = int(_apart(apart[j], chirps))
+                near[found] = j
+                bound = weight[j] * over_ranges[far] * (over_rates[0, slow] + drift * over_rates[1, slow])
+                found += 1 if bound >= enough else 0
+            for k in range(found):
+                j = near[k]
+                i = first + j
+                wave = waves[j] * _answer(away[j], apart[j], moved[j], sizes, across, tables, middles)
+                _count(c, group[i], i, wave, ranges[j], rate[i], total, size, strongest, most)
     for c in range(len(cells)):
         copy_to(size[c, 0], count)
 

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from raychan.channel.ends import rx_fields
 from raychan.channel.paths import over_routes
-from raychan.channel.transfer import rates, transfer
+from raychan.channel.rates import rates
+from raychan.channel.transfer import transfer
 from raychan.radar.interferer import Interferer
 from raychan.records import Paths
 from raychan.run.specular_paths import Chain, exact_routes

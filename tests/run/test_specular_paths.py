@@ -8,7 +8,7 @@ from support.facets import box, facets, ground, quad
 from truth import paths as brute
 from truth import slab, tworay
 
-from raychan.channel.transfer import rates
+from raychan.channel.rates import rates
 from raychan.records import HALF_SPACE, LAYER, PEC
 from raychan.run.specular_paths import jones, specular_routes
 from raychan.units import C0
