@@ -117,13 +117,12 @@ def _flown(step: _Bounce, tubes: Tubes) -> tuple[list[Tubes], list[Floats]]:
 
 
 def _narrowed(step: _Bounce, tubes: Tubes) -> Tubes:
-    """Return the tubes, those on curved surfaces bisected until each spreads its rays by one fan at most on its first
-    surface, by `_DEEPER` fans later; where the rule is coarse, only those that matter. Where it is not, the launch
-    does so on first surfaces."""
+    """Return the tubes, those on curved surfaces bisected until each spreads its rays by `_DEEPER` fans at most, by one
+    on first surfaces, where the launch does so already unless the rule is coarse; then only those that matter."""
     rule, done, coarse = step.rule, list[Tubes](), step.rule.coarse != 1.0
-    if rule.fan == np.inf or (step.first and not coarse):
+    fan = (1.0 if step.first else _DEEPER) * rule.fan
+    if fan == np.inf or (step.first and not coarse):
         return tubes
-    fan = rule.fan if step.first else _DEEPER * rule.fan
     for _ in range(rule.levels):
         edge = edge_of_spread(tubes.k, tubes.normals, tubes.facet, step.geometry.curved, fan)
         wide = edge >= 0
@@ -296,7 +295,5 @@ def _landed_tubes(
         last=tubes.history.append(tubes.last[rows], vertex, normal, tubes.facet[rows], REFLECT),
         history=tubes.history,
     )
-    passed = through[rows]
-    if (passed >= 0).any():
-        write_layers(geometry, landed, vertex, after.k[:, CENTRE], passed, step.rule)
+    write_layers(geometry, landed, vertex, after.k[:, CENTRE], through[rows], step.rule)
     return landed

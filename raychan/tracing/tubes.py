@@ -46,8 +46,9 @@ class Refinement:
     what is found there; `least` bisections of each first tube on a curved facet, and of all that bounce again, for a
     launch to be finer where the one before was fine enough; `fan` [rad] by which curved facets may
     spread the rays of a tube that bounces again (twice that after its first bounce), where `coarse` is not 1 of one
-    that matters: where it is not infinite and `coarse` is 1, tubes are cut by what they may bring where they land; `patch` least cosine between the normals of facets of one smooth
-    patch for a tube to land on several of them, 1: on one only.
+    that matters: where it is not infinite and `coarse` is 1, tubes are cut by what they may bring where they land;
+    `patch` least cosine between the normals of facets of one smooth patch for a tube to land on several of them, 1: on
+    one only.
     """
 
     wavenumber: float
