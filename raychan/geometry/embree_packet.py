@@ -42,7 +42,7 @@ def new_packet() -> Packet:
     return block.view(np.float32), words
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def put_ray(floats, words, lane, x, y, z, along):  # type: ignore[no-untyped-def]
     """Write one ray into the packet: origin x, y, z [m], direction `along` (3,)."""
     floats[ORIGIN + lane], floats[ORIGIN + LANES + lane], floats[ORIGIN + 2 * LANES + lane] = x, y, z
@@ -52,7 +52,7 @@ def put_ray(floats, words, lane, x, y, z, along):  # type: ignore[no-untyped-def
     words[PRIMITIVE + lane] = words[GEOMETRY + lane] = words[INSTANCE + lane] = _NONE
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def first_triangles(intersect, scene, words):  # type: ignore[no-untyped-def]
     """Return the numbers of the triangles that the packet's rays meet first, -1 for none.
 
