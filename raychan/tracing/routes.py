@@ -156,7 +156,7 @@ def leg_of_arrival(tubes: Tubes, mirrors: int, layers: int) -> tuple[Floats, Int
     return corners, passed
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def same_leg_out(last, slots, history, mirrors, corners, passed):  # type: ignore[no-untyped-def]
     """Write the mirror points (n, m, 3) at the start of each history, and the layers (n, l) right behind them, -1 for
     none.
@@ -178,7 +178,7 @@ def same_leg_out(last, slots, history, mirrors, corners, passed):  # type: ignor
             at = before[at]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _write_history(i, used, tubes, history, retrace, planes, out):  # type: ignore[no-untyped-def]
     """Write the first `used` interactions of tube i from its history, newest first; with `retrace` and after plane
     mirrors alone each vertex moves to where the centre ray meets its plane (subdivision moved the centre)."""
@@ -206,7 +206,7 @@ def _write_history(i, used, tubes, history, retrace, planes, out):  # type: igno
         at = before[at]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _write_layers_out(i, used, here, planes, legs, out):  # type: ignore[no-untyped-def]
     """Write the layers that the ray from `here` (3,) to the end passes, from slot `used` on; return the next slot."""
     first, normal, _ = planes
@@ -231,7 +231,7 @@ def _write_layers_out(i, used, here, planes, legs, out):  # type: ignore[no-unty
     return used
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def interactions(tubes, history, retrace, planes, legs, out):  # type: ignore[no-untyped-def]
     """Write the interactions of tubes that scatter on their present footprint and leave over mirrors, in order.
 
@@ -240,7 +240,6 @@ def interactions(tubes, history, retrace, planes, legs, out):  # type: ignore[no
     `Interactions`.
     """
     body_of = planes[2]
-    # Taken out of the tuples once: each access counts a reference.
     vertices, normals, facet, body, kind = out
     d = kind.shape[1]
     for i in range(len(tubes.facet)):
