@@ -14,44 +14,44 @@ _ALIKE = 1.0 + 1e-9  # ratio of sizes that count as equal, so that rounding does
 Vec = tuple[Any, Any, Any]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Return a . b without conjugation."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def cross(a, b):  # type: ignore[no-untyped-def]
     """Return a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def row(a, i):  # type: ignore[no-untyped-def]
     """Return row i of a (n, 3) as three numbers: a view of it would count a reference."""
     return a[i, 0], a[i, 1], a[i, 2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def less(a, b):  # type: ignore[no-untyped-def]
     """Return a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def copy_to(out, a):  # type: ignore[no-untyped-def]
     """Write a into out, one axis; numba compiles `out[:] = a` into much code, for an error message."""
     for c in range(len(out)):
         out[c] = a[c]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def distance(p, q):  # type: ignore[no-untyped-def]
     """Return the distance between p and q."""
     return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def length_to(p, image, far):  # type: ignore[no-untyped-def]
     """Return the length [m] of the ray between p and a source at `image`; of a plane wave from the direction `image`
     when far, against the plane through 0."""
@@ -60,7 +60,7 @@ def length_to(p, image, far):  # type: ignore[no-untyped-def]
     return math.sqrt((p[0] - image[0]) ** 2 + (p[1] - image[1]) ** 2 + (p[2] - image[2]) ** 2)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def largest(a, b, c):  # type: ignore[no-untyped-def]
     """Return which of three sizes is largest: 0, 1 or 2, the first of equal ones."""
     if a * _ALIKE >= b and a * _ALIKE >= c:
@@ -68,7 +68,7 @@ def largest(a, b, c):  # type: ignore[no-untyped-def]
     return 1 if b * _ALIKE >= c else 2
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
     """Return the distance from x + along d to the plane through v of normal n, along d."""
     slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]

@@ -18,14 +18,14 @@ _STEPS, _CLOSE = 12, 1e-9  # most steps from a plane to its patch, and the m by 
 _BESIDE = 0.5  # of a facet's barycentric range: so far beside the facet its patch goes on; not measured
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def copy_corners(out, w):  # type: ignore[no-untyped-def]
     """Write the corners w (3, 3) into out."""
     for c in range(3):
         out[c, 0], out[c, 1], out[c, 2] = w[c, 0], w[c, 1], w[c, 2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
     """Write into p the point of the curved surface at barycentric (x, y, z)."""
     xy, yz, zx = x * y, y * z, z * x
@@ -33,7 +33,7 @@ def place_on(v, b, x, y, z, p):  # type: ignore[no-untyped-def]
         p[c] = x * v[0, c] + y * v[1, c] + z * v[2, c] - xy * b[0, c] - yz * b[1, c] - zx * b[2, c]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def weights_at(v, x, y, z):  # type: ignore[no-untyped-def]
     """Return the barycentric coordinates of a point (x, y, z) [m] above or below a facet of corners v (3, 3)."""
     ax, ay, az = v[1, 0] - v[0, 0], v[1, 1] - v[0, 1], v[1, 2] - v[0, 2]
@@ -46,7 +46,7 @@ def weights_at(v, x, y, z):  # type: ignore[no-untyped-def]
     return 1.0 - one - two, one, two
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def distance_to_patch(v, b, normal, o, k, flat):  # type: ignore[no-untyped-def]
     """Return the distance [m] at which a ray from o along k meets the patch over a facet (v, b: corners, curvatures),
     whose plane it meets after `flat`; that distance where it passes beside the patch, or almost along it."""
@@ -78,7 +78,7 @@ def distance_to_patch(v, b, normal, o, k, flat):  # type: ignore[no-untyped-def]
     return flat
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def rise_off_chord(a, b, at_a, at_b, t, out):  # type: ignore[no-untyped-def]
     """Write how far (3,) [m] a curved surface lies off the chord from a to b (3,) at the share t of it, by the unit
     normals at_a, at_b (3,) at its ends; return whether it does."""
@@ -92,7 +92,7 @@ def rise_off_chord(a, b, at_a, at_b, t, out):  # type: ignore[no-untyped-def]
     return scale != 0.0
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def middle(w):  # type: ignore[no-untyped-def]
     """Return the barycentric coordinates of a patch's centre."""
     return (
@@ -102,7 +102,7 @@ def middle(w):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _normal_on(n, x, y, z, out):  # type: ignore[no-untyped-def]
     """Write into out the unit normal of the curved surface at barycentric (x, y, z)."""
     for c in range(3):
@@ -112,7 +112,7 @@ def _normal_on(n, x, y, z, out):  # type: ignore[no-untyped-def]
         out[c] /= size
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
     """Write into k the direction in which a ray from the source travels at p; return its length [m]."""
     if far:
@@ -126,7 +126,7 @@ def _ray(p, image, far, k):  # type: ignore[no-untyped-def]
     return length
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _length_across(p, q, image, far):  # type: ignore[no-untyped-def]
     """Return the length of pq across the rays from the image [m]."""
     whole, along, size = 0.0, 0.0, 0.0

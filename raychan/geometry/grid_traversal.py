@@ -13,7 +13,7 @@ ALONG = 0.1  # cosine to the axis under which a ray counts as running along the 
 BESIDE = 0.25  # cells that a tube is taken to be wider: edges are sampled every half cell, so they may cross one unseen
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def widths(points, ks):  # type: ignore[no-untyped-def]
     """Return how far a tube's corners lie from its centre [m], and how far its rays spread for each metre."""
     wide, spread = 0.0, 0.0
@@ -27,7 +27,7 @@ def widths(points, ks):  # type: ignore[no-untyped-def]
     return wide, spread
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def span_through_spheres(points, ks, wide, spread, reach, centre, radius):  # type: ignore[no-untyped-def]
     """Return from where to where [m] (at most `reach`) a tube passes through the spheres about bodies, centre (b, 3)
     and radius (b,) [m]; equal: nowhere."""
@@ -50,21 +50,20 @@ def span_through_spheres(points, ks, wide, spread, reach, centre, radius):  # ty
     return (begin, end) if begin < end else (0.0, 0.0)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
-def layer_cells(points, ks, axis, at, count, near, far_off, grid, begin, end):  # type: ignore[no-untyped-def]
-    """Write the box of cells, from begin to end (3,), that a tube passes from `near` to `far_off` [m] along its rays in
-    `count` layers across an axis, from layer `at` on; return how many cells it has in one layer."""
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def layer_cells(points, ks, axis, at, count, near, far_off, grid):  # type: ignore[no-untyped-def]
+    """Return the box of cells, from (3,) and to (3,), that a tube passes from `near` to `far_off` [m] along its rays in
+    `count` layers across an axis, from layer `at` on, and how many cells it has in one layer."""
     low, cell, shape, cut_off = grid.low, grid.cell, grid.shape, grid.cut_off
-    floor, room, per = low[axis] + cell * (at - BESIDE), 1, 1.0 / cell
-    for c in range(3):
-        begin[c], end[c] = shape[c], 0
+    floor, thick = low[axis] + cell * (at - BESIDE), (count + 2.0 * BESIDE) * cell
+    least_x, least_y, least_z, most_x, most_y, most_z = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
     for q in range(4):
         along, start, stop = ks[q, axis], near, far_off
         # A ray that runs along the layers counts whole.
         if abs(along) > ALONG:
             over = 1.0 / along
             one = (floor - points[q, axis]) * over
-            other = one + (count + 2.0 * BESIDE) * cell * over
+            other = one + thick * over
             # What is beyond a grid that is cut off belongs to its outermost layers.
             if cut_off and at <= 0:
                 one = -math.copysign(np.inf, over)
@@ -72,19 +71,31 @@ def layer_cells(points, ks, axis, at, count, near, far_off, grid, begin, end):  
                 other = math.copysign(np.inf, over)
             start = min(max(min(one, other), near), far_off)
             stop = min(max(max(one, other), near), far_off)
-        for c in range(3):
-            x, y = points[q, c] + start * ks[q, c], points[q, c] + stop * ks[q, c]
-            begin[c] = min(begin[c], max(int((min(x, y) - low[c]) * per - BESIDE), 0))
-            end[c] = max(end[c], min(int((max(x, y) - low[c]) * per + BESIDE) + 1, shape[c]))
-            if cut_off:
-                begin[c], end[c] = min(begin[c], shape[c] - 1), max(end[c], 1)
-    begin[axis], end[axis] = max(at, 0), min(at + count, shape[axis])
-    for c in range(3):
-        room *= max(end[c] - begin[c], 0) if c != axis else 1
-    return room
+        x, y, z = points[q, 0] + start * ks[q, 0], points[q, 1] + start * ks[q, 1], points[q, 2] + start * ks[q, 2]
+        u, v, w = points[q, 0] + stop * ks[q, 0], points[q, 1] + stop * ks[q, 1], points[q, 2] + stop * ks[q, 2]
+        least_x, least_y, least_z = min(least_x, min(x, u)), min(least_y, min(y, v)), min(least_z, min(z, w))
+        most_x, most_y, most_z = max(most_x, max(x, u)), max(most_y, max(y, v)), max(most_z, max(z, w))
+    per = 1.0 / cell
+    a, b = _cells_between(least_x, most_x, low[0], per, shape[0], cut_off)
+    c, d = _cells_between(least_y, most_y, low[1], per, shape[1], cut_off)
+    e, f = _cells_between(least_z, most_z, low[2], per, shape[2], cut_off)
+    first, last = max(at, 0), min(at + count, shape[axis])
+    if axis == 0:
+        return (first, c, e), (last, d, f), max(d - c, 0) * max(f - e, 0)
+    if axis == 1:
+        return (a, first, e), (b, last, f), max(b - a, 0) * max(f - e, 0)
+    return (a, c, first), (b, d, last), max(b - a, 0) * max(d - c, 0)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
+def _cells_between(least, most, low, per, count, cut_off):  # type: ignore[no-untyped-def]
+    """Return from which to which of an axis' `count` cells `least` to `most` [m] reach."""
+    begin = max(int((least - low) * per - BESIDE), 0)
+    end = min(int((most - low) * per + BESIDE) + 1, count)
+    return (min(begin, count - 1), max(end, 1)) if cut_off else (begin, end)
+
+
+@njit(cache=True, forceinline=True, uncounted=True)
 def layer_range(points, ks, axis, near, far_off, grid):  # type: ignore[no-untyped-def]
     """Return the first and the last layer across an axis that a tube passes from `near` to `far_off` [m]."""
     low, cell, shape, cut_off = grid.low, grid.cell, grid.shape, grid.cut_off
@@ -97,7 +108,7 @@ def layer_range(points, ks, axis, near, far_off, grid):  # type: ignore[no-untyp
     return (min(first, shape[axis] - 1), max(last, 0)) if cut_off else (first, last)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def any_occupied(occupied, begin, end):  # type: ignore[no-untyped-def]
     """Tell whether any block of a box of cells holds an edge."""
     for i in range(begin[0] // BLOCK, (end[0] + BLOCK - 1) // BLOCK):

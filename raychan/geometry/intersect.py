@@ -89,7 +89,7 @@ def plane_distances(facet, origin, direction, first, normal):  # type: ignore[no
     return out
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def contains(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
     """Tell whether x + t d, a point of a facet's plane, lies on the facet, or at most `margin` [m] outside."""
     for a in range(3):
@@ -102,7 +102,7 @@ def contains(v, n, x, t, d, margin):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _is_near(x, d, most, begin, end, centre, radius):  # type: ignore[no-untyped-def]
     """Tell whether a ray may meet one of the spheres from `begin` to `end` before `most` [m]; centre (s, 3), radius
     (s,) [m]."""
@@ -118,7 +118,7 @@ def _is_near(x, d, most, begin, end, centre, radius):  # type: ignore[no-untyped
     return False
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _ahead(x, d, leaves, start, centre, radius, size):  # type: ignore[no-untyped-def]
     """Return how far ahead [m] of its origin a ray is cast, and its offset [m]: a few float32 spacings.
 
@@ -141,7 +141,7 @@ def _ahead(x, d, leaves, start, centre, radius, size):  # type: ignore[no-untype
     return at + (offset if at == start and (leaves or start > 0.0) else 0.0), offset
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _put_companions(x, d, ahead, offset, middle, turn, floats, words):  # type: ignore[no-untyped-def]
     """Write a ray and its two companions into Embree's packet: an offset [m] to either side, or a quarter turn from
     there if `turn`; no plane through the ray holds both pairs. Coordinates count from the `middle` (3,) [m]."""
@@ -158,7 +158,7 @@ def _put_companions(x, d, ahead, offset, middle, turn, floats, words):  # type: 
     put_ray(floats, words, 2, p - u - middle[0], q - v - middle[1], r - w - middle[2], d)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _on_facet(v, n, x, d, t, offset):  # type: ignore[no-untyped-def]
     """Tell whether the distance t [m] along a ray to a facet's plane is one to the facet: not before it nor beyond.
 
@@ -176,7 +176,7 @@ def _on_facet(v, n, x, d, t, offset):  # type: ignore[no-untyped-def]
     return low - room < t < high + room
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _instead_of_grazed(h, one, other, x, d, ahead, offset, vertices, first, normal):  # type: ignore[no-untyped-def]
     """Return the facet that counts instead of h, which a ray runs along: the nearest that its companions meet, `one`
     and `other`, -1 for none; -2 if they run along one too."""
@@ -192,7 +192,7 @@ def _instead_of_grazed(h, one, other, x, d, ahead, offset, vertices, first, norm
     return found
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _nearer(h, one, other, x, d, ahead, offset, vertices, first, normal):  # type: ignore[no-untyped-def]
     """Return the facet h that a ray meets, -1 for none, or what a companion meets, `one` or `other`, where that is
     nearer and the ray meets it too."""
@@ -211,7 +211,7 @@ def _nearer(h, one, other, x, d, ahead, offset, vertices, first, normal):  # typ
     return h
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def first_in_group(j, x, d, skip, start, groups, shapes, floats, words):  # type: ignore[no-untyped-def]
     """Return the first facet of group j that a ray meets, -1 for none, its distance [m], and how often it was cast.
 
@@ -248,7 +248,7 @@ def first_in_group(j, x, d, skip, start, groups, shapes, floats, words):  # type
     return -1, np.inf, _TRIES
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _turned(m, shift, x, by):  # type: ignore[no-untyped-def]
     """Return matrix m (3, 3) times x (3,), plus `by` times shift (3,)."""
     return (
@@ -258,7 +258,7 @@ def _turned(m, shift, x, by):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def first_hit(x, d, skip, start, groups, shapes, floats, words):  # type: ignore[no-untyped-def]
     """Return the first facet that a ray meets, -1 for none, its distance [m], and how often it was cast: once with its
     companions, however many groups it is cast at, and more where its hits do not count. Args as `first_in_group`."""

@@ -52,7 +52,7 @@ def first_within(origin, direction, own, reach, group, shapes, packet, facet):  
                 ahead[lane] = 2.0 * max(t, ahead[lane]) if again else reach
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _put(floats, words, lane, p, d, ahead, reach, middle):  # type: ignore[no-untyped-def]
     """Write a ray from p along d into the packet, from `ahead` to its reach [m]; return whether there is any of it."""
     x, y, z = p[0] + ahead * d[0], p[1] + ahead * d[1], p[2] + ahead * d[2]

@@ -53,7 +53,7 @@ class MetFacets(NamedTuple):
     blocker: Ints
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _is_clear(a, t, x, d, b, limit, slack, surfaces):  # type: ignore[no-untyped-def]
     """Tell whether a ray aimed at facet b (-1: none) that met facet a at t [m] reached its `limit` [m].
 
@@ -75,13 +75,13 @@ def _is_clear(a, t, x, d, b, limit, slack, surfaces):  # type: ignore[no-untyped
     return free and not (_inside(a, x, t, d, surfaces) and _inside(b, x, t, d, surfaces))
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _inside(a, x, t, d, surfaces):  # type: ignore[no-untyped-def]
     """Tell whether a ray meets facet a farther from its edges than rounding."""
     return contains(surfaces.vertices[a], surfaces.normal[a], x, t, d, -surfaces.margin)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _unused(passed):  # type: ignore[no-untyped-def]
     """Return the first place in `passed` (layers,) that holds no facet yet, -1 if all do."""
     for q in range(len(passed)):
@@ -90,7 +90,7 @@ def _unused(passed):  # type: ignore[no-untyped-def]
     return -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def follow_rays(rays, targets, groups, shapes, surfaces, packet, met):  # type: ignore[no-untyped-def]
     """Write into `met` what rays meet first, or, where they are aimed at targets, what they reached through layers.
 
@@ -99,7 +99,6 @@ def follow_rays(rays, targets, groups, shapes, surfaces, packet, met):  # type: 
     Returns: how many rays were cast; a ray and its companions count as one.
     """
     floats, words = packet
-    # Taken out of the tuples once: each access counts a reference.
     origin, direction, skip, starts = rays
     facet, distance, reached, passed, blocker = met
     aimed, casts = len(targets.limit) > 0, 0

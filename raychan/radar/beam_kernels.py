@@ -13,7 +13,7 @@ import numpy as np
 from raychan.compile.jit import njit
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def field_towards(look, table):  # type: ignore[no-untyped-def]
     """Return the table's value in a direction (3,), linear in both angles."""
     steps = table.shape[0] - 1

@@ -87,13 +87,13 @@ def seed_facets(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     return rows
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _half_width(radius, distance):  # type: ignore[no-untyped-def]
     """Return half the angle [rad] under which a sphere is seen; pi from within."""
     return math.asin(radius / distance) if radius < distance else math.pi
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _depth(centre, source):  # type: ignore[no-untyped-def]
     """Return how far [m] a point lies within the planes between which rays run, below 0 beyond one of them."""
     depth = np.inf
@@ -102,7 +102,7 @@ def _depth(centre, source):  # type: ignore[no-untyped-def]
     return depth
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _behind_wall(centre, radius, body, walls):  # type: ignore[no-untyped-def]
     """Tell whether a wall of another body hides a sphere: it lies behind, within the planes through the wall's
     edges."""
@@ -125,7 +125,7 @@ def _behind_wall(centre, radius, body, walls):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _eclipsed(centre, radius, body, image, far, spheres):  # type: ignore[no-untyped-def]
     """Tell whether a sphere lies wholly in the shadow of a sphere inside another body: within its cone or, from far,
     cylinder, and behind where rays enter it."""
@@ -153,7 +153,7 @@ def _eclipsed(centre, radius, body, image, far, spheres):  # type: ignore[no-unt
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def _may_be_lit(clusters, source, walls, spheres, out):  # type: ignore[no-untyped-def]
     """Write which clusters (k,) may hold a facet that the source lights; named tuples as their types say."""
     image, far = source.image, source.far

@@ -40,7 +40,7 @@ class FacetPlanes(NamedTuple):
     normal: NDArray[np.float64]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _normal(a, b, image, k, far):  # type: ignore[no-untyped-def]
     """Return a vector normal to the plane through segment ab and the image."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -51,7 +51,7 @@ def _normal(a, b, image, k, far):  # type: ignore[no-untyped-def]
     return dy * wz - dz * wy, dz * wx - dx * wz, dx * wy - dy * wx
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
     """Write the normals of the planes through the image and a tube's sides, one over the centre's height long, inward;
     return how far the centre lies ahead along k [m]."""
@@ -65,7 +65,7 @@ def pyramid(corners, image, k, far, planes):  # type: ignore[no-untyped-def]
     return (corners[3, 0] - image[0]) * k[0] + (corners[3, 1] - image[1]) * k[1] + (corners[3, 2] - image[2]) * k[2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def scale_at(a, b, image, k, far, here):  # type: ignore[no-untyped-def]
     """Return the tube's width at the middle of segment ab over that at its footprint, `here` [m] ahead of the image."""
     if far:
@@ -76,7 +76,7 @@ def scale_at(a, b, image, k, far, here):  # type: ignore[no-untyped-def]
     return min(max(edge / here, 0.01), 100.0)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped-def]
     """Return the part of segment ab (within begin to end, 0 to 1) that lies inside the pyramid of rays."""
     for e in range(3):
@@ -93,7 +93,7 @@ def within(a, b, corners, planes, scale, begin, end):  # type: ignore[no-untyped
     return begin, max(end, begin)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
     """Write into side (3,) the signed distances [m] of the corners from the plane through the image and segment ab;
     return whether the plane parts them."""
@@ -108,13 +108,13 @@ def apart(a, b, corners, image, k, far, side):  # type: ignore[no-untyped-def]
     return low < 0.0 < high
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def size_of(a, b):  # type: ignore[no-untyped-def]
     """Return the length of segment ab [m]."""
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def above(ha, hb):  # type: ignore[no-untyped-def]
     """Return from where to where (0 to 1) a segment whose ends have heights ha, hb lies above zero; equal: nowhere."""
     if ha <= 0.0 and hb <= 0.0:
@@ -124,13 +124,13 @@ def above(ha, hb):  # type: ignore[no-untyped-def]
     return 0.0, 1.0 if hb > 0.0 else ha / (ha - hb)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _height(a, p, n):  # type: ignore[no-untyped-def]
     """Return the height [m] of a over the plane through p of normal n."""
     return (a[0] - p[0]) * n[0] + (a[1] - p[1]) * n[1] + (a[2] - p[2]) * n[2]
 
 
-@njit(cache=True)
+@njit(cache=True, uncounted=True)
 def _two_planes(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # type: ignore[no-untyped-def]
     """Write into side (3,) the corners' distances [m] from the plane through the source and the line in which two
     planes meet: where bodies run into each other, no edge is drawn there.
@@ -158,7 +158,7 @@ def _two_planes(points, source, k, far, plane, p1, n1, p2, n2, a, b, side):  # t
     return min(side[0], side[1], side[2]) < 0.0 and max(side[0], side[1], side[2]) > 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, uncounted=True)
 def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side, work):  # type: ignore[no-untyped-def]
     """Write into side (3,) the corners' distances [m] from a line in which two of the planes that the rays hit meet."""
     for r in range(3):
@@ -173,12 +173,12 @@ def _meeting_line(points, source, k, far, plane, facet, first, normal, own, side
             break
 
 
-@njit(cache=True)
-def _line_beside(points, source, k, far, plane, facet, planes, beside, own, side, work):  # type: ignore[no-untyped-def]
+@njit(cache=True, uncounted=True)
+def _line_beside(points, source, k, far, plane, facet, planes, beside, own, side, work, hidden):  # type: ignore[no-untyped-def]
     """Write into side (3,) the corners' distances [m] from a line that parts the hidden rays from the others, in which
     the tube's own plane meets that of a neighbour, or of a neighbour's, of a facet in the way: a body that runs into
     this one may hide it by faces that no ray met."""
-    hidden, some = np.empty(4, np.int32), 0
+    some = 0
     for r in range(4):
         hidden[r] = 1 if facet[r] >= 0 else (0 if plane[r] >= 0 else -1)
         some |= 1 << hidden[r] if hidden[r] >= 0 else 0
@@ -201,6 +201,12 @@ def _line_beside(points, source, k, far, plane, facet, planes, beside, own, side
                 return
 
 
+@njit(cache=True, forceinline=True, uncounted=True)
+def _any(side):  # type: ignore[no-untyped-def]
+    """Tell whether a corner's distance is not zero."""
+    return side[0] != 0.0 or side[1] != 0.0 or side[2] != 0.0
+
+
 @njit(cache=True, nogil=True)
 def meeting_lines(points, source, k, far, plane, facet, planes, beside, own, side):  # type: ignore[no-untyped-def]
     """Fill in the rows of side (n, 3) that are zero: distances [m] of corners from the line in which two of the planes
@@ -211,16 +217,25 @@ def meeting_lines(points, source, k, far, plane, facet, planes, beside, own, sid
     own plane, of normal own (n, 3); planes of all facets as `FacetPlanes`; beside (f, 3) facets across their edges, -1
     for none.
     """
-    work = np.empty(3)
+    _each_meeting_line(
+        points, source, k, far, plane, facet, planes, beside, own, side, np.empty(3), np.empty(4, np.int32)
+    )
+
+
+@njit(cache=True, nogil=True, uncounted=True)
+def _each_meeting_line(points, source, k, far, plane, facet, planes, beside, own, side, work, hidden):  # type: ignore[no-untyped-def]
+    """Do what `meeting_lines` does, with room for work (3,) and (4,)."""
     first, normal = planes.point, planes.normal
     for i in range(points.shape[0]):
-        if not side[i].any():
+        if not _any(side[i]):
             _meeting_line(points[i], source[i], k[i], far, plane[i], facet[i], first, normal, own[i], side[i], work)
-        if not side[i].any():
-            _line_beside(points[i], source[i], k[i], far, plane[i], facet[i], planes, beside, own[i], side[i], work)
+        if not _any(side[i]):
+            _line_beside(
+                points[i], source[i], k[i], far, plane[i], facet[i], planes, beside, own[i], side[i], work, hidden
+            )
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _longest(corners, source, k, far, plane, first_edge, edges, planes, side, work):  # type: ignore[no-untyped-def]
     """Write into side (3,) the distances [m] of the corners from the edge of which the longest part lies inside a tube;
     return whether there is one."""
@@ -259,8 +274,13 @@ def edges_within(rows, rays, far, extent, planes, first_edge, edges, side):  # t
     rays that hit nothing; planes as `FacetPlanes`; edges[first_edge[g] : first_edge[g + 1]] (e, 2, 3) [m] around plane
     g.
     """
-    at, source, landed = np.empty((4, 3)), np.empty(3), np.empty(4, np.int32)
-    sides, work = np.empty((3, 3)), np.empty(3)
+    _each_edge_within(rows, rays, far, extent, planes, first_edge, edges, side, np.empty((9, 3)), np.empty(4, np.int32))
+
+
+@njit(cache=True, nogil=True, uncounted=True)
+def _each_edge_within(rows, rays, far, extent, planes, first_edge, edges, side, room, landed):  # type: ignore[no-untyped-def]
+    """Do what `edges_within` does, with room for work (9, 3) and (4,)."""
+    at, source, sides, work = room[:4], room[4], room[5:8], room[8]
     for i in rows:
         points, k, hit = rays.points[i], rays.directions[i, 3], rays.hit[i]
         t = rays.reach[i, 3] if hit[3] >= 0 else extent

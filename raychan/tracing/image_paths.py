@@ -18,7 +18,7 @@ _ROUNDING = 1e-9  # rad, and m
 _BEYOND = 1e-4  # m about a mirror, for rounding: a ray too many does no harm
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _mirror_point(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
     """Return where the line from a point to an image meets the mirror's plane; the point itself if it never does."""
     dx, dy, dz = image[0] - x, image[1] - y, image[2] - z
@@ -29,7 +29,7 @@ def _mirror_point(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
     return x + t * dx, y + t * dy, z + t * dz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
 def _may_reach(point, size, images, at, normal, centre, radius):  # type: ignore[no-untyped-def]
     """Tell whether a ray may reach a sphere: in front of the last mirror, over the circle about each mirror.
 
@@ -79,7 +79,7 @@ def may_reach(points, size, images, at, normal, centre, radius):  # type: ignore
     return ok
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _clipped(left, count, toward, least, other):  # type: ignore[no-untyped-def]
     """Write what of a convex polygon `left`, of so many corners, lies where x . toward >= least into `other`; return
     its number of corners."""
@@ -100,7 +100,7 @@ def _clipped(left, count, toward, least, other):  # type: ignore[no-untyped-def]
     return k
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _beyond_one(triangle, normals, offsets):  # type: ignore[no-untyped-def]
     """Tell whether all corners of a triangle lie beyond one of some planes."""
     p, q, r = row(triangle, 0), row(triangle, 1), row(triangle, 2)
@@ -120,10 +120,17 @@ def may_leave(corners, rows, images, at, normal, low, high, axes, windows):  # t
     Args: low, high (m, 2) [m] ends of the rectangles along their axes (m, 2, 3); windows (w, 3) normals of the planes
     through the image between which all rays run, inward.
     """
+    ok, most, w = np.empty(len(rows), np.bool_), 3 + 5 * len(at), len(windows)
+    polygons, planes = (np.empty((most, 3)), np.empty((most, 3))), (np.empty((1 + w, 3)), np.empty(1 + w))
+    _each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok)
+    return ok
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok):  # type: ignore[no-untyped-def]
+    """Write into ok (k,) what `may_leave` returns; polygons, planes room for work."""
     m, w = len(at), len(windows)
-    ok = np.empty(len(rows), np.bool_)
-    left, other = np.empty((3 + 5 * m, 3)), np.empty((3 + 5 * m, 3))  # halves of one array are compiled for apart
-    normals, offsets = np.empty((1 + w, 3)), np.empty(1 + w)
+    (left, other), (normals, offsets) = polygons, planes
     for k in range(-1, w):
         copy_to(normals[k + 1], normal[m - 1] if k < 0 else windows[k])
         offsets[k + 1] = dot(normals[k + 1], at[m - 1] if k < 0 else images[m])
@@ -147,7 +154,6 @@ def may_leave(corners, rows, images, at, normal, low, high, axes, windows):  # t
                 count = _clipped(left, count, along, low[j, side] - _BEYOND, other) if count else count
                 count = _clipped(other, count, back, -high[j, side] - _BEYOND, left) if count else count
         ok[o] = count > 0
-    return ok
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -232,7 +238,7 @@ def rays_from(points, image, far):  # type: ignore[no-untyped-def]
     return k, length
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def weight(p, images, far, normal, table, look):  # type: ignore[no-untyped-def]
     """Return the field, relative to the strongest, that the end's antenna sends to p (3,) over the mirrors.
 

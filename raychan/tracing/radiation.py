@@ -119,7 +119,7 @@ def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refine
     return Phases(**written._asdict())
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _length_at_middle(c, points, k, length, normals, bary, v, b, image, far, middle):  # type: ignore[no-untyped-def]
     """Write the middle of edge c of a tube; return the length there [m]: straight to the curved surface on the first
     facet, later by the cubic Hermite rule on the chord, and along the rays from there to the surface."""
@@ -138,7 +138,7 @@ def _length_at_middle(c, points, k, length, normals, bary, v, b, image, far, mid
     return 0.5 * (length[c] + length[d]) + 0.125 * turned + risen
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _area_across(points, k):  # type: ignore[no-untyped-def]
     """Return twice the area of a tube's corners (3, 3) or more as seen along k (3,), with its sign [m^2]."""
     p, q, r = points[0], points[1], points[2]
@@ -147,7 +147,7 @@ def _area_across(points, k):  # type: ignore[no-untyped-def]
     return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _reflection(j, materials, normal, k, wavenumber):  # type: ignore[no-untyped-def]
     """Return the larger of |R_s|, |R_p| of material j for a ray along k (3,)."""
     kind, eps, thickness, roughness = materials
@@ -169,14 +169,19 @@ def phases(tubes, facets, image, far, antenna, wavenumber, limits, out):  # type
     image (3,) of the end by which they came, or the direction to it when far; antenna of the leg out (see
     `image_paths.weight`); limits (phase, turn, most_bend) as for `edge_to_cut`; out as `PhaseColumns`.
     """
+    _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, out, np.empty((2, 3)))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, out, room):  # type: ignore[no-untyped-def]
+    """Do what `phases` does, with room (2, 3) for work."""
     images, out_far, mirrors, table = antenna
     out_image = images[len(mirrors)]
     phase, turn, most_bend = limits
-    # Taken out of the tuples once: each access counts a reference.
     corners, ks, lengths, normals, facet, bary, strength, spread = tubes
     vertices, edge_curvature, lossy, material, materials = facets
     all_six, all_bend, bound, in_phase, rough, whole = out
-    middle, look = np.empty(3), np.empty(3)
+    middle, look = room[0], room[1]
     for i in range(len(facet)):
         points, k, length, f = corners[i], ks[i], lengths[i], facet[i]
         six, bend = all_six[i], all_bend[i]

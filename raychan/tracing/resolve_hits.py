@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
 from raychan.geometry.curved_patches import distance_to_patch, weights_at
-from raychan.vectors import length_to
+from raychan.vectors import dot, length_to
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -66,12 +66,7 @@ class ReflectingFacets(NamedTuple):
     materials: tuple[Any, ...]
 
 
-@njit(cache=True, forceinline=True)
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _twice_area(p, k):  # type: ignore[no-untyped-def]
     """Return twice the area of a triangle as seen along k."""
     ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
@@ -79,7 +74,7 @@ def _twice_area(p, k):  # type: ignore[no-untyped-def]
     return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _strength(j, materials, cosine, wavenumber):  # type: ignore[no-untyped-def]
     """Return the larger of |R_s|, |R_p| of a material."""
     kind, eps, thickness, roughness = materials
@@ -87,17 +82,17 @@ def _strength(j, materials, cosine, wavenumber):  # type: ignore[no-untyped-def]
     return max(abs(back_s), abs(back_p))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
 def reflect_directions(k, normals, directions):  # type: ignore[no-untyped-def]
     """Write the directions (n, 4, 3) after reflection at the curved surface."""
     for i in range(len(k)):
         for q in range(4):
-            twice = 2.0 * _dot(k[i, q], normals[i, q])
+            twice = 2.0 * dot(k[i, q], normals[i, q])
             for c in range(3):
                 directions[i, q, c] = k[i, q, c] - twice * normals[i, q, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
 def contribution_bounds(  # type: ignore[no-untyped-def]
     points, k, length, normals, facet, strength, spread, image, far, wavenumber, lossy, material, materials, in_phase,
     bound, whole,
@@ -114,7 +109,7 @@ def contribution_bounds(  # type: ignore[no-untyped-def]
         if not far:
             share /= length_to(points[i, 3], image, far)
         if lossy[facet[i]]:
-            share *= _strength(material[facet[i]], materials, abs(_dot(normals[i, 3], k[i, 3])), wavenumber)
+            share *= _strength(material[facet[i]], materials, abs(dot(normals[i, 3], k[i, 3])), wavenumber)
         in_phase[i], bound[i] = share, share / (1.0 + 0.5 * wavenumber * (high - low))
         whole[i] = total / 3.0
 
@@ -144,7 +139,7 @@ def phase_at_hits(  # type: ignore[no-untyped-def]
             height = 0.0
             for c in range(3):
                 height += (first[f, c] - points[i, q, c]) * normal[f, c]
-            slope = _dot(directions[i, q], normal[f])
+            slope = dot(directions[i, q], normal[f])
             if height * slope <= 0.0:
                 # Not all of the tube can land there: how much of it does is not known yet.
                 low, high = 0.0, 0.0
@@ -193,7 +188,7 @@ def corner_rays(rows, points, directions, facet, start):  # type: ignore[no-unty
     return origin, direction, own, begin
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def on_one_surface(rows, hit, plane, smooth, normal, least_cosine, out):  # type: ignore[no-untyped-def]
     """Write for the tubes `rows` (m,) whether all rays land on one plane, or on one smooth patch whose normals there
     have at least `least_cosine` with the centre's.
@@ -207,7 +202,7 @@ def on_one_surface(rows, hit, plane, smooth, normal, least_cosine, out):  # type
         for q in range(3):
             g = h[q]
             one_plane &= g >= 0 and plane[g] == plane[f]
-            one_patch &= g >= 0 and smooth[g] == smooth[f] and _dot(normal[g], normal[f]) > least_cosine
+            one_patch &= g >= 0 and smooth[g] == smooth[f] and dot(normal[g], normal[f]) > least_cosine
         out[rows[j]] = one_plane or one_patch
 
 
@@ -221,16 +216,23 @@ def resolve_hits(rows, points, directions, hit, one_surface, first, normal, patc
 
     Args: patches vertices, edge curvature (f, 3, 3) and curved (f,) of the facets.
     """
-    vertices, edge_curvature, curved = patches
     m = len(rows)
     kept, facet, reach = np.empty(m, np.int64), np.empty((m, 4), hit.dtype), np.empty((m, 4))
+    count = _each_hit(rows, points, directions, hit, one_surface, first, normal, patches, kept, facet, reach)
+    return kept[:count], facet[:count], reach[:count]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _each_hit(rows, points, directions, hit, one_surface, first, normal, patches, kept, facet, reach):  # type: ignore[no-untyped-def]
+    """Write what `resolve_hits` returns, of the first m tubes; return m."""
+    vertices, edge_curvature, curved = patches
     count = 0
-    for j in range(m):
+    for j in range(len(rows)):
         i = rows[j]
         lands = True
         for q in range(3, -1, -1):
             f = hit[i, q] if one_surface[i] else hit[i, 3]
-            slope, height = _dot(directions[i, q], normal[f]), 0.0
+            slope, height = dot(directions[i, q], normal[f]), 0.0
             for c in range(3):
                 height += normal[f, c] * (first[f, c] - points[i, q, c])
             t = height / slope if slope != 0.0 else np.inf
@@ -242,10 +244,10 @@ def resolve_hits(rows, points, directions, hit, one_surface, first, normal, patc
         if lands:
             kept[count] = i
             count += 1
-    return kept[:count], facet[:count], reach[:count]
+    return count
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _normal_at(v, n, p, out):  # type: ignore[no-untyped-def]
     """Write the unit normal of the curved surface behind p, a point of the plane of a facet (v, n: corners, normals):
     corner normals weighted by barycentric coordinates."""
@@ -254,12 +256,12 @@ def _normal_at(v, n, p, out):  # type: ignore[no-untyped-def]
     one, two = min(max(one, -0.5), 1.5), min(max(two, -0.5), 1.5)
     for c in range(3):
         out[c] = none * n[0, c] + one * n[1, c] + two * n[2, c]
-    size = math.sqrt(_dot(out, out))
+    size = math.sqrt(dot(out, out))
     for c in range(3):
         out[c] /= size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
 def tubes_at_hits(rows, hit, reach, tubes, facets, far, wavenumber, out):  # type: ignore[no-untyped-def]
     """Write the state of the tubes `rows` (m,) where they land.
 
@@ -272,7 +274,7 @@ def tubes_at_hits(rows, hit, reach, tubes, facets, far, wavenumber, out):  # typ
     for j in range(len(rows)):
         i = rows[j]
         left = tubes.facet[i]
-        cosine = abs(_dot(tubes.normals[i, 3], tubes.directions[i, 3]))
+        cosine = abs(dot(tubes.normals[i, 3], tubes.directions[i, 3]))
         out.strength[j] = tubes.strength[i] * _strength(facets.material[left], facets.materials, cosine, wavenumber)
         for q in range(3, -1, -1):
             out.length[j, q] = tubes.length[i, q] + reach[j, q]
@@ -282,7 +284,7 @@ def tubes_at_hits(rows, hit, reach, tubes, facets, far, wavenumber, out):  # typ
             f = hit[j, q]
             _normal_at(facets.vertices[f], facets.normals[f], out.points[j, q], out.normals[j, q])
         # The centre says which side is lit; a corner beyond the terminator then shows its back and carries nothing.
-        if _dot(out.normals[j, 3], tubes.directions[i, 3]) > 0.0:
+        if dot(out.normals[j, 3], tubes.directions[i, 3]) > 0.0:
             for q in range(4):
                 for c in range(3):
                     out.normals[j, q, c] = -out.normals[j, q, c]

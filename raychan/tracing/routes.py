@@ -13,7 +13,7 @@ from raychan.records import REFLECT, SCATTER, TRANSMIT, Routes
 from raychan.tracing.footprints import footprints
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import Tubes, edge_middles, slices
-from raychan.vectors import copy_to, dot, plane_distance, row
+from raychan.vectors import copy_to, plane_distance
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -156,7 +156,7 @@ def leg_of_arrival(tubes: Tubes, mirrors: int, layers: int) -> tuple[Floats, Int
     return corners, passed
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def same_leg_out(last, slots, history, mirrors, corners, passed):  # type: ignore[no-untyped-def]
     """Write the mirror points (n, m, 3) at the start of each history, and the layers (n, l) right behind them, -1 for
     none.
@@ -178,13 +178,35 @@ def same_leg_out(last, slots, history, mirrors, corners, passed):  # type: ignor
             at = before[at]
 
 
-@njit(cache=True, forceinline=True)
-def _put(out, i, j, x):  # type: ignore[no-untyped-def]
-    """Write x into slot j of route i of out (n, d, 3)."""
-    out[i, j, 0], out[i, j, 1], out[i, j, 2] = x
+@njit(cache=True, forceinline=True, uncounted=True)
+def _write_history(i, used, tubes, history, retrace, planes, out):  # type: ignore[no-untyped-def]
+    """Write the first `used` interactions of tube i from its history, newest first; with `retrace` and after plane
+    mirrors alone each vertex moves to where the centre ray meets its plane (subdivision moved the centre)."""
+    place, normal_of, facet_of, kind_of, before = history
+    first, normal, _ = planes
+    vertices, normals, facet, _, kind = out
+    moves = retrace and tubes.flat[i]
+    at = tubes.last[i]
+    px, py, pz = tubes.points[i, 3, 0], tubes.points[i, 3, 1], tubes.points[i, 3, 2]
+    kx, ky, kz = tubes.k[i, 3, 0], tubes.k[i, 3, 1], tubes.k[i, 3, 2]
+    for s in range(used - 1, -1, -1):
+        f = facet_of[at]
+        facet[i, s], kind[i, s] = f, kind_of[at]
+        for c in range(3):
+            vertices[i, s, c], normals[i, s, c] = place[at, c], normal_of[at, c]
+        if moves:
+            t = plane_distance(normal[f], first[f], (px, py, pz), 0.0, (-kx, -ky, -kz))
+            if abs(t) < 1e300:
+                px, py, pz = px - t * kx, py - t * ky, pz - t * kz
+            vertices[i, s, 0], vertices[i, s, 1], vertices[i, s, 2] = px, py, pz
+            if kind_of[at] == _REFLECT:
+                x, y, z = normal_of[at]
+                turn = 2.0 * (kx * x + ky * y + kz * z)
+                kx, ky, kz = kx - turn * x, ky - turn * y, kz - turn * z
+        at = before[at]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _write_layers_out(i, used, here, planes, legs, out):  # type: ignore[no-untyped-def]
     """Write the layers that the ray from `here` (3,) to the end passes, from slot `used` on; return the next slot."""
     first, normal, _ = planes
@@ -209,51 +231,34 @@ def _write_layers_out(i, used, here, planes, legs, out):  # type: ignore[no-unty
     return used
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def interactions(tubes, history, retrace, planes, legs, out):  # type: ignore[no-untyped-def]
     """Write the interactions of tubes that scatter on their present footprint and leave over mirrors, in order.
 
-    Args: tubes as `RouteTubes`; history as for `same_leg_out`; retrace whether, after plane mirrors alone, vertices
-    move to where the centre ray meets the mirrors, as subdivision moved the centre; planes first, normal (f, 3) and
-    body (f,) of facets; legs as `ReturnLegs`; out as `Interactions`.
+    Args: tubes as `RouteTubes`; history as for `same_leg_out`; retrace whether vertices move to where the centre ray
+    meets the plane mirrors; planes first, normal (f, 3) and body (f,) of facets; legs as `ReturnLegs`; out as
+    `Interactions`.
     """
-    # Taken out of the tuples once: each access counts a reference.
-    (vertices, normals, facet, body, kind), (first, normal, body_of) = out, planes
-    place, normal_of, facet_of, kind_of, before = history
-    points, k, own, facets, last, slots, flat = tubes
-    corners, mirrors, mirror_facets, passed, _, _, end = legs
-    d, out_mirrors, layers = kind.shape[1], len(mirror_facets), passed.shape[1] > 0
-    for i in range(len(facets)):
-        used, at, moves = slots[i], last[i], retrace and flat[i]
-        p, ahead = (points[i, 3, 0], points[i, 3, 1], points[i, 3, 2]), (k[i, 3, 0], k[i, 3, 1], k[i, 3, 2])
-        _put(vertices, i, used, p)
-        _put(normals, i, used, (own[i, 3, 0], own[i, 3, 1], own[i, 3, 2]))
-        facet[i, used], kind[i, used] = facets[i], _SCATTER
-        # The history, newest first; each vertex that moves does so to where the centre ray meets its plane.
-        for s in range(used - 1, -1, -1):
-            f, n = facet_of[at], row(normal_of, at)
-            facet[i, s], kind[i, s] = f, kind_of[at]
-            _put(normals, i, s, n)
-            if moves:
-                t = plane_distance(row(normal, f), row(first, f), p, 0.0, (-ahead[0], -ahead[1], -ahead[2]))
-                if abs(t) < 1e300:
-                    p = p[0] - t * ahead[0], p[1] - t * ahead[1], p[2] - t * ahead[2]
-                if kind_of[at] == _REFLECT:
-                    turn = 2.0 * dot(ahead, n)
-                    ahead = ahead[0] - turn * n[0], ahead[1] - turn * n[1], ahead[2] - turn * n[2]
-            _put(vertices, i, s, p if moves else row(place, at))
-            at = before[at]
+    body_of = planes[2]
+    vertices, normals, facet, body, kind = out
+    d = kind.shape[1]
+    for i in range(len(tubes.facet)):
+        used, here = tubes.slots[i], tubes.points[i, 3]
+        _write_history(i, used, tubes, history, retrace, planes, out)
+        for c in range(3):
+            vertices[i, used, c], normals[i, used, c] = here[c], tubes.normals[i, 3, c]
+        facet[i, used], kind[i, used] = tubes.facet[i], _SCATTER
         used += 1
-        if layers:
-            used = _write_layers_out(i, used, points[i, 3], planes, legs, out)
-        for j in range(out_mirrors - 1, -1, -1):
-            _put(vertices, i, used, (corners[i, j, 0], corners[i, j, 1], corners[i, j, 2]))
-            _put(normals, i, used, row(mirrors, j))
-            facet[i, used], kind[i, used] = mirror_facets[j], _REFLECT
+        if legs.passed.shape[1] > 0:
+            used = _write_layers_out(i, used, here, planes, legs, out)
+        for j in range(len(legs.facets) - 1, -1, -1):
+            for c in range(3):
+                vertices[i, used, c], normals[i, used, c] = legs.corners[i, j, c], legs.normals[j, c]
+            facet[i, used], kind[i, used] = legs.facets[j], _REFLECT
             used += 1
         for s in range(used):
             body[i, s] = body_of[facet[i, s]] if facet[i, s] >= 0 else -1
         for s in range(used, d):
             facet[i, s], body[i, s], kind[i, s] = -1, -1, 0
-            _put(vertices, i, s, (end[0], end[1], end[2]))
-            _put(normals, i, s, (0.0, 0.0, 0.0))
+            for c in range(3):
+                vertices[i, s, c], normals[i, s, c] = legs.end[c], 0.0

@@ -101,7 +101,7 @@ def _silhouette(geometry: Geometry, leg: Leg) -> tuple[Floats, Ints]:
     return np.ascontiguousarray(edges), np.ascontiguousarray(smooth)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _direction_to(p, image, far, out):  # type: ignore[no-untyped-def]
     """Write the direction to p from the image, or where p lies in the plane across a direction [m]; return the distance
     [m], 1 when far."""
@@ -186,10 +186,18 @@ def _longest_shadows(points, facet, slack, normals, smooth, touch, shadows, out)
     Args: as for `ShadowEdges.across`; normals (f, 3), smooth (f,) of facets; touch [m] within which surfaces lie on
     each other; shadows as `_Shadows`.
     """
+    tested, room, cells = np.full(len(shadows.edges), -1, np.int64), np.empty((8, 3)), np.empty((2, 2), np.int64)
+    _each_longest_shadow(points, facet, slack, normals, smooth, touch, shadows, out, tested, room, cells)
+
+
+@njit(cache=True, nogil=True, uncounted=True)
+def _each_longest_shadow(points, facet, slack, normals, smooth, touch, shadows, out, tested, room, cells):  # type: ignore[no-untyped-def]
+    """Do what `_longest_shadows` does.
+
+    Args: tested (e,) which tube was last tested against each edge; room (8, 3), cells (2, 2) for work.
+    """
     image, far = shadows.image, shadows.far
-    tested = np.full(len(shadows.edges), -1, np.int64)
-    side, k, sides, cells = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((2, 2), np.int64)
-    x, least, most = np.empty(3), np.empty(3), np.empty(3)
+    side, k, sides, x, least, most = room[0], room[1], room[2:5], room[5], room[6], room[7]
     for i in range(len(points)):
         centre, normal, patch = points[i, 3], normals[facet[i]], smooth[facet[i]]
         for c in range(3):
@@ -224,7 +232,7 @@ def _longest_shadows(points, facet, slack, normals, smooth, touch, shadows, out)
                     copy_to(out[i], side)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _covered_cells(points, shadows, x, least, most, cells):  # type: ignore[no-untyped-def]
     """Write the cells that a tube (4, 3) covers, from and to on both axes of the grid (2, 2).
 

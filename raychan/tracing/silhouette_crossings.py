@@ -91,7 +91,7 @@ def _grid_of(geometry: Geometry) -> EdgeGrid:
     return EdgeGrid(edges, planes, first, index, low, cell, shape, bool(cut_off), occupied)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _steepest(k):  # type: ignore[no-untyped-def]
     """Return the axis along which a ray runs most."""
     axis = 0
@@ -105,97 +105,135 @@ def _longest_crossings(rows, rays, far, extent, planes, grid, centre, radius, ou
     """Write into `rows` of out (n, 3) the corners' distances from the silhouette edge of which the longest part lies
     inside each tube. Args: as for `SilhouetteCrossings.find`; extent [m] reach of rays that hit nothing; centre (b, 3),
     radius (b,) [m] of spheres about bodies, outside of which there is no edge."""
-    # Arrays are taken out of the tuples once, and the loop is one function: each access, and each call with arrays,
-    # counts references, which makes the loop 2.7 times slower.
-    all_points, all_directions, length, flat, hit, reach = rays
-    _, plane_point, plane_normal = planes
-    edges, edge_planes, first, entries, _, cell, shape, cut_off, occupied = grid
-    tested = np.full(len(edges), -1, np.int32)
-    side, source, sides, section = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((4, 3))
-    begin_cell, end_cell = np.empty(3, np.int64), np.empty(3, np.int64)
-    # Not constants: the compiler would make `layer_cells` anew for each of those.
-    single, many = np.int64(1), np.int64(BLOCK)
+    tested, room = np.full(len(grid.edges), -1, np.int32), np.empty((9, 3))
+    _each_longest_crossing(rows, rays, far, extent, planes, grid, centre, radius, out, tested, room)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _each_longest_crossing(rows, rays, far, extent, planes, grid, centre, radius, out, tested, room):  # type: ignore[no-untyped-def]
+    """Do what `_longest_crossings` does.
+
+    Args: tested (e,) which tube was last tested against each edge; room (9, 3) for work.
+    """
+    source, sides, section, side = room[0], room[1:4], room[4:8], room[8]
     for i in rows:
-        points, ks = all_points[i], all_directions[i]
-        middle, k = points[3], ks[3]
-        lands = hit[i, 3] >= 0
-        parallel = far or not flat[i]
+        points, ks, facet = rays.points[i], rays.directions[i], rays.hit[i, 3]
+        k, lands, parallel = ks[3], facet >= 0, far or not rays.flat[i]
         for c in range(3):
-            source[c] = middle[c] - length[i, 3] * k[c]
-        normal, landing = plane_normal[max(hit[i, 3], 0)], plane_point[max(hit[i, 3], 0)]
+            source[c] = points[3, c] - rays.length[i, 3] * k[c]
+        normal, landing = planes.normal[max(facet, 0)], planes.point[max(facet, 0)]
         sign = -1.0 if dot(k, normal) > 0.0 else 1.0
         ahead = pyramid(points, source, k, parallel, sides)
         for q in range(4):
             copy_to(section[q], points[q])
-        wide, spread = widths(points, ks)
-        far_end = reach[i, 3] if lands else extent
-        near, far_end = span_through_spheres(points, ks, wide, spread, far_end, centre, radius)
-        axis = _steepest(k)
-        for q in range(3):
-            if ks[q, axis] * math.copysign(1.0, k[axis]) <= ALONG:
-                far_end = min(far_end, _WIDEST_FAN * cell / spread)
-        (x, y, z), w = (-k, 0.0) if parallel else (source, 1.0)
-        best = 0.0
-        low_layer, high_layer = layer_range(points, ks, axis, near, far_end, grid)
-        count = high_layer - low_layer + 1 if far_end > near else 0
-        clear_until = 0
-        for s in range(count):
-            if s < clear_until:
+        x, y, z = (-k[0], -k[1], -k[2]) if parallel else (source[0], source[1], source[2])
+        tube = points, ks, rays.flat[i], source, parallel, ahead, sides, section
+        floor = lands, landing, normal, sign
+        looks = x, y, z, 0.0 if parallel else 1.0
+        span = _span(points, ks, rays.reach[i, 3] if lands else extent, grid.cell, centre, radius)
+        _longest_along(i, tube, floor, looks, span, grid, tested, side, out[i])
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _span(points, ks, reach, cell, centre, radius):  # type: ignore[no-untyped-def]
+    """Return the axis along which a tube runs most, and from where to where [m], at most `reach`, it is searched."""
+    k, (wide, spread) = ks[3], widths(points, ks)
+    near, far_end = span_through_spheres(points, ks, wide, spread, reach, centre, radius)
+    axis = _steepest(k)
+    for q in range(3):
+        if ks[q, axis] * math.copysign(1.0, k[axis]) <= ALONG:
+            far_end = min(far_end, _WIDEST_FAN * cell / spread)
+    return axis, near, far_end
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _longest_along(i, tube, floor, looks, span, grid, tested, side, out):  # type: ignore[no-untyped-def]
+    """Write into out (3,) the corners' distances from the edge of which the longest part lies inside tube i, layer by
+    layer from the mirror on: what is far off is left out where the tube grows too wide."""
+    points, ks = tube[0], tube[1]
+    axis, near, far_end = span
+    # Not constants: the compiler would make `layer_cells` anew for each of those.
+    single, many = np.int64(1), np.int64(BLOCK)
+    onward = ks[3, axis] > 0.0
+    low_layer, high_layer = layer_range(points, ks, axis, near, far_end, grid)
+    best, clear_until = 0.0, 0
+    for s in range(high_layer - low_layer + 1 if far_end > near else 0):
+        if s < clear_until:
+            continue
+        layer = low_layer + s if onward else high_layer - s
+        if s % BLOCK == 0:
+            block = layer if onward else layer - BLOCK + 1
+            begin, end, _ = layer_cells(points, ks, axis, block, many, near, far_end, grid)
+            if not any_occupied(grid.occupied, begin, end):
+                clear_until = s + BLOCK
                 continue
-            # From the mirror on: what is far off is left out where the tube grows too wide.
-            layer = low_layer + s if k[axis] > 0.0 else high_layer - s
-            if s % BLOCK == 0:
-                block = layer if k[axis] > 0.0 else layer - BLOCK + 1
-                layer_cells(points, ks, axis, block, many, near, far_end, grid, begin_cell, end_cell)
-                if not any_occupied(occupied, begin_cell, end_cell):
-                    clear_until = s + BLOCK
-                    continue
-            room = layer_cells(points, ks, axis, layer, single, near, far_end, grid, begin_cell, end_cell)
-            # The outermost layers of a grid that is cut off hold all that lies beyond: no width tells anything there.
-            if room > _WIDEST_LAYER and not (cut_off and (layer == 0 or layer == shape[axis] - 1)):
-                break
-            for ci in range(begin_cell[0], end_cell[0]):
-                for cj in range(begin_cell[1], end_cell[1]):
-                    row = (ci * shape[1] + cj) * shape[2]
-                    if end_cell[2] <= begin_cell[2]:
-                        continue
-                    for at in range(first[row + begin_cell[2]], first[row + end_cell[2]]):
-                        e = entries[at]
-                        # An edge is a silhouette where its faces look to different sides of the source.
-                        one = edge_planes[e, 0, 0] * x + edge_planes[e, 0, 1] * y + edge_planes[e, 0, 2] * z
-                        other = edge_planes[e, 1, 0] * x + edge_planes[e, 1, 1] * y + edge_planes[e, 1, 2] * z
-                        one, other = one - w * edge_planes[e, 0, 3], other - w * edge_planes[e, 1, 3]
-                        if (one > 0.0) == (other > 0.0) or tested[e] == i:
-                            continue
-                        tested[e] = i
-                        # As numbers: parts of an array would count references, which several threads wait for.
-                        a = edges[e, 0, 0], edges[e, 0, 1], edges[e, 0, 2]
-                        b = edges[e, 1, 0], edges[e, 1, 1], edges[e, 1, 2]
-                        # The part beyond the mirror, and before the plane of landing.
-                        da, db, ha, hb = -_TOUCHING, -_TOUCHING, -_TOUCHING, -_TOUCHING
-                        for c in range(3):
-                            da += (a[c] - middle[c]) * k[c]
-                            db += (b[c] - middle[c]) * k[c]
-                            ha += sign * (a[c] - landing[c]) * normal[c]
-                            hb += sign * (b[c] - landing[c]) * normal[c]
-                        begin, end = above(da, db)
-                        low_end, high_end = above(ha, hb) if lands else (0.0, 1.0)
-                        begin, end = max(begin, low_end), min(end, high_end)
-                        size = size_of(a, b)
-                        if (end - begin) * size <= best:
-                            continue
-                        if not flat[i]:
-                            # Off a curved mirror rays count as parallel, in the section that the tube has here.
-                            depth = 0.0
-                            for c in range(3):
-                                depth += (a[c] + 0.5 * (begin + end) * (b[c] - a[c]) - middle[c]) * k[c]
-                            for q in range(3):
-                                for c in range(3):
-                                    section[q, c] = points[q, c] + depth * (ks[q, c] - k[c])
-                            pyramid(section, source, k, True, sides)
-                        scale = scale_at(a, b, source, k, parallel, ahead)
-                        begin, end = within(a, b, section, sides, scale, begin, end)
-                        part = (end - begin) * size
-                        if part > best and apart(a, b, section, source, k, parallel, side):
-                            best = part
-                            copy_to(out[i], side)
+        begin, end, room = layer_cells(points, ks, axis, layer, single, near, far_end, grid)
+        # The outermost layers of a grid that is cut off hold all that lies beyond: no width tells anything there.
+        outermost = grid.cut_off and (layer == 0 or layer == grid.shape[axis] - 1)
+        if room > _WIDEST_LAYER and not outermost:
+            break
+        best = _longest_in_box(i, tube, floor, looks, begin, end, grid, best, tested, side, out)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _longest_in_box(i, tube, floor, looks, begin, end, grid, best, tested, side, out):  # type: ignore[no-untyped-def]
+    """Write into out (3,) the corners' distances from the edge in a box of cells of which a longer part than `best` [m]
+    lies inside tube i; return how long.
+
+    Args: floor see `_part_before`; looks (x, y, z, 1) a point from which edges are seen, or (x, y, z, 0) a direction.
+    """
+    x, y, z, w = looks
+    for ci in range(begin[0], end[0]):
+        for cj in range(begin[1], end[1] if end[2] > begin[2] else begin[1]):
+            row = (ci * grid.shape[1] + cj) * grid.shape[2]
+            for at in range(grid.first[row + begin[2]], grid.first[row + end[2]]):
+                e = grid.entries[at]
+                one, other = grid.planes[e, 0], grid.planes[e, 1]
+                # An edge is a silhouette where its faces look to different sides of the source.
+                front = one[0] * x + one[1] * y + one[2] * z - w * one[3] > 0.0
+                if front != (other[0] * x + other[1] * y + other[2] * z - w * other[3] > 0.0) and tested[e] != i:
+                    tested[e] = i
+                    best = _longer(grid.edges[e, 0], grid.edges[e, 1], tube, floor, best, side, out)
+    return best
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _longer(a, b, tube, floor, best, side, out):  # type: ignore[no-untyped-def]
+    """Write into out (3,) the corners' distances from edge ab if a longer part of it than `best` [m] lies inside a
+    tube; return how long."""
+    points, ks, flat, source, parallel, ahead, sides, section = tube
+    k, size = ks[3], size_of(a, b)
+    begin, end = _part_before(a, b, points[3], k, floor)
+    if (end - begin) * size <= best:
+        return best
+    if not flat:
+        # Off a curved mirror rays count as parallel, in the section that the tube has here.
+        depth = 0.0
+        for c in range(3):
+            depth += (a[c] + 0.5 * (begin + end) * (b[c] - a[c]) - points[3, c]) * k[c]
+        for q in range(3):
+            for c in range(3):
+                section[q, c] = points[q, c] + depth * (ks[q, c] - k[c])
+        pyramid(section, source, k, True, sides)
+    begin, end = within(a, b, section, sides, scale_at(a, b, source, k, parallel, ahead), begin, end)
+    part = (end - begin) * size
+    if part > best and apart(a, b, section, source, k, parallel, side):
+        copy_to(out, side)
+        return part
+    return best
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _part_before(a, b, middle, k, floor):  # type: ignore[no-untyped-def]
+    """Return which part of edge ab, from begin to end (0 to 1), lies beyond the mirror and before the plane of landing:
+    floor whether there is one, its point, its normal, and on which side of it the tube lies."""
+    lands, landing, normal, sign = floor
+    da, db, ha, hb = -_TOUCHING, -_TOUCHING, -_TOUCHING, -_TOUCHING
+    for c in range(3):
+        da += (a[c] - middle[c]) * k[c]
+        db += (b[c] - middle[c]) * k[c]
+        ha += sign * (a[c] - landing[c]) * normal[c]
+        hb += sign * (b[c] - landing[c]) * normal[c]
+    begin, end = above(da, db)
+    low_end, high_end = above(ha, hb) if lands else (0.0, 1.0)
+    return max(begin, low_end), min(end, high_end)

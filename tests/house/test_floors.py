@@ -106,7 +106,6 @@ LONG: dict[str, str] = {
     "cli/rcs:rcs": "48 lines declare its options, each with its help",
     "signal/nufft:add_transposed": "in blocks; splitting a fast-math loop may change its last digits",
     "signal/nufft:interpolate": "in blocks of chirps; as above",
-    "tracing/silhouette_crossings:_longest_crossings": "one loop: helpers that take arrays made it 2.7 times slower",
 }
 """Functions that may be longer or deeper, each with its reason."""
 
