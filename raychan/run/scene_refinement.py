@@ -23,7 +23,7 @@ from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
-from raychan.run.map_cells import Classes, MapCells, class_of, feeding_sources
+from raychan.run.map_cells import ALONG, Classes, MapCells, feeding_sources
 from raychan.run.mechanisms import QUIET, choose, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
@@ -31,6 +31,7 @@ from raychan.run.probes import probes_of
 from raychan.run.receiver import detections_in, least_in, map_of, noise_amplitude
 from raychan.run.refinement_budget import STEPS, Budget
 from raychan.run.rules import first_rule, step_rule
+from raychan.run.source_changes import class_of
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
@@ -171,7 +172,9 @@ class SceneRefinement:
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
         now = held.now if steps else first.paths
-        doubtful = raised(response, held.doubtful, cells.place, cells.doubt[: len(cells.place)] / COVER)
+        doubtful = held.doubtful
+        doubtful = scaled(doubtful, np.full(len(doubtful.length), ALONG))
+        doubtful = raised(response, doubtful, cells.place, cells.doubt[: len(cells.place)] / COVER)
         if first.left is not None:
             # What a level lacks is known: it needs no factor that covers what is not.
             doubtful = join([doubtful, scaled(first.left, np.full(len(first.left.length), 1.0 / COVER))])
@@ -235,6 +238,7 @@ def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list
     for i, x in enumerate(sums):
         found.append(feeding_sources(own, x, float(allowed[i])))
         cells.left[i] = x[deep & ~np.isin(own, found[-1][1])].sum()
+        cells.tubes[i] = np.linalg.norm(x[own != EXACT])
     return found
 
 
