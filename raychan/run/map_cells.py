@@ -15,15 +15,11 @@ from raychan.tracing.sources import EXACT, Sources
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating]
 Bools = NDArray[np.bool_]
-Classes = tuple[Sources, Sources]
-"""Sources of shallow tubes, and of deep ones."""
 
 _SHALLOW = 0.5  # of the tolerance, as an amplitude: so much shallow tubes may bring that are not traced again
 _DEEP = 0.3  # of the tolerance, as an amplitude: so much the deep tubes left uncut may bring
-_EITHER = 0.5  # of the tolerance: a class of tubes whose change takes more of it is refined further
-_REST = (
-    0.15  # of the tolerance, as an amplitude: so much the last changes of sources may add up to that are not refined
-)
+# Of the tolerance, as an amplitude: so much the last changes of sources may add up to that are not refined.
+_REST = 0.15
 ALONG = math.sqrt(0.5)
 """Share of an error's amplitude, rms, that lies along a level and changes it: their phases are unrelated. Of 106 levels
 of `bench.detections`, seeds 9700 to 9759, refined until they are within, 99 % lie within what is stated with it or
@@ -37,10 +33,11 @@ _FIRM, _HELD = 0.7, 0.5
 """A doubt that has not shrunk by _FIRM is one of errors that come by chance, and the next one may be small by chance:
 _HELD of it counts on, until another change is small as well. With it 73 of 76 levels of `bench.detections`, seeds 9700
 to 9759 at 1 dB, lie within what is stated, without 72."""
-_SURE, _SHRINK = 3, 0.7
-"""From so many steps on a cell is given up whose error would not be within the tolerance after all STEPS if it shrank
-by this factor a step. Of 38 cells above it after three of six steps (seeds 0 to 93) the 10 by 0.7^-3 or more were not
-reached, 22 of the others were."""
+_SHRINK = 0.65  # factor on doubts a step, as long as a cell has not told its own: median of the same seeds
+_FAST, _SLOW = 0.4, 0.75  # limits of such factors that cells tell by few steps (not measured)
+# Of the rms sum of a cell's changes: those of sources that bring least a ray wait. Urban's second step takes 0.26 of
+# the rays that all but _REST take, and leaves the same cells open.
+_PART = 0.3
 
 
 class MapCells:
@@ -62,7 +59,8 @@ class MapCells:
             mean = np.sqrt((np.abs(level) ** 2).mean(axis=0))
             self.tolerance *= (mean / np.maximum(np.abs(level), 1e-300)).ravel()
         self._changes = [Changes.none() for _ in self.level]
-        self._given_up, self._before = np.zeros(len(self.level), bool), np.full(len(self.level), np.inf)
+        self._before = np.full(len(self.level), np.inf)
+        self._shrunk, self._told = np.zeros(len(self.level)), np.zeros(len(self.level))
         self._held, self._older = np.zeros(len(self.level)), np.full(len(self.level), np.inf)
 
     def __len__(self) -> int:
@@ -131,11 +129,8 @@ class MapCells:
 
     @property
     def open(self) -> Bools:
-        """Which classes of tubes (c, 2) keep a level from its tolerance."""
-        share = ALONG * COVER * self.change / np.maximum(np.abs(self.level) * self.allowed, 1e-300)[:, None]
-        largest = share >= share.max(axis=1, keepdims=True)
-        refined = (self.over > 1.0)[:, None] & ((share > _EITHER) | largest)
-        return np.asarray((refined | self._to_confirm[:, None]) & (share > 0.0))
+        """Which levels (c,) are to be refined further."""
+        return np.asarray(((self.over > 1.0) | self._to_confirm) & self.change.any(axis=1))
 
     @property
     def _to_confirm(self) -> Bools:
@@ -143,41 +138,58 @@ class MapCells:
         change tells whether it was small by chance."""
         return np.asarray((self.over <= 1.0) & (self._held > 1.0))
 
-    def give_up(self, steps: int, left: int) -> None:
-        """Refine cells no more whose tolerance is out of reach, after some steps and before those that are left."""
+    def stepped(self) -> None:
+        """Note what a step has made of the doubts."""
         before, self._before, old = self._before, self.over, self._older
         self._held, self._older = np.where(before > _FIRM * old, _HELD * before, 0.0), before
-        if steps >= _SURE:
-            # The change of one step may be large by chance.
-            self._given_up |= np.minimum(before, self._before) * _SHRINK**left > 1.0
+        told = np.isfinite(before) & (before != self._before) & (before > 0.0)
+        self._shrunk[told] += np.log(np.maximum(self._before[told], 1e-9) / before[told])
+        self._told += told
 
     @property
-    def to_refine(self) -> Bools:
-        """Which classes of tubes (c, 2) must be refined."""
-        return self.open & ~self._given_up[:, None]
+    def steps(self) -> Floats:
+        """How many steps (c,) it takes to bring each level within its tolerance, about, by what steps brought so far:
+        the doubt of one step may be large or small by chance."""
+        shrink = np.clip(np.exp((math.log(_SHRINK) + self._shrunk) / (1.0 + self._told)), _FAST, _SLOW)
+        over = np.where(np.isfinite(self._before), np.sqrt(self._before * shrink * self.over), self.over)
+        return np.asarray(np.maximum(np.ceil(np.log(np.maximum(over, 1.0)) / -np.log(shrink)), 1.0))
 
-    def wanted(self, i: int) -> Classes:
-        """Return the sources whose last changes keep cell i open, shallow and deep: all but the weakest, as long as
-        neither their sum nor their rms sum exceeds a share of the tolerance; all that changed it last where that is to
-        be confirmed."""
-        known, limit = self._changes[i], _REST * self.allowed[i] * abs(self.level[i]) * (not self._to_confirm[i])
-        classes = class_of(known.source)
-        found = [_but_weakest(known.source[classes == j], known.change[classes == j], limit, True) for j in (0, 1)]
-        return found[0], found[1]
+    def sources(self, i: int) -> Sources:
+        """Return the sources (n,) that changed cell i."""
+        return self._changes[i].source
+
+    def wanted(self, i: int, rays: Floats, launch: Sources) -> Sources:
+        """Return the sources whose last changes keep cell i open, without those that bring least a ray, as long as
+        neither their sum nor their rms sum exceeds what may stay; all that changed it where that is to be confirmed.
+
+        Args: rays (n,) that it takes to trace each source again; launch (n,) one number for all traced together.
+        """
+        known, allowed = self._changes[i], self.allowed[i] * abs(self.level[i])
+        _, group = np.unique(launch, return_inverse=True)
+        change = known.slowness * known.change
+        sums = np.bincount(group, change.real) + 1j * np.bincount(group, change.imag)
+        power, cost = np.bincount(group, known.doubt**2), np.zeros(len(sums))
+        cost[group] = rays
+        limit = max(_REST * allowed, _PART * math.sqrt(power.sum()))
+        order = np.argsort(power / cost, kind="stable")
+        rest = np.maximum(np.sqrt(np.cumsum(power[order])), np.abs(np.cumsum(sums[order])))
+        first = int(np.flatnonzero(rest <= limit * (not self._to_confirm[i])).max(initial=-1)) + 1
+        return known.source[np.isin(group, order[first:])]
 
 
-def feeding_sources(source: Sources, sums: Complexes, tolerance: float) -> Classes:
-    """Return the shallow and the deep sources that a cell's level depends on, of sums (s,) of its paths by source.
+def feeding_sources(source: Sources, sums: Complexes, tolerance: float) -> Sources:
+    """Return the sources that a cell's level depends on, of sums (s,) of its paths by source.
 
     The weakest are left out: of the deep, as long as neither their sum nor their rms sum exceeds a share of the
     tolerance; of the shallow, which the first launch has cut, as long as their rms sum does not.
     """
     level, classes = abs(sums.sum()), class_of(source)
     shallow, deep = (np.flatnonzero((classes == j) & (source != EXACT) & (sums != 0.0)) for j in (0, 1))
-    return (
+    found = (
         _but_weakest(source[shallow], sums[shallow], _SHALLOW * tolerance * level, False),
         _but_weakest(source[deep], sums[deep], _DEEP * tolerance * level, True),
     )
+    return np.concatenate(found)
 
 
 def _but_weakest(source: Sources, sums: Complexes, limit: float, both: bool) -> Sources:

@@ -25,22 +25,28 @@ _BETTER = math.sqrt(0.5)
 """Factor on a last change from the second on. It is made by the errors of two launches, and that of the newer one is at
 most the other's: half of its power. Covers 96.8 % of 1209 levels of the same detections, 1.0 97.9 %."""
 
+_KEPT = 0.35
+"""Of a change, that the next one counts at least: it may be small by chance. Of 275 levels of `bench.detections`, seeds
+9640 to 9759, 97 % lie within what is stated with it, 96 % without."""
+
 
 @dataclass
 class Changes:
-    """The last change (n,) of a cell's level by each source (n,), and which sources (n,) changed it before; of such
-    sources, for each class, how the newest changes lie to those before: `pair` (2, 2), sums of products, and of squares
-    of the latter."""
+    """The last change (n,) of a cell's level by each source (n,), its `size` (n,), at least a share of the one before,
+    and which sources (n,) changed it before; of such sources how the last change lies to the one before: `pair` (2, n),
+    the product of both, and the square of the latter."""
 
     source: Sources
     change: Complexes
+    size: Floats
     again: Bools
     pair: Floats
 
     @staticmethod
     def none() -> Changes:
         """Return what holds where no launch changed anything."""
-        return Changes(np.zeros(0, np.int64), np.zeros(0, complex), np.zeros(0, bool), np.zeros((2, 2)))
+        none = np.zeros(0)
+        return Changes(none.astype(np.int64), none.astype(complex), none, none.astype(bool), np.zeros((2, 0)))
 
     def add(self, source: Sources, by: Complexes, least: float) -> None:
         """Note changes by sources (s,), in order, that replace earlier ones of these."""
@@ -48,23 +54,24 @@ class Changes:
             return
         at = np.minimum(np.searchsorted(source, self.source), len(source) - 1)
         twice = source[at] == self.source
-        classes = class_of(self.source[twice])
-        for j in (0, 1):
-            new, old = by[at[twice]][classes == j], self.change[twice][classes == j]
-            if len(old):
-                self.pair[j] = (new * old.conj()).real.sum(), (np.abs(old) ** 2).sum()
-        again = np.zeros(len(source), bool)
-        again[at[twice]] = True
-        keep = np.abs(by) > least
+        again, old, size = np.zeros(len(source), bool), np.zeros(len(source), complex), np.abs(by)
+        again[at[twice]], old[at[twice]] = True, self.change[twice]
+        size[at[twice]] = np.maximum(size[at[twice]], _KEPT * self.size[twice])
+        # A change that is small now tells how fast changes shrink.
+        keep = again | (np.abs(by) > least)
+        pair = np.stack([(by * old.conj()).real, np.abs(old) ** 2])
         self.source = np.concatenate([self.source[~twice], source[keep]])
         self.change = np.concatenate([self.change[~twice], by[keep]])
+        self.size = np.concatenate([self.size[~twice], size[keep]])
         self.again = np.concatenate([self.again[~twice], again[keep]])
+        self.pair = np.concatenate([self.pair[:, ~twice], pair[:, keep]], axis=1)
 
     @property
     def ratio(self) -> Floats:
         """By what factor (2,) the changes of each class shrink a step, below 0 where they change sides."""
+        new, old = (np.bincount(class_of(self.source), x, 2) for x in self.pair)
         with np.errstate(divide="ignore", invalid="ignore"):
-            q = self.pair[:, 0] / self.pair[:, 1]
+            q = new / old
         return np.where(np.isfinite(q), q, _UNKNOWN)
 
     @property
@@ -80,8 +87,15 @@ class Changes:
 
     def sums(self) -> tuple[Complexes, Floats]:
         """Return the sums (2,) and the rms sums (2,) of what may still change, by class."""
-        mine, change = class_of(self.source) == np.arange(2)[:, None], self.slowness * self.change
-        return (mine * change).sum(axis=1), np.sqrt((mine * np.abs(change) ** 2).sum(axis=1))
+        mine, factor = class_of(self.source) == np.arange(2)[:, None], self.slowness
+        return (mine * factor * self.change).sum(axis=1), np.sqrt((mine * self.doubt**2).sum(axis=1))
+
+    @property
+    def doubt(self) -> Floats:
+        """What may still change (n,) by each source, over COVER."""
+        return np.asarray(
+            np.maximum(self.slowness * np.abs(self.change), np.where(self.again, _BETTER, 1.0) * self.size)
+        )
 
 
 def class_of(source: Sources) -> NDArray[np.int64]:
