@@ -25,8 +25,8 @@ ALONG = math.sqrt(0.5)
 of `bench.detections`, seeds 9700 to 9759, refined until they are within, 99 % lie within what is stated with it or
 without."""
 _CLAIMED = 0.1
-"""Of the tolerance: no smaller error of tubes is stated, for what feeds a cell least is not traced again. Of 110 such
-levels all lie within what is stated with it, 98 % without."""
+"""Of the tolerance: no smaller error of tubes is stated, for what feeds a cell least is not traced again. Of such
+levels 99 % lie within what is stated with it, 98 % with half of it."""
 _ROOM = 0.9  # of the tolerance: the rest is for what is under the noise, and for neighbouring cells
 _NOTHING = 1e-3  # of the tolerance, as an amplitude: smaller changes are not kept one by one
 _FIRM, _HELD = 0.7, 0.5
@@ -35,7 +35,7 @@ _HELD of it counts on, until another change is small as well. With it 73 of 76 l
 to 9759 at 1 dB, lie within what is stated, without 72."""
 _SHRINK = 0.65  # factor on doubts a step, as long as a cell has not told its own: median of the same seeds
 _FAST, _SLOW = 0.4, 0.75  # limits of such factors that cells tell by few steps (not measured)
-# Of the rms sum of a cell's changes: those of sources that bring least a ray wait. Urban's second step takes 0.26 of
+# Of the rms sum of a cell's changes: those of sources that bring least a ray wait. Urban's second step takes 0.25 of
 # the rays that all but _REST take, and leaves the same cells open.
 _PART = 0.3
 
