@@ -9,7 +9,7 @@ or a budget ends.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,21 +23,23 @@ from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
-from raychan.run.map_cells import Classes, MapCells, class_of, feeding_sources
+from raychan.run.map_cells import ALONG, MapCells, feeding_sources
 from raychan.run.mechanisms import QUIET, choose, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.probes import probes_of
 from raychan.run.receiver import detections_in, least_in, map_of, noise_amplitude
 from raychan.run.refinement_budget import STEPS, Budget
+from raychan.run.refinement_plan import planned
 from raychan.run.rules import first_rule, step_rule
+from raychan.run.source_changes import class_of
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.run.unreached import Unreached, unreached_notes, unreached_of
 from raychan.signal.baseband import noisy, synthesize
-from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Batch, Launch, Stats
+from raychan.tracing.source_rays import SourceRays
 from raychan.tracing.sources import EXACT, Rings, Sources, launches
 from raychan.world.geometry import Geometry
 
@@ -48,7 +50,6 @@ Bools = NDArray[np.bool_]
 _MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may bring above it
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
-_SLOW = "changes that shrink too slowly for more steps to help"
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,9 @@ class SceneRefinement:
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
         now = held.now if steps else first.paths
-        doubtful = raised(response, held.doubtful, cells.place, cells.doubt[: len(cells.place)] / COVER)
+        doubtful = held.doubtful
+        doubtful = scaled(doubtful, np.full(len(doubtful.length), ALONG))
+        doubtful = raised(response, doubtful, cells.place, cells.doubt[: len(cells.place)] / COVER)
         if first.left is not None:
             # What a level lacks is known: it needs no factor that covers what is not.
             doubtful = join([doubtful, scaled(first.left, np.full(len(first.left.length), 1.0 / COVER))])
@@ -204,55 +207,52 @@ class SceneRefinement:
         self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells
     ) -> tuple[int, tuple[Unreached, ...], str]:
         """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why."""
-        feeding, facets = _feeding(held, response, cells), len(self.geometry.facets.body)
-        budget, steps, ended = Budget(self.model, self.stats), 0, ""
-        rings = Rings(self.geometry)
-        by = list(rings.with_those_beside(launches(_united(feeding), facets)))
-        while by and not ended:
+        wanted, rays = _feeding(held, response, cells), SourceRays(len(self.geometry.facets.body))
+        budget, rings, steps, ended = Budget(self.model, self.stats), Rings(self.geometry), 0, ""
+        while len(wanted) and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
-            rule = step_rule(self.radar, self.settings, self.model, steps + 1)
-            finer = replace(rule.refinement, least=steps + 1)
-            new = self._paths(launch.again(finer, by, self.stats, self._carried))
-            assert new is not None
-            own, sums = held.sums_of(*held.replace(*new, by), response, cells.place)
+            own, sums = held.sums_of(*self._again(launch, held, wanted, rays, rings), response, cells.place)
             for i, change in enumerate(sums):
                 cells.changed(i, own, change)
             steps += 1
-            cells.give_up(steps, STEPS - steps)
-            before, by = by, list(rings.with_those_beside(launches(_united(_wanted(cells)), facets)))
-            if by:
-                ended = budget.ended(steps, self.stats, len(held), _facets(by) / _facets(before))
+            cells.stepped()
+            wanted, foreseen, ended = planned(cells, rays, budget.left(self.stats), STEPS - steps)
+            if not ended and len(wanted):
+                ended = budget.ended(self.stats, len(held), foreseen)
+        reached = cells.over <= 1.0
         for i in range(len(cells)):
-            held.doubt(*cells.slowness(i))
-        unreached = tuple(unreached_of(cells))
-        return steps, unreached, ended or (_SLOW if unreached else "")
+            source, factor, share = cells.slowness(i)
+            # Cells not reached are raised to what they may be wrong by: their factors need not count elsewhere.
+            held.doubt(source, factor, share * reached[i])
+        return steps, tuple(unreached_of(cells)), ended
+
+    def _again(
+        self, launch: Launch, held: SourcedPaths, wanted: Sources, rays: SourceRays, rings: Rings
+    ) -> tuple[Paths, Sources]:
+        """Trace sources again, each half as coarse as before; return what that changes, as `SourcedPaths.replace`."""
+        step, changed = rays.next_step(wanted), list[tuple[Paths, Sources]]()
+        for k in np.unique(step):
+            by = list(rings.with_those_beside(launches(wanted[step == k], len(self.geometry.facets.body))))
+            rule, before = step_rule(self.radar, self.settings, self.model, int(k)), self.stats.rays
+            finer = replace(rule.refinement, least=int(k))
+            new = self._paths(launch.again(finer, by, self.stats, self._carried))
+            assert new is not None
+            rays.learn(int(k), by, new[1], self.stats.rays - before)
+            changed.append(held.replace(*new, by))
+        paths, sources = zip(*changed, strict=True)
+        return join(list(paths)), np.concatenate(sources)
 
 
-def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> list[Classes]:
-    """Return the sources that feed each cell, shallow and deep, and note what the deep tubes bring that are left."""
+def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> Sources:
+    """Return the sources that feed cells, and note what all tubes bring, and the deep ones that are left."""
     own, sums = held.by_source(response, cells.place)
-    deep, allowed, found = class_of(own) == 1, cells.allowed, []
+    deep, allowed, found = class_of(own) == 1, cells.allowed, np.zeros(len(own), bool)
     for i, x in enumerate(sums):
-        found.append(feeding_sources(own, x, float(allowed[i])))
-        cells.left[i] = x[deep & ~np.isin(own, found[-1][1])].sum()
-    return found
-
-
-def _wanted(cells: MapCells) -> Iterator[Classes]:
-    """Give the sources of each open cell that are to be traced again."""
-    none = np.zeros(0, np.int64)
-    for i, classes in enumerate(cells.to_refine):
-        if classes.any():
-            shallow, deep = cells.wanted(i)
-            yield shallow if classes[0] else none, deep if classes[1] else none
-
-
-def _united(classes: Iterable[Classes]) -> Sources:
-    return np.unique(np.concatenate([np.zeros(0, np.int64), *(x for both in classes for x in both)]))
-
-
-def _facets(by: list[tuple[int, Wanted]]) -> int:
-    return sum(int(wanted.facets.sum()) for _, wanted in by)
+        feeding = np.isin(own, feeding_sources(own, x, float(allowed[i])))
+        cells.left[i] = x[deep & ~feeding].sum()
+        cells.tubes[i] = np.linalg.norm(x[own != EXACT])
+        found |= feeding
+    return own[found]
 
 
 def counting(batches: list[Batch], keep: Bools) -> list[Batch]:

@@ -29,8 +29,8 @@ class Unreached:
 
 
 def unreached_of(cells: MapCells) -> Iterator[Unreached]:
-    """Give the cells of which a class of tubes is still to be refined."""
-    change, last = cells.change, np.flatnonzero(cells.open.any(axis=1))
+    """Give the cells that are still to be refined."""
+    change, last = cells.change, np.flatnonzero(cells.open)
     weak = cells.allowed > cells.tolerance
     for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
         (shallow, deep), place = change[i], cells.cell_of(i)

@@ -48,9 +48,14 @@ def facet_of(source: Sources) -> Ints:
     return np.where(source == EXACT, -1, source & ((1 << _FACET) - 1))
 
 
-def _legs_of(source: Sources) -> tuple[Ints, Ints]:
+def legs_of(source: Sources) -> tuple[Ints, Ints]:
     """Return the numbers of the legs (n,) in and out."""
     return source >> (_LEG + _DEPTH + _FACET), (source >> (_DEPTH + _FACET)) & ((1 << _LEG) - 1)
+
+
+def without_out(source: Sources) -> Sources:
+    """Return sources (n,) without the leg out: one number for all that a launch traces together."""
+    return source & ~np.int64(((1 << _LEG) - 1) << (_DEPTH + _FACET))
 
 
 def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
@@ -59,7 +64,7 @@ def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
     From each facet of a launch all its outgoing legs are traced: see `covered`.
     """
     own = source[source != EXACT]
-    (leg, out), depth = _legs_of(own), depth_of(own)
+    (leg, out), depth = legs_of(own), depth_of(own)
     for i, d in np.unique(np.stack([leg, depth], axis=1), axis=0):
         mine = (leg == i) & (depth == d)
         wanted = np.zeros(facets, bool)
@@ -99,7 +104,7 @@ class Rings:
 def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
     """Tell which sources (n,) some launches trace again."""
     found = np.zeros(len(source), bool)
-    (leg, out), depth, facet = _legs_of(source), depth_of(source), facet_of(source)
+    (leg, out), depth, facet = legs_of(source), depth_of(source), facet_of(source)
     for i, wanted in by:
         rows = np.flatnonzero((leg == i) & (depth == wanted.depth))
         found[rows] |= wanted.facets[facet[rows]] & np.isin(out[rows], list(wanted.outs))

@@ -201,8 +201,8 @@ class Model(Table):
     speckle: bool = False
     """Levels that makers' tolerances of the bodies move by more than tolerance_db are refined to that only."""
     max_rays: Literal["auto"] | Rays = "auto"
-    """Rays that a frame may cast to reach tolerance_db; auto: 4 times those of its first launch,
-    or 2,500,000 more where that is more."""
+    """Rays that a frame may cast to reach tolerance_db; auto: 1.5 times those of its first launch,
+    or 1,000,000 more where that is more."""
     max_seconds: RunSeconds | None = None
     """Time after which refinement takes no further step."""
     max_memory_mb: MemoryMb | None = None

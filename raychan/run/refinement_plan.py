@@ -1,0 +1,57 @@
+"""What the next step of a refinement traces again: what brings cells within their tolerance for few rays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.run.map_cells import MapCells
+from raychan.run.refinement_budget import RAYS, STEPS
+from raychan.tracing.source_rays import SourceRays
+from raychan.tracing.sources import Sources, without_out
+
+Floats = NDArray[np.float64]
+
+SLOW = "changes that shrink too slowly for more steps to help"
+_HOPE = 0.1  # of the rays left: so many cells may take that are not expected to be reached (not measured)
+_GROWTH = 1.6
+"""Rays of a cell's step over those of the one before: ever fewer sources keep it open. At 2.2, as for one source, cells
+are given up before half of the rays that are left is spent: 90 % of the detections of `bench.detections`, seeds 9640 to
+9759, at 0.5 dB are within it, 93 % at 1.6, by 16 and 21 million rays."""
+
+
+def planned(cells: MapCells, rays: SourceRays, left: float, steps: int) -> tuple[Sources, float, str]:
+    """Return the sources to trace again, how many rays that takes, about, and, where open cells have none, why.
+
+    Cells that take fewest rays come first; those that are not expected to be reached by the rays that are left wait,
+    and by the steps that are left, unless they take few: what they would take is lost.
+    """
+    opened, needs = np.flatnonzero(cells.open).tolist(), cells.steps
+    every = np.unique(np.concatenate([np.zeros(0, np.int64), *(cells.sources(i) for i in opened)]))
+    launch, cost = without_out(every), _GROWTH * rays.of(every)
+    wanted, needed = dict[int, list[Sources]](), dict[int, float]()
+    for i in opened:
+        at, place = np.searchsorted(every, cells.sources(i)), i % len(cells.place)
+        wanted.setdefault(place, []).append(cells.wanted(i, cost[at], launch[at]))
+        needed[place] = max(needed.get(place, 0.0), float(needs[i]))
+    rows = {p: np.searchsorted(every, np.unique(np.concatenate(x))) for p, x in wanted.items()}
+    rows = {p: r for p, r in rows.items() if len(r)}
+    if not rows or steps <= 0:
+        ended = SLOW if steps > 0 else f"{STEPS} steps"
+        return every[:0], 0.0, ended if opened else ""
+    series = {p: (_GROWTH ** min(n, steps) - 1.0) / (_GROWTH - 1.0) for p, n in needed.items()}
+    hope = {p: 1.0 if n <= steps else _HOPE for p, n in needed.items()}
+    taken, spent, again = np.zeros(0, np.int64), 0.0, np.zeros(len(every), bool)
+    for p in sorted(rows, key=lambda p: series[p] * _sum(cost, launch, rows[p])):
+        more = series[p] * _sum(cost, launch, rows[p][~np.isin(launch[rows[p]], taken)])
+        if spent + more <= hope[p] * left:
+            spent, again[rows[p]] = spent + more, True
+            taken = np.union1d(taken, launch[rows[p]])
+    ended = RAYS if max(hope[p] for p in rows) == 1.0 else SLOW
+    return every[again], _sum(cost, launch, np.flatnonzero(again)), "" if again.any() else ended
+
+
+def _sum(cost: Floats, launch: Sources, rows: NDArray[np.intp]) -> float:
+    """Return the rays of some rows, those traced together once."""
+    _, first = np.unique(launch[rows], return_index=True)
+    return float(cost[rows[first]].sum())
