@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import hashlib
+import operator
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -150,10 +151,11 @@ def _open(value: Any) -> Any:
     if type(value) is np.ndarray:
         if value.flags.writeable:
             return value
-    elif type(value) is tuple:
-        return tuple(map(_open, value))
     elif isinstance(value, tuple):
-        return type(value)(*map(_open, value))
+        opened = [_open(x) for x in value]
+        if all(map(operator.is_, opened, value)):
+            return value
+        return tuple(opened) if type(value) is tuple else type(value)(*opened)
     else:
         return value
     seen = value.view()

@@ -6,13 +6,13 @@ second order in v / c, which at 30 m/s and 4 GHz bandwidth are at -78 dB.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.parallel import threads
+from raychan.parallel import parallel_map
 from raychan.radar.array import Wavefronts, reach, wavefronts
 from raychan.radar.dual_paths import DualPaths
 from raychan.radar.radar import Radar
@@ -148,27 +148,22 @@ def _direct(amplitude: Complexes, delay: Floats, delay_rate: Floats, wave: Wavef
     return np.asarray(beat_sum(a, d, g, *ramp, wave.n_chirps, wave.n_samples))
 
 
+def _add_pair(grid: Keystone, echoes: Echoes, layer: Complexes, pair: tuple[Floats, Floats]) -> None:
+    """Add to the samples (chirps, samples) of one pair of elements what the `prepared` echoes of a grid bring."""
+    total = np.zeros(layer.shape, np.complex128)
+    grid.add(total, echoes, pair)
+    layer += total
+
+
 def _add_fast(samples: Samples, grids: list[tuple[Keystone, Echoes]], elements: list[tuple[Floats, Floats]]) -> None:
     """Write the samples of all pairs of elements, one grid after the other: of a long frame each may take gigabytes."""
-    cores = threads()
     sums = samples if len(grids) == 1 else np.zeros(samples.shape, np.complex128)
     # One buffer for all grids: allocating so much again costs more than filling it.
     buffer = np.empty(max(grid.factors for grid, _ in grids), np.complex128)
-    with ThreadPoolExecutor(max_workers=cores) as pool:
-        # At least as many receivers as cores: one core each. Else all cores work on one receiver. The sums are equal.
-        outer, inner = (pool.map, map) if len(elements) >= cores > 1 else (map, pool.map)
-        while grids:
-            grid, echoes = grids.pop()
-            ready = grid.prepared(echoes, buffer)
+    while grids:
+        grid, echoes = grids.pop()
+        ready = grid.prepared(echoes, buffer)
 
-            def receiver(
-                layer: Complexes, pair: tuple[Floats, Floats], grid: Keystone = grid, ready: Echoes = ready
-            ) -> None:
-                total = np.zeros(layer.shape, np.complex128)
-                grid.add(total, ready, pair, inner)
-                layer += total
-
-            for _ in outer(receiver, sums, elements):
-                pass
+        parallel_map(partial(_add_pair, grid, ready), list(sums), elements)
     if sums is not samples:
         samples[...] = sums

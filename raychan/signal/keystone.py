@@ -15,7 +15,6 @@ A, each term one more pair of transforms, cut where the tolerance allows.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -24,6 +23,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from raychan.parallel import parallel_map
 from raychan.radar.array import Wavefronts
 from raychan.radar.waveform import Waveform
 from raychan.signal.keystone_kernels import place_samples, place_sources
@@ -45,7 +45,6 @@ from raychan.units import C0
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
-Each = Callable[..., Iterable[Any]]
 
 # Sizes trade memory against threads at work; other values were not measured.
 _SINGLE = 1e-6  # tolerance down to which single precision and a kernel of 8 cells suffice
@@ -184,13 +183,10 @@ class Keystone:
         self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
         return echoes[order]
 
-    def add(
-        self, out: Complexes, echoes: Echoes, elements: tuple[Floats, Floats], each: Each, chunk: int = CHUNK
-    ) -> None:
+    def add(self, out: Complexes, echoes: Echoes, elements: tuple[Floats, Floats], chunk: int = CHUNK) -> None:
         """Add to out (chirps, samples) the beat signal of the `prepared` echoes between two elements.
 
-        Args: elements, positions (3,) [m] of transmitter and receiver; each, `map` or that of a thread pool; chunk,
-        most echoes spread at a time.
+        Args: elements, positions (3,) [m] of transmitter and receiver; chunk, most echoes spread at a time.
         """
         count, samples, half = len(echoes.delay), self.wave.n_samples, self.width // 2
         ramp = np.array([self.wave.carrier, self.wave.slope, self.then, self.t, self.step])
@@ -214,7 +210,7 @@ class Keystone:
 
         stripes = min(count, max(_STRIPES, -(-count // chunk)))
         bounds = np.linspace(0, count, stripes + 1).astype(int)
-        spectra_rows = list(each(gridded, [slice(a, b) for a, b in pairwise(bounds)]))
+        spectra_rows = parallel_map(gridded, [slice(a, b) for a, b in pairwise(bounds)])
 
         def read_block(start: int) -> None:
             end = min(start + _BLOCK, samples)
@@ -228,8 +224,7 @@ class Keystone:
             part, factor = np.s_[:, start:end], self.factor[:, :, start:end]
             interpolate(out[part], spectra, self.first[part], self.weight[part], factor)
 
-        for _ in each(read_block, range(0, samples, _BLOCK)):
-            pass
+        parallel_map(read_block, range(0, samples, _BLOCK))
 
 
 def keystones(

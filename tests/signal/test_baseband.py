@@ -93,7 +93,7 @@ def summed(parts, wave: Waveform, chunk: int = CHUNK) -> Cube:
     total = np.zeros((wave.n_chirps, wave.n_samples), complex)
     for grid, echoes_ in parts:
         ready = grid.prepared(echoes_, np.empty(grid.factors, complex))
-        grid.add(total, ready, (np.zeros(3), np.zeros(3)), map, chunk)
+        grid.add(total, ready, (np.zeros(3), np.zeros(3)), chunk)
     return Cube(samples=total[None].astype(np.complex64), noise_power=0.0)
 
 
