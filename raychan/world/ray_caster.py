@@ -178,7 +178,7 @@ class RayCaster:
         found, fixed = np.full(len(origin), _MISS, np.int32), (reach, self._facet_groups, self._shapes)
 
         def some(r: slice) -> None:
-            first_within(origin[r], direction[r], own[r], *fixed, new_packet(coherent=False), found[r])
+            first_within(origin[r], direction[r], own[r], *fixed, new_packet(), found[r])
 
         parallel_for(len(origin), some, _PARALLEL_FROM)
         return found
