@@ -14,6 +14,7 @@ Floats = NDArray[np.float64]
 
 SLOW = "changes that shrink too slowly for more steps to help"
 _HOPE = 0.1  # of the rays left: so many cells may take that are not expected to be reached (not measured)
+_SURE = 3  # steps from which on cells are given up for the steps or rays that they would take (not measured)
 _GROWTH = 1.6
 """Rays of a cell's step over those of the one before: ever fewer sources keep it open. At 2.2, as for one source, cells
 are given up before half of the rays that are left is spent: 90 % of the detections of `bench.detections`, seeds 9640 to
@@ -39,8 +40,10 @@ def planned(cells: MapCells, rays: SourceRays, left: float, steps: int) -> tuple
     if not rows or steps <= 0:
         ended = SLOW if steps > 0 else f"{STEPS} steps"
         return every[:0], 0.0, ended if opened else ""
-    series = {p: (_GROWTH ** min(n, steps) - 1.0) / (_GROWTH - 1.0) for p, n in needed.items()}
-    hope = {p: 1.0 if n <= steps else _HOPE for p, n in needed.items()}
+    # How changes shrink is not known before some: until then a step must be paid for, not all that follow.
+    known = STEPS - steps >= _SURE
+    series = {p: (_GROWTH ** min(n, steps) - 1.0) / (_GROWTH - 1.0) if known else 1.0 for p, n in needed.items()}
+    hope = {p: _HOPE if known and n > steps else 1.0 for p, n in needed.items()}
     taken, spent, again = np.zeros(0, np.int64), 0.0, np.zeros(len(every), bool)
     for p in sorted(rows, key=lambda p: series[p] * _sum(cost, launch, rows[p])):
         more = series[p] * _sum(cost, launch, rows[p][~np.isin(launch[rows[p]], taken)])

@@ -43,7 +43,7 @@ _PHASE, _TURN = 0.5, 0.5
 # levels in place of one lie beyond the errors stated (`make bench BENCH="--only auto"`, docs/measurements.md).
 _FLOOR = 2.0
 # rad: without, echoes over two cylinders, 22 dB over the noise, come out 10 dB weaker and are lost. The three scenes at
-# 0.5 dB cast 0.90 times the rays, and one echo more of the occluded pedestrian is found at 3 dB.
+# 0.5 dB cast 0.90 times the rays (command not kept).
 _FAN = 0.1
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
