@@ -24,8 +24,8 @@ are given up before half of the rays that are left is spent: 90 % of the detecti
 def planned(cells: MapCells, rays: SourceRays, left: float, steps: int) -> tuple[Sources, float, str]:
     """Return the sources to trace again, how many rays that takes, about, and, where open cells have none, why.
 
-    Cells that take fewest rays come first; those that are not expected to be reached by the rays that are left wait,
-    and by the steps that are left, unless they take few: what they would take is lost.
+    Cells that take fewest rays come first. After some steps those that are not expected to be reached by the rays that
+    are left wait, and by the steps that are left, unless they take few: what they would take is lost.
     """
     opened, needs = np.flatnonzero(cells.open).tolist(), cells.steps
     every = np.unique(np.concatenate([np.zeros(0, np.int64), *(cells.sources(i) for i in opened)]))
