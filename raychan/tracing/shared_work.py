@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from raychan.parallel import parallel_tasks
+from raychan.parallel import parallel_map
 from raychan.world.geometry import Geometry
 
 T = TypeVar("T")
@@ -17,17 +17,17 @@ def all_of(geometry: Geometry, tasks: Sequence[Callable[[], T]]) -> list[T]:
 
     No task may depend on another.
     """
-    found: dict[int, T] = {}
-    caller, elsewhere = threading.get_ident(), []
+    caller, elsewhere = threading.get_ident(), list[int]()
 
-    def one(i: int) -> None:
+    def one(task: Callable[[], T]) -> T:
         before = geometry.rays
-        found[i] = tasks[i]()
+        made = task()
         if threading.get_ident() != caller:
             rays = geometry.rays - before
             elsewhere.append(rays)
             geometry.count_rays(-rays)  # they are the caller's
+        return made
 
-    parallel_tasks(len(tasks), one)
+    found = parallel_map(one, tasks)
     geometry.count_rays(sum(elsewhere))
-    return [found[i] for i in range(len(tasks))]
+    return found

@@ -72,3 +72,9 @@ def test_a_source_of_two_cells_is_paid_for_once():
     cells.stepped()
     _, rays, _ = planned(cells, rays_of(100, 100), 1e6, 6)
     assert rays == planned(cells_of((0.05,)), rays_of(100), 1e6, 6)[1]
+
+
+@pytest.mark.parametrize(("left", "count", "why"), [(7, 1, ""), (5, 0, SLOW)])
+def test_no_cell_is_given_up_before_three_steps_told_how_its_changes_shrink(left, count, why):
+    found, _, ended = planned(cells_of((30.0,)), rays_of(1000), 5e3, left)
+    assert len(found) == count and ended == why
