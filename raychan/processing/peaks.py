@@ -92,3 +92,31 @@ class SideLobes:
             if kept[i]:
                 lobes[i:] += self.at(place[i:], place[i], power[i], smear[i])
         return kept
+
+    def shoulders(self, power: Floats, pad: tuple[int, int], peaks: Ints, cells: Ints) -> tuple[Ints, Floats]:
+        """Return which of the cells (c, 2) are not side lobes, and lie a resolution cell or more from peaks (p, 2) and
+        from stronger ones of them; and the most power (s,) within a resolution cell of each: so much makes it a peak.
+
+        Args: power of a map with `pad` map cells per resolution cell."""
+        every = np.concatenate([peaks, cells])
+        order = np.argsort(-power[tuple(every.T)], kind="stable")
+        own = np.zeros(len(every), bool)
+        own[order] = self.own(every[order] / np.array(pad), power[tuple(every[order].T)], np.zeros(len(every)))
+        found = list(peaks)
+        for i in order[(order >= len(peaks)) & own[order]]:
+            away = np.abs(every[i] - np.reshape(found, (-1, 2)))
+            if ((np.minimum(away, power.shape - away) / pad).max(axis=1) >= 1.0).all():
+                found.append(every[i])
+        kept = np.reshape(found, (-1, 2)).astype(np.int64)[len(peaks) :]
+        steps = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in pad), indexing="ij"), axis=-1).reshape(-1, 2)
+        near = (kept[:, None] + steps) % power.shape
+        return kept, power[near[..., 0], near[..., 1]].max(axis=1, initial=0.0)
+
+
+def strongest(power: Floats, grid: Grid) -> Ints:
+    """Return the strongest map cell (c, 2) of each resolution cell."""
+    pad = np.array(grid.pad)
+    size = np.array(power.shape) // pad
+    blocks = power[: size[0] * pad[0], : size[1] * pad[1]].reshape(size[0], pad[0], size[1], pad[1])
+    best = np.argmax(blocks.transpose(0, 2, 1, 3).reshape(*size, -1), axis=2)
+    return np.reshape(np.moveaxis(np.indices(size), 0, -1) * pad + np.stack(np.divmod(best, pad[1]), -1), (-1, 2))

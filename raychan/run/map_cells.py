@@ -79,7 +79,8 @@ class MapCells:
         return count
 
     def spare(self, least: Floats) -> None:
-        """Let levels below amplitudes (c,), from which on cells are detections, be wrong by what keeps them from it."""
+        """Let levels below amplitudes (c,), from which on cells are detections or peaks, be wrong by what keeps them
+        from it."""
         self._least = np.tile(least, len(self) // max(len(least), 1))
 
     @property

@@ -12,14 +12,17 @@ from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Grid, fitting_guard
 from raychan.processing.detection import Array, detect, least_power
 from raychan.processing.mimo import virtual_range_doppler
+from raychan.processing.peaks import SideLobes, strongest
 from raychan.processing.staggered import hypotheses, unfolded
 from raychan.radar.aperture import Aperture
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
-from raychan.units import C0
+from raychan.units import C0, undb
 
 Floats = NDArray[np.float64]
+
+_FAINT = 1e-8  # of the strongest cell: the weakest shoulder possible where there is no noise; not measured
 
 
 def map_of(cube: Cube, radar: Radar, settings: Any, cross: bool = False) -> RangeDoppler:
@@ -49,6 +52,20 @@ def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detection
 def least_in(rdmap: RangeDoppler, cells: NDArray[np.int64], radar: Radar, settings: Any) -> Floats:
     """Return the power (c,) [W] that map cells (c, 2) need to become detections."""
     return least_power(rdmap, cells, **_detector(rdmap, radar, settings))
+
+
+def shoulders_in(
+    rdmap: RangeDoppler, peaks: NDArray[np.int64], radar: Radar, settings: Any
+) -> tuple[NDArray[np.int64], Floats]:
+    """Return map cells (c, 2) beside peaks (p, 2) that have the power of detections, but are neither local maxima nor
+    side lobes, and the power (c,) [W] that makes each a local maximum."""
+    power, grid = rdmap.power, Grid.of(rdmap)
+    cells = strongest(power, grid)
+    least = max(float(undb(settings.min_snr_db)) * rdmap.noise, _FAINT * float(power.max(initial=0.0)))
+    cells = cells[power[tuple(cells.T)] >= least]
+    cells = cells[power[tuple(cells.T)] >= least_in(rdmap, cells, radar, settings)]
+    lobes = SideLobes(grid, (settings.rate_window, settings.range_window))
+    return lobes.shoulders(power, grid.pad, peaks, cells)
 
 
 def _detector(rdmap: RangeDoppler, radar: Radar, settings: Any) -> dict[str, Any]:
