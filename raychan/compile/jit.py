@@ -56,12 +56,12 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
         with global_compiler_lock:
             if given != opened and given not in self.served:
                 self.served.add(given)
-                self._insert(list(given), code, False)
+                self._insert(list(given), code, False)  # type: ignore[attr-defined]
         return code
 
     def _code_of(self, value: Any) -> int:
         """Return numba's number of an argument's type."""
-        kind = types.Omitted(value.value) if isinstance(value, OmittedArg) else self.typeof_pyval(value)
+        kind: Any = types.Omitted(value.value) if isinstance(value, OmittedArg) else self.typeof_pyval(value)
         return int(kind._code)
 
     def compile(self, sig: Any) -> Any:
