@@ -19,6 +19,7 @@ import numpy as np
 from numba import types
 from numba.core import config
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import OmittedArg
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
@@ -43,10 +44,25 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
 
     kept: CodeCache
     stamp: bytes
+    served: set[tuple[int, ...]]  # codes of the types of read-only arguments that code for writable ones serves
 
-    def __call__(self, *args: Any) -> Any:
-        """Call the kernel; unless bounds are checked, it may write to all arrays."""
-        return super().__call__(*args) if _CHECKED else super().__call__(*map(_open, args))
+    def _compile_for_args(self, *args: Any, **named: Any) -> Any:
+        """Return the code for arguments of types that no call had before; unless bounds are checked, it may write to
+        all arrays. Later calls of such types go straight to it."""
+        if _CHECKED:
+            return super()._compile_for_args(*args, **named)
+        code = super()._compile_for_args(*map(_open, args), **named)
+        given, opened = (tuple(self._code_of(x) for x in xs) for xs in (args, map(_open, args)))
+        with global_compiler_lock:
+            if given != opened and given not in self.served:
+                self.served.add(given)
+                self._insert(list(given), code, False)  # type: ignore[attr-defined]
+        return code
+
+    def _code_of(self, value: Any) -> int:
+        """Return numba's number of an argument's type."""
+        kind: Any = types.Omitted(value.value) if isinstance(value, OmittedArg) else self.typeof_pyval(value)
+        return int(kind._code)
 
     def compile(self, sig: Any) -> Any:
         """Compile the kernel for these argument types, or wait for the process that does and take its code.
@@ -139,6 +155,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
                 return made
             made.__class__ = Kernel
             made._cache = made.kept = cache
+            made.served = set()
             made.stamp = made.kept.stamped(hashlib.sha256(_within_reach(function, made.kept.source)).digest())
             KERNELS.append(made)
         return made

@@ -91,7 +91,8 @@ class MapCells:
     def changed(self, i: int, source: Sources, by: Complexes) -> None:
         """Note by what sources (s,), in order, changed cell i."""
         self.level[i] += by.sum()
-        self._changes[i].add(source, by, _NOTHING * self.tolerance[i] * abs(self.level[i]))
+        least = _NOTHING * self.tolerance[i] * abs(self.level[i])
+        self._changes[i] = self._changes[i].with_more(source, by, least)
 
     @property
     def doubt(self) -> Floats:
@@ -107,7 +108,7 @@ class MapCells:
         rms sum."""
         found = np.zeros(len(self))
         for i, changes in enumerate(self._changes):
-            whole, rms = changes.sums()
+            whole, rms = changes.sums
             sizes = abs(whole.sum() + self.left[i]), float(np.hypot(np.hypot(*rms), abs(self.left[i])))
             found[i] = ALONG * COVER * max(sizes)
         return found
@@ -115,7 +116,7 @@ class MapCells:
     @property
     def change(self) -> Floats:
         """By how much (c, 2) shallow and deep tubes may still change each level, rms sums."""
-        return np.array([c.sums()[1] for c in self._changes]).reshape(-1, 2)
+        return np.array([c.sums[1] for c in self._changes]).reshape(-1, 2)
 
     def slowness(self, i: int) -> tuple[Sources, Floats, Floats]:
         """Return the sources (n,) that changed cell i, by what factor (n,) the error of each exceeds COVER times its
@@ -178,23 +179,22 @@ class MapCells:
         return known.source[np.isin(group, order[first:])]
 
 
-def feeding_sources(source: Sources, sums: Complexes, tolerance: float) -> Sources:
-    """Return the sources that a cell's level depends on, of sums (s,) of its paths by source.
+def feeding_sources(source: Sources, sums: Complexes, tolerance: float) -> Bools:
+    """Tell on which sources (s,) a cell's level depends, by sums (s,) of its paths by source.
 
     The weakest are left out: of the deep, as long as neither their sum nor their rms sum exceeds a share of the
     tolerance; of the shallow, which the first launch has cut, as long as their rms sum does not.
     """
-    level, classes = abs(sums.sum()), class_of(source)
-    shallow, deep = (np.flatnonzero((classes == j) & (source != EXACT) & (sums != 0.0)) for j in (0, 1))
-    found = (
-        _but_weakest(source[shallow], sums[shallow], _SHALLOW * tolerance * level, False),
-        _but_weakest(source[deep], sums[deep], _DEEP * tolerance * level, True),
-    )
-    return np.concatenate(found)
+    level, deep, brings = abs(sums.sum()), class_of(source) == 1, (source != EXACT) & (sums != 0.0)
+    found = np.zeros(len(source), bool)
+    for rows, share, both in ((~deep, _SHALLOW, False), (deep, _DEEP, True)):
+        some = np.flatnonzero(rows & brings)
+        found[some[_but_weakest(sums[some], share * tolerance * level, both)]] = True
+    return found
 
 
-def _but_weakest(source: Sources, sums: Complexes, limit: float, both: bool) -> Sources:
-    """Return the sources without the weakest, as long as their rms sum, or with `both` neither that nor their sum,
+def _but_weakest(sums: Complexes, limit: float, both: bool) -> NDArray[np.intp]:
+    """Return the rows without the weakest, as long as their rms sum, or with `both` neither that nor their sum,
     exceeds a limit."""
     order = np.argsort(np.abs(sums), kind="stable")
     ordered = sums[order]
@@ -202,4 +202,4 @@ def _but_weakest(source: Sources, sums: Complexes, limit: float, both: bool) -> 
     if both:
         small &= np.abs(np.cumsum(ordered)) <= limit
     keep = int(np.flatnonzero(small).max(initial=-1)) + 1
-    return source[order[keep:]]
+    return order[keep:]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
 from raychan.columns import take
+from raychan.parallel import parallel_tasks
 from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
@@ -217,8 +218,7 @@ class SceneRefinement:
         while len(wanted) and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
             own, sums = held.sums_of(*self._again(launch, held, wanted, rays, rings), response, cells.place)
-            for i, change in enumerate(sums):
-                cells.changed(i, own, change)
+            _each(sums, lambda i, change, own=own: cells.changed(i, own, change))  # type: ignore[misc]
             steps += 1
             cells.stepped()
             wanted, foreseen, ended = planned(cells, rays, budget.left(self.stats), STEPS - steps)
@@ -252,12 +252,25 @@ def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> Sour
     """Return the sources that feed cells, and note what all tubes bring, and the deep ones that are left."""
     own, sums = held.by_source(response, cells.place)
     deep, allowed, found = class_of(own) == 1, cells.allowed, np.zeros(len(own), bool)
-    for i, x in enumerate(sums):
-        feeding = np.isin(own, feeding_sources(own, x, float(allowed[i])))
+    tubes = int(np.searchsorted(own, EXACT, side="right"))  # from there on, for exact routes have the least number
+
+    def one(i: int, x: Complexes) -> None:
+        feeding = feeding_sources(own, x, float(allowed[i]))
         cells.left[i] = x[deep & ~feeding].sum()
-        cells.tubes[i] = np.linalg.norm(x[own != EXACT])
-        found |= feeding
+        # Not by BLAS, whose sums depend on how many threads it takes.
+        cells.tubes[i] = math.sqrt((np.abs(x[tubes:]) ** 2).sum())
+        found[feeding] = True
+
+    _each(sums, one)
     return own[found]
+
+
+def _each(sums: Iterator[Complexes], work: Callable[[int, Complexes], None]) -> None:
+    """Call `work` with the number of each level and its sums (s,), by all threads."""
+    first = 0
+    for part in sums:
+        parallel_tasks(len(part), lambda j, first=first, part=part: work(first + j, part[j]))  # type: ignore[misc]
+        first += len(part)
 
 
 def counting(batches: list[Batch], keep: Bools) -> list[Batch]:

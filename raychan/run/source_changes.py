@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +31,11 @@ _KEPT = 0.35
 seeds 9640 to 9759, 97 % lie within what is stated with it, as with 0.5, and 96 % without."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Changes:
     """The last change (n,) of a cell's level by each source (n,), its `size` (n,), at least a share of the one before,
     and which sources (n,) changed it before; of such sources how the last change lies to the one before: `pair` (2, n),
-    the product of both, and the square of the latter."""
+    the product of both, and the square of the latter. What follows from them is computed once."""
 
     source: Sources
     change: Complexes
@@ -48,10 +49,10 @@ class Changes:
         none = np.zeros(0)
         return Changes(none.astype(np.int64), none.astype(complex), none, none.astype(bool), np.zeros((2, 0)))
 
-    def add(self, source: Sources, by: Complexes, least: float) -> None:
-        """Note changes by sources (s,), in order, that replace earlier ones of these."""
+    def with_more(self, source: Sources, by: Complexes, least: float) -> Changes:
+        """Return these with changes by sources (s,), in order, that replace earlier ones of these."""
         if not len(source):
-            return
+            return self
         at = np.minimum(np.searchsorted(source, self.source), len(source) - 1)
         twice = source[at] == self.source
         again, old, size = np.zeros(len(source), bool), np.zeros(len(source), complex), np.abs(by)
@@ -60,37 +61,44 @@ class Changes:
         # A change that is small now tells how fast changes shrink.
         keep = again | (np.abs(by) > least)
         pair = np.stack([(by * old.conj()).real, np.abs(old) ** 2])
-        self.source = np.concatenate([self.source[~twice], source[keep]])
-        self.change = np.concatenate([self.change[~twice], by[keep]])
-        self.size = np.concatenate([self.size[~twice], size[keep]])
-        self.again = np.concatenate([self.again[~twice], again[keep]])
-        self.pair = np.concatenate([self.pair[:, ~twice], pair[:, keep]], axis=1)
+        return Changes(
+            source=np.concatenate([self.source[~twice], source[keep]]),
+            change=np.concatenate([self.change[~twice], by[keep]]),
+            size=np.concatenate([self.size[~twice], size[keep]]),
+            again=np.concatenate([self.again[~twice], again[keep]]),
+            pair=np.concatenate([self.pair[:, ~twice], pair[:, keep]], axis=1),
+        )
 
-    @property
+    @cached_property
+    def _class(self) -> NDArray[np.int64]:
+        return class_of(self.source)
+
+    @cached_property
     def ratio(self) -> Floats:
         """By what factor (2,) the changes of each class shrink a step, below 0 where they change sides."""
-        new, old = (np.bincount(class_of(self.source), x, 2) for x in self.pair)
+        new, old = (np.bincount(self._class, x, 2) for x in self.pair)
         with np.errstate(divide="ignore", invalid="ignore"):
             q = new / old
         return np.where(np.isfinite(q), q, _UNKNOWN)
 
-    @property
+    @cached_property
     def slowness(self) -> Floats:
         """By what factor (n,) the error of each source exceeds COVER times its last change, _BETTER to _SLOWEST.
 
         Changes that go on to one side and shrink by q a step add up to q / (1 - q) times the last one; of a single
         change q is not known.
         """
-        q = np.where(self.again, self.ratio[class_of(self.source)], _UNKNOWN)
+        q = np.where(self.again, self.ratio[self._class], _UNKNOWN)
         q = np.clip(q, 0.0, 0.99)
         return np.asarray(np.clip(q / (1.0 - q) / COVER, np.where(self.again, _BETTER, 1.0), _SLOWEST))
 
+    @cached_property
     def sums(self) -> tuple[Complexes, Floats]:
-        """Return the sums (2,) and the rms sums (2,) of what may still change, by class."""
-        mine, factor = class_of(self.source) == np.arange(2)[:, None], self.slowness
+        """The sums (2,) and the rms sums (2,) of what may still change, by class."""
+        mine, factor = self._class == np.arange(2)[:, None], self.slowness
         return (mine * factor * self.change).sum(axis=1), np.sqrt((mine * self.doubt**2).sum(axis=1))
 
-    @property
+    @cached_property
     def doubt(self) -> Floats:
         """What may still change (n,) by each source, over COVER."""
         return np.asarray(

@@ -131,21 +131,20 @@ class SourcedPaths:
         return np.asarray(share * np.exp(1j * turn))
 
     def by_source(self, response: PointSpread, cells: Floats) -> tuple[Sources, Iterator[Complexes]]:
-        """Return the sources (s,) of the first launch, and the sums (s,) of its paths as `sums_of` gives them."""
+        """Return the sources (s,) of the first launch, and the sums of its paths as `sums_of` gives them."""
         return self.sums_of(self._parts[0].paths, self._parts[0].source, response, cells)
 
     def sums_of(
         self, paths: Paths, source: Sources, response: PointSpread, cells: Floats
     ) -> tuple[Sources, Iterator[Complexes]]:
-        """Return the sources (s,), in order, of the trajectories (w,) of paths, and the sums (s,) of its paths: in each
-        of the cells (c, 3) at the phase centres, then in each at the first probe, and so on."""
+        """Return the sources (s,), in order, of the trajectories (w,) of paths, and the sums of its paths, (some, s) at
+        a time: in each of the cells (c, 3) at the phase centres, then in each at the first probe, and so on."""
         own, group = np.unique(source, return_inverse=True)
         most = max(1, _SUMS // max(len(own), 1))
         seen = chain([paths], (p.seen(paths) for p in self._probes))
-        parts = (
+        return own, (
             _sums(response, x, group, len(own), cells[i : i + most]) for x in seen for i in range(0, len(cells), most)
         )
-        return own, (row for part in parts for row in part)
 
 
 def _powers(first: _Part, rows: NDArray[np.bool_], paths: Paths, source: Sources) -> Floats:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.tracing.shooting import Wanted
-from raychan.tracing.sources import EXACT, Sources, depth_of, facet_of, legs_of, without_out
+from raychan.tracing.sources import EXACT, Sources, by_launch, facet_of, without_out
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,7 +36,7 @@ class SourceRays:
     def learn(self, step: int, launched: list[tuple[int, Wanted]], source: Sources, rays: int) -> None:
         """Note what launches brought, the source (w,) of each route, and how many rays they took."""
         routes, own = dict[tuple[int, int], Floats](), source[source != EXACT]
-        for key, rows in _by_launch(own):
+        for key, rows in by_launch(own):
             routes[key] = np.bincount(facet_of(own[rows]), minlength=self._facets).astype(float)
         found = {}
         for i, wanted in launched:
@@ -52,7 +51,7 @@ class SourceRays:
     def step_of(self, source: Sources) -> Ints:
         """Return the step (n,) at which each source was traced last; 0 for those of the first launch."""
         found = np.zeros(len(source), np.int64)
-        for key, rows in _by_launch(source):
+        for key, rows in by_launch(source):
             if key in self._step:
                 found[rows] = self._step[key][facet_of(source[rows])]
         return found
@@ -61,7 +60,7 @@ class SourceRays:
         """Return the step (n,) at which to trace each source again: the next one, or one more where others of its leg
         and bounce are at that and a launch of its own takes longer than the rays that it saves."""
         step, rays = self.step_of(source) + 1, _GROWTH * self.of(source)
-        for _, rows in _by_launch(source):
+        for _, rows in by_launch(source):
             for low, high in pairwise(np.unique(step[rows])):
                 own = rows[step[rows] == low]
                 _, once = np.unique(without_out(source[own]), return_index=True)
@@ -73,15 +72,7 @@ class SourceRays:
     def of(self, source: Sources) -> Floats:
         """Return the rays (n,) that the last launch from the facet of each source took; 1 where none is known."""
         found = np.ones(len(source))
-        for key, rows in _by_launch(source):
+        for key, rows in by_launch(source):
             if key in self._rays:
                 found[rows] = np.maximum(self._rays[key][facet_of(source[rows])], 1.0)
         return found
-
-
-def _by_launch(source: Sources) -> Iterator[tuple[tuple[int, int], Ints]]:
-    """Give leg in and bounce of sources (n,), and which (m,) have them."""
-    keys = np.stack([legs_of(source)[0], depth_of(source)], axis=1)
-    every, group = np.unique(keys, axis=0, return_inverse=True)
-    for k, (leg, depth) in enumerate(every.tolist()):
-        yield (leg, depth), np.flatnonzero(group.ravel() == k)

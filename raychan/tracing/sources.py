@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,18 +59,32 @@ def without_out(source: Sources) -> Sources:
     return source & ~np.int64(((1 << _LEG) - 1) << (_DEPTH + _FACET))
 
 
+def by_launch(source: Sources) -> Iterator[tuple[tuple[int, int], Ints]]:
+    """Give leg in and bounce of sources (n,), in order, and which (m,) have them."""
+    launch = _launch_of(source)
+    order = np.argsort(launch, kind="stable")
+    ordered = launch[order]
+    begin = np.flatnonzero(np.diff(ordered, prepend=ordered[:1] - 1)).tolist()
+    for first, end in pairwise([*begin, len(order)]):
+        one = int(ordered[first])
+        yield (one >> _DEPTH, one & ((1 << _DEPTH) - 1)), order[first:end]
+
+
+def _launch_of(source: Sources) -> Ints:
+    """Return one number (n,) of the leg in and the bounce of each source."""
+    return legs_of(source)[0] << _DEPTH | depth_of(source)
+
+
 def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
     """Give the launches that trace sources (n,) again: numbers of legs in, and what is wanted there, one depth each.
 
     From each facet of a launch all its outgoing legs are traced: see `covered`.
     """
     own = source[source != EXACT]
-    (leg, out), depth = legs_of(own), depth_of(own)
-    for i, d in np.unique(np.stack([leg, depth], axis=1), axis=0):
-        mine = (leg == i) & (depth == d)
+    for (leg, depth), rows in by_launch(own):
         wanted = np.zeros(facets, bool)
-        wanted[facet_of(own[mine])] = True
-        yield int(i), Wanted(wanted, int(d), frozenset(map(int, out[mine])))
+        wanted[facet_of(own[rows])] = True
+        yield leg, Wanted(wanted, depth, frozenset(np.unique(legs_of(own[rows])[1]).tolist()))
 
 
 class Rings:
@@ -103,9 +118,9 @@ class Rings:
 
 def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
     """Tell which sources (n,) some launches trace again."""
-    found = np.zeros(len(source), bool)
-    (leg, out), depth, facet = legs_of(source), depth_of(source), facet_of(source)
+    found, launch = np.zeros(len(source), bool), _launch_of(source)
     for i, wanted in by:
-        rows = np.flatnonzero((leg == i) & (depth == wanted.depth))
-        found[rows] |= wanted.facets[facet[rows]] & np.isin(out[rows], list(wanted.outs))
+        rows = np.flatnonzero(launch == (i << _DEPTH | wanted.depth))
+        out = np.isin(legs_of(source[rows])[1], list(wanted.outs))
+        found[rows] |= wanted.facets[facet_of(source[rows])] & out
     return found
