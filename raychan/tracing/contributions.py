@@ -26,6 +26,11 @@ _DEPTH = 1e-2  # of the strongest cell: without noise weaker cells are refined a
 SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; not measured
 
 
+CUTS, RAYS, BEGUN, BEFORE = 0, 1, 2, 3
+"""Of the account of a budget, for kernels: cuts made; rays cast by this thread, when the budget was first asked (-1: it
+was not), and when the account was made."""
+
+
 class Budget:
     """How often a launch may still cut tubes, and the tubes that were left coarser than asked for."""
 
@@ -73,13 +78,27 @@ class Budget:
             n = max(len(self.uncut), len(part.uncut))
             self.uncut = np.pad(self.uncut, (0, n - len(self.uncut))) + np.pad(part.uncut, (0, n - len(part.uncut)))
 
+    def account(self, geometry: Geometry) -> Floats:
+        """Return what is spent (4,), for kernels."""
+        return np.array([self._cuts, geometry.rays, self._rays, geometry.rays], float)
+
+    def settle(self, geometry: Geometry, account: Floats, uncut: NDArray[np.int64]) -> None:
+        """Take over what kernels spent, and the tubes (b,) of bodies that they left uncut."""
+        self._cuts, self._rays = float(account[CUTS]), int(account[BEGUN])
+        geometry.count_rays(int(account[RAYS] - account[BEFORE]))
+        if uncut.any():
+            self._left_uncut(geometry, uncut)
+
+    def _left_uncut(self, geometry: Geometry, count: NDArray[np.int64]) -> None:
+        n = max(len(count), len(self.uncut))
+        self.uncut = np.pad(count, (0, n - len(count))) + np.pad(self.uncut, (0, n - len(self.uncut)))
+        geometry.count_uncut(int(count.sum()))
+
     def _within(self, geometry: Geometry, facet: Ints, wanted: Bools, spent: bool) -> Bools:
         if not spent or not wanted.any():
             return wanted
         bodies = geometry.facets.body[facet[wanted]]
-        count = np.bincount(bodies, minlength=max(len(geometry.facets.role), len(self.uncut)))
-        self.uncut = count + np.pad(self.uncut, (0, len(count) - len(self.uncut)))
-        geometry.count_uncut(int(np.count_nonzero(wanted)))
+        self._left_uncut(geometry, np.bincount(bodies, minlength=len(geometry.facets.role)))
         return np.zeros_like(wanted)
 
 
@@ -132,19 +151,29 @@ class Contributions:
     def prune_threshold(self, length: Floats) -> Floats:
         """Return the contribution [1/m] below which tubes of two-way lengths (n,) [m] are not cut further; about a
         hundred such tubes add up to `rule.relative` of the field found there."""
-        at = np.minimum(self._cell(length), len(self._level) - 1)
-        level = np.maximum(self._level[at], _DEPTH * self._level.max())
-        return np.maximum(max(self.rule.floor, _NOTHING), 0.1 * self.rule.relative * level)
+        return self._in_cells(self.rule.floor, 0.1 * self.rule.relative)[self._cell_held(length)]
 
     def deep_threshold(self, length: Floats) -> Floats:
         """Return the contribution [1/m] (n,) below which tubes that bounced are not cut: where the rule is coarse, what
         alone would not make a detection nor change what was found by more than a good part of the tolerance: what is
         not cut is missed where its centre is hidden."""
-        if self.rule.coarse == 1.0:
-            return self.prune_threshold(length)
-        at = np.minimum(self._cell(length), len(self._level) - 1)
-        level = np.maximum(self._level[at], _DEPTH * self._level.max())
-        return np.maximum(max(self.rule.coarse * self.rule.floor, _NOTHING), self.rule.relative * level)
+        return self.deep_thresholds[self._cell_held(length)]
+
+    @property
+    def deep_thresholds(self) -> Floats:
+        """The `deep_threshold` of each cell; the last one holds for all longer paths, too."""
+        coarse, relative = self.rule.coarse, self.rule.relative
+        if coarse == 1.0:
+            return self._in_cells(self.rule.floor, 0.1 * relative)
+        return self._in_cells(coarse * self.rule.floor, relative)
+
+    def _in_cells(self, least: float, relative: float) -> Floats:
+        """Return for each cell a share of what was found there, or the least contribution that counts."""
+        level = np.maximum(self._level, _DEPTH * self._level.max())
+        return np.maximum(max(least, _NOTHING), relative * level)
+
+    def _cell_held(self, length: Floats) -> NDArray[np.int64]:
+        return np.minimum(self._cell(length), len(self._level) - 1)
 
     def add(self, ph: Phases, each: Complexes | None = None) -> None:
         """Add tubes that are seen: in each cell the sum of their amplitudes, or their rms sum where that cancels.

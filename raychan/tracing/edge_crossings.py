@@ -264,34 +264,27 @@ def _longest(corners, source, k, far, plane, first_edge, edges, planes, side, wo
     return best > 0.0
 
 
-@njit(cache=True, nogil=True)
-def edges_within(rows, rays, far, extent, planes, first_edge, edges, side):  # type: ignore[no-untyped-def]
-    """Write into rows of side (n, 3) the signed distances [m] of a tube's corners from the plane through its source and
-    an edge inside it: of the edges around the planes that its rays hit the one of which the longest part lies inside,
-    or else the line in which two of these planes meet.
+@njit(cache=True, forceinline=True, uncounted=True)
+def edge_within(i, rays, far, extent, planes, first_edge, edges, side, room, landed):  # type: ignore[no-untyped-def]
+    """Write into side (3,) the signed distances [m] of the corners of tube i from the plane through its source and an
+    edge inside it: of the edges around the planes that its rays hit the one of which the longest part lies inside, or
+    else the line in which two of these planes meet.
 
-    Args: rows (m,) of the tubes to test; rays as `TubeRays`; far whether the source is a direction; extent [m] reach of
-    rays that hit nothing; planes as `FacetPlanes`; edges[first_edge[g] : first_edge[g + 1]] (e, 2, 3) [m] around plane
-    g.
+    Args: rays as `TubeRays`; far whether the source is a direction; extent [m] reach of rays that hit nothing; planes
+    as `FacetPlanes`; edges[first_edge[g] : first_edge[g + 1]] (e, 2, 3) [m] around plane g; room (9, 3), landed (4,)
+    for work.
     """
-    _each_edge_within(rows, rays, far, extent, planes, first_edge, edges, side, np.empty((9, 3)), np.empty(4, np.int32))
-
-
-@njit(cache=True, nogil=True, uncounted=True)
-def _each_edge_within(rows, rays, far, extent, planes, first_edge, edges, side, room, landed):  # type: ignore[no-untyped-def]
-    """Do what `edges_within` does, with room for work (9, 3) and (4,)."""
     at, source, sides, work = room[:4], room[4], room[5:8], room[8]
-    for i in rows:
-        points, k, hit = rays.points[i], rays.directions[i, 3], rays.hit[i]
-        t = rays.reach[i, 3] if hit[3] >= 0 else extent
-        parallel = far or not rays.flat[i]
+    points, k, hit = rays.points[i], rays.directions[i, 3], rays.hit[i]
+    t = rays.reach[i, 3] if hit[3] >= 0 else extent
+    parallel = far or not rays.flat[i]
+    for c in range(3):
+        source[c] = points[3, c] - rays.length[i, 3] * k[c]
+    for q in range(4):
+        landed[q] = planes.number[hit[q]] if hit[q] >= 0 else -1
         for c in range(3):
-            source[c] = points[3, c] - rays.length[i, 3] * k[c]
-        for q in range(4):
-            landed[q] = planes.number[hit[q]] if hit[q] >= 0 else -1
-            for c in range(3):
-                # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the
-                # section that the tube has where it lands.
-                at[q, c] = points[q, c] + (0.0 if rays.flat[i] else t * (rays.directions[i, q, c] - k[c]))
-        if not _longest(at, source, k, parallel, landed, first_edge, edges, sides, side[i], work):
-            _meeting_line(at, source, k, parallel, landed, hit, planes.point, planes.normal, k, side[i], work)
+            # Off a curved mirror rays seem to come from no one point: there they count as parallel, with the section
+            # that the tube has where it lands.
+            at[q, c] = points[q, c] + (0.0 if rays.flat[i] else t * (rays.directions[i, q, c] - k[c]))
+    if not _longest(at, source, k, parallel, landed, first_edge, edges, sides, side, work):
+        _meeting_line(at, source, k, parallel, landed, hit, planes.point, planes.normal, k, side, work)

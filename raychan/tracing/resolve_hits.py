@@ -82,128 +82,118 @@ def _strength(j, materials, cosine, wavenumber):  # type: ignore[no-untyped-def]
     return max(abs(back_s), abs(back_p))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def reflect_directions(k, normals, directions):  # type: ignore[no-untyped-def]
-    """Write the directions (n, 4, 3) after reflection at the curved surface."""
-    for i in range(len(k)):
-        for q in range(4):
-            twice = 2.0 * dot(k[i, q], normals[i, q])
-            for c in range(3):
-                directions[i, q, c] = k[i, q, c] - twice * normals[i, q, c]
+    """Write the directions (4, 3) of a tube after reflection at the curved surface."""
+    for q in range(4):
+        twice = 2.0 * dot(k[q], normals[q])
+        for c in range(3):
+            directions[q, c] = k[q, c] - twice * normals[q, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
-def contribution_bounds(  # type: ignore[no-untyped-def]
-    points, k, length, normals, facet, strength, spread, image, far, wavenumber, lossy, material, materials, in_phase,
-    bound, whole,
-):  # fmt: skip
+def contribution_bounds(tubes, image, far, wavenumber, lossy, material, materials, in_phase, bound, whole):  # type: ignore[no-untyped-def]
     """Write what tubes may scatter straight back, all in phase (`in_phase`) and by how their corners' phases run
-    (`bound`) (n,) [1/m], and the two-way length `whole` (n,) [m]: k A / (4 pi r) times the field there, over one plus
-    half the span of phase. See `radiation.phases`, which knows the edges' middles too."""
-    for i in range(len(facet)):
-        low, high, total = np.inf, -np.inf, 0.0
+    (`bound`) (n,) [1/m], and the two-way length `whole` (n,) [m] (see `contribution_bound`)."""
+    surface = lossy, material, materials
+    for i in range(len(tubes.facet)):
+        in_phase[i], bound[i], whole[i] = contribution_bound(i, tubes, image, far, wavenumber, surface)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def contribution_bound(i, tubes, image, far, wavenumber, surface):  # type: ignore[no-untyped-def]
+    """Return what tube i may scatter straight back, all in phase and by how its corners' phases run [1/m], and the
+    two-way length [m]: k A / (4 pi r) times the field there, over one plus half the span of phase. See
+    `radiation.phases`, which knows the edges' middles too.
+
+    Args: surface which facets (f,) are lossy, the material of each (f,), and the materials.
+    """
+    lossy, material, materials = surface
+    points, k, facet = tubes.points[i], tubes.k[i], tubes.facet[i]
+    low, high, total = np.inf, -np.inf, 0.0
+    for c in range(3):
+        there = tubes.length[i, c] + length_to(points[c], image, far)
+        low, high, total = min(low, there), max(high, there), total + there
+    share = wavenumber / (4.0 * math.pi) * abs(_twice_area(points, k[3])) * tubes.strength[i] * tubes.spread[i]
+    if not far:
+        share /= length_to(points[3], image, far)
+    if lossy[facet]:
+        share *= _strength(material[facet], materials, abs(dot(tubes.normals[i, 3], k[3])), wavenumber)
+    return share, share / (1.0 + 0.5 * wavenumber * (high - low)), total / 3.0
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def phase_at_hit(points, directions, length, f, reach, first, normal, out, wavenumber, p):  # type: ignore[no-untyped-def]
+    """Return by how much the two-way phase runs over a tube where it lands [rad], and the two-way length [m] over
+    there.
+
+    Args: f facet that the centre ray meets after reach [m], -1 for none: then the phase does not run and the path ends
+    at the mirror; out (image, far) of the leg out; p (3,) room for work.
+    """
+    image, far = out
+    t = reach if f >= 0 else 0.0
+    for c in range(3):
+        p[c] = points[3, c] + t * directions[3, c]
+    whole = length[3] + t + length_to(p, image, far)
+    low, high = np.inf, -np.inf
+    for q in range(3):
+        if f < 0:
+            return 0.0, whole
+        height = 0.0
         for c in range(3):
-            there = length[i, c] + length_to(points[i, c], image, far)
-            low, high, total = min(low, there), max(high, there), total + there
-        share = wavenumber / (4.0 * math.pi) * abs(_twice_area(points[i], k[i, 3])) * strength[i] * spread[i]
-        if not far:
-            share /= length_to(points[i, 3], image, far)
-        if lossy[facet[i]]:
-            share *= _strength(material[facet[i]], materials, abs(dot(normals[i, 3], k[i, 3])), wavenumber)
-        in_phase[i], bound[i] = share, share / (1.0 + 0.5 * wavenumber * (high - low))
-        whole[i] = total / 3.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def phase_at_hits(  # type: ignore[no-untyped-def]
-    points, directions, length, hit, reach, first, normal, image, far, wavenumber, span, whole
-):
-    """Write by how much the two-way phase runs over tubes where they land, `span` (n,) [rad], and the `whole` two-way
-    length (n,) [m] over there.
-
-    Args: hit (n,) facet that the centre ray meets after reach (n,) [m], -1 for none: then span is 0 and the path ends
-    at the mirror.
-    """
-    p = np.empty(3)
-    for i in range(len(hit)):
-        f = hit[i]
-        t = reach[i] if f >= 0 else 0.0
+            height += (first[f, c] - points[q, c]) * normal[f, c]
+        slope = dot(directions[q], normal[f])
+        if height * slope <= 0.0:
+            # Not all of the tube can land there: how much of it does is not known yet.
+            return 0.0, whole
+        t = height / slope
         for c in range(3):
-            p[c] = points[i, 3, c] + t * directions[i, 3, c]
-        whole[i] = length[i, 3] + t + length_to(p, image, far)
-        low, high = np.inf, -np.inf
-        for q in range(3):
-            if f < 0:
-                low, high = 0.0, 0.0
-                break
-            height = 0.0
-            for c in range(3):
-                height += (first[f, c] - points[i, q, c]) * normal[f, c]
-            slope = dot(directions[i, q], normal[f])
-            if height * slope <= 0.0:
-                # Not all of the tube can land there: how much of it does is not known yet.
-                low, high = 0.0, 0.0
-                break
-            t = height / slope
-            for c in range(3):
-                p[c] = points[i, q, c] + t * directions[i, q, c]
-            phase = wavenumber * (length[i, q] + t + length_to(p, image, far))
-            low, high = min(low, phase), max(high, phase)
-        span[i] = high - low
+            p[c] = points[q, c] + t * directions[q, c]
+        phase = wavenumber * (length[q] + t + length_to(p, image, far))
+        low, high = min(low, phase), max(high, phase)
+    return high - low, whole
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def spread_at_hits(points, directions, hit, reach, grown):  # type: ignore[no-untyped-def]
-    """Write by how much more tubes may scatter where they land than on their mirror, `grown` (n,), at least 1: the root
-    of the area across the centre's ray there over that before, for of A E the field E falls with the root of A.
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def growth_at_hit(points, directions, f, reach, p):  # type: ignore[no-untyped-def]
+    """Return by how much more a tube may scatter where it lands than on its mirror, at least 1: the root of the area
+    across the centre's ray there over that before, for of A E the field E falls with the root of A.
 
-    Args: hit (n,) facet that the centre ray meets after reach (n,) [m], -1 for none: then 1.
+    Args: f facet that the centre ray meets after reach [m], -1 for none: then 1; p (3, 3) room for work.
     """
-    p = np.empty((3, 3))
-    for i in range(len(hit)):
-        grown[i] = 1.0
-        if hit[i] >= 0:
-            for q in range(3):
-                for c in range(3):
-                    p[q, c] = points[i, q, c] + reach[i] * directions[i, q, c]
-            there, before = _twice_area(p, directions[i, 3]), _twice_area(points[i], directions[i, 3])
-            grown[i] = math.sqrt(max(abs(there / before), 1.0)) if before != 0.0 else 1.0
+    if f < 0:
+        return 1.0
+    for q in range(3):
+        for c in range(3):
+            p[q, c] = points[q, c] + reach * directions[q, c]
+    there, before = _twice_area(p, directions[3]), _twice_area(points, directions[3])
+    return math.sqrt(max(abs(there / before), 1.0)) if before != 0.0 else 1.0
 
 
-@njit(cache=True, nogil=True)
-def corner_rays(rows, points, directions, facet, start):  # type: ignore[no-untyped-def]
-    """Return origins and directions (3 m, 3), facets left (3 m,) and distances from which hits count (3 m,) of the
-    corner rays of the tubes `rows` (m,)."""
-    m = len(rows)
-    origin, direction = np.empty((3 * m, 3)), np.empty((3 * m, 3))
-    own, begin = np.empty(3 * m, facet.dtype), np.empty(3 * m)
-    for j in range(m):
-        i = rows[j]
-        for q in range(3):
-            at = 3 * j + q
-            own[at], begin[at] = facet[i], start[i, q]
-            for c in range(3):
-                origin[at, c] = points[i, 3, c] + _SHRINK * (points[i, q, c] - points[i, 3, c])
-                direction[at, c] = directions[i, q, c]
-    return origin, direction, own, begin
+@njit(cache=True, forceinline=True, uncounted=True)
+def corner_origin(points, q):  # type: ignore[no-untyped-def]
+    """Return from where [m] the ray of corner q of a tube's points (4, 3) is cast."""
+    return (
+        points[3, 0] + _SHRINK * (points[q, 0] - points[3, 0]),
+        points[3, 1] + _SHRINK * (points[q, 1] - points[3, 1]),
+        points[3, 2] + _SHRINK * (points[q, 2] - points[3, 2]),
+    )
 
 
-@njit(cache=True, nogil=True, uncounted=True)
-def on_one_surface(rows, hit, plane, smooth, normal, least_cosine, out):  # type: ignore[no-untyped-def]
-    """Write for the tubes `rows` (m,) whether all rays land on one plane, or on one smooth patch whose normals there
-    have at least `least_cosine` with the centre's.
+@njit(cache=True, forceinline=True, uncounted=True)
+def on_one_surface(h, plane, smooth, normal, least_cosine):  # type: ignore[no-untyped-def]
+    """Tell whether all rays land on one plane, or on one smooth patch whose normals there have at least `least_cosine`
+    with the centre's.
 
-    Args: hit (n, 4) facets met, -1 for none; plane, smooth (f,) to which facets belong.
+    Args: h (4,) facets met, -1 for none; plane, smooth (f,) to which facets belong.
     """
-    for j in range(len(rows)):
-        h = hit[rows[j]]
-        f = h[3]
-        one_plane = one_patch = f >= 0
-        for q in range(3):
-            g = h[q]
-            one_plane &= g >= 0 and plane[g] == plane[f]
-            one_patch &= g >= 0 and smooth[g] == smooth[f] and dot(normal[g], normal[f]) > least_cosine
-        out[rows[j]] = one_plane or one_patch
+    f = h[3]
+    one_plane = one_patch = f >= 0
+    for q in range(3):
+        g = h[q]
+        one_plane = one_plane and g >= 0 and plane[g] == plane[f]
+        one_patch = one_patch and g >= 0 and smooth[g] == smooth[f] and dot(normal[g], normal[f]) > least_cosine
+    return one_plane or one_patch
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -8,6 +8,7 @@ across the axis along which it runs most, and tests the edges that it finds ther
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +24,9 @@ from raychan.geometry.grid_traversal import (
     span_through_spheres,
     widths,
 )
-from raychan.parallel import parallel_for
 from raychan.records import MIRROR
 from raychan.tracing.cache import cache_of
-from raychan.tracing.edge_crossings import FacetPlanes, TubeRays, above, apart, pyramid, scale_at, size_of, within
+from raychan.tracing.edge_crossings import FacetPlanes, above, apart, pyramid, scale_at, size_of, within
 from raychan.vectors import copy_to, dot
 from raychan.world.geometry import Geometry
 
@@ -37,40 +37,30 @@ _MOST_CELLS = 2_000_000  # of a grid: trades memory for edges a cell; not measur
 _LEAST_CELL = 0.02  # m; not measured
 _WIDEST_LAYER = 150  # cells in a layer beyond which a tube is taken to be bisected before; not measured
 _WIDEST_FAN = 10  # cells of width beyond which the same holds for a fan with rays along the layers; not measured
-_PARALLEL_FROM = 500  # tubes from which on a second thread pays; not measured
 _TOUCHING = 1e-5  # m: what lies nearer to a surface belongs to it
 
 
-class SilhouetteCrossings:
-    """The grid of all edges of a geometry that can be a silhouette, and the search in it."""
+class Outlines(NamedTuple):
+    """All edges of a geometry that can be a silhouette, in a grid; extent [m] reach of rays that hit nothing; planes of
+    the facets; centre (b, 3), radius (b,) [m] of spheres about bodies, outside of which there is no edge."""
 
-    def __init__(self, geometry: Geometry) -> None:
-        self._planes = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
-        self._extent = geometry.extent
-        self._grid = _grid_of(geometry)
-        centre, radius, empty = geometry.body_spheres
-        solid = ~empty & (geometry.facets.role != MIRROR)
-        self._centre, self._radius = centre[solid], radius[solid]
-
-    def find(self, rows: NDArray[np.signedinteger], rays: TubeRays, far: bool, side: Floats) -> None:
-        """Fill in those `rows` of side (n, 3) that are zero: distances [m] of a tube's corners from the plane through
-        its source and the silhouette edge of which the longest part lies inside it.
-
-        Args: far whether rays come from a direction instead of a point.
-        """
-        rows = rows[~side[rows].any(axis=1)]
-
-        def some(part: slice) -> None:
-            _longest_crossings(
-                rows[part], rays, far, self._extent, self._planes, self._grid, self._centre, self._radius, side
-            )
-
-        parallel_for(len(rows), some, _PARALLEL_FROM)
+    extent: float
+    planes: FacetPlanes
+    grid: EdgeGrid
+    centre: Floats
+    radius: Floats
 
 
-def silhouette_crossings_of(geometry: Geometry) -> SilhouetteCrossings:
+def outlines_of(geometry: Geometry) -> Outlines:
     """Return the grid of a geometry's edges, built once."""
-    return cache_of(geometry).single("silhouette crossings", lambda: SilhouetteCrossings(geometry))
+    return cache_of(geometry).single("outlines", lambda: _outlines(geometry))
+
+
+def _outlines(geometry: Geometry) -> Outlines:
+    planes = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
+    centre, radius, empty = geometry.body_spheres
+    solid = ~empty & (geometry.facets.role != MIRROR)
+    return Outlines(geometry.extent, planes, _grid_of(geometry), centre[solid], radius[solid])
 
 
 def _grid_of(geometry: Geometry) -> EdgeGrid:
@@ -100,38 +90,32 @@ def _steepest(k):  # type: ignore[no-untyped-def]
     return axis
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _longest_crossings(rows, rays, far, extent, planes, grid, centre, radius, out):  # type: ignore[no-untyped-def]
-    """Write into `rows` of out (n, 3) the corners' distances from the silhouette edge of which the longest part lies
-    inside each tube. Args: as for `SilhouetteCrossings.find`; extent [m] reach of rays that hit nothing; centre (b, 3),
-    radius (b,) [m] of spheres about bodies, outside of which there is no edge."""
-    tested, room = np.full(len(grid.edges), -1, np.int32), np.empty((9, 3))
-    _each_longest_crossing(rows, rays, far, extent, planes, grid, centre, radius, out, tested, room)
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def longest_crossing(i, tag, rays, far, outlines, out, tested, room):  # type: ignore[no-untyped-def]
+    """Write into out (3,) the distances [m] of the corners of tube i from the plane through its source and the
+    silhouette edge of which the longest part lies inside it.
 
-
-@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
-def _each_longest_crossing(rows, rays, far, extent, planes, grid, centre, radius, out, tested, room):  # type: ignore[no-untyped-def]
-    """Do what `_longest_crossings` does.
-
-    Args: tested (e,) which tube was last tested against each edge; room (9, 3) for work.
+    Args: tag a number of this search, tested (e,) that of the last one for each edge; rays as `TubeRays`; far whether
+    they come from a direction instead of a point; outlines as `Outlines`; room (9, 3) for work.
     """
+    planes, grid = outlines.planes, outlines.grid
     source, sides, section, side = room[0], room[1:4], room[4:8], room[8]
-    for i in rows:
-        points, ks, facet = rays.points[i], rays.directions[i], rays.hit[i, 3]
-        k, lands, parallel = ks[3], facet >= 0, far or not rays.flat[i]
-        for c in range(3):
-            source[c] = points[3, c] - rays.length[i, 3] * k[c]
-        normal, landing = planes.normal[max(facet, 0)], planes.point[max(facet, 0)]
-        sign = -1.0 if dot(k, normal) > 0.0 else 1.0
-        ahead = pyramid(points, source, k, parallel, sides)
-        for q in range(4):
-            copy_to(section[q], points[q])
-        x, y, z = (-k[0], -k[1], -k[2]) if parallel else (source[0], source[1], source[2])
-        tube = points, ks, rays.flat[i], source, parallel, ahead, sides, section
-        floor = lands, landing, normal, sign
-        looks = x, y, z, 0.0 if parallel else 1.0
-        span = _span(points, ks, rays.reach[i, 3] if lands else extent, grid.cell, centre, radius)
-        _longest_along(i, tube, floor, looks, span, grid, tested, side, out[i])
+    points, ks, facet = rays.points[i], rays.directions[i], rays.hit[i, 3]
+    k, lands, parallel = ks[3], facet >= 0, far or not rays.flat[i]
+    for c in range(3):
+        source[c] = points[3, c] - rays.length[i, 3] * k[c]
+    normal, landing = planes.normal[max(facet, 0)], planes.point[max(facet, 0)]
+    sign = -1.0 if dot(k, normal) > 0.0 else 1.0
+    ahead = pyramid(points, source, k, parallel, sides)
+    for q in range(4):
+        copy_to(section[q], points[q])
+    x, y, z = (-k[0], -k[1], -k[2]) if parallel else (source[0], source[1], source[2])
+    tube = points, ks, rays.flat[i], source, parallel, ahead, sides, section
+    floor = lands, landing, normal, sign
+    looks = x, y, z, 0.0 if parallel else 1.0
+    reach = rays.reach[i, 3] if lands else outlines.extent
+    span = _span(points, ks, reach, grid.cell, outlines.centre, outlines.radius)
+    _longest_along(tag, tube, floor, looks, span, grid, tested, side, out)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
@@ -147,8 +131,8 @@ def _span(points, ks, reach, cell, centre, radius):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
-def _longest_along(i, tube, floor, looks, span, grid, tested, side, out):  # type: ignore[no-untyped-def]
-    """Write into out (3,) the corners' distances from the edge of which the longest part lies inside tube i, layer by
+def _longest_along(tag, tube, floor, looks, span, grid, tested, side, out):  # type: ignore[no-untyped-def]
+    """Write into out (3,) the corners' distances from the edge of which the longest part lies inside a tube, layer by
     layer from the mirror on: what is far off is left out where the tube grows too wide."""
     points, ks = tube[0], tube[1]
     axis, near, far_end = span
@@ -172,13 +156,13 @@ def _longest_along(i, tube, floor, looks, span, grid, tested, side, out):  # typ
         outermost = grid.cut_off and (layer == 0 or layer == grid.shape[axis] - 1)
         if room > _WIDEST_LAYER and not outermost:
             break
-        best = _longest_in_box(i, tube, floor, looks, begin, end, grid, best, tested, side, out)
+        best = _longest_in_box(tag, tube, floor, looks, begin, end, grid, best, tested, side, out)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
-def _longest_in_box(i, tube, floor, looks, begin, end, grid, best, tested, side, out):  # type: ignore[no-untyped-def]
+def _longest_in_box(tag, tube, floor, looks, begin, end, grid, best, tested, side, out):  # type: ignore[no-untyped-def]
     """Write into out (3,) the corners' distances from the edge in a box of cells of which a longer part than `best` [m]
-    lies inside tube i; return how long.
+    lies inside a tube; return how long.
 
     Args: floor see `_part_before`; looks (x, y, z, 1) a point from which edges are seen, or (x, y, z, 0) a direction.
     """
@@ -191,8 +175,8 @@ def _longest_in_box(i, tube, floor, looks, begin, end, grid, best, tested, side,
                 one, other = grid.planes[e, 0], grid.planes[e, 1]
                 # An edge is a silhouette where its faces look to different sides of the source.
                 front = one[0] * x + one[1] * y + one[2] * z - w * one[3] > 0.0
-                if front != (other[0] * x + other[1] * y + other[2] * z - w * other[3] > 0.0) and tested[e] != i:
-                    tested[e] = i
+                if front != (other[0] * x + other[1] * y + other[2] * z - w * other[3] > 0.0) and tested[e] != tag:
+                    tested[e] = tag
                     best = _longer(grid.edges[e, 0], grid.edges[e, 1], tube, floor, best, side, out)
     return best
 

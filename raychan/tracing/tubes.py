@@ -7,8 +7,8 @@ gradients (the directions) by a Hermite rule that is exact to third order; on th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,24 @@ class Refinement:
         return replace(self, slots=min(max(self.slots, bounces + self.layers * (bounces + 1) + 3), _MOST_SLOTS))
 
 
+class TubeColumns(NamedTuple):
+    """The columns of `Tubes`, for kernels."""
+
+    points: Floats
+    k: Floats
+    length: Floats
+    normals: Floats
+    facet: Ints
+    spread: Floats
+    strength: Floats
+    flat: Bools
+    bary: Floats
+    slots: Ints
+    bounces: Ints
+    caustics: Ints
+    last: Ints
+
+
 @dataclass
 class Tubes:
     """n tubes on their present footprint, four rays each: three corners, then the centre.
@@ -106,10 +124,15 @@ class Tubes:
     def __len__(self) -> int:
         return len(self.facet)
 
+    @property
+    def columns(self) -> TubeColumns:
+        """The columns, for kernels."""
+        return TubeColumns(*(getattr(self, name) for name in _COLUMNS))
+
     def take(self, index: NDArray[np.generic]) -> Tubes:
         """Return the tubes at `index` (mask or numbers)."""
         rows = row_numbers(index)
-        return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _ROWS}, history=self.history)
+        return Tubes(**{name: getattr(self, name).take(rows, axis=0) for name in _COLUMNS}, history=self.history)
 
     def only(self, rows: NDArray[np.intp]) -> Tubes:
         """Return the tubes `rows`, in order and each once; these tubes themselves, not a copy, if it is all of them."""
@@ -123,11 +146,11 @@ class Tubes:
         if kept is None or len(kept) == bounds[-1]:
             if len(some) == 1:
                 return some[0]
-            rows = {name: np.concatenate([getattr(p, name) for p in some]) for name in _ROWS}
+            rows = {name: np.concatenate([getattr(p, name) for p in some]) for name in _COLUMNS}
             return Tubes(**rows, history=parts[0].history)
         at = np.searchsorted(kept, bounds)
         rows = {}
-        for name in _ROWS:
+        for name in _COLUMNS:
             columns = [getattr(p, name) for p in some]
             rows[name] = np.empty((len(kept), *columns[0].shape[1:]), columns[0].dtype)
             for column, before, i, j in zip(columns, bounds, at, at[1:], strict=False):
@@ -145,7 +168,7 @@ class Tubes:
         return self.history.newest(self.last, REFLECT)
 
 
-_ROWS = tuple(f.name for f in fields(Tubes) if f.name != "history")
+_COLUMNS = TubeColumns._fields
 
 
 def launch_tubes(geometry: Geometry, leg: Leg, facet: Ints, bary: Floats) -> Tubes:

@@ -133,6 +133,11 @@ class RayCaster:
         """The facets for rays."""
         return FacetShapes(self.facets.vertices, self.first, self.normal, self._size, self._nearest)
 
+    @property
+    def ray_targets(self) -> tuple[FacetGroups, FacetShapes]:
+        """What compiled code casts rays at (see `geometry.intersect.first_hit`)."""
+        return self._facet_groups, self._shapes
+
     @cached
     def _surfaces(self) -> ShadowSurfaces:
         """The facets for shadow rays."""

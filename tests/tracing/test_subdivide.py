@@ -7,11 +7,12 @@ import pytest
 import trimesh
 from support.facets import facets
 
+from raychan.compile.jit import njit
 from raychan.tracing.edge_crossings import TubeRays
 from raychan.tracing.history import History
 from raychan.tracing.legs import Leg
 from raychan.tracing.resolve_hits import IncidentTubes, LandedTubes, ReflectingFacets, tubes_at_hits
-from raychan.tracing.silhouette_crossings import silhouette_crossings_of
+from raychan.tracing.silhouette_crossings import longest_crossing, outlines_of
 from raychan.tracing.subdivide import bisect, edge_of_spread, subdivide
 from raychan.tracing.tubes import Tubes
 from raychan.world.geometry import Geometry
@@ -83,6 +84,12 @@ def test_tubes_are_cut_where_their_rays_spread_most_off_a_curved_mirror():
     assert edge_of_spread(k, normals, facet, curved, 0.09).tolist() == [-1, -1]
 
 
+@njit()
+def search(rows, rays, outlines, side, tested, room):
+    for i in rows:
+        longest_crossing(i, i, rays, False, outlines, side[i], tested, room)
+
+
 def shares_inside(tubes, i, source, ends, margin=0.0, steps=4000):
     """How much [m] of each edge (e, 2, 3) lies inside tube i, or beside it by a margin, beyond its footprint: point by
     point."""
@@ -107,7 +114,8 @@ def test_outline_found_between_mirror_and_nowhere_is_that_of_which_most_lies_ins
     rows = np.arange(0, N, 2)
     hit, reach = np.full((N, 4), -1, np.int32), np.full((N, 4), np.inf)
     rays = TubeRays(tubes.points, tubes.k, tubes.length, tubes.flat, hit, reach)
-    silhouette_crossings_of(geometry).find(rows, rays, False, side)
+    outlines = outlines_of(geometry)
+    search(rows, rays, outlines, side, np.full(len(outlines.grid.edges), -1, np.int32), np.empty((9, 3)))
     ends, faces = geometry.edge_ends, geometry.edge_faces
     towards = np.einsum("fj,fj->f", geometry.normal, source - geometry.first) > 0.0
     ends = ends[towards[faces[:, 0]] != towards[faces[:, 1]]]

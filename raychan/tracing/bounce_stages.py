@@ -1,0 +1,56 @@
+"""The stages of a reflection, from a wave of tubes to the next, as one compiled function: so threads seldom meet at the
+interpreter's lock."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from raychan.compile.jit import njit
+from raychan.tracing.bounce_landing import going_on, is_spent, keep_to_budget, land
+from raychan.tracing.bounce_rays import cast_centres, cast_corners, room_for
+from raychan.tracing.contributions import RAYS
+
+ALL, CENTRES, CORNERS, SETTLE = 0, 1, 2, 3
+"""Stages: from the centre rays on, only these, only the corner rays, and from when all rays are cast on."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fly(stage, begin, end, most, flight, met, landed, count, world, how, account, uncut, packet):  # type: ignore[no-untyped-def]
+    """Do one stage for the tubes from `begin` to `end`, or follow all, wave by wave, until none is left or a wave has
+    more than `most`.
+
+    Args: flight as `Flight`, met, room for it, as `Met`; landed as `Landed`, of which `count` are in use; world as
+    `Surroundings`, how as `Rules`; account of the budget (see `contributions`), uncut (b,) tubes of bodies that it
+    kept from being subdivided; packet as of `embree_packet`. Returns: flight, met, landed, count; rays cast by CENTRES
+    or CORNERS, which all others add to the account.
+    """
+    casts, tag = 0, 0
+    if stage == CENTRES:
+        casts = cast_centres(begin, end, flight, met, world, packet)
+        return flight, met, landed, count, casts
+    tested, room, planes = (
+        np.full(len(world.outlines.grid.edges), -1, np.int32),
+        np.empty((9, 3)),
+        np.empty(4, np.int32),
+    )
+    work = tested, room, planes
+    if stage == CORNERS:
+        casts = cast_corners(begin, end, not is_spent(account, how), tag, flight, met, world, how, packet, *work)
+        return flight, met, landed, count, casts
+    n = len(flight.tubes.facet)
+    settle = stage == SETTLE
+    if not settle:
+        met = room_for(flight, world, how)
+    while n and (settle or n <= most):
+        if not settle:
+            account[RAYS] += cast_centres(0, n, flight, met, world, packet)
+            matter = not is_spent(account, how)
+            account[RAYS] += cast_corners(0, n, matter, tag, flight, met, world, how, packet, *work)
+            tag += n
+        settle = False
+        keep_to_budget(met.wanted, flight.tubes.facet, world.body, how, account, uncut)
+        landed, count, ready = land(flight, met, landed, count, world, how)
+        flight = going_on(flight, met, ready, world, how)
+        n = len(flight.tubes.facet)
+        met = room_for(flight, world, how)
+    return flight, met, landed, count, casts
