@@ -143,6 +143,11 @@ class RayCaster:
             f.vertices, self.normal, self.plane, self.smooth, np.asarray(f.body, np.int32), layer, self.touch, margin
         )
 
+    @cached
+    def met_by_rays(self) -> tuple[FacetGroups, FacetShapes, ShadowSurfaces, bool]:
+        """The facets as kernels read them that cast rays themselves, and whether facets hide nothing."""
+        return self._facet_groups, self._shapes, self._surfaces, self.hides_nothing
+
     def _follow(self, rays: CastRays, targets: ShadowTargets, met: MetFacets) -> None:
         """Write what rays meet, on all threads; count them."""
         fixed = self._facet_groups, self._shapes, self._surfaces
