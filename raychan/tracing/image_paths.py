@@ -122,12 +122,12 @@ def may_leave(corners, rows, images, at, normal, low, high, axes, windows):  # t
     """
     ok, most, w = np.empty(len(rows), np.bool_), 3 + 5 * len(at), len(windows)
     polygons, planes = (np.empty((most, 3)), np.empty((most, 3))), (np.empty((1 + w, 3)), np.empty(1 + w))
-    _each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok)
+    each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok)
     return ok
 
 
 @njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
-def _each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok):  # type: ignore[no-untyped-def]
+def each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok):  # type: ignore[no-untyped-def]
     """Write into ok (k,) what `may_leave` returns; polygons, planes room for work."""
     m, w = len(at), len(windows)
     (left, other), (normals, offsets) = polygons, planes
