@@ -95,7 +95,7 @@ def follow_rays(rays, targets, groups, shapes, surfaces, packet, met):  # type: 
     """Write into `met` what rays meet first, or, where they are aimed at targets, what they reached through layers.
 
     Args: rays as `CastRays`, targets as `ShadowTargets`, groups as `FacetGroups`, shapes as `FacetShapes`, surfaces as
-    `ShadowSurfaces`, packet as `embree_packet.new_packet` returns it, met as `MetFacets`.
+    `ShadowSurfaces`, packet as `embree_packet.own_packet` returns it, met as `MetFacets`.
     Returns: how many rays were cast; a ray and its companions count as one.
     """
     floats, words = packet

@@ -90,7 +90,7 @@ def follow_leg(p, target, slack, inside, leg, reach, caster, packet, corners, pa
 
     Args: target facet on which p lies, -1 for none; slack [m] by which its smooth surface may lie before p; inside body
     in which p lies, -1 for none; leg as `LegChain`; reach [m] from which rays come when far; caster as
-    `RayCaster.met_by_rays`; packet as `embree_packet.new_packet` returns it.
+    `RayCaster.met_by_rays`; packet as `embree_packet.own_packet` returns it.
     Returns: whether the end sees p; the facet in the way, -1 for none; how many rays were cast.
     """
     groups, shapes, surfaces, hides_nothing = caster

@@ -230,29 +230,36 @@ def resolve_return_leg(
             view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
         how = facing, view.centre.seen, view.some, view.mixed, ph.rough
         what = choose_actions(*how, cut)
-        wanted = (what == BISECT) | (what == CLIP)
+        wanted = what >= BISECT
         afforded = found.budget.affords(geometry, tubes.facet, wanted)
         if (wanted & ~afforded).any():
             what = choose_actions(*how, cut & (~wanted | afforded))
-        ready, bent, shaded = (np.flatnonzero(what == w) for w in (KEEP, BISECT, CLIP))
+        ready = np.flatnonzero(what == KEEP)
         resolved.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
-        if not len(bent) and not len(shaded):
+        if not (what >= BISECT).any():
             break
-        parts = list[Tubes]()
-        if len(bent):
-            # Where the phase bends on no edge, the longest is bisected.
-            lengths = sizes(tubes.points[bent, :3] - np.roll(tubes.points[bent, :3], -1, axis=1))
-            bend = np.abs(ph.bend[bent])
-            edge = np.argmax(np.where((ph.rough[bent] > 1.0)[:, None], bend, lengths), axis=1)
-            parts.append(bisect(geometry, leg, tubes, bent, edge, first, rule.jitter))
-        if len(shaded):
-            parts.append(subdivide(geometry, leg, tubes, shaded, view.side, first, rule.jitter)[0])
-        tubes = Tubes.join(parts)
+        tubes = _parts_of(geometry, leg, tubes, what, ph, view.side, first, rule.jitter)
     some, views, phases = zip(*resolved, strict=True)
     if not geometry.convex_alone:
         found.add(Phases.join(list(phases)))
     seen = View.join(list(views))
     return Tubes.join(list(some)), seen.corners, seen.passed
+
+
+def _parts_of(
+    geometry: Geometry, leg: Leg, tubes: Tubes, what: NDArray[np.int8], ph: Phases, side: Floats, first: bool,
+    jitter: float,
+) -> Tubes:  # fmt: skip
+    """Return the parts of tubes that are to be bisected or clipped, `what` (n,); else as for `subdivide`."""
+    bent, shaded, parts = np.flatnonzero(what == BISECT), np.flatnonzero(what == CLIP), list[Tubes]()
+    if len(bent):
+        # Where the phase bends on no edge, the longest is bisected.
+        lengths = sizes(tubes.points[bent, :3] - np.roll(tubes.points[bent, :3], -1, axis=1))
+        edge = np.argmax(np.where((ph.rough[bent] > 1.0)[:, None], np.abs(ph.bend[bent]), lengths), axis=1)
+        parts.append(bisect(geometry, leg, tubes, bent, edge, first, jitter))
+    if len(shaded):
+        parts.append(subdivide(geometry, leg, tubes, shaded, side, first, jitter)[0])
+    return Tubes.join(parts)
 
 
 @dataclass(frozen=True)

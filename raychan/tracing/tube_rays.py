@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.geometry.embree_packet import new_packet
+from raychan.geometry.embree_packet import own_packet
 from raychan.parallel import parallel_for
 from raychan.tracing.leg_rays import LegChain, follow_leg
 from raychan.vectors import copy_to
@@ -113,7 +113,7 @@ def cast_shadow_rays(
     def some(rows: slice) -> None:
         room = np.empty(rays.corners.shape[1:]), np.empty(rays.passed.shape[1], np.int32)
         how = projects, cast, rows.start, rows.stop
-        counts.append(_each_tube(rays, tested, *fixed, new_packet(), room, *how))
+        counts.append(_each_tube(rays, tested, *fixed, own_packet(), room, *how))
 
     parallel_for(len(rays.slack), some, _PARALLEL_FROM)
     geometry.count_rays(sum(counts))

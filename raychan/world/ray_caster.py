@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.embree_packet import new_packet
+from raychan.geometry.embree_packet import own_packet
 from raychan.geometry.intersect import EDGE, OFFSET, CastRays, FacetGroups, FacetShapes, plane_distances
 from raychan.geometry.near_rays import first_within
 from raychan.geometry.shadow_rays import MetFacets, ShadowSurfaces, ShadowTargets, follow_rays
@@ -155,7 +155,7 @@ class RayCaster:
 
         def some(rows: slice) -> None:
             part: list[Any] = [type(x)(*(column[rows] for column in x)) for x in (rays, targets, met)]  # type: ignore
-            casts.append(follow_rays(part[0], part[1], *fixed, new_packet(), part[2]))
+            casts.append(follow_rays(part[0], part[1], *fixed, own_packet(), part[2]))
 
         parallel_for(len(rays.origin), some, _PARALLEL_FROM)
         self.count_rays(sum(casts))
@@ -183,7 +183,7 @@ class RayCaster:
         found, fixed = np.full(len(origin), _MISS, np.int32), (reach, self._facet_groups, self._shapes)
 
         def some(r: slice) -> None:
-            first_within(origin[r], direction[r], own[r], *fixed, new_packet(), found[r])
+            first_within(origin[r], direction[r], own[r], *fixed, own_packet(), found[r])
 
         parallel_for(len(origin), some, _PARALLEL_FROM)
         return found
