@@ -12,9 +12,10 @@ import numpy as np
 
 from raychan.compile.jit import njit
 from raychan.radar.beam_kernels import field_towards
-from raychan.vectors import copy_to, dot, length_to, row
+from raychan.vectors import copy_to, dot, length_to, less, row
 
 _ROUNDING = 1e-9  # rad, and m
+ON_PLANE = 1e-6  # m: corners of tubes so near to a plane lie on it
 BEYOND = 1e-4  # m about a mirror, for rounding: a ray too many does no harm
 
 
@@ -154,6 +155,24 @@ def each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, 
                 count = _clipped(left, count, along, low[j, side] - BEYOND, other) if count else count
                 count = _clipped(other, count, back, -high[j, side] - BEYOND, left) if count else count
         ok[o] = count > 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bounds_of_light(corners, rows, images, at, normal, low, high, axes, windows, side):  # type: ignore[no-untyped-def]
+    """Write into side (n, 3) signed distances [m] of the corners of triangles `rows` (k,) from a line that bounds what
+    of them the leg reaches: where they meet the plane of the last mirror, or rays over a side of a mirror's rectangle;
+    zeros where none runs through them. Args: as for `may_leave`."""
+    ok = may_leave(corners, rows, images, at, normal, low, high, axes, windows)
+    m = len(at)
+    for o in range(len(rows)):
+        p, found = corners[rows[o]], side[rows[o]]
+        for k in range(-1, len(windows)):
+            n, b = row(normal, m - 1) if k < 0 else row(windows, k), row(at, m - 1) if k < 0 else row(images, m)
+            x, y, z = dot(less(row(p, 0), b), n), dot(less(row(p, 1), b), n), dot(less(row(p, 2), b), n)
+            across = ok[o] and min(x, y, z) < -ON_PLANE and max(x, y, z) > ON_PLANE
+            found[0], found[1], found[2] = (x, y, z) if across else (0.0, 0.0, 0.0)
+            if across:
+                break
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -23,7 +23,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-ON_PLANE = 1e-6  # m: corners of tubes so near to a plane lie on it
 _LEAST_AREA = 0.5  # m^2 of a mirror; at street distances smaller faces lie within a few Fresnel zones
 _MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not measured
 
@@ -132,20 +131,6 @@ class Leg:
             found = np.concatenate([found, sides / np.linalg.norm(sides, axis=1)[:, None]])
         return found
 
-    def bounds_of_light(self, points: Floats) -> Floats:
-        """Return signed distances (n, 3) [m] of the corners (n, 3 or more, 3) [m] of triangles from a line that bounds
-        what of them the leg reaches; zeros where none runs through them: where they meet the plane of the last mirror,
-        or rays over a side of a mirror's rectangle."""
-        found = np.zeros((len(points), 3))
-        rows, last = np.flatnonzero(self.may_leave(points)), self.mirrors[-1]
-        at = np.stack([last.point, *([self.image] * len(self.windows))])
-        normal = np.concatenate([last.normal[None], self.windows])
-        side = ((points[rows, :3] - at[:, None, None]) @ normal[:, None, :, None])[..., 0]
-        across = (side.min(axis=2) < -ON_PLANE) & (side.max(axis=2) > ON_PLANE)
-        cut = np.flatnonzero(across.any(axis=0))
-        found[rows[cut]] = side[across[:, cut].argmax(axis=0), cut]
-        return found
-
     def outside_beam(self, points: Floats, radius: Floats) -> Bools:
         """Tell which spheres (n,), about points (n, 3) of this radius (n,) [m], lie outside the beam over this leg."""
         if self.beam is None or self.far:
@@ -177,8 +162,13 @@ class Leg:
         """Tell from which triangles of corners (n, 3 or more, 3) [m], or of these from which `rows` (k,), a ray may
         come to the end, and to which from it, over the rectangle about each mirror."""
         every = np.arange(len(points)) if rows is None else rows.astype(np.int64, copy=False)
-        ok: Bools = may_leave(points, every, *self.chain[:3], *self.chain[4:7], self.windows)
+        ok: Bools = may_leave(points, every, *self.edges_of_mirrors)
         return ok
+
+    @property
+    def edges_of_mirrors(self) -> tuple[Floats, ...]:
+        """What kernels need to know of where rays over the mirrors run (see `image_paths.may_leave`)."""
+        return *self.chain[:3], *self.chain[4:7], self.windows
 
     def visible(
         self, geometry: Geometry, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
 from raychan.tracing.edge_crossings import FacetPlanes, meeting_lines
+from raychan.tracing.image_paths import bounds_of_light
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.radiation import exit_points
 from raychan.tracing.shadow_edges import longest_shadows, shadow_edges_of
@@ -84,16 +85,13 @@ def tube_visibility(
         cast_shadow_rays(geometry, leg.chain, rays, tested)
     else:
         cast_shadow_rays(geometry, leg.chain, rays, tested, drawn)
-    side, mixed = np.zeros((n, 3)), rays.mixed
+    side = np.zeros((n, 3))
     rows = np.flatnonzero(rays.search)
     if len(rows):
         _search(geometry, leg, rows, drawn, rays, corners, side)
     if leg.mirrors:
-        # What the leg lights may lie between all rays: a strip of a long facet beside a small mirror.
-        rows = np.flatnonzero(corners & (mixed | ~rays.some) & ~side.any(axis=1))
-        side[rows] = leg.bounds_of_light(tubes.points[rows])
-        mixed[rows] |= (side[rows] != 0.0).any(axis=1)
-    return Visibility(View.of(rays) if centre is None else centre, rays.some, mixed, side)
+        edges_of_light(tubes.points, corners, rays, leg.edges_of_mirrors, side)
+    return Visibility(View.of(rays) if centre is None else centre, rays.some, rays.mixed, side)
 
 
 def _drawn(geometry: Geometry, tubes: Tubes, first: bool) -> TubesToSee:
@@ -199,6 +197,24 @@ def _gather(rows, tubes, rays, corners, plane, image, far, out):  # type: ignore
         for c in range(3):
             own[j, c] /= max(math.sqrt(area), 1e-300)
             back[j, c] /= math.sqrt(size)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def edges_of_light(points, corners, rays, mirrors, side):  # type: ignore[no-untyped-def]
+    """Write into side (n, 3) where what a leg lights of tubes (n,) ends, and that these are `mixed`: it may lie between
+    all their rays, as a strip of a long facet beside a small mirror.
+
+    Args: points (n, 4, 3) [m]; corners (n,) of which tubes the corners were tested; rays as `ShadowRays`; mirrors as
+    `Leg.edges_of_mirrors`.
+    """
+    rows, count = np.empty(len(points), np.int64), 0
+    for i in range(len(points)):
+        if corners[i] and (rays.mixed[i] or not rays.some[i]) and not side[i].any():
+            rows[count] = i
+            count += 1
+    bounds_of_light(points, rows[:count], *mirrors, side)
+    for i in rows[:count]:
+        rays.mixed[i] |= side[i].any()
 
 
 DROP, KEEP, BISECT, CLIP = 0, 1, 2, 3
