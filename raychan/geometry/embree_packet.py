@@ -10,6 +10,8 @@ each of its rays meets the facet that it meets alone.
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,8 +32,23 @@ _NONE = -1  # RTC_INVALID_GEOMETRY_ID
 Packet = tuple[NDArray[np.float32], NDArray[np.int32]]
 
 
-def new_packet() -> Packet:
-    """Return a block of memory for one thread, as float32 and as int32 words, with all set that stays the same."""
+class _OfThread(threading.local):
+    """The block of memory of a thread."""
+
+    packet: Packet | None = None
+
+
+_own = _OfThread()
+
+
+def own_packet() -> Packet:
+    """Return the block of memory of this thread, as float32 and as int32 words, with all set that stays the same."""
+    if _own.packet is None:
+        _own.packet = _new_packet()
+    return _own.packet
+
+
+def _new_packet() -> Packet:
     room = np.zeros(4 * END + _BYTE_ALIGNMENT, np.uint8)
     at = -room.ctypes.data % _BYTE_ALIGNMENT
     block = room[at : at + 4 * END]

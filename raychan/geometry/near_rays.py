@@ -22,7 +22,7 @@ def first_within(origin, direction, own, reach, group, shapes, packet, facet):  
     """Write into facet (n,) the first facet that each ray meets within its reach; of the others nothing is written.
 
     Args: origin (n, 3) [m], direction (n, 3) unit; own (n,) facet that each leaves and cannot meet; reach [m]; group
-    the first of `FacetGroups`, the only one; shapes as `FacetShapes`; packet as `embree_packet.new_packet` returns it.
+    the first of `FacetGroups`, the only one; shapes as `FacetShapes`; packet as `embree_packet.own_packet` returns it.
     """
     floats, words = packet
     normal, first = shapes.normal, shapes.first

@@ -54,7 +54,7 @@ class MetFacets(NamedTuple):
 
 
 @njit(cache=True, forceinline=True, uncounted=True)
-def _is_clear(a, t, x, d, b, limit, slack, surfaces):  # type: ignore[no-untyped-def]
+def is_clear(a, t, x, d, b, limit, slack, surfaces):  # type: ignore[no-untyped-def]
     """Tell whether a ray aimed at facet b (-1: none) that met facet a at t [m] reached its `limit` [m].
 
     Only the target's own smooth surface may lie before it by `slack` [m], others by the surfaces' touch [m]. Where
@@ -82,7 +82,7 @@ def _inside(a, x, t, d, surfaces):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True, uncounted=True)
-def _unused(passed):  # type: ignore[no-untyped-def]
+def unused(passed):  # type: ignore[no-untyped-def]
     """Return the first place in `passed` (layers,) that holds no facet yet, -1 if all do."""
     for q in range(len(passed)):
         if passed[q] < 0:
@@ -95,7 +95,7 @@ def follow_rays(rays, targets, groups, shapes, surfaces, packet, met):  # type: 
     """Write into `met` what rays meet first, or, where they are aimed at targets, what they reached through layers.
 
     Args: rays as `CastRays`, targets as `ShadowTargets`, groups as `FacetGroups`, shapes as `FacetShapes`, surfaces as
-    `ShadowSurfaces`, packet as `embree_packet.new_packet` returns it, met as `MetFacets`.
+    `ShadowSurfaces`, packet as `embree_packet.own_packet` returns it, met as `MetFacets`.
     Returns: how many rays were cast; a ray and its companions count as one.
     """
     floats, words = packet
@@ -114,11 +114,11 @@ def follow_rays(rays, targets, groups, shapes, surfaces, packet, met):  # type: 
             if not aimed:
                 facet[i], distance[i] = a, t
                 break
-            free = _is_clear(a, t, x, d, targets.facet[i], targets.limit[i], targets.slack[i], surfaces)
+            free = is_clear(a, t, x, d, targets.facet[i], targets.limit[i], targets.slack[i], surfaces)
             if not free and len(targets.inside):
                 free = surfaces.body[a] == targets.inside[i]
             reached[i], blocker[i] = free, -1 if free else a
-            layer = -1 if free or not len(surfaces.is_layer) or not surfaces.is_layer[a] else _unused(passed[i])
+            layer = -1 if free or not len(surfaces.is_layer) or not surfaces.is_layer[a] else unused(passed[i])
             if layer < 0:
                 break
             # Behind a thin layer the ray goes on.

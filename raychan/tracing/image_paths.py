@@ -12,14 +12,15 @@ import numpy as np
 
 from raychan.compile.jit import njit
 from raychan.radar.beam_kernels import field_towards
-from raychan.vectors import copy_to, dot, length_to, row
+from raychan.vectors import copy_to, dot, length_to, less, row
 
 _ROUNDING = 1e-9  # rad, and m
-_BEYOND = 1e-4  # m about a mirror, for rounding: a ray too many does no harm
+ON_PLANE = 1e-6  # m: corners of tubes so near to a plane lie on it
+BEYOND = 1e-4  # m about a mirror, for rounding: a ray too many does no harm
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
-def _mirror_point(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
+def mirror_point(x, y, z, image, at, normal):  # type: ignore[no-untyped-def]
     """Return where the line from a point to an image meets the mirror's plane; the point itself if it never does."""
     dx, dy, dz = image[0] - x, image[1] - y, image[2] - z
     over = (at[0] - x) * normal[0] + (at[1] - y) * normal[1] + (at[2] - z) * normal[2]
@@ -52,7 +53,7 @@ def _may_reach(point, size, images, at, normal, centre, radius):  # type: ignore
             return False
         if not (x - image[0]) * n[0] + (y - image[1]) * n[1] + (z - image[2]) * n[2] > 0.0:
             return True
-        x, y, z = _mirror_point(x, y, z, image, at[i], n)
+        x, y, z = mirror_point(x, y, z, image, at[i], n)
         ray = x - image[0], y - image[1], z - image[2]
         to = centre[i, 0] - image[0], centre[i, 1] - image[1], centre[i, 2] - image[2]
         length, away = math.sqrt(dot(ray, ray)), math.sqrt(dot(to, to))
@@ -106,8 +107,8 @@ def _beyond_one(triangle, normals, offsets):  # type: ignore[no-untyped-def]
     p, q, r = row(triangle, 0), row(triangle, 1), row(triangle, 2)
     for k in range(len(offsets)):
         n = row(normals, k)
-        out = dot(n, p) - offsets[k] < -_BEYOND
-        if out and dot(n, q) - offsets[k] < -_BEYOND and dot(n, r) - offsets[k] < -_BEYOND:
+        out = dot(n, p) - offsets[k] < -BEYOND
+        if out and dot(n, q) - offsets[k] < -BEYOND and dot(n, r) - offsets[k] < -BEYOND:
             return True
     return False
 
@@ -122,12 +123,12 @@ def may_leave(corners, rows, images, at, normal, low, high, axes, windows):  # t
     """
     ok, most, w = np.empty(len(rows), np.bool_), 3 + 5 * len(at), len(windows)
     polygons, planes = (np.empty((most, 3)), np.empty((most, 3))), (np.empty((1 + w, 3)), np.empty(1 + w))
-    _each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok)
+    each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok)
     return ok
 
 
 @njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
-def _each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok):  # type: ignore[no-untyped-def]
+def each_may_leave(corners, rows, images, at, normal, low, high, axes, windows, polygons, planes, ok):  # type: ignore[no-untyped-def]
     """Write into ok (k,) what `may_leave` returns; polygons, planes room for work."""
     m, w = len(at), len(windows)
     (left, other), (normals, offsets) = polygons, planes
@@ -147,13 +148,31 @@ def _each_may_leave(corners, rows, images, at, normal, low, high, axes, windows,
             count = _clipped(left, count, normal[j], dot(at[j], normal[j]), other) if count else count
             for q in range(count):
                 p = other[q]
-                left[q, 0], left[q, 1], left[q, 2] = _mirror_point(p[0], p[1], p[2], images[j + 1], at[j], normal[j])
+                left[q, 0], left[q, 1], left[q, 2] = mirror_point(p[0], p[1], p[2], images[j + 1], at[j], normal[j])
             for side in range(2):
                 along = axes[j, side]
                 back = -along[0], -along[1], -along[2]
-                count = _clipped(left, count, along, low[j, side] - _BEYOND, other) if count else count
-                count = _clipped(other, count, back, -high[j, side] - _BEYOND, left) if count else count
+                count = _clipped(left, count, along, low[j, side] - BEYOND, other) if count else count
+                count = _clipped(other, count, back, -high[j, side] - BEYOND, left) if count else count
         ok[o] = count > 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bounds_of_light(corners, rows, images, at, normal, low, high, axes, windows, side):  # type: ignore[no-untyped-def]
+    """Write into side (n, 3) signed distances [m] of the corners of triangles `rows` (k,) from a line that bounds what
+    of them the leg reaches: where they meet the plane of the last mirror, or rays over a side of a mirror's rectangle;
+    zeros where none runs through them. Args: as for `may_leave`."""
+    ok = may_leave(corners, rows, images, at, normal, low, high, axes, windows)
+    m = len(at)
+    for o in range(len(rows)):
+        p, found = corners[rows[o]], side[rows[o]]
+        for k in range(-1, len(windows)):
+            n, b = row(normal, m - 1) if k < 0 else row(windows, k), row(at, m - 1) if k < 0 else row(images, m)
+            x, y, z = dot(less(row(p, 0), b), n), dot(less(row(p, 1), b), n), dot(less(row(p, 2), b), n)
+            across = ok[o] and min(x, y, z) < -ON_PLANE and max(x, y, z) > ON_PLANE
+            found[0], found[1], found[2] = (x, y, z) if across else (0.0, 0.0, 0.0)
+            if across:
+                break
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -163,68 +182,9 @@ def mirror_points(points, images, at, normal):  # type: ignore[no-untyped-def]
     for j in range(len(points)):
         x, y, z = points[j, 0], points[j, 1], points[j, 2]
         for i in range(len(at) - 1, -1, -1):
-            x, y, z = _mirror_point(x, y, z, images[i + 1], at[i], normal[i])
+            x, y, z = mirror_point(x, y, z, images[i + 1], at[i], normal[i])
             out[j, i, 0], out[j, i, 1], out[j, i, 2] = x, y, z
     return out
-
-
-@njit(cache=True, nogil=True)
-def on_mirrors(corners, low, high, axes):  # type: ignore[no-untyped-def]
-    """Return the rows (k,) of mirror points (n, m, 3) [m] that all lie within the rectangle about their mirror (see
-    `may_leave`)."""
-    rows, k = np.empty(len(corners), np.int64), 0
-    for j in range(len(corners)):
-        within = True
-        for i in range(len(low)):
-            for side in range(2):
-                x = dot(corners[j, i], axes[i, side])
-                within = within and low[i, side] - _BEYOND <= x <= high[i, side] + _BEYOND
-        rows[k] = j
-        k += within
-    return rows[:k]
-
-
-@njit(cache=True, nogil=True)
-def stretch(i, rows, points, corners, images, at, normal, far, reach):  # type: ignore[no-untyped-def]
-    """Return the `rows` whose path may go along stretch i (from mirror i - 1 to mirror i), with its starts (k, 3) [m],
-    unit directions (k, 3) and lengths (k,) [m]: both ends of a stretch lie on the lit sides of its mirrors.
-
-    Args: points (n, 3) [m], corners (n, m, 3) [m] mirror points of the legs to them; reach [m] from which rays come
-    when far.
-    """
-    m, k = len(at), 0
-    kept, start, d, length = (
-        np.empty(len(rows), np.int64),
-        np.empty((len(rows), 3)),
-        np.empty((len(rows), 3)),
-        np.empty(len(rows)),
-    )
-    for r in rows:
-        before, ahead, square = 0.0, 0.0, 0.0
-        for c in range(3):
-            stop = corners[r, i, c] if i < m else points[r, c]
-            if i == 0:
-                start[k, c] = stop + reach * images[0, c] if far and m == 0 else images[0, c]
-            else:
-                start[k, c] = corners[r, i - 1, c]
-                before += (stop - at[i - 1, c]) * normal[i - 1, c]
-            if i < m:
-                ahead += (start[k, c] - at[i, c]) * normal[i, c]
-            d[k, c] = stop - start[k, c]
-            square += d[k, c] ** 2
-        if (i > 0 and before <= 0.0) or (i < m and (ahead <= 0.0 or square == 0.0)):
-            continue
-        length[k] = math.sqrt(square)
-        for c in range(3):
-            d[k, c] /= length[k] if square > 0.0 else 1.0
-        if far and i == m:
-            length[k] = reach
-            for c in range(3):
-                d[k, c] = -images[m, c]
-                start[k, c] = points[r, c] + reach * images[m, c]
-        kept[k] = r
-        k += 1
-    return kept[:k], start[:k], d[:k], length[:k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -18,7 +18,8 @@ from raychan.poses import sizes
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
-from raychan.tracing.legs import ON_PLANE, Leg, View
+from raychan.tracing.image_paths import ON_PLANE
+from raychan.tracing.legs import Leg, View
 from raychan.tracing.radiation import OBLIQUE, phases_of, radiating
 from raychan.tracing.subdivide import subdivide
 from raychan.tracing.tubes import CENTRE, MOST_BEND, Refinement, Tubes, launch_tubes, unit

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from raychan.radar.beam_table import Beam
 from raychan.records import BLOCKER, MIRROR
 from raychan.tracing.cache import cache_of
-from raychan.tracing.image_paths import may_leave, may_reach, mirror_points, on_mirrors, rays_from, stretch, weights
+from raychan.tracing.image_paths import may_leave, may_reach, mirror_points, rays_from, weights
+from raychan.tracing.leg_rays import LegChain
 from raychan.tracing.mirrors import Mirror
+from raychan.tracing.tube_rays import ShadowRays, points_seen
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
-ON_PLANE = 1e-6  # m: corners of tubes so near to a plane lie on it
 _LEAST_AREA = 0.5  # m^2 of a mirror; at street distances smaller faces lie within a few Fresnel zones
 _MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not measured
 
@@ -41,6 +42,11 @@ class View:
         return View(self.seen[index], self.corners[index], self.passed[index], self.blocker[index])
 
     @staticmethod
+    def of(rays: ShadowRays) -> View:
+        """Return how the points of rays to centres are seen."""
+        return View(rays.seen, rays.corners, rays.passed, rays.blocker)
+
+    @staticmethod
     def join(parts: list[View]) -> View:
         """Return how the points of several views are seen as one."""
         return View(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(View)))
@@ -49,27 +55,30 @@ class View:
 @dataclass(frozen=True, eq=False)
 class Leg:
     """The one-way path between an end (a point, or a direction when `far`) and a surface, over mirrors, end's side
-    first; `image` (3,) the end mirrored at all of them; `beam` of the end's antenna."""
+    first; `image` (3,) the end mirrored at all of them; `beam` of the end's antenna; `chain` what kernels follow."""
 
     end: Floats
     far: bool = False
     mirrors: tuple[Mirror, ...] = ()
     beam: Beam | None = None
     image: Floats = field(init=False)
-    _chain: tuple[Floats, ...] = field(init=False, repr=False)
-    _rectangles: tuple[Floats, ...] = field(init=False, repr=False)
+    chain: LegChain = field(init=False, repr=False)
+    _circles: tuple[Floats, Floats] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         images = [np.asarray(self.end, float)]
         for m in self.mirrors:
             images.append(m.image(images[-1]))
         object.__setattr__(self, "image", images[-1])
-        sheets = [np.array([getattr(m, name) for m in self.mirrors]) for name in ("point", "normal", "centre")]
-        radius = np.array([m.radius for m in self.mirrors])
-        object.__setattr__(self, "_chain", (np.array(images), *(s.reshape(-1, 3) for s in sheets), radius))
-        ends = (np.array([getattr(m, name) for m in self.mirrors]).reshape(-1, 2) for name in ("low", "high"))
+        at, normal, centre = (
+            np.array([getattr(m, name) for m in self.mirrors]).reshape(-1, 3) for name in ("point", "normal", "centre")
+        )
+        low, high = (np.array([getattr(m, name) for m in self.mirrors]).reshape(-1, 2) for name in ("low", "high"))
         axes = np.array([m.axes for m in self.mirrors]).reshape(-1, 2, 3)
-        object.__setattr__(self, "_rectangles", (*ends, axes))
+        facet = np.array([m.facet for m in self.mirrors], np.int64)
+        chain = LegChain(np.array(images), at, normal, facet, low, high, axes, bool(self.far))
+        object.__setattr__(self, "chain", chain)
+        object.__setattr__(self, "_circles", (centre, np.array([m.radius for m in self.mirrors])))
 
     def pieces(self, geometry: Geometry) -> Ints:
         """Return the pieces (m,) of the mirrors."""
@@ -94,8 +103,12 @@ class Leg:
     def antenna(self) -> tuple[Any, ...]:
         """What kernels need of the end's antenna: images, far, normals of the mirrors, table of its beam (empty:
         isotropic)."""
-        images, _, normals = self._chain[:3]
-        return images, self.far, normals, np.zeros((0, 0)) if self.beam is None else self.beam.table
+        return (
+            self.chain.images,
+            self.far,
+            self.chain.normal,
+            np.zeros((0, 0)) if self.beam is None else self.beam.table,
+        )
 
     @property
     def gain_ends(self) -> Floats:
@@ -112,24 +125,10 @@ class Leg:
         found = np.zeros((0, 3))
         for m in self.mirrors:
             found = found - 2.0 * np.outer(found @ m.normal, m.normal)
-            to = m.corners - self._chain[0][1 + len(found) // 4]
+            to = m.corners - self.chain.images[1 + len(found) // 4]
             sides = np.cross(to, np.roll(to, -1, axis=0))
             sides *= np.sign(sides @ to.mean(axis=0))[:, None]
             found = np.concatenate([found, sides / np.linalg.norm(sides, axis=1)[:, None]])
-        return found
-
-    def bounds_of_light(self, points: Floats) -> Floats:
-        """Return signed distances (n, 3) [m] of the corners (n, 3 or more, 3) [m] of triangles from a line that bounds
-        what of them the leg reaches; zeros where none runs through them: where they meet the plane of the last mirror,
-        or rays over a side of a mirror's rectangle."""
-        found = np.zeros((len(points), 3))
-        rows, last = np.flatnonzero(self.may_leave(points)), self.mirrors[-1]
-        at = np.stack([last.point, *([self.image] * len(self.windows))])
-        normal = np.concatenate([last.normal[None], self.windows])
-        side = ((points[rows, :3] - at[:, None, None]) @ normal[:, None, :, None])[..., 0]
-        across = (side.min(axis=2) < -ON_PLANE) & (side.max(axis=2) > ON_PLANE)
-        cut = np.flatnonzero(across.any(axis=0))
-        found[rows[cut]] = side[across[:, cut].argmax(axis=0), cut]
         return found
 
     def outside_beam(self, points: Floats, radius: Floats) -> Bools:
@@ -150,21 +149,26 @@ class Leg:
 
     def mirror_points(self, points: Floats) -> Floats:
         """Return the mirror points (n, m, 3) [m] on the way to each point (n, 3) [m], end's side first."""
-        found: Floats = mirror_points(points, *self._chain[:3])
+        found: Floats = mirror_points(points, *self.chain[:3])
         return found
 
     def may_reach(self, points: Floats, size: Floats) -> Bools:
         """Tell which spheres about points (n, 3) of radius `size` (n,) [m] the leg may reach: in front of the last
         mirror, over the circle about each mirror."""
-        ok: Bools = may_reach(points, size, *self._chain)
+        ok: Bools = may_reach(points, size, *self.chain[:3], *self._circles)
         return ok
 
     def may_leave(self, points: Floats, rows: NDArray[np.signedinteger] | None = None) -> Bools:
         """Tell from which triangles of corners (n, 3 or more, 3) [m], or of these from which `rows` (k,), a ray may
         come to the end, and to which from it, over the rectangle about each mirror."""
         every = np.arange(len(points)) if rows is None else rows.astype(np.int64, copy=False)
-        ok: Bools = may_leave(points, every, *self._chain[:3], *self._rectangles, self.windows)
+        ok: Bools = may_leave(points, every, *self.edges_of_mirrors)
         return ok
+
+    @property
+    def edges_of_mirrors(self) -> tuple[Floats, ...]:
+        """What kernels need to know of where rays over the mirrors run (see `image_paths.may_leave`)."""
+        return *self.chain[:3], *self.chain[4:7], self.windows
 
     def visible(
         self, geometry: Geometry, points: Floats, facet: Ints, slack: Floats, layers: int, inside: Ints | None = None
@@ -174,27 +178,7 @@ class Leg:
         Args: points (n, 3) [m] on facets (n,); slack (n,) [m] by which the points' own smooth surface may lie before
         them; layers that the last stretch may pass; inside (n,) bodies in which the points lie, which do not hide them.
         """
-        n = len(points)
-        corners = self.mirror_points(points)
-        chain = *self._chain[:3], self.far, 2.0 * geometry.extent + 1.0
-        rows, skip = on_mirrors(corners, *self._rectangles), np.full(n, -1, np.int32)
-        for i, m in enumerate(self.mirrors):
-            rows, start, d, _ = stretch(i, rows, points, corners, *chain)
-            hit, _ = geometry.cast(start, d, skip[rows])
-            # The mirror itself is hit first.
-            ok = (hit >= 0) & (geometry.plane[hit] == geometry.plane[m.facet])
-            rows = rows[ok]
-            skip[rows] = hit[ok]
-        rows, start, d, length = stretch(len(self.mirrors), rows, points, corners, *chain)
-        rays: Any = start, d, length, slack, skip, facet, layers, inside
-        if len(rows) < n:
-            rays = *rays[:3], slack[rows], skip[rows], facet[rows], layers, None if inside is None else inside[rows]
-        reached, passed, in_way = geometry.walk(*rays)
-        if len(rows) == n:
-            return View(reached, corners, passed, in_way)
-        view = View(np.zeros(n, bool), corners, np.full((n, layers), -1, np.int32), np.full(n, -1, np.int32))
-        view.seen[rows], view.passed[rows], view.blocker[rows] = reached, passed, in_way
-        return view
+        return View.of(points_seen(geometry, self.chain, points, facet, slack, layers, inside))
 
 
 def planes_that_mirror(geometry: Geometry, end: Floats) -> list[Mirror]:

@@ -20,7 +20,7 @@ from raychan.geometry.curved_patches import place_on, rise_off_chord
 from raychan.parallel import parallel_for
 from raychan.tracing.image_paths import weight
 from raychan.tracing.legs import Leg
-from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, row_numbers, slices
+from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, row_numbers
 from raychan.vectors import distance, length_to
 from raychan.world.geometry import Geometry
 
@@ -86,7 +86,7 @@ class PhaseFacets(NamedTuple):
 
 
 class PhaseColumns(NamedTuple):
-    """The fields of `Phases`, to be written."""
+    """The fields of `Phases`, and what `radiates` tells of each tube, to be written."""
 
     six: Floats
     bend: Floats
@@ -94,6 +94,8 @@ class PhaseColumns(NamedTuple):
     in_phase: Floats
     rough: Floats
     length: Floats
+    share: Floats
+    facing: Bools
 
 
 def radiating(out: Leg, tubes: Tubes, which: int) -> tuple[Floats, Bools]:
@@ -105,18 +107,28 @@ def radiating(out: Leg, tubes: Tubes, which: int) -> tuple[Floats, Bools]:
 
 def phases_of(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement) -> Phases:
     """Return the phases of tubes that came by `leg` over the leg `out`, and what each can scatter there at most."""
+    return radiating_phases(geometry, leg, out, tubes, rule, LIT)[0]
+
+
+def radiating_phases(
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, rule: Refinement, which: int
+) -> tuple[Phases, Floats, Bools]:
+    """Return the phases of tubes that came by `leg` over the leg `out`, what share (n,) of their obliquity they have
+    towards its end, and which (n,) face it (see `radiates`); phases of those of no share are not set."""
     n, f = len(tubes), geometry.facets
-    written = PhaseColumns(np.empty((n, 6)), np.empty((n, 3)), *np.empty((4, n)))
-    columns = [getattr(tubes, name) for name in PhaseTubes._fields]
+    bound, in_phase, rough, length, share = np.empty((5, n))
+    facing = np.empty(n, bool)
+    written = PhaseColumns(np.empty((n, 6)), np.empty((n, 3)), bound, in_phase, rough, length, share, facing)
+    given = PhaseTubes(*(getattr(tubes, name) for name in PhaseTubes._fields))
     facets = PhaseFacets(f.vertices, geometry.edge_curvature, geometry.lossy, *geometry.material_columns)
     limits = rule.phase, rule.turn, MOST_BEND
 
     def some(rows: slice) -> None:
-        here = PhaseTubes(*(x[rows] for x in columns))
-        phases(here, facets, leg.image, leg.far, out.antenna, rule.wavenumber, limits, slices(written, rows))
+        every = rows.start, rows.stop, which
+        phases(given, facets, leg.image, leg.far, out.antenna, rule.wavenumber, limits, every, written)
 
     parallel_for(n, some, _PARALLEL_FROM)
-    return Phases(**written._asdict())
+    return Phases(written.six, written.bend, bound, in_phase, rough, length), share, facing
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
@@ -158,31 +170,58 @@ def _reflection(j, materials, normal, k, wavenumber):  # type: ignore[no-untyped
     return max(abs(r_s), abs(r_p))
 
 
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def radiates(point, k, normal, image, far, which):  # type: ignore[no-untyped-def]
+    """Return what share of the obliquity cos_i of a tube is left towards an end, 0 where it does not radiate, and
+    whether it faces it.
+
+    Args: point, k, normal (3,) of its arriving centre ray; image (3,) [m] of the end, or the direction to it when far;
+    which of FACING, OBLIQUE, LIT. The reflected wave's obliquity is (cos_i + r . n) / 2 towards r: it goes on beyond
+    the horizon r . n = 0 and ends where it changes its sign (Ufimtsev 2014, ch. 1).
+    """
+    size, towards, cosine = 0.0, 0.0, 0.0
+    for c in range(3):
+        d = image[c] if far else image[c] - point[c]
+        size += d * d
+        towards += d * normal[c]
+        cosine -= k[c] * normal[c]
+    towards /= math.sqrt(size)
+    if towards > 0.0 or which == LIT:
+        return 1.0, towards > 0.0
+    left = 0.5 * (cosine + towards) if which == OBLIQUE else 0.0
+    return (left / cosine if left > 0.0 else 0.0), False
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def phases(tubes, facets, image, far, antenna, wavenumber, limits, out):  # type: ignore[no-untyped-def]
-    """Write the two-way phases of tubes at corners and edge middles, and bounds on what each tube may scatter.
+def phases(tubes, facets, image, far, antenna, wavenumber, limits, every, out):  # type: ignore[no-untyped-def]
+    """Write the two-way phases of tubes that radiate at corners and edge middles, and bounds on what each may scatter.
 
     The bound is the amplitude k A cos_i / (2 pi r) of the tube all in phase, over one plus half the span of its phase
     at the corners.
 
     Args: tubes as `PhaseTubes`, with bary (n, 3, 3) on their first facet, (n, 0, 3) later; facets as `PhaseFacets`;
     image (3,) of the end by which they came, or the direction to it when far; antenna of the leg out (see
-    `image_paths.weight`); limits (phase, turn, most_bend) as for `edge_to_cut`; out as `PhaseColumns`.
+    `image_paths.weight`); limits (phase, turn, most_bend) as for `edge_to_cut`; every first of the
+    tubes to look at, the one after the last, and which of them radiate; out as `PhaseColumns`.
     """
-    _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, out, np.empty((2, 3)))
+    _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, every, out, np.empty((2, 3)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
-def _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, out, room):  # type: ignore[no-untyped-def]
+def _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, every, out, room):  # type: ignore[no-untyped-def]
     """Do what `phases` does, with room (2, 3) for work."""
     images, out_far, mirrors, table = antenna
     out_image = images[len(mirrors)]
     phase, turn, most_bend = limits
     corners, ks, lengths, normals, facet, bary, strength, spread = tubes
     vertices, edge_curvature, lossy, material, materials = facets
-    all_six, all_bend, bound, in_phase, rough, whole = out
+    all_six, all_bend, bound, in_phase, rough, whole, shares, facing = out
     middle, look = room[0], room[1]
-    for i in range(len(facet)):
+    begin, end, which = every
+    for i in range(begin, end):
+        shares[i], facing[i] = radiates(corners[i, 3], ks[i, 3], normals[i, 3], out_image, out_far, which)
+        if shares[i] == 0.0:
+            continue
         points, k, length, f = corners[i], ks[i], lengths[i], facet[i]
         six, bend = all_six[i], all_bend[i]
         low, high = np.inf, -np.inf
@@ -215,28 +254,10 @@ def _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, out, roo
 
 @njit(cache=True, nogil=True)
 def radiating_share(points, k, normals, image, far, which):  # type: ignore[no-untyped-def]
-    """Return what share of the obliquity cos_i of tubes (n,) is left towards an end, 0 where they do not radiate, and
-    whether they face it.
-
-    Args: points, k, normals (n, 4, 3) of arriving tubes, the centre last; image (3,) [m] of the end, or the direction
-    to it when far; which of FACING, OBLIQUE, LIT. The reflected wave's obliquity is (cos_i + r . n) / 2 towards r: it
-    goes on beyond the horizon r . n = 0 and ends where it changes its sign (Ufimtsev 2014, ch. 1).
-    """
+    """Return share and side (n,) of `radiates` for tubes of points, k, normals (n, 4, 3), the centre last."""
     share, facing = np.empty(len(points)), np.empty(len(points), np.bool_)
     for i in range(len(points)):
-        size, towards, cosine = 0.0, 0.0, 0.0
-        for c in range(3):
-            d = image[c] if far else image[c] - points[i, 3, c]
-            size += d * d
-            towards += d * normals[i, 3, c]
-            cosine -= k[i, 3, c] * normals[i, 3, c]
-        towards /= math.sqrt(size)
-        facing[i] = towards > 0.0
-        if facing[i] or which == LIT:
-            share[i] = 1.0
-        else:
-            left = 0.5 * (cosine + towards) if which == OBLIQUE else 0.0
-            share[i] = left / cosine if left > 0.0 else 0.0
+        share[i], facing[i] = radiates(points[i, 3], k[i, 3], normals[i, 3], image, far, which)
     return share, facing
 
 

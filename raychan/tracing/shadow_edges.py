@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.geometry.edge_grid import grid_bounds, restore_starts
-from raychan.parallel import parallel_for
 from raychan.tracing.cache import cache_of
 from raychan.tracing.edge_crossings import above, apart, pyramid, scale_at, size_of, within
 from raychan.tracing.legs import Leg
@@ -24,12 +23,11 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_PARALLEL_FROM = 200  # tubes from which on a second thread pays; not measured
 _LEGS_KEPT = 64  # of which the grids are kept; each takes a megabyte or two
 _CELLS = 512  # along the longest side of the grid of directions: trades memory for edges a cell; not measured
 
 
-class _Shadows(NamedTuple):
+class ShadowEdges(NamedTuple):
     """Silhouette edges (e, 2, 3) [m] as seen from an image (3,) [m] (a unit direction when far), the smooth patches
     (e, 2) that meet there, and the grid of directions: edges entries[first[i] : first[i + 1]] pass cell i; `axes` (2,)
     that the grid keeps of a direction's three coordinates, its corner low (2,), cell size and shape (2,)."""
@@ -46,47 +44,30 @@ class _Shadows(NamedTuple):
     shape: NDArray[np.int64]
 
 
-class ShadowEdges:
-    """The silhouette edges of all bodies as seen over one leg, in a grid of directions from the leg's last image: of
-    these the two coordinates that vary most."""
-
-    def __init__(self, geometry: Geometry, leg: Leg) -> None:
-        self.edges, smooth = _silhouette(geometry, leg)
-        self._facets = geometry.normal, geometry.smooth, geometry.touch
-        if len(self.edges):
-            low, high = _bounds(self.edges, leg.image, leg.far)
-            low, high, _ = grid_bounds(_directions_to(self.edges.mean(axis=1), leg.image, leg.far), low, high)
-            axes = np.sort(np.argsort(high - low, kind="stable")[1:])
-            low, high = low[axes], high[axes]
-            cell = max(float((high - low).max()) / _CELLS, 1e-9)
-            low -= 2.0 * cell
-            shape = np.ceil((high - low) / cell).astype(np.int64) + 3
-            first, index = _fill(self.edges, leg.image, leg.far, axes, low, cell, shape)
-            self._shadows = _Shadows(leg.image, leg.far, self.edges, smooth, first, index, axes, low, cell, shape)
-
-    def across(self, points: Floats, facet: Ints, slack: Floats) -> Floats:
-        """Return signed distances (n, 3) [m] of tubes' corners from the plane through the image and the edge of which
-        the longest shadow falls on each; zeros: none.
-
-        Args: points (n, 4, 3) [m] corners and centres of tubes on facets (n,); slack (n,) [m] by which the tube's own
-        smooth patch may lie before its facet.
-        """
-        side = np.zeros((len(points), 3))
-        if not len(self.edges):
-            return side
-
-        def some(rows: slice) -> None:
-            _longest_shadows(points[rows], facet[rows], slack[rows], *self._facets, self._shadows, side[rows])
-
-        parallel_for(len(points), some, _PARALLEL_FROM)
-        return side
+def _shadows_of(geometry: Geometry, leg: Leg) -> ShadowEdges:
+    """Return the silhouette edges of all bodies as seen over one leg, in a grid of directions from the leg's last
+    image: of these the two coordinates that vary most."""
+    edges, smooth = _silhouette(geometry, leg)
+    image = np.asarray(leg.image, float)
+    if not len(edges):
+        nowhere = np.zeros(2, np.int32), np.zeros(0, np.int32), np.arange(2), np.zeros(2), 1.0, np.ones(2, np.int64)
+        return ShadowEdges(image, leg.far, edges, smooth, *nowhere)
+    low, high = _bounds(edges, image, leg.far)
+    low, high, _ = grid_bounds(_directions_to(edges.mean(axis=1), image, leg.far), low, high)
+    axes = np.sort(np.argsort(high - low, kind="stable")[1:])
+    low, high = low[axes], high[axes]
+    cell = max(float((high - low).max()) / _CELLS, 1e-9)
+    low -= 2.0 * cell
+    shape = np.ceil((high - low) / cell).astype(np.int64) + 3
+    first, entries = _fill(edges, image, leg.far, axes, low, cell, shape)
+    return ShadowEdges(image, leg.far, edges, smooth, first, entries, axes, low, cell, shape)
 
 
 def shadow_edges_of(geometry: Geometry, leg: Leg) -> ShadowEdges:
     """Return the shadow edges of a leg, built once for all legs of the same last image and mirror."""
     last = (leg.mirrors[-1].facet, leg.mirrors[-1].normal.tobytes()) if leg.mirrors else None
     key = np.asarray(leg.image, float).tobytes(), leg.far, last
-    return cache_of(geometry).newest("shadow edges", key, _LEGS_KEPT, lambda: ShadowEdges(geometry, leg))
+    return cache_of(geometry).newest("shadow edges", key, _LEGS_KEPT, lambda: _shadows_of(geometry, leg))
 
 
 def _silhouette(geometry: Geometry, leg: Leg) -> tuple[Floats, Ints]:
@@ -139,7 +120,7 @@ def _bounds(edges, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped-def]
-    """Return the edges in each cell as (first, index), see `_Shadows`: edges are sampled in steps under half a cell."""
+    """Return `first` and `entries` of `ShadowEdges`: edges are sampled in steps under half a cell."""
     first = np.zeros(shape[0] * shape[1] + 1, np.int32)
     cells, owner = np.empty(4 * len(edges), np.int32), np.empty(4 * len(edges), np.int32)
     count = 0
@@ -180,11 +161,12 @@ def _fill(edges, image, far, axes, low, cell, shape):  # type: ignore[no-untyped
 
 
 @njit(cache=True, nogil=True)
-def _longest_shadows(points, facet, slack, normals, smooth, touch, shadows, out):  # type: ignore[no-untyped-def]
+def longest_shadows(points, facet, slack, normals, smooth, touch, shadows, out):  # type: ignore[no-untyped-def]
     """Write into out (n, 3) the corners' distances from the plane of the edge whose shadow on each tube is longest.
 
-    Args: as for `ShadowEdges.across`; normals (f, 3), smooth (f,) of facets; touch [m] within which surfaces lie on
-    each other; shadows as `_Shadows`.
+    Zeros stay where there is none. Args: points (n, 4, 3) [m] corners and centres of tubes on facets (n,); slack (n,)
+    [m] by which the tube's own smooth patch may lie before its facet; normals (f, 3), smooth (f,) of facets; touch [m]
+    within which surfaces lie on each other; shadows as `ShadowEdges`.
     """
     tested, room, cells = np.full(len(shadows.edges), -1, np.int64), np.empty((8, 3)), np.empty((2, 2), np.int64)
     _each_longest_shadow(points, facet, slack, normals, smooth, touch, shadows, out, tested, room, cells)
@@ -192,7 +174,7 @@ def _longest_shadows(points, facet, slack, normals, smooth, touch, shadows, out)
 
 @njit(cache=True, nogil=True, uncounted=True)
 def _each_longest_shadow(points, facet, slack, normals, smooth, touch, shadows, out, tested, room, cells):  # type: ignore[no-untyped-def]
-    """Do what `_longest_shadows` does.
+    """Do what `longest_shadows` does.
 
     Args: tested (e,) which tube was last tested against each edge; room (8, 3), cells (2, 2) for work.
     """

@@ -16,8 +16,9 @@ from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.launch import GAP_LEVELS, OBLIQUE_SHARE, launch
-from raychan.tracing.legs import Leg, View, returning
-from raychan.tracing.radiation import FACING, LIT, OBLIQUE, Phases, phases_of, radiating
+from raychan.tracing.legs import Leg, View
+from raychan.tracing.outgoing import Leaving
+from raychan.tracing.radiation import FACING, LIT, OBLIQUE, Phases, phases_of, radiating_phases
 from raychan.tracing.routes import leg_of_arrival, routes_of
 from raychan.tracing.shared_work import all_of
 from raychan.tracing.subdivide import bisect, subdivide
@@ -125,11 +126,12 @@ class _Wave(Generic[T]):
             ends = count >= self.bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth)
             # Mirrors such as the ground return by their exact foot points, not by tubes.
             scatters = geometry.facets.role[geometry.facets.body[tubes.facet]] != MIRROR
-            present = np.zeros(len(geometry.piece_role), bool)
-            present[geometry.piece[tubes.facet[scatters]]] = True
             share = 1.0 / min(max(len(outs), 1), _SHARES)
-            outs = [i for i in outs if (returning(geometry, self.outs[i]) & present).any()]
-            left = partial(self._left, tubes, scatters, self.images.returns(geometry, self.leg, tubes, first), depth)
+            twice, which = self.images.returns(geometry, self.leg, tubes, first), OBLIQUE if first else FACING
+            any_over = self.leg if first else None
+            leaving = Leaving(geometry, self.outs, outs, tubes, scatters, twice, first, which, any_over)
+            outs = [i for i in outs if leaving.any_over(i)]
+            left = partial(self._left, tubes, leaving, depth)
             # What returns by the leg that it came by counts first, and the others against that.
             same = [i for i in outs if first and self.outs[i] is self.leg]
             for i in same:
@@ -149,18 +151,14 @@ class _Wave(Generic[T]):
                 return
             tubes, depth = landed[0], depth + 1
 
-    def _left(
-        self, tubes: Tubes, scatters: Bools, by_image: Bools, depth: int, i: int, found: Contributions
-    ) -> list[T]:
-        """Return what is made of the routes over leg out i of tubes on their surface number `depth`.
-
-        Args: scatters (n,) which return by tubes; by_image (n,) which legs over mirrors carry.
-        """
+    def _left(self, tubes: Tubes, leaving: Leaving, depth: int, i: int, found: Contributions) -> list[T]:
+        """Return what is made of the routes over leg out i of tubes on their surface number `depth`."""
+        own, behind = (tubes.only(rows) for rows in leaving.over(i))
         leg, out, first = self.leg, self.outs[i], depth == 1
-        twice = by_image & (not first or self.images.over(self.geometry, out))
-        parts = [_returned(self.geometry, leg, out, tubes, scatters & ~twice, first, False, found)]
-        if self.geometry.has_layers:
-            parts.append(_returned(self.geometry, leg, out, tubes, scatters & twice, first, True, found))
+        parts = (
+            _returned(self.geometry, leg, out, own, first, False, found),
+            _returned(self.geometry, leg, out, behind, first, True, found),
+        )
         return [self.each(routes, depth, i) for routes in chain(*parts)]
 
     def _bounced(self, tubes: Tubes, count: int, depth: int, found: Contributions, landed: list[Tubes]) -> list[T]:
@@ -174,17 +172,12 @@ class _Wave(Generic[T]):
 
 
 def _returned(
-    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, own: Bools, first: bool, behind: bool, found: Contributions
+    geometry: Geometry, leg: Leg, out: Leg, some: Tubes, first: bool, behind: bool, found: Contributions
 ) -> Iterator[Routes]:
-    """Yield the routes of tubes, of those chosen by `own` (n,), that an outgoing leg sees; `behind`: only those that
-    it sees through a layer."""
+    """Yield the routes of those tubes that an outgoing leg sees; `behind`: only those that it sees through a layer."""
     rule = found.rule
-    rows = np.flatnonzero(own & returning(geometry, out)[geometry.piece[tubes.facet]])
-    if out.mirrors:
-        rows = rows[out.may_leave(tubes.points, rows)]
-    if not len(rows):
+    if not len(some):
         return
-    some = tubes.only(rows)
     if first and out == leg and not behind:
         corners, passed = leg_of_arrival(some, len(leg.mirrors), rule.layers)
         if not geometry.convex_alone:
@@ -217,10 +210,10 @@ def resolve_return_leg(
     resolved: list[tuple[Tubes, View, Phases]] = []
     rule = found.rule
     for level in range(rule.levels + 1):
-        share, facing = radiating(out, tubes, which)
-        rows = np.flatnonzero(share > 0.0)
-        tubes, share, facing = tubes.only(rows), share[rows], facing[rows]
-        ph = phases_of(geometry, leg, out, tubes, rule)
+        ph, share, facing = radiating_phases(geometry, leg, out, tubes, rule, which)
+        if not share.all():
+            rows = np.flatnonzero(share)
+            tubes, ph, share, facing = tubes.take(rows), ph.take(rows), share[rows], facing[rows]
         if which == OBLIQUE and not facing.all():
             # Beyond the horizon tubes are mostly out of phase with their neighbours, and few count.
             weak = np.flatnonzero(~facing)
@@ -237,25 +230,36 @@ def resolve_return_leg(
             view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
         how = facing, view.centre.seen, view.some, view.mixed, ph.rough
         what = choose_actions(*how, cut)
-        wanted = (what == BISECT) | (what == CLIP)
-        cut &= ~wanted | found.budget.affords(geometry, tubes.facet, wanted)
-        what = choose_actions(*how, cut)
-        ready, bent, shaded = (np.flatnonzero(what == w) for w in (KEEP, BISECT, CLIP))
+        wanted = what >= BISECT
+        afforded = found.budget.affords(geometry, tubes.facet, wanted)
+        if (wanted & ~afforded).any():
+            what = choose_actions(*how, cut & (~wanted | afforded))
+        ready = np.flatnonzero(what == KEEP)
         resolved.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
-        if not len(bent) and not len(shaded):
+        if not (what >= BISECT).any():
             break
-        # Where the phase bends on no edge, the longest is bisected.
-        lengths = sizes(tubes.points[bent, :3] - np.roll(tubes.points[bent, :3], -1, axis=1))
-        bend = np.abs(ph.bend[bent])
-        edge = np.argmax(np.where((ph.rough[bent] > 1.0)[:, None], bend, lengths), axis=1)
-        halved = bisect(geometry, leg, tubes, bent, edge, first, rule.jitter)
-        parted, _ = subdivide(geometry, leg, tubes, shaded, view.side, first, rule.jitter)
-        tubes = Tubes.join([halved, parted])
+        tubes = _parts_of(geometry, leg, tubes, what, ph, view.side, first, rule.jitter)
     some, views, phases = zip(*resolved, strict=True)
     if not geometry.convex_alone:
         found.add(Phases.join(list(phases)))
     seen = View.join(list(views))
     return Tubes.join(list(some)), seen.corners, seen.passed
+
+
+def _parts_of(
+    geometry: Geometry, leg: Leg, tubes: Tubes, what: NDArray[np.int8], ph: Phases, side: Floats, first: bool,
+    jitter: float,
+) -> Tubes:  # fmt: skip
+    """Return the parts of tubes that are to be bisected or clipped, `what` (n,); else as for `subdivide`."""
+    bent, shaded, parts = np.flatnonzero(what == BISECT), np.flatnonzero(what == CLIP), list[Tubes]()
+    if len(bent):
+        # Where the phase bends on no edge, the longest is bisected.
+        lengths = sizes(tubes.points[bent, :3] - np.roll(tubes.points[bent, :3], -1, axis=1))
+        edge = np.argmax(np.where((ph.rough[bent] > 1.0)[:, None], np.abs(ph.bend[bent]), lengths), axis=1)
+        parts.append(bisect(geometry, leg, tubes, bent, edge, first, jitter))
+    if len(shaded):
+        parts.append(subdivide(geometry, leg, tubes, shaded, side, first, jitter)[0])
+    return Tubes.join(parts)
 
 
 @dataclass(frozen=True)
@@ -277,10 +281,6 @@ class Images:
         for used, legs in ((planes, ins), (outward, outs)):
             used[geometry.plane[[m.facet for leg in legs for m in leg.mirrors]]] = True
         return Images(planes, outward)
-
-    def over(self, geometry: Geometry, out: Leg) -> bool:
-        """Tell whether an outgoing leg has a mirror that also scatters (the ground does not)."""
-        return any(geometry.facets.role[m.body] != MIRROR for m in out.mirrors)
 
     def returns(self, geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> Bools:
         """Tell which tubes (n,) stand on a mirror whose image carries their return: on their first surface those that

@@ -11,35 +11,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
+from raychan.parallel import parallel_for
 from raychan.tracing.edge_crossings import FacetPlanes, meeting_lines
+from raychan.tracing.image_paths import bounds_of_light
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.radiation import exit_points
-from raychan.tracing.shadow_edges import shadow_edges_of
+from raychan.tracing.shadow_edges import longest_shadows, shadow_edges_of
+from raychan.tracing.tube_rays import NONE_AWAY, ShadowRays, Tested, TubesToSee, cast_shadow_rays, project_to_facet
 from raychan.tracing.tubes import Refinement, Tubes
+from raychan.vectors import copy_to
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
+Rows = NDArray[np.intp]
 
-_SHRINK = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share; not measured
-
-
-class ShadowRays(NamedTuple):
-    """What shadow rays to tubes met: seen, blocker (3 c,) of those to corners, one after the other, for the tubes of
-    which corners (n,) were tested; seen, blocker (n,) of those to centres. Blockers are facets, -1 for none."""
-
-    seen: Bools
-    blocker: Ints
-    centre_seen: Bools
-    centre_blocker: Ints
-    corners: Bools
+_PARALLEL_FROM = 200  # tubes searched for shadow edges from which on a second thread pays; not measured
 
 
 @dataclass(frozen=True)
@@ -55,10 +48,11 @@ class Visibility:
 
 def centre_visibility(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool, rule: Refinement) -> View:
     """Return how the centres of tubes are seen over a leg; first whether these stand on their first surface."""
-    points = on_facets(geometry, tubes) if first else tubes.points
-    shape = geometry.first, geometry.normal, leg.image, leg.far
-    aim, target, near, _ = shadow_rays(points, tubes.points, tubes.facet, *shape, True, np.zeros(len(tubes), bool))
-    return leg.visible(geometry, aim, target, near, rule.layers)
+    rays, none = ShadowRays.room(len(tubes), len(leg.mirrors), rule.layers), np.zeros(len(tubes), bool)
+    cast_shadow_rays(
+        geometry, leg.chain, rays, Tested(none, True, none, False, NONE_AWAY), _drawn(geometry, tubes, first)
+    )
+    return View.of(rays)
 
 
 def tube_visibility(
@@ -79,50 +73,54 @@ def tube_visibility(
     tubes beyond the horizon, which their own body does not hide.
     """
     n = len(tubes)
-    points = on_facets(geometry, tubes) if first else tubes.points
-    where = tubes.facet, geometry.first, geometry.normal, leg.image, leg.far
     corners = np.zeros(n, bool) if geometry.convex_alone else matters
-    aim, target, near, slack = shadow_rays(points, tubes.points, *where, centre is None, corners)
-    if facing_away is not None:
-        rows = np.concatenate([np.arange(n if centre is None else 0), np.repeat(np.flatnonzero(corners), 3)])
-        rows = np.flatnonzero(facing_away[rows])
-        if not geometry.hides_nothing:
-            aim[rows], target[rows] = exit_points(geometry, leg, aim[rows], target[rows])
-    view = leg.visible(geometry, aim, target, near, rule.layers)
-    if geometry.hides_nothing and facing_away is not None:
-        view.seen[rows] = True
-    if centre is None:
-        centre, view = view.take(slice(n)), view.take(slice(n, None))
-    rays = ShadowRays(view.seen, view.blocker, centre.seen, centre.blocker, corners)
-    some, mixed, search = classify_rays(rays, matters, gaps, geometry.smooth)
-    if facing_away is not None:
-        search &= ~facing_away
+    away = NONE_AWAY if facing_away is None else facing_away
+    rays = ShadowRays.room(n, len(leg.mirrors), rule.layers)
+    if centre is not None:
+        rays = rays._replace(seen=centre.seen, blocker=centre.blocker, corners=centre.corners, passed=centre.passed)
+    tested, drawn = Tested(corners, centre is None, matters, gaps, away), _drawn(geometry, tubes, first)
+    if not geometry.hides_nothing and away.any():
+        cast_shadow_rays(geometry, leg.chain, rays, tested, drawn, cast=False)
+        _leave_bodies(geometry, leg, rays, tested)
+        cast_shadow_rays(geometry, leg.chain, rays, tested)
+    else:
+        cast_shadow_rays(geometry, leg.chain, rays, tested, drawn)
     side = np.zeros((n, 3))
-    rows, *parts = gather_partly_visible(search, points, tubes.facet, rays, geometry.plane, leg.image, leg.far)
+    rows = np.flatnonzero(rays.search)
     if len(rows):
-        found = _shadow_edges(geometry, leg, tubes.facet[rows], slack[rows], parts)
-        side[rows] = found
-        mixed[rows] |= (found != 0.0).any(axis=1)
+        _search(geometry, leg, rows, drawn, rays, corners, side)
     if leg.mirrors:
-        # What the leg lights may lie between all rays: a strip of a long facet beside a small mirror.
-        rows = np.flatnonzero(corners & (mixed | ~some) & ~side.any(axis=1))
-        side[rows] = leg.bounds_of_light(tubes.points[rows])
-        mixed[rows] |= (side[rows] != 0.0).any(axis=1)
-    return Visibility(centre, some, mixed, side)
+        edges_of_light(tubes.points, corners, rays, leg.edges_of_mirrors, side)
+    return Visibility(View.of(rays) if centre is None else centre, rays.some, rays.mixed, side)
 
 
-def _shadow_edges(geometry: Geometry, leg: Leg, facet: Ints, slack: Floats, parts: list[Any]) -> Floats:
-    """Return signed distances (k, 3) [m] of corners from the shadow edges on tubes that are seen in part.
+def _drawn(geometry: Geometry, tubes: Tubes, first: bool) -> TubesToSee:
+    """Return tubes as rays are drawn to them."""
+    # On their first surface tubes are moved to the flat facets that rays meet.
+    flat = np.empty_like(tubes.points) if first and geometry.any_curved else tubes.points
+    return TubesToSee(tubes.points, flat, tubes.facet, tubes.bary)
 
-    Args: parts as `gather_partly_visible` returns them, from the points on.
-    """
-    points, met, planes, source, back, own = parts
-    found = shadow_edges_of(geometry, leg).across(points, facet, slack)
-    # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
-    every = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
-    beside = geometry.scene_topology.beside
-    meeting_lines(points, source, back, leg.far, planes, met, every, beside, own, found)
-    return found
+
+def _leave_bodies(geometry: Geometry, leg: Leg, rays: ShadowRays, tested: Tested) -> None:
+    """Move the points of tubes beyond the horizon to where the rays from there leave their body."""
+    cast = np.column_stack([tested.corners] * 3 + [np.full(len(rays.slack), tested.centres)])
+    rows = np.nonzero(cast & tested.facing_away[:, None])
+    rays.points[rows], rays.target[rows] = exit_points(geometry, leg, rays.points[rows], rays.target[rows])
+
+
+def _search(
+    geometry: Geometry, leg: Leg, rows: Rows, tubes: TubesToSee, rays: ShadowRays, corners: Bools, side: Floats
+) -> None:
+    """Write signed distances (n, 3) [m] of the corners of tubes `rows` (k,), which are seen in part, from the shadow
+    edges on them, and that these are `mixed`."""
+    edges = shadow_edges_of(geometry, leg)
+    planes = FacetPlanes(geometry.plane, geometry.first, geometry.normal)
+    facets = planes, geometry.smooth, geometry.touch, geometry.scene_topology.beside
+
+    def some(part: slice) -> None:
+        edges_across(rows[part], tubes, rays, corners, facets, leg.image, leg.far, edges, side)
+
+    parallel_for(len(rows), some, _PARALLEL_FROM)
 
 
 def on_facets(geometry: Geometry, tubes: Tubes) -> Floats:
@@ -138,135 +136,85 @@ def project_to_facets(points, facet, bary, curved, vertices):  # type: ignore[no
     """Return the points (n, 4, 3), those on curved facets moved to the flat ones by their corners' bary (n, 3, 3)."""
     out = points.copy()
     for i in range(len(facet)):
-        f = facet[i]
-        if not curved[f]:
-            continue
-        for c in range(3):
-            total = 0.0
-            for q in range(3):
-                at = 0.0
-                for j in range(3):
-                    at += bary[i, q, j] * vertices[f, j, c]
-                out[i, q, c] = at
-                total += at
-            out[i, 3, c] = total / 3.0
+        if curved[facet[i]]:
+            project_to_facet(bary[i], vertices[facet[i]], out[i])
     return out
 
 
-@njit(cache=True, forceinline=True)
-def _slack(curved_points, first, normal, image, far):  # type: ignore[no-untyped-def]
-    """Return by how much [m] the neighbours of a tube on the same curved surface may lie before it: a multiple of its
-    height over its facet, along the ray."""
-    height, slope, size = 0.0, 0.0, 0.0
-    for q in range(4):
-        rise = 0.0
+@njit(cache=True, nogil=True, error_model="numpy")
+def edges_across(rows, tubes, rays, corners, facets, image, far, edges, side):  # type: ignore[no-untyped-def]
+    """Write into side (n, 3) how the corners of tubes `rows` (k,), seen in part, lie to a shadow edge.
+
+    Args: tubes as `TubesToSee`, rays as `ShadowRays`; corners (n,) of which tubes the corners were tested; facets as
+    `FacetPlanes`, their smooth patches (f,), touch [m] within which surfaces lie on each other, and the facets (f, 3)
+    beside each; edges as `shadow_edges.ShadowEdges`.
+    """
+    planes, smooth, touch, beside = facets
+    n = len(rows)
+    points, facet, slack, found = np.empty((n, 4, 3)), np.empty(n, np.int32), np.empty(n), np.zeros((n, 3))
+    met, plane = np.empty((n, 4), np.int32), np.empty((n, 4), np.int32)
+    source, back, own = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
+    _gather(
+        rows, tubes, rays, corners, planes.number, image, far, (points, facet, slack, met, plane, source, back, own)
+    )
+    longest_shadows(points, facet, slack, planes.normal, smooth, touch, edges, found)
+    # Where a body runs into this one, the shadow ends on the line in which the two planes meet.
+    meeting_lines(points, source, back, far, plane, met, planes, beside, own, found)
+    for j in range(n):
+        for q in range(3):
+            side[rows[j], q] = found[j, q]
+            rays.mixed[rows[j]] |= found[j, q] != 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _gather(rows, tubes, rays, corners, plane, image, far, out):  # type: ignore[no-untyped-def]
+    """Write of tubes `rows` (k,) what `edges_across` needs, one after the other.
+
+    Args: plane (f,) of the facets; out points (k, 4, 3) [m]; facet, slack (k,); met (k, 4) blockers, -1 for the tube's
+    own surface; planes (k, 4) of these, -1 unknown; source (k, 3) [m], back (k, 3) the direction towards it; own (k, 3)
+    unit normals of the tubes.
+    """
+    at, facet, slack, met, planes, source, back, own = out
+    for j in range(len(rows)):
+        i = rows[j]
+        facet[j], slack[j] = tubes.facet[i], rays.slack[i]
+        for q in range(4):
+            cast = q < 3 and corners[i]
+            free = rays.corner_seen[i, q] if cast else rays.seen[i]
+            block = rays.corner_blocker[i, q] if cast else rays.blocker[i]
+            met[j, q] = block
+            planes[j, q] = plane[block] if block >= 0 else (plane[facet[j]] if free else -1)
+            copy_to(at[j, q], tubes.flat[i, q])
+        size, area = 0.0, 0.0
         for c in range(3):
-            rise += (curved_points[q, c] - first[c]) * normal[c]
-        height = max(height, abs(rise))
-    for c in range(3):
-        k = image[c] if far else curved_points[3, c] - image[c]
-        slope += k * normal[c]
-        size += k * k
-    return 1e-5 + 3.0 * height / max(abs(slope) / math.sqrt(size), 0.05)
+            a, b = (c + 1) % 3, (c + 2) % 3
+            own[j, c] = (at[j, 1, a] - at[j, 0, a]) * (at[j, 2, b] - at[j, 0, b])
+            own[j, c] -= (at[j, 1, b] - at[j, 0, b]) * (at[j, 2, a] - at[j, 0, a])
+            area += own[j, c] ** 2
+            source[j, c] = image[c]
+            back[j, c] = image[c] if far else image[c] - at[j, 3, c]
+            size += back[j, c] ** 2
+        for c in range(3):
+            own[j, c] /= max(math.sqrt(area), 1e-300)
+            back[j, c] /= math.sqrt(size)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def shadow_rays(points, curved_points, facet, first, normal, image, far, centres, corners):  # type: ignore[no-untyped-def]
-    """Return the shadow rays (r,) to cast: points (r, 3) [m], facets and slack (r,) [m]; and the slack (n,) [m] of each
-    tube.
+def edges_of_light(points, corners, rays, mirrors, side):  # type: ignore[no-untyped-def]
+    """Write into side (n, 3) where what a leg lights of tubes (n,) ends, and that these are `mixed`: it may lie between
+    all their rays, as a strip of a long facet beside a small mirror.
 
-    Args: curved_points (n, 4, 3) [m] the points on the curved surface; first, normal (m, 3) of the facets; centres
-    whether those of all tubes are wanted, which then come first; corners (n,) of which tubes the corners are.
+    Args: points (n, 4, 3) [m]; corners (n,) of which tubes the corners were tested; rays as `ShadowRays`; mirrors as
+    `Leg.edges_of_mirrors`.
     """
-    n = len(facet)
-    at = n if centres else 0
-    r = at
-    for i in range(n):
-        r += 3 if corners[i] else 0
-    aim, target, near, slack = np.empty((r, 3)), np.empty(r, np.int32), np.empty(r), np.empty(n)
-    for i in range(n):
-        f = facet[i]
-        slack[i] = _slack(curved_points[i], first[f], normal[f], image, far)
-        if centres:
-            target[i], near[i] = f, slack[i]
-            for c in range(3):
-                aim[i, c] = points[i, 3, c]
-        if corners[i]:
-            for q in range(3):
-                target[at], near[at] = f, slack[i]
-                for c in range(3):
-                    aim[at, c] = points[i, 3, c] + _SHRINK * (points[i, q, c] - points[i, 3, c])
-                at += 1
-    return aim, target, near, slack
-
-
-@njit(cache=True, nogil=True)
-def classify_rays(rays, matters, gaps, smooth):  # type: ignore[no-untyped-def]
-    """Return of tubes (n,) whether some ray is seen, whether only some are, and whether to search for a shadow edge.
-
-    Args: rays as `ShadowRays`; matters (n,); gaps whether to search tubes that two bodies hide, between which there may
-    be a gap: behind one smooth patch (f,) there is none.
-    """
-    seen, blocker, centre_seen, centre_blocker, corners = rays
-    n = len(corners)
-    some, mixed, search = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty(n, np.bool_)
-    at = 0
-    for i in range(n):
-        whole, block = centre_seen[i], centre_blocker[i]
-        some[i], one = whole, block >= 0
-        if corners[i]:
-            for q in range(at, at + 3):
-                some[i] |= seen[q]
-                whole &= seen[q]
-                one = one and blocker[q] >= 0 and smooth[blocker[q]] == smooth[block]
-            at += 3
-        mixed[i] = some[i] and not whole
-        search[i] = matters[i] and (some[i] or (gaps and not one))
-    return some, mixed, search
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def gather_partly_visible(search, points, facet, rays, plane, image, far):  # type: ignore[no-untyped-def]
-    """Return of the tubes to `search` (n,) their numbers, points, what each ray met, and the planes of that.
-
-    Args: rays as `ShadowRays`; plane (f,) of the facets. Returns: rows (k,); points (k, 4, 3) [m]; met (k, 4) blockers,
-    -1 for the tube's own surface; planes (k, 4) of these, -1 unknown; source (k, 3) [m], back (k, 3) the direction
-    towards it; own (k, 3) unit normals of the tubes.
-    """
-    k = 0
-    for i in range(len(search)):
-        k += 1 if search[i] else 0
-    rows, at = np.empty(k, np.int64), np.empty((k, 4, 3))
-    met, planes = np.empty((k, 4), np.int32), np.empty((k, 4), np.int32)
-    source, back, own = np.empty((k, 3)), np.empty((k, 3)), np.empty((k, 3))
-    j, ray = 0, 0
-    for i in range(len(search)):
-        if search[i]:
-            rows[j] = i
-            for q in range(4):
-                cast = q < 3 and rays.corners[i]
-                free = rays.seen[ray + q] if cast else rays.centre_seen[i]
-                block = rays.blocker[ray + q] if cast else rays.centre_blocker[i]
-                met[j, q] = block
-                planes[j, q] = plane[block] if block >= 0 else (plane[facet[i]] if free else -1)
-                for c in range(3):
-                    at[j, q, c] = points[i, q, c]
-            size, area = 0.0, 0.0
-            for c in range(3):
-                a, b = (c + 1) % 3, (c + 2) % 3
-                own[j, c] = (at[j, 1, a] - at[j, 0, a]) * (at[j, 2, b] - at[j, 0, b])
-                own[j, c] -= (at[j, 1, b] - at[j, 0, b]) * (at[j, 2, a] - at[j, 0, a])
-                area += own[j, c] ** 2
-                source[j, c] = image[c]
-                back[j, c] = image[c] if far else image[c] - at[j, 3, c]
-                size += back[j, c] ** 2
-            for c in range(3):
-                own[j, c] /= max(math.sqrt(area), 1e-300)
-                back[j, c] /= math.sqrt(size)
-            j += 1
-        if rays.corners[i]:
-            ray += 3
-    return rows, at, met, planes, source, back, own
+    rows, count = np.empty(len(points), np.int64), 0
+    for i in range(len(points)):
+        if corners[i] and (rays.mixed[i] or not rays.some[i]) and not side[i].any():
+            rows[count] = i
+            count += 1
+    bounds_of_light(points, rows[:count], *mirrors, side)
+    for i in rows[:count]:
+        rays.mixed[i] |= side[i].any()
 
 
 DROP, KEEP, BISECT, CLIP = 0, 1, 2, 3

@@ -183,6 +183,11 @@ class Geometry(RayCaster):
         return out
 
     @cached
+    def any_curved(self) -> bool:
+        """Whether any facet is curved."""
+        return bool(self.curved.any())
+
+    @cached
     def closed_opaque(self) -> NDArray[np.bool_]:
         """Which facets (n,) are of closed opaque pieces."""
         opaque = ~self.is_layer

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.embree_packet import new_packet
+from raychan.geometry.embree_packet import own_packet
 from raychan.geometry.intersect import EDGE, OFFSET, CastRays, FacetGroups, FacetShapes, plane_distances
 from raychan.geometry.near_rays import first_within
 from raychan.geometry.shadow_rays import MetFacets, ShadowSurfaces, ShadowTargets, follow_rays
@@ -148,6 +148,11 @@ class RayCaster:
             f.vertices, self.normal, self.plane, self.smooth, np.asarray(f.body, np.int32), layer, self.touch, margin
         )
 
+    @cached
+    def met_by_rays(self) -> tuple[FacetGroups, FacetShapes, ShadowSurfaces, bool]:
+        """The facets as kernels read them that cast rays themselves, and whether facets hide nothing."""
+        return self._facet_groups, self._shapes, self._surfaces, self.hides_nothing
+
     def _follow(self, rays: CastRays, targets: ShadowTargets, met: MetFacets) -> None:
         """Write what rays meet, on all threads; count them."""
         fixed = self._facet_groups, self._shapes, self._surfaces
@@ -155,7 +160,7 @@ class RayCaster:
 
         def some(rows: slice) -> None:
             part: list[Any] = [type(x)(*(column[rows] for column in x)) for x in (rays, targets, met)]  # type: ignore
-            casts.append(follow_rays(part[0], part[1], *fixed, new_packet(), part[2]))
+            casts.append(follow_rays(part[0], part[1], *fixed, own_packet(), part[2]))
 
         parallel_for(len(rays.origin), some, _PARALLEL_FROM)
         self.count_rays(sum(casts))
@@ -183,7 +188,7 @@ class RayCaster:
         found, fixed = np.full(len(origin), _MISS, np.int32), (reach, self._facet_groups, self._shapes)
 
         def some(r: slice) -> None:
-            first_within(origin[r], direction[r], own[r], *fixed, new_packet(), found[r])
+            first_within(origin[r], direction[r], own[r], *fixed, own_packet(), found[r])
 
         parallel_for(len(origin), some, _PARALLEL_FROM)
         return found

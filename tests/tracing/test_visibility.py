@@ -10,7 +10,7 @@ from support.facets import facets, ground, quad
 from raychan.geometry.lit_parts import lit_parts
 from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import Mirror
-from raychan.tracing.shadow_edges import shadow_edges_of
+from raychan.tracing.shadow_edges import longest_shadows, shadow_edges_of
 from raychan.tracing.tubes import Refinement, launch_tubes
 from raychan.tracing.visibility import tube_visibility
 from raychan.world.geometry import Geometry
@@ -129,7 +129,9 @@ def test_a_tube_far_beside_all_silhouettes_has_no_shadow():
     geometry = Geometry(facets([crumb, wide], role=[0, 1]))
     leg = Leg(end=np.zeros(3))
     tubes = small_tubes(geometry, leg, np.random.default_rng(3))
-    side = shadow_edges_of(geometry, leg).across(tubes.points, tubes.facet, np.full(len(tubes), 1e-5))
+    side, slack = np.zeros((len(tubes), 3)), np.full(len(tubes), 1e-5)
+    facets_of = geometry.normal, geometry.smooth, geometry.touch
+    longest_shadows(tubes.points, tubes.facet, slack, *facets_of, shadow_edges_of(geometry, leg), side)
     y, z = tubes.points[..., 1], tubes.points[..., 2]
     clear = (np.hypot(y, z) > 20.0).all(axis=1) & ((y > 1.0).all(axis=1) | (z > 1.0).all(axis=1))
     assert clear.sum() > 20

@@ -14,7 +14,7 @@ from truth.embree_rays import SlowCaster
 
 from raychan import parallel
 from raychan.geometry import embree_packet
-from raychan.geometry.embree_packet import END, LANES, RECORD_END, new_packet, put_ray
+from raychan.geometry.embree_packet import END, LANES, RECORD_END, own_packet, put_ray
 from raychan.records import LAYER, PEC
 from raychan.world import embree_library
 from raychan.world.embree_library import EmbreeScene, NoEmbree, intersect_address
@@ -109,7 +109,7 @@ def test_any_number_of_threads_finds_the_same_bytes_and_counts_the_same_rays():
 
 
 def test_the_packet_is_embrees_record_and_nothing_is_written_beyond_it():
-    floats, words = new_packet()
+    floats, words = own_packet()
     assert words.ctypes.data % 64 == 0
     assert floats.ctypes.data == words.ctypes.data
     assert words.nbytes == floats.nbytes == 4 * END
