@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.embree_packet import new_packet
+from raychan.geometry.embree_packet import own_packet
 from raychan.parallel import parallel_for, threads
 from raychan.records import REFLECT
 from raychan.tracing.bounce_records import Flight, Landed, Rules, none_landed, nothing_met, surroundings
@@ -103,7 +103,7 @@ def _followed(step: _Bounce, tubes: Tubes) -> tuple[Landed, int]:
     most = _PARALLEL_FROM if threads() > 1 else np.iinfo(np.int64).max
 
     def staged(stage: int, state: Any, rows: slice) -> Any:
-        return fly(stage, rows.start, rows.stop, most, *state, *fixed, new_packet())
+        return fly(stage, rows.start, rows.stop, most, *state, *fixed, own_packet())
 
     start = np.zeros((n, 4)) if step.first else clearance(geometry, tubes)
     none = np.zeros(n, np.int8)
