@@ -235,6 +235,8 @@ def _column(
 
 def _copy(one: NDArray[Any], rows: NDArray[np.intp], place: NDArray[Any], empty: Any) -> None:
     """Copy some rows of a column to their place, whose slots beyond those of the column become empty ones."""
+    if not place.size:
+        return
     if one.shape[1:] != place.shape[1:]:
         place[:, : one.shape[1]] = one if len(one) == len(place) else one.take(rows, axis=0)
         place[:, one.shape[1] :] = empty
