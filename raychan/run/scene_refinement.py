@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
 from raychan.columns import take
-from raychan.parallel import parallel_tasks
+from raychan.parallel import parallel_tasks, run_pair
 from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
@@ -172,13 +172,14 @@ class SceneRefinement:
             steps, unreached, ended = self._refined(first.launch, held, response, cells)
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
-        now = held.now if steps else first.paths
-        doubtful = held.doubtful
-        doubtful = scaled(doubtful, np.full(len(doubtful.length), ALONG))
-        doubtful = raised(response, doubtful, cells.place, cells.doubt[: len(cells.place)] / COVER)
-        if first.left is not None:
+
+        def doubted() -> Paths:
+            doubt = cells.doubt[: len(cells.place)] / COVER
+            found = raised(response, scaled(held.doubtful, ALONG), cells.place, doubt)
             # What a level lacks is known: it needs no factor that covers what is not.
-            doubtful = join([doubtful, scaled(first.left, np.full(len(first.left.length), 1.0 / COVER))])
+            return found if first.left is None else join([found, scaled(first.left, 1.0 / COVER)])
+
+        now, doubtful = run_pair(lambda: held.now if steps else first.paths, doubted)
         # One after the other: both at once take the memory of both.
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)

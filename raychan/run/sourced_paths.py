@@ -222,4 +222,4 @@ def _bare(paths: Paths) -> Paths:
 
 
 def _negative(paths: Paths) -> Paths:
-    return scaled(paths, np.full(len(paths.length), -1.0))
+    return scaled(paths, -1.0)

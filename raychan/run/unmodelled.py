@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.diffuse import mean_sigma0
+from raychan.parallel import parallel_map
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
 from raychan.run.clutter import laws_of, scatters_diffusely
@@ -40,16 +41,18 @@ def ledger(
     """
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
-    found: dict[str, Entry] = {
-        "further bounces": _further(paths, radar, settings, model.max_bounces, weakest),
-        "transmission": _transmission(paths, radar, settings, weakest),
-        "diffraction": _diffraction(geometry, radar, weakest),
-        "diffraction to point targets": _around(geometry, points, radar, settings, model, weakest),
-        "diffuse scattering": _diffuse(geometry, radar, model, weakest),
-        "tessellation": _tessellation(paths, geometry, bodies, radar, settings, weakest),
-        "range migration": Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
-        "intra-frame motion": _motion(paths, geometry.facets, radar),
+    # Those that take longest first: at the end threads wait for the last one.
+    entries: dict[str, Callable[[], Entry]] = {
+        "further bounces": lambda: _further(paths, radar, settings, model.max_bounces, weakest),
+        "transmission": lambda: _transmission(paths, radar, settings, weakest),
+        "diffraction to point targets": lambda: _around(geometry, points, radar, settings, model, weakest),
+        "diffuse scattering": lambda: _diffuse(geometry, radar, model, weakest),
+        "tessellation": lambda: _tessellation(paths, geometry, bodies, radar, settings, weakest),
+        "intra-frame motion": lambda: _motion(paths, geometry.facets, radar),
+        "diffraction": lambda: _diffraction(geometry, radar, weakest),
+        "range migration": lambda: Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
     }
+    found = dict(zip(entries, parallel_map(lambda entry: entry(), list(entries.values())), strict=True))
     if radar.rx_position is not None:
         aside = Entry(UNKNOWN, "none", "not estimated for receivers elsewhere than the transmitter")
         found |= dict.fromkeys(_MONOSTATIC, aside)

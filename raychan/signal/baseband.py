@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from raychan.parallel import parallel_map
 from raychan.radar.array import Wavefronts, reach, wavefronts
-from raychan.radar.dual_paths import DualPaths
+from raychan.radar.dual_paths import DualPaths, products
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.records import DIFFUSE, POINT, SCATTER, Cube, Paths
@@ -55,7 +55,7 @@ def synthesize(
     if len(paths.length):
         sent = [one.since(first) for one in radar.transmissions]
         fronts = fronts_of(paths) if stand_apart(radar) else None
-        amplitude = np.sqrt(radar.power) * paths.amplitude
+        amplitude = products(paths.amplitude, np.broadcast_to(np.sqrt(radar.power), paths.length.shape))
         echoes = Echoes(paths.delay, paths.length_rate / C0, amplitude, fronts)
         for one in sent:
             rows = samples[:, one.first :: one.step]

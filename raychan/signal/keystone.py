@@ -23,10 +23,10 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from raychan.parallel import parallel_map
+from raychan.parallel import parallel_for, parallel_map
 from raychan.radar.array import Wavefronts
 from raychan.radar.waveform import Waveform
-from raychan.signal.keystone_kernels import place_samples, place_sources
+from raychan.signal.keystone_kernels import place_boxes, place_samples, place_sources
 from raychan.signal.nufft import (
     OVER,
     add_transposed,
@@ -54,6 +54,7 @@ ROOM = 1 << 28  # bytes of a grid: beyond, the echoes are split over several gri
 CHUNK = 1 << 18  # echoes spread at a time
 _BOX = 8, 8  # rows and columns of a box by which echoes are sorted, so that neighbours share cells in the cache
 _READ, _READY = 4.0, 4  # cost of reading a sample off a plane, in cells transformed; planes that setting it up costs
+_MANY = 20_000  # echoes from which on a second thread pays (not measured)
 _CROWD = 64  # echoes in a box up to which they are summed in single precision: it errs by 3e-7 of their sum
 
 
@@ -72,6 +73,17 @@ class Echoes:
     def __getitem__(self, rows: Any) -> Echoes:
         fronts = None if self.fronts is None else self.fronts[rows]
         return Echoes(self.delay[rows], self.delay_rate[rows], self.amplitude[rows], fronts)
+
+    def in_order(self, order: Ints) -> Echoes:
+        """Return the echoes in another order, sorted by all threads."""
+        (delay, rate), amplitude = np.empty((2, len(order))), np.empty(len(order), np.complex128)
+
+        def some(at: slice) -> None:
+            rows = order[at]
+            delay[at], rate[at], amplitude[at] = self.delay[rows], self.delay_rate[rows], self.amplitude[rows]
+
+        parallel_for(len(order), some, _MANY)
+        return Echoes(delay, rate, amplitude, None if self.fronts is None else self.fronts[order])
 
     def after(self, time: float, carrier: float) -> Echoes:
         """Return the echoes a time [s] later, their amplitudes with the phase of the carrier [Hz] until then."""
@@ -159,13 +171,14 @@ class Keystone:
 
     def prepared(self, echoes: Echoes, buffer: Complexes) -> Echoes:
         """Return the echoes sorted by row, and set up how samples are read off; the `factors` go into the buffer."""
-        wave = self.wave
-        shift = echoes.delay_rate * (self.frequency - wave.slope * (echoes.delay - self.delay))
-        turn = (wave.slope * echoes.delay + shift) * self.step
+        wave, box, across = self.wave, np.empty(len(echoes.delay), np.int64), self.columns // _BOX[1] + 1
+        grid = wave.slope, self.delay, self.frequency, self.shift, self.dense, 0.5 * self.rows, self.columns, self.step
+
+        def boxed(at: slice) -> None:
+            place_boxes(box[at], echoes.delay[at], echoes.delay_rate[at], grid, _BOX, across)
+
         # Sorted by boxes, so that neighbours add to cells that are in the cache: rows first, for the stripes.
-        box = ((shift - self.shift) * self.dense + 0.5 * self.rows).astype(np.int64) // _BOX[0]
-        across = self.columns // _BOX[1] + 1
-        box = box * across + ((turn - np.floor(turn)) * self.columns).astype(np.int64) // _BOX[1]
+        parallel_for(len(box), boxed, _MANY)
         self.polynomials = kernel_polynomials(self.width)
         k, s = np.arange(self.rows) - self.rows // 2, np.arange(wave.n_samples) - wave.n_samples // 2
         # The sign moves the transform's middle to the middle of its length: nothing is read across its end.
@@ -181,7 +194,7 @@ class Keystone:
         order, most = counting_sort(box, (self.rows // _BOX[0] + 1) * across)
         # Where many echoes add up in one cell, single precision would round too coarsely.
         self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
-        return echoes[order]
+        return echoes.in_order(order)
 
     def add(self, out: Complexes, echoes: Echoes, elements: tuple[Floats, Floats], chunk: int = CHUNK) -> None:
         """Add to out (chirps, samples) the beat signal of the `prepared` echoes between two elements.

@@ -33,6 +33,21 @@ def _bessel(n, x):  # type: ignore[no-untyped-def]
     return total
 
 
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def place_boxes(box, delay, delay_rate, grid, size, across):  # type: ignore[no-untyped-def]
+    """Write in which box (n,) of the grid echoes (n,) lie, `across` boxes in a row of such size: rows, columns.
+
+    Args: delay [s], delay_rate at the middle instant; grid slope [Hz/s], middle delay, frequency, shift of row zero,
+    rows per Hz, middle row, columns a turn, step [s].
+    """
+    slope, middle, frequency, shift_0, dense, row_0, columns, step = grid
+    for i in range(delay.size):
+        shift = delay_rate[i] * (frequency - slope * (delay[i] - middle))
+        turn = (slope * delay[i] + shift) * step
+        row, column = int((shift - shift_0) * dense + row_0), int((turn - math.floor(turn)) * columns)
+        box[i] = row // size[0] * across + column // size[1]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def place_sources(x, y, strength, amplitude, delay, delay_rate, later, ramp, grid, rest, terms):  # type: ignore[no-untyped-def]
     """Write where echoes (n,) lie on the grid, x (n,) rows of Doppler shift and y (n,) columns of beat frequency, and

@@ -70,7 +70,8 @@ def routes_of(
     n, m, f = len(tubes), len(out.mirrors), geometry.facets
     end = np.asarray(out.end, float)
     middle, half_way = edge_middles(geometry, leg, tubes, first)
-    slots = int((tubes.slots + (passed >= 0).sum(axis=1)).max(initial=0)) + 1 + m
+    # Column by column: numpy is slow over a short axis.
+    slots = int(sum((x >= 0 for x in passed.T), tubes.slots.astype(np.int64)).max(initial=0)) + 1 + m
     vertices, normals = np.empty((2, n, slots, 3))
     facet, body = np.empty((n, slots), np.int32), np.empty((n, slots), np.int16)
     kind = np.empty((n, slots), np.int8)
