@@ -124,6 +124,10 @@ def points_seen(
 ) -> ShadowRays:
     """Return rays to single points (n, 3) [m] on facets (n,), as centres (see `legs.Leg.visible`)."""
     rays = ShadowRays.room(len(points), len(chain.at), layers)
+    if not len(geometry.first):
+        # Where nothing is, nothing hides.
+        rays.seen[:], rays.passed[:], rays.blocker[:] = True, -1, -1
+        return rays
     rays.points[:, 3], rays.target[:, 3], rays.slack[:] = points, facet, slack
     none = np.zeros(len(points), bool)
     body = _NO_BODY if inside is None else np.ascontiguousarray(inside, np.int64)
