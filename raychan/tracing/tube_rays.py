@@ -106,6 +106,10 @@ def cast_shadow_rays(
     Args: inside (n,; empty: none) bodies in which the points lie, which do not hide them; cast whether rays are cast,
     not only drawn.
     """
+    if not len(geometry.first):
+        # Where nothing is, nothing hides.
+        rays.seen[:], rays.passed[:], rays.blocker[:] = True, -1, -1
+        return
     facets = FlatFacets(geometry.facets.vertices, geometry.first, geometry.normal, geometry.curved)
     fixed = tubes, facets, inside, chain, 2.0 * geometry.extent + 1.0, geometry.met_by_rays
     projects, counts = len(tubes.facet) > 0 and tubes.flat is not tubes.points, []
@@ -124,10 +128,6 @@ def points_seen(
 ) -> ShadowRays:
     """Return rays to single points (n, 3) [m] on facets (n,), as centres (see `legs.Leg.visible`)."""
     rays = ShadowRays.room(len(points), len(chain.at), layers)
-    if not len(geometry.first):
-        # Where nothing is, nothing hides.
-        rays.seen[:], rays.passed[:], rays.blocker[:] = True, -1, -1
-        return rays
     rays.points[:, 3], rays.target[:, 3], rays.slack[:] = points, facet, slack
     none = np.zeros(len(points), bool)
     body = _NO_BODY if inside is None else np.ascontiguousarray(inside, np.int64)
