@@ -106,6 +106,10 @@ def cast_shadow_rays(
     Args: inside (n,; empty: none) bodies in which the points lie, which do not hide them; cast whether rays are cast,
     not only drawn.
     """
+    if not len(geometry.first):
+        # Where nothing is, nothing hides.
+        rays.seen[:], rays.passed[:], rays.blocker[:] = True, -1, -1
+        return
     facets = FlatFacets(geometry.facets.vertices, geometry.first, geometry.normal, geometry.curved)
     fixed = tubes, facets, inside, chain, 2.0 * geometry.extent + 1.0, geometry.met_by_rays
     projects, counts = len(tubes.facet) > 0 and tubes.flat is not tubes.points, []

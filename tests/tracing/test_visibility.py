@@ -7,6 +7,7 @@ import pytest
 import trimesh
 from support.facets import facets, ground, quad
 
+from raychan.columns import take
 from raychan.geometry.lit_parts import lit_parts
 from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import Mirror
@@ -93,6 +94,13 @@ def test_points_over_a_mirror_are_seen_where_neither_stretch_is_hidden():
     free = ~hidden(spot, end) & ~np.array([hidden(p[None], s)[0] for p, s in zip(points, spot, strict=True)])
     np.testing.assert_array_equal(view.seen, free)
     assert 0 < free.sum() < len(free)
+
+
+def test_where_nothing_is_an_end_sees_all_points():
+    nothing = Geometry(take(facets([ground()]), np.zeros(0, int)))
+    view = Leg(end=np.zeros(3)).visible(nothing, np.eye(3), np.full(3, -1, np.int32), np.full(3, 1e-6), 2)
+    assert view.seen.all() and (view.passed == -1).all() and (view.blocker == -1).all()
+    assert view.corners.shape == (3, 0, 3) and nothing.rays == 0
 
 
 @pytest.mark.parametrize("end", [(0.0, 0.0, 0.0), (3.0, 4.0, 1.0), (6.0, -4.0, 1.0)])
