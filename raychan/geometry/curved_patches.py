@@ -238,7 +238,14 @@ def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyp
     source to corners and centre of each patch; normals of facets lit from both sides (`is_open`) face the source."""
     m = len(facet)
     p, k, length, normal = np.empty((m, 4, 3)), np.empty((m, 4, 3)), np.empty((m, 4)), np.empty((m, 4, 3))
-    for i in range(m):
+    write_rays_on(facet, bary, v, n, b, is_open, image, far, p, k, length, normal)
+    return p, k, length, normal
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def write_rays_on(facet, bary, v, n, b, is_open, image, far, p, k, length, normal):  # type: ignore[no-untyped-def]
+    """Write what `rays_on` returns."""
+    for i in range(len(facet)):
         f, w = facet[i], bary[i]
         for q in range(4):
             if q == 3:
@@ -252,4 +259,3 @@ def rays_on(facet, bary, v, n, b, is_open, image, far):  # type: ignore[no-untyp
             for q in range(4):
                 for c in range(3):
                     normal[i, q, c] = -normal[i, q, c]
-    return p, k, length, normal

@@ -11,7 +11,7 @@ from raychan.tracing.bounce_records import Flight, Landed
 from raychan.tracing.contributions import BEGUN, CUTS, RAYS
 from raychan.tracing.resolve_hits import IncidentTubes, LandedTubes, ReflectingFacets, resolve_hits, tubes_at_hits
 from raychan.tracing.subdivide import parts_and_parents
-from raychan.tracing.tube_rows import gathered, grown, with_room
+from raychan.tracing.tube_rows import copy_tubes, room_for_tubes
 from raychan.tracing.tubes import CENTRE
 from raychan.vectors import copy_to
 
@@ -56,14 +56,7 @@ def land(flight, met, landed, count, world, how):  # type: ignore[no-untyped-def
     )  # fmt: skip
     end = count + len(rows)
     if end > len(landed.left):
-        size = max(end, 2 * len(landed.left))
-        landed = Landed(
-            with_room(landed.tubes, count, size),
-            grown(landed.vertex, count, size),
-            grown(landed.normal, count, size),
-            grown(landed.left, count, size),
-            grown(landed.through, count, size),
-        )
+        landed = _grown(landed, count, max(end, 2 * len(landed.left)))
     out = landed.tubes
     before = IncidentTubes(
         tubes.points, rays.directions, tubes.length, tubes.normals, tubes.facet, tubes.spread, tubes.strength,
@@ -77,6 +70,28 @@ def land(flight, met, landed, count, world, how):  # type: ignore[no-untyped-def
     tubes_at_hits(rows, facet, reach, before, facets, how.patches.far, how.wavenumber, after)
     _where_they_left(rows, facet, flight, landed, count)
     return landed, end, ready
+
+
+@njit(cache=True, nogil=True)
+def _grown(landed, count, size):  # type: ignore[no-untyped-def]
+    """Return room for `size` landed tubes, with the first `count`."""
+    through = np.empty((size, landed.through.shape[1]), np.int32)
+    out = Landed(
+        room_for_tubes(size, False), np.empty((size, 3)), np.empty((size, 3)), np.empty(size, np.int32), through
+    )
+    copy_tubes(landed.tubes, np.arange(count), out.tubes, 0)
+    _copy_each(landed, count, out)
+    return out
+
+
+@njit(cache=True, nogil=True, uncounted=True)
+def _copy_each(landed, count, out):  # type: ignore[no-untyped-def]
+    """Write the columns of the first `count` landed tubes that are not of `TubeColumns`."""
+    for i in range(count):
+        out.left[i] = landed.left[i]
+        copy_to(out.vertex[i], landed.vertex[i])
+        copy_to(out.normal[i], landed.normal[i])
+        copy_to(out.through[i], landed.through[i])
 
 
 @njit(cache=True, nogil=True)
@@ -110,7 +125,12 @@ def going_on(flight, met, ready, world, how):  # type: ignore[no-untyped-def]
     """Return the parts of tubes that are subdivided, and then those of the tubes `ready` (m,) that go on behind thin
     layers, as a flight."""
     tubes = flight.tubes
-    split = np.flatnonzero(met.wanted)
+    split, count = np.empty(len(met.wanted), np.int64), 0
+    for i in range(len(split)):
+        if met.wanted[i]:
+            split[count] = i
+            count += 1
+    split = split[:count]
     parts, parent, kept = parts_and_parents(tubes, split, met.side, how.patches, how.first, how.jitter)
     behind, count = np.empty(len(ready), np.int64), 0
     for i in ready:
@@ -120,12 +140,14 @@ def going_on(flight, met, ready, world, how):  # type: ignore[no-untyped-def]
     behind = behind[:count]
     n = len(kept) + count
     onward = Flight(
-        gathered(parts, kept, tubes, behind),
+        room_for_tubes(n, how.first),
         np.empty((n, 4)),
         np.empty((n, how.layers), np.int32),
         np.empty(n, np.int8),
         np.empty(n, np.int8),
     )
+    copy_tubes(parts, kept, onward.tubes, 0)
+    copy_tubes(tubes, behind, onward.tubes, len(kept))
     _each_going_on(flight, parent, kept, behind, met.rays, onward)
     return onward
 

@@ -38,12 +38,18 @@ def room_for(flight, world, how):  # type: ignore[no-untyped-def]
     return Met(rays, np.zeros((n, 3)), np.empty(n, np.bool_), np.empty(n, np.bool_))
 
 
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _first_hit(x, d, skip, start, groups, shapes, floats, words):  # type: ignore[no-untyped-def]
+    """Return what `first_hit` does. Not for speed, but so that its code is there once."""
+    return first_hit(x, d, skip, start, groups, shapes, floats, words)
+
+
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _cast(i, q, x, flight, met, world, packet):  # type: ignore[no-untyped-def]
     """Cast ray q of tube i from x (3,); write what it meets, and return how often it was cast."""
     d = row(met.rays.directions[i], q)
     skip, start = flight.tubes.facet[i], flight.start[i, q]
-    found, distance, casts = first_hit(x, d, skip, start, world.groups, world.shapes, packet[0], packet[1])
+    found, distance, casts = _first_hit(x, d, skip, start, world.groups, world.shapes, packet[0], packet[1])
     met.rays.hit[i, q], met.rays.reach[i, q] = found, distance
     return casts
 

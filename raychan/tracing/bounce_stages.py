@@ -24,33 +24,30 @@ def fly(stage, begin, end, most, flight, met, landed, count, world, how, account
     kept from being subdivided; packet as of `embree_packet`. Returns: flight, met, landed, count; rays cast by CENTRES
     or CORNERS, which all others add to the account.
     """
-    casts, tag = 0, 0
-    if stage == CENTRES:
-        casts = cast_centres(begin, end, flight, met, world, packet)
-        return flight, met, landed, count, casts
-    tested, room, planes = (
-        np.full(len(world.outlines.grid.edges), -1, np.int32),
-        np.empty((9, 3)),
-        np.empty(4, np.int32),
-    )
-    work = tested, room, planes
-    if stage == CORNERS:
-        casts = cast_corners(begin, end, not is_spent(account, how), tag, flight, met, world, how, packet, *work)
-        return flight, met, landed, count, casts
-    n = len(flight.tubes.facet)
-    settle = stage == SETTLE
-    if not settle:
-        met = room_for(flight, world, how)
-    while n and (settle or n <= most):
-        if not settle:
-            account[RAYS] += cast_centres(0, n, flight, met, world, packet)
+    # Not constants: the compiler would make what takes them once more.
+    casts, tag, none = np.int64(0), np.int64(0), np.int64(0)
+    tested = np.full(len(world.outlines.grid.edges) if stage != CENTRES else 0, -1, np.int32)
+    room, planes = np.empty((9, 3)), np.empty(4, np.int32)
+    # Each part is called at one place: what is called twice may be compiled twice.
+    while True:
+        if stage == ALL:
+            begin, end = none, len(flight.tubes.facet)
+            met = room_for(flight, world, how)
+            if end == 0 or end > most:
+                break
+        if stage in (ALL, CENTRES):
+            casts = cast_centres(begin, end, flight, met, world, packet)
+            if stage == CENTRES:
+                break
+            account[RAYS] += casts
+        if stage in (ALL, CORNERS):
             matter = not is_spent(account, how)
-            account[RAYS] += cast_corners(0, n, matter, tag, flight, met, world, how, packet, *work)
-            tag += n
-        settle = False
+            casts = cast_corners(begin, end, matter, tag, flight, met, world, how, packet, tested, room, planes)
+            if stage == CORNERS:
+                break
+            account[RAYS] += casts
+        tag, stage = tag + end, ALL
         keep_to_budget(met.wanted, flight.tubes.facet, world.body, how, account, uncut)
         landed, count, ready = land(flight, met, landed, count, world, how)
         flight = going_on(flight, met, ready, world, how)
-        n = len(flight.tubes.facet)
-        met = room_for(flight, world, how)
     return flight, met, landed, count, casts

@@ -76,16 +76,14 @@ def clip_each(side, rows, out):  # type: ignore[no-untyped-def]
         out[n + i, 1, b], out[n + i, 2, c], out[2 * n + i, 1, c] = 1.0, 1.0, 1.0
 
 
-@njit(cache=True, nogil=True)
-def part_coordinates(weights, parent, bary):  # type: ignore[no-untyped-def]
-    """Return the barycentric corners (m, 3, 3) of parts on the first facet of their parents (m,)."""
-    out = np.empty((len(parent), 3, 3))
+@njit(cache=True, nogil=True, uncounted=True)
+def part_coordinates(weights, parent, bary, out):  # type: ignore[no-untyped-def]
+    """Write the barycentric corners (m, 3, 3) of parts on the first facet of their parents (m,)."""
     for i in range(len(parent)):
         w, b = weights[i], bary[parent[i]]
         for c in range(3):
             for x in range(3):
                 out[i, c, x] = w[c, 0] * b[0, x] + w[c, 1] * b[1, x] + w[c, 2] * b[2, x]
-    return out
 
 
 @njit(cache=True, nogil=True)
@@ -103,14 +101,14 @@ def nonempty_parts(points, halves):  # type: ignore[no-untyped-def]
     return out[:count]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _mean(w, x, out):  # type: ignore[no-untyped-def]
     """Write the mean of the rows of x (3, 3) by weights w (3,)."""
     for c in range(3):
         out[c] = w[0] * x[0, c] + w[1] * x[1, c] + w[2] * x[2, c]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _to_unit(v):  # type: ignore[no-untyped-def]
     """Scale v (3,) to length one; a vector of none stays as it is."""
     size = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
@@ -119,7 +117,7 @@ def _to_unit(v):  # type: ignore[no-untyped-def]
             v[c] /= size
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _length_on(w, p, k, length):  # type: ignore[no-untyped-def]
     """Return the length [m] at a corner of weights w (3,) on the parent's edges, by the cubic Hermite rule."""
     for a in range(3):
@@ -138,7 +136,7 @@ def _length_on(w, p, k, length):  # type: ignore[no-untyped-def]
     return h
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _rise(w, p, n, out):  # type: ignore[no-untyped-def]
     """Write how far (3,) [m] a corner of weights w (3,) on the parent's edges lies off their chords; return whether it
     does."""
@@ -149,13 +147,15 @@ def _rise(w, p, n, out):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, uncounted=True)
 def part_rays(  # type: ignore[no-untyped-def]
-    weights, parent, points, k, length, normals, out_points, out_k, out_length, out_normals
+    weights, parent, points, k, length, normals, out_points, out_k, out_length, out_normals, offset
 ):  # fmt: skip
     """Write the rays of parts of parents (m,): points, directions and normals are weighted means, points raised to the
-    curved surface; lengths follow the cubic Hermite rule, the centre's is the mean of parabolas along the medians."""
-    offset = np.empty(3)
+    curved surface; lengths follow the cubic Hermite rule, the centre's is the mean of parabolas along the medians.
+
+    Args: offset (3,) room for work.
+    """
     for i in range(len(parent)):
         j = parent[i]
         p, direction, normal = out_points[i], out_k[i], out_normals[i]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.geometry.curved_patches import rays_on
+from raychan.geometry.curved_patches import write_rays_on
 from raychan.tracing.legs import Leg
 from raychan.tracing.part_rays import (
     bisect_each,
@@ -23,8 +23,8 @@ from raychan.tracing.part_rays import (
     part_coordinates,
     part_rays,
 )
-from raychan.tracing.tube_rows import gathered, rows_of
-from raychan.tracing.tubes import TubeColumns, Tubes
+from raychan.tracing.tube_rows import copy_history, copy_tubes, room_for_tubes
+from raychan.tracing.tubes import Tubes
 from raychan.vectors import distance, largest
 from raychan.world.geometry import Geometry
 
@@ -92,10 +92,13 @@ def bisected(tubes, rows, edge, patches, first, jitter):  # type: ignore[no-unty
 def subdivided(tubes, rows, side, patches, first, jitter):  # type: ignore[no-untyped-def]
     """Return what `subdivide` does, as columns, and the parents."""
     parts, parent, kept = parts_and_parents(tubes, rows, side, patches, first, jitter)
-    if len(kept) < len(parent):
-        none = kept[:0]
-        return gathered(parts, kept, parts, none), parent[kept]
-    return parts, parent
+    if len(kept) == len(parent):
+        return parts, parent
+    out, parents = room_for_tubes(len(kept), first), np.empty(len(kept), np.int64)
+    copy_tubes(parts, kept, out, 0)
+    for j in range(len(kept)):
+        parents[j] = parent[kept[j]]
+    return out, parents
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -124,35 +127,34 @@ def parts_and_parents(tubes, rows, side, patches, first, jitter):  # type: ignor
 @njit(cache=True, nogil=True, error_model="numpy")
 def _parts(tubes, parent, weights, patches, first):  # type: ignore[no-untyped-def]
     """Return part tubes whose corner i is the mean of the parent's corners by weights[:, i] (m, 3, 3); parent (m,)."""
-    n = len(parent)
-    facet, spread = rows_of(tubes.facet, parent), np.empty(n)
-    if first:
-        v, normals, b, both_sides, image, far = patches
-        bary = part_coordinates(weights, parent, tubes.bary)
-        points, k, length, normal = rays_on(facet, bary, v, normals, b, both_sides, image, far)
-        for i in range(n):
-            spread[i] = 1.0 if far else 1.0 / length[i, 3]
-    else:
-        bary = np.empty((n, 0, 3))
-        points, k, normal, length = np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4, 3)), np.empty((n, 4))
-        part_rays(weights, parent, tubes.points, tubes.k, tubes.length, tubes.normals, points, k, length, normal)
-        for i in range(n):
-            spread[i] = tubes.spread[parent[i]]
-    return TubeColumns(
-        points,
-        k,
-        length,
-        normal,
-        facet,
-        spread,
-        rows_of(tubes.strength, parent),
-        rows_of(tubes.flat, parent),
-        bary,
-        rows_of(tubes.slots, parent),
-        rows_of(tubes.bounces, parent),
-        rows_of(tubes.caustics, parent),
-        rows_of(tubes.last, parent),
+    out = room_for_tubes(len(parent), first)
+    for j in range(len(parent)):
+        i = parent[j]
+        out.facet[j], out.spread[j] = tubes.facet[i], tubes.spread[i]
+        copy_history(tubes, i, out, j)
+    if not first:
+        part_rays(
+            weights,
+            parent,
+            tubes.points,
+            tubes.k,
+            tubes.length,
+            tubes.normals,
+            out.points,
+            out.k,
+            out.length,
+            out.normals,
+            np.empty(3),
+        )
+        return out
+    v, normals, b, both_sides, image, far = patches
+    part_coordinates(weights, parent, tubes.bary, out.bary)
+    write_rays_on(
+        out.facet, out.bary, v, normals, b, both_sides, image, far, out.points, out.k, out.length, out.normals
     )
+    for j in range(len(parent)):
+        out.spread[j] = 1.0 if far else 1.0 / out.length[j, 3]
+    return out
 
 
 @njit(cache=True, nogil=True)
