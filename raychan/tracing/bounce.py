@@ -194,23 +194,24 @@ def _matters(step: _Bounce, tubes: Tubes, directions: Floats, mid: Ints, ahead: 
     """
     geometry, out, found = step.geometry, step.out, step.found
     in_phase, _, length = _contribution_bounds(step, tubes)
-    if step.rule.fan < np.inf and step.rule.coarse == 1.0:
+    if step.rule.by_landing:
         grown = np.empty(len(tubes))
         spread_at_hits(tubes.points, directions, mid, ahead, grown)
         in_phase *= grown
     if step.last:
         # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.
-        # Before more mirrors that is not known. Where the centre ray meets nothing, or the ground, from which tubes do
-        # not return, a body may still stand beside it.
+        # Where the centre ray meets nothing, or the ground, from which tubes do not return, a body may stand beside it.
         span, length = np.empty((2, len(tubes)))
         f = geometry.facets
         mid = np.where(f.role[f.body[mid]] == MIRROR, -1, mid)
         planes = geometry.first, geometry.normal
         rays = tubes.points, directions, tubes.length
         phase_at_hits(*rays, mid, ahead, *planes, out.image, out.far, step.rule.wavenumber, span, length)
-        matters = in_phase > found.deep_threshold(length) * (1.0 + 0.5 * span)
-    else:
-        matters = in_phase > found.deep_threshold(length)
+        if step.rule.by_landing:
+            # Beside where the centre ray lands the phase may run slowly, and there tubes along an edge err alike.
+            span[tubes.flat & ~geometry.curved[tubes.facet]] = 0.0
+        in_phase /= 1.0 + 0.5 * span
+    matters = in_phase > found.deep_threshold(length)
     return np.asarray(matters & (not found.budget.spent(geometry)))
 
 

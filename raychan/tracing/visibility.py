@@ -28,6 +28,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+_GAP_LEVELS = 2
+"""Subdivisions of a hidden tube in search of a part that is seen, on flat facets; on curved ones it is one. With one on
+all, one of 150 bodies of overlapping boxes is off by 0.4 dB where 0.3 dB are stated, three are no better than two; with
+two on all, a car takes 3 % more rays."""
 _SHRINK = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share; not measured
 
 
@@ -68,15 +72,15 @@ def tube_visibility(
     matters: Bools,
     first: bool,
     rule: Refinement,
-    gaps: bool = True,
+    level: int = 0,
     centre: View | None = None,
     facing_away: Bools | None = None,
 ) -> Visibility:
     """Return how tubes are seen over a leg; by the centre ray alone where subdividing would not matter.
 
-    Args: matters (n,); first whether they stand on their first surface; gaps whether to look for one through which a
-    tube is seen that none of its rays is; centre how their centres are seen, tested if not given; facing_away (n,)
-    tubes beyond the horizon, which their own body does not hide.
+    Args: matters (n,); first whether they stand on their first surface; level how often they were subdivided: at the
+    first ones a gap is looked for through which a tube is seen that none of its rays is; centre how their centres are
+    seen, tested if not given; facing_away (n,) tubes beyond the horizon, which their own body does not hide.
     """
     n = len(tubes)
     points = on_facets(geometry, tubes) if first else tubes.points
@@ -94,6 +98,7 @@ def tube_visibility(
     if centre is None:
         centre, view = view.take(slice(n)), view.take(slice(n, None))
     rays = ShadowRays(view.seen, view.blocker, centre.seen, centre.blocker, corners)
+    gaps = np.where(geometry.curved[tubes.facet], level < 1, level < _GAP_LEVELS)
     some, mixed, search = classify_rays(rays, matters, gaps, geometry.smooth)
     if facing_away is not None:
         search &= ~facing_away
@@ -204,8 +209,8 @@ def shadow_rays(points, curved_points, facet, first, normal, image, far, centres
 def classify_rays(rays, matters, gaps, smooth):  # type: ignore[no-untyped-def]
     """Return of tubes (n,) whether some ray is seen, whether only some are, and whether to search for a shadow edge.
 
-    Args: rays as `ShadowRays`; matters (n,); gaps whether to search tubes that two bodies hide, between which there may
-    be a gap: behind one smooth patch (f,) there is none.
+    Args: rays as `ShadowRays`; matters (n,); gaps (n,) whether to search a tube that two bodies hide, between which
+    there may be a gap: behind one smooth patch (f,) there is none.
     """
     seen, blocker, centre_seen, centre_blocker, corners = rays
     n = len(corners)
@@ -221,7 +226,7 @@ def classify_rays(rays, matters, gaps, smooth):  # type: ignore[no-untyped-def]
                 one = one and blocker[q] >= 0 and smooth[blocker[q]] == smooth[block]
             at += 3
         mixed[i] = some[i] and not whole
-        search[i] = matters[i] and (some[i] or (gaps and not one))
+        search[i] = matters[i] and (some[i] or (gaps[i] and not one))
     return some, mixed, search
 
 
