@@ -216,6 +216,7 @@ class SceneRefinement:
                 cells.changed(i, own, change)
             steps += 1
             cells.stepped()
+            budget.stepped(self.stats)
             wanted, foreseen, ended = planned(cells, rays, budget.left(self.stats), STEPS - steps)
             if not ended and len(wanted):
                 ended = budget.ended(self.stats, len(held), foreseen)
