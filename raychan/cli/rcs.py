@@ -173,7 +173,12 @@ def _target(
         return load(source[0], unit=unit, up=up, scale=scale, crease_deg=angle), Path(source[0]).name
     from raychan.world.shapes import build
 
-    return build(shape, dict(_parameter(text) for text in source)), " ".join([shape, *source])
+    params = dict[str, Any]()
+    for key, value in map(_parameter, source):
+        if key in params:
+            raise typer.BadParameter(f"'{key}' is given twice")
+        params[key] = value
+    return build(shape, params), " ".join([shape, *source])
 
 
 def _parameter(text: str) -> tuple[str, Any]:

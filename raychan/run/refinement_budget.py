@@ -17,8 +17,12 @@ _LEAST = 1_000_000
 urban, living street and occluded pedestrian take 2.1, 1.7 and 2.3 million rays in place of 1.9, 1.2 and 1.6, and bring
 25 of 30 detections within 0.5 dB in place of 24."""
 _GROWTH = 2.0  # paths of a step over those of the one before, about
-RAYS = "the budget of rays (model.max_rays)"
 _BYTES = 400.0  # a path
+RAYS, SECONDS, MEMORY = (
+    f"the budget of {what} (model.{key})"
+    for what, key in (("rays", "max_rays"), ("seconds", "max_seconds"), ("memory", "max_memory_mb"))
+)
+FORESEEN = ", foreseen not to suffice for what is left"
 
 
 class Budget:
@@ -29,24 +33,34 @@ class Budget:
         self._rays = stats.rays + further if model.max_rays == "auto" else float(model.max_rays)
         self._seconds, self._memory = model.max_seconds, model.max_memory_mb
         self._cast, self._start = stats.rays, time.perf_counter()
-        self._spent = 0.0
+        self._spent, self._slowest = 0.0, 0.0
 
-    def left(self, stats: Stats) -> float:
-        """Return the rays that further steps may cast."""
-        return self._rays - stats.rays
+    def stepped(self, stats: Stats) -> None:
+        """Note what a step took."""
+        spent, cast = time.perf_counter() - self._start, stats.rays
+        # A step of few rays does not take its time for these.
+        if cast > self._cast:
+            self._slowest = max(self._slowest, (spent - self._spent) / (cast - self._cast))
+        self._cast, self._spent = cast, spent
+
+    def left(self, stats: Stats) -> tuple[float, str]:
+        """Return the rays that further steps may cast, and which budget does not allow more: seconds count as the rays
+        that the slowest step so far would have cast in them."""
+        rays = self._rays - stats.rays
+        if self._seconds is not None:
+            within = max(self._seconds - self._spent, 0.0) / max(self._slowest, 1e-12)
+            if within < rays:
+                return within, SECONDS
+        return rays, RAYS
 
     def ended(self, stats: Stats, paths: int, rays: float) -> str:
         """Return what leaves no room for a further step, '' if nothing does.
 
         Args: paths held; rays that the step takes, about.
         """
-        cast, self._cast = stats.rays - self._cast, stats.rays
-        spent, before = time.perf_counter() - self._start, self._spent
-        self._spent = spent
-        if rays > self.left(stats):
-            return RAYS
-        if self._seconds is not None and spent + rays / max(cast, 1) * (spent - before) > self._seconds:
-            return "the budget of time (model.max_seconds)"
+        left, which = self.left(stats)
+        if rays > left:
+            return which + (FORESEEN if left > 0.0 else "")
         if self._memory is not None and _GROWTH * paths * _BYTES > 1e6 * self._memory:
-            return "the budget of memory (model.max_memory_mb)"
+            return MEMORY
         return ""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.run.map_cells import MapCells
-from raychan.run.refinement_budget import RAYS, STEPS
+from raychan.run.refinement_budget import FORESEEN, STEPS
 from raychan.tracing.source_rays import SourceRays
 from raychan.tracing.sources import Sources, without_out
 
@@ -21,12 +21,15 @@ are given up before half of the rays that are left is spent: 90 % of the detecti
 9759, at 0.5 dB are within it, 93 % at 1.6, by 16 and 21 million rays."""
 
 
-def planned(cells: MapCells, rays: SourceRays, left: float, steps: int) -> tuple[Sources, float, str]:
+def planned(cells: MapCells, rays: SourceRays, budget: tuple[float, str], steps: int) -> tuple[Sources, float, str]:
     """Return the sources to trace again, how many rays that takes, about, and, where open cells have none, why.
 
     Cells that take fewest rays come first. After some steps those that are not expected to be reached by the rays that
     are left wait, and by the steps that are left, unless they take few: what they would take is lost.
+
+    Args: budget the rays that are left, and what does not allow more; steps that are left.
     """
+    left, which = budget
     opened, needs = np.flatnonzero(cells.open).tolist(), cells.steps
     every = np.unique(np.concatenate([np.zeros(0, np.int64), *(cells.sources(i) for i in opened)]))
     launch, cost = without_out(every), _GROWTH * rays.of(every)
@@ -50,7 +53,7 @@ def planned(cells: MapCells, rays: SourceRays, left: float, steps: int) -> tuple
         if spent + more <= hope[p] * left:
             spent, again[rows[p]] = spent + more, True
             taken = np.union1d(taken, launch[rows[p]])
-    ended = RAYS if max(hope[p] for p in rows) == 1.0 else SLOW
+    ended = which + (FORESEEN if left > 0.0 else "") if max(hope[p] for p in rows) == 1.0 else SLOW
     return every[again], _sum(cost, launch, np.flatnonzero(again)), "" if again.any() else ended
 
 

@@ -222,6 +222,7 @@ class SceneRefinement:
             _each(sums, lambda i, change, own=own: cells.changed(i, own, change))  # type: ignore[misc]
             steps += 1
             cells.stepped()
+            budget.stepped(self.stats)
             wanted, foreseen, ended = planned(cells, rays, budget.left(self.stats), STEPS - steps)
             if not ended and len(wanted):
                 ended = budget.ended(self.stats, len(held), foreseen)

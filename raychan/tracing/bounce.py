@@ -138,7 +138,7 @@ def _rules(step: _Bounce) -> Rules:
         levels=rule.levels,
         jitter=float(rule.jitter),
         patch=float(rule.patch),
-        grows=rule.fan < np.inf and rule.coarse == 1.0,
+        by_landing=rule.by_landing,
         wide=not rule.fan < np.inf,
         thresholds=found.deep_thresholds,
         cell=float(rule.cell),

@@ -118,16 +118,18 @@ def _matters(i, tubes, rays, world, how, room):  # type: ignore[no-untyped-def]
     points, directions, length = tubes.points[i], rays.directions[i], tubes.length[i]
     in_phase, _, whole = contribution_bound(i, tubes, how.image, how.far, how.wavenumber, surface)
     mid, ahead = rays.hit[i, 3], rays.reach[i, 3]
-    if how.grows:
+    if how.by_landing:
         in_phase *= growth_at_hit(points, directions, mid, ahead, room)
     span = 0.0
     if how.last:
         # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.
-        # Before more mirrors that is not known. Where the centre ray meets nothing, or the ground, from which tubes do
-        # not return, a body may still stand beside it.
+        # Where the centre ray meets nothing, or the ground, from which tubes do not return, a body may stand beside it.
         if mid >= 0 and world.role[world.body[mid]] == MIRROR:
             mid = -1
         first, normal, out = world.shapes.first, world.shapes.normal, (how.image, how.far)
         span, whole = phase_at_hit(points, directions, length, mid, ahead, first, normal, out, how.wavenumber, room[0])
+        if how.by_landing and tubes.flat[i] and not world.curved[tubes.facet[i]]:
+            # Beside where the centre ray lands the phase may run slowly, and there tubes along an edge err alike.
+            span = 0.0
     cell = min(int(max(whole / how.cell, 0.0)), len(how.thresholds) - 1)
     return in_phase > how.thresholds[cell] * (1.0 + 0.5 * span)

@@ -51,7 +51,7 @@ def surroundings(geometry: Geometry) -> Surroundings:
 class Rules(NamedTuple):
     """How tubes are reflected: patches lit over their leg; image (3,), far of the leg by which contributions are
     bounded; wavenumber [rad/m]; first, last whether they stand on their first surface, or land on their last; layers,
-    levels, jitter, patch of the `Refinement`; grows whether bounds count what tubes bring where they land; wide whether
+    levels, jitter, patch of the `Refinement`; by_landing whether tubes are cut by what they bring, all in phase, where they land; wide whether
     fans are not narrow; thresholds (c,) [1/m] of contributions for each `cell` [m] of length; max_cuts, max_rays."""
 
     patches: Patches
@@ -64,7 +64,7 @@ class Rules(NamedTuple):
     levels: int
     jitter: float
     patch: float
-    grows: bool
+    by_landing: bool
     wide: bool
     thresholds: Floats
     cell: float

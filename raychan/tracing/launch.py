@@ -31,7 +31,6 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 OBLIQUE_SHARE = 0.1  # of their sum in phase that tubes facing away from an end are taken to add up to; not measured
-GAP_LEVELS = 1  # subdivisions of a hidden tube in search of a part that is seen; not measured
 
 
 def launch(
@@ -115,7 +114,7 @@ def _bisect_for_phase(
             left += [(facet[half:].copy(), bary[half:].copy(), level), (facet[:half], bary[:half], level)]
             continue
         edge = edge_to_cut(facet, bary, *(*shape, *images, *limits))
-        if rule.fan < np.inf and rule.coarse == 1.0 and not across:
+        if rule.by_landing and not across:
             edge = np.where(edge < 0, edge_of_fan(facet, bary, shape[1], rule.fan), edge)
         if level < rule.least:
             edge = np.where((edge < 0) & (geometry.curved[facet] | (not across)), _longest(facet, bary, shape[0]), edge)
@@ -172,7 +171,7 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     for level in range(rule.levels + 1):
         if not len(tubes):
             break
-        s = tube_visibility(geometry, leg, tubes, matters, True, rule, level < GAP_LEVELS, known)
+        s = tube_visibility(geometry, leg, tubes, matters, True, rule, level, known)
         split = found.budget.affords(geometry, tubes.facet, s.mixed & matters & (level < rule.levels))
         take_seen(s.centre, ~split & s.centre.seen)
         rows = np.flatnonzero(split)

@@ -15,7 +15,7 @@ from raychan.poses import sizes
 from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions
-from raychan.tracing.launch import GAP_LEVELS, OBLIQUE_SHARE, launch
+from raychan.tracing.launch import OBLIQUE_SHARE, launch
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.outgoing import Leaving
 from raychan.tracing.radiation import FACING, LIT, OBLIQUE, Phases, phases_of, radiating_phases
@@ -221,10 +221,12 @@ def resolve_return_leg(
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, facing = tubes.only(rows), ph.take(rows), facing[rows]
         least = found.prune_threshold(ph.length) if first else found.deep_threshold(ph.length)
-        matters = (ph.bound > least) & (not found.budget.spent(geometry))
+        # Along an edge flat tubes may err alike though the phase runs over each.
+        alike = tubes.flat & ~geometry.curved[tubes.facet] & rule.by_landing
+        matters = (np.where(alike, ph.in_phase, ph.bound) > least) & (not found.budget.spent(geometry))
         # In a scene currents beyond the horizon are weak: their visibility is tested by their centres alone.
         tested = matters if which == LIT else matters & facing
-        view = tube_visibility(geometry, out, tubes, tested, first, rule, level < GAP_LEVELS, facing_away=~facing)
+        view = tube_visibility(geometry, out, tubes, tested, first, rule, level, facing_away=~facing)
         cut = matters if level < rule.levels else np.zeros_like(matters)
         if behind:
             view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False

@@ -79,13 +79,13 @@ class FlatFacets(NamedTuple):
 
 class Tested(NamedTuple):
     """What of tubes is tested: corners (n,); whether centres are; tubes that matters (n,), of which shadow edges are
-    searched, also of those that two bodies hide if there may be gaps; facing_away (n,; empty: none) tubes beyond the
-    horizon, for which no edge is searched and which a convex body does not hide."""
+    searched; gaps (n,) whether also where two bodies hide a tube, between which there may be one; facing_away (n,;
+    empty: none) tubes beyond the horizon, for which no edge is searched and which a convex body does not hide."""
 
     corners: Bools
     centres: bool
     matters: Bools
-    gaps: bool
+    gaps: Bools
     facing_away: Bools
 
 
@@ -131,7 +131,7 @@ def points_seen(
     rays.points[:, 3], rays.target[:, 3], rays.slack[:] = points, facet, slack
     none = np.zeros(len(points), bool)
     body = _NO_BODY if inside is None else np.ascontiguousarray(inside, np.int64)
-    cast_shadow_rays(geometry, chain, rays, Tested(none, True, none, False, NONE_AWAY), _NO_TUBES, body)
+    cast_shadow_rays(geometry, chain, rays, Tested(none, True, none, none, NONE_AWAY), _NO_TUBES, body)
     return rays
 
 
@@ -223,5 +223,5 @@ def _each_tube(  # type: ignore[no-untyped-def]
             # Behind one smooth patch there is no gap.
             one = one and other >= 0 and smooth[other] == smooth[block]
         rays.some[i], rays.mixed[i] = some, some and not whole
-        rays.search[i] = tested.matters[i] and (some or (tested.gaps and not one)) and not away
+        rays.search[i] = tested.matters[i] and (some or (tested.gaps[i] and not one)) and not away
     return casts

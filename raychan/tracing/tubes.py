@@ -71,6 +71,11 @@ class Refinement:
     fan: float = np.inf
     patch: float = 0.98
 
+    @property
+    def by_landing(self) -> bool:
+        """Whether tubes are cut by what they may bring, all in phase, where they land."""
+        return self.fan < np.inf and self.coarse == 1.0
+
     def for_depth(self, bounces: int) -> Refinement:
         """Return the same rule with slots for so many bounces, and for layers on every stretch between them."""
         return replace(self, slots=min(max(self.slots, bounces + self.layers * (bounces + 1) + 3), _MOST_SLOTS))

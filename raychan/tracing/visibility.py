@@ -32,6 +32,10 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 
+_GAP_LEVELS = 2
+"""Subdivisions of a hidden tube in search of a part that is seen, on flat facets; on curved ones it is one. With one on
+all, one of 150 bodies of overlapping boxes is off by 0.4 dB where 0.3 dB are stated, three are no better than two; with
+two on all, a car takes 3 % more rays."""
 _PARALLEL_FROM = 200  # tubes searched for shadow edges from which on a second thread pays; not measured
 
 
@@ -50,7 +54,7 @@ def centre_visibility(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool, r
     """Return how the centres of tubes are seen over a leg; first whether these stand on their first surface."""
     rays, none = ShadowRays.room(len(tubes), len(leg.mirrors), rule.layers), np.zeros(len(tubes), bool)
     cast_shadow_rays(
-        geometry, leg.chain, rays, Tested(none, True, none, False, NONE_AWAY), _drawn(geometry, tubes, first)
+        geometry, leg.chain, rays, Tested(none, True, none, none, NONE_AWAY), _drawn(geometry, tubes, first)
     )
     return View.of(rays)
 
@@ -62,15 +66,15 @@ def tube_visibility(
     matters: Bools,
     first: bool,
     rule: Refinement,
-    gaps: bool = True,
+    level: int = 0,
     centre: View | None = None,
     facing_away: Bools | None = None,
 ) -> Visibility:
     """Return how tubes are seen over a leg; by the centre ray alone where subdividing would not matter.
 
-    Args: matters (n,); first whether they stand on their first surface; gaps whether to look for one through which a
-    tube is seen that none of its rays is; centre how their centres are seen, tested if not given; facing_away (n,)
-    tubes beyond the horizon, which their own body does not hide.
+    Args: matters (n,); first whether they stand on their first surface; level how often they were subdivided: at the
+    first ones a gap is looked for through which a tube is seen that none of its rays is; centre how their centres are
+    seen, tested if not given; facing_away (n,) tubes beyond the horizon, which their own body does not hide.
     """
     n = len(tubes)
     corners = np.zeros(n, bool) if geometry.convex_alone else matters
@@ -78,6 +82,7 @@ def tube_visibility(
     rays = ShadowRays.room(n, len(leg.mirrors), rule.layers)
     if centre is not None:
         rays = rays._replace(seen=centre.seen, blocker=centre.blocker, corners=centre.corners, passed=centre.passed)
+    gaps = np.where(geometry.curved[tubes.facet], level < 1, level < _GAP_LEVELS)
     tested, drawn = Tested(corners, centre is None, matters, gaps, away), _drawn(geometry, tubes, first)
     if not geometry.hides_nothing and away.any():
         cast_shadow_rays(geometry, leg.chain, rays, tested, drawn, cast=False)

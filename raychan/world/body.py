@@ -22,6 +22,7 @@ from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
 from raychan.world.mesh_io import from_trimesh, load, oddities
 from raychan.world.motion import Motion
+from raychan.world.read_only import ReadOnly
 
 if TYPE_CHECKING:
     import trimesh
@@ -63,6 +64,11 @@ class Body:
     forward: str | None = None
     scale: float = 1.0
     crease_deg: float = CREASE_DEG
+
+    def __post_init__(self) -> None:
+        # The mesh is made once: a later change would have no effect.
+        if isinstance(self.params, Mapping):
+            object.__setattr__(self, "params", ReadOnly(self.params))
 
     @cached_property
     def geometry(self) -> Mesh:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from raychan.em.diffuse import Diffuse
@@ -17,6 +18,16 @@ _FORM = ("shape", "params", "mesh", "unit", "up", "forward", "scale", "crease_de
 
 
 _LARGEST = 16 << 20  # bytes of a scene file; 10,000 bodies take 2 MB
+
+
+def _near(file: Path, known: Sequence[str]) -> str:
+    """Return a text that names the scenes beside a missing file, or those known, whose names are close to its own; all
+    that are known where none is."""
+    beside = [f.name for f in file.parent.glob("*.toml")] if file.parent.is_dir() else []
+    close = [*get_close_matches(file.name, beside, n=2), *get_close_matches(file.stem, known, n=1)]
+    if close:
+        return "did you mean " + " or ".join(f"'{name}'" for name in close) + "?"
+    return "a scene file that exists" + (f", or {nearest(file.stem, known)}" if known else "")
 
 
 def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
@@ -36,8 +47,7 @@ def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
         return file.read_text(encoding="utf-8-sig"), file
     except FileNotFoundError:
         known = known or bundled.names() + bundled.ship_names()
-        more = f", or {nearest(file.stem, known)}" if known else ""
-        raise SceneError("file not found", file=file, allowed=f"a scene file that exists{more}") from None
+        raise SceneError("file not found: there is none of that name", file=file, allowed=_near(file, known)) from None
     except (OSError, UnicodeDecodeError) as e:
         reason = getattr(e, "strerror", None) or e
         raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e

@@ -35,6 +35,8 @@ def load(
     Raises: SceneError for a file that is missing, unreadable or empty, and for options not allowed.
     """
     file = Path(path)
+    if file.is_dir():
+        raise SceneError("is a folder", file=file, value=str(file), allowed="a mesh file")
     if not file.is_file():
         raise SceneError("mesh file not found", file=file, value=str(file), allowed="a path to a file that exists")
     if file.suffix.lower() not in SUFFIXES:

@@ -289,3 +289,10 @@ def test_rays_beyond_the_budget_and_zeros_are_told(capsys, monkeypatch):
     for most, told in (("4", True), ("5", False)):
         assert invoke(["rcs", "--shape", "plate", "--max-rays", most]) == 0
         assert ("1 of 1 angles took more rays than --max-rays (4), up to 10" in capsys.readouterr().err) == told
+
+
+def test_a_parameter_given_twice_and_a_folder_are_refused_by_name(tmp_path, capsys):
+    assert invoke(["rcs", "--shape", "sphere", "radius=1", "radius=2"]) == 2
+    assert "'radius' is given twice" in capsys.readouterr().err
+    assert invoke(["rcs", str(tmp_path)]) == 2
+    assert "is a folder" in capsys.readouterr().err

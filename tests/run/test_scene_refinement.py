@@ -68,7 +68,8 @@ def test_speckle_stops_refinement_at_what_a_millimetre_changes():
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "word"), [("max_rays", 1, "rays"), ("max_seconds", 0.0, "time"), ("max_memory_mb", 1.0, "memory")]
+    ("key", "value", "word"),
+    [("max_rays", 1, "rays"), ("max_seconds", 0.0, "seconds"), ("max_memory_mb", 1.0, "memory")],
 )
 def test_a_budget_ends_refinement_and_is_told(key, value, word):
     found = rc.simulate(scene_of(2, tolerance_db=0.1, **({"max_rays": 10**9} | {key: value})))
@@ -141,6 +142,21 @@ def test_a_step_of_few_rays_fits_into_what_is_left():
         stats.rays = 2_000_000
         ended.append(budget.ended(stats, 10, rays))
     assert "max_rays" in ended[0] and ended[1] == ""
+
+
+@pytest.mark.parametrize(("rays", "why"), [(100_000, ""), (400_000, "seconds")])
+def test_a_step_does_not_start_that_would_end_beyond_the_seconds(monkeypatch, rays, why):
+    """200,000 rays took 2 of 5 s: 400,000 more would take 4 s."""
+    now = [100.0]
+    monkeypatch.setattr(refinement_budget.time, "perf_counter", lambda: now[0])
+    model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}, model={"max_seconds": 5.0}).model
+    stats = Stats(rays=100)
+    budget = refinement_budget.Budget(model, stats)
+    stats.rays, now[0] = 200_100, 102.0
+    budget.stepped(stats)
+    assert budget.left(stats)[0] == pytest.approx(300_000)
+    ended = budget.ended(stats, 10, rays)
+    assert ended == "" if not why else (why in ended and "foreseen" in ended and "rays" not in ended)
 
 
 @pytest.mark.parametrize(("yaw", "side"), [(160.0, 0.2), (180.0, 0.12), (190.0, 0.3)])

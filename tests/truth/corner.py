@@ -2,7 +2,7 @@
 
 The lit footprint on the last face is an exact convex polygon: earlier faces, unfolded over the mirrors, are projected
 from the image of the source onto it and clipped (Sutherland & Hodgman 1974); shadows cast by other faces on any leg
-are subtracted by inclusion and exclusion. Far field: Gordon's polygon integral. Near: dense quadrature.
+are cut off. Far field: Gordon's polygon integral. Near: dense quadrature.
 Faces conduct perfectly and reflect on both sides.
 """
 
@@ -172,13 +172,25 @@ def footprints(faces, order, tx, rx):
 
 
 def minus(polygon, holes, n):
-    """Polygon without the union of holes, as signed convex polygons."""
+    """Polygon without the union of holes, as signed convex polygons that do not overlap."""
     smallest = 1e-14 * max(area(polygon, n), TINY)
-    parts = [(1.0, polygon)] if area(polygon, n) > smallest else []
+    parts = [polygon] if area(polygon, n) > smallest else []
     for hole in holes:
-        cuts = [(-sign, intersect(part, hole, n)) for sign, part in parts]
-        parts += [(sign, cut) for sign, cut in cuts if area(cut, n) > smallest]
-    return parts
+        if abs(area(hole, n)) > smallest:
+            parts = [cut for part in parts for cut in beside(part, hole, n) if area(cut, n) > smallest]
+    return [(1.0, part) for part in parts]
+
+
+def beside(polygon, hole, n):
+    """Convex parts of a convex polygon outside of a convex hole, one beyond each of its edges."""
+    hole = hole if area(hole, n) > 0 else hole[::-1]
+    for i in range(len(hole)):
+        edge = hole[(i + 1) % len(hole)] - hole[i]
+        if np.linalg.norm(edge) >= TINY and len(polygon):
+            wall = object.__new__(Plane)
+            wall.n, wall.p = np.cross(n, edge), hole[i]
+            yield keep(polygon, wall, -1.0)
+            polygon = keep(polygon, wall, 1.0)
 
 
 def sequences(count, max_bounces):
@@ -201,7 +213,7 @@ def _last_face(part, n, order, planes, k, tx, rx, form):
         phase = np.exp(-1j * k * (image @ offset))
         e_in, e_out = flip * po.polarisations(-tx[0]) @ turn.T, po.polarisations(-rx[0])
         pairs = [[po.coupling(n, -image, e_in[b], -rx[0], e_out[a], None, form) for b in (0, 1)] for a in (0, 1)]
-        return np.array(pairs) * (-1j * k / (4 * np.pi)) * phase * po.fourier(part, k * (image + rx[0]))
+        return np.array(pairs) * (-1j * k / (4 * np.pi)) * phase * po.fourier(part, k * (image + rx[0]), n)
 
     def samples(points, weights):
         k_tx, a_in, l_in = po.wave((points - offset) @ turn, tx)

@@ -165,10 +165,11 @@ def side(point, normal, end):
     return normal @ (to_end if np.isinf(distance) else distance * to_end - point)
 
 
-def fourier(corners, g):
-    """Integral of exp(j g.P) over a planar polygon (m, 3) (Gordon 1975, by the divergence theorem)."""
+def fourier(corners, g, n=None):
+    """Integral of exp(j g.P) over a planar polygon (m, 3) (Gordon 1975, by the divergence theorem); n its unit normal,
+    which a sliver's corners do not tell."""
     p = np.asarray(corners, float)
-    n = unit_normal(p)
+    n = unit_normal(p) if n is None else n
     nxt = np.roll(p, -1, axis=0)
     w = g - (g @ n) * n
     size = w @ w

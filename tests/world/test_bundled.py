@@ -67,6 +67,12 @@ def test_what_is_nowhere_is_told_with_what_there_is(name, elsewhere, capsys):
     assert "file not found" in said and ("did you mean 'urban'" in said or "occluded_pedestrian" in said)
 
 
+def test_a_missing_scene_is_told_with_the_files_of_close_names_beside_it(elsewhere, capsys):
+    (elsewhere / "crossing.toml").write_text(PLATE)
+    assert invoke(["info", "crosing.toml"]) == 2
+    assert "did you mean 'crossing.toml'?" in capsys.readouterr().err
+
+
 def test_run_without_a_scene_lists_those_that_come_along(elsewhere, capsys):
     assert invoke(["run"]) == 0
     said = capsys.readouterr().out
