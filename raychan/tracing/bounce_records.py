@@ -51,8 +51,9 @@ def surroundings(geometry: Geometry) -> Surroundings:
 class Rules(NamedTuple):
     """How tubes are reflected: patches lit over their leg; image (3,), far of the leg by which contributions are
     bounded; wavenumber [rad/m]; first, last whether they stand on their first surface, or land on their last; layers,
-    levels, jitter, patch of the `Refinement`; by_landing whether tubes are cut by what they bring, all in phase, where they land; wide whether
-    fans are not narrow; thresholds (c,) [1/m] of contributions for each `cell` [m] of length; max_cuts, max_rays."""
+    levels, jitter, patch of the `Refinement`; by_landing whether tubes are cut by what they bring, all in phase, where
+    they land; wide whether fans are not narrow; thresholds (c,) [1/m] of contributions for each `cell` [m] of length;
+    max_cuts, max_rays."""
 
     patches: Patches
     image: Floats
