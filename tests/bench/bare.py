@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -10,56 +11,92 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from raychan.geometry.intersect import CastRays
-from raychan.geometry.shadow_rays import MetFacets, ShadowTargets
-from raychan.world.ray_caster import RayCaster
+from raychan import parallel
+from raychan.geometry.embree_packet import COMPANIONS, DIRECTION, LANES, ORIGIN
+from raychan.world import triangle_groups
+from raychan.world.embree_library import EmbreeScene as OwnScene
+from raychan.world.embree_library import intersect_address
 
 _CHUNK = 1 << 16
-_EACH = 3  # a ray and its two companions
-Cast = tuple[RayCaster, np.ndarray, np.ndarray]
+_WORDS = DIRECTION + 3 * LANES  # of a packet: origins and directions
+_HELD = 4096  # packets
+_FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
+
+
+class Casts:
+    """Recorded packets by scene of Embree, in the order in which they were cast, and the triangles of each scene."""
+
+    def __init__(self) -> None:
+        self.scenes: list[tuple[OwnScene, np.ndarray]] = []  # alive, or another would have the address of one
+        self._packets: list[tuple[np.ndarray, np.ndarray]] = []
+        self._room, self._scene, self._count = np.empty((_HELD, _WORDS), np.float32), np.empty(_HELD, np.uint64), 0
+        self._real = _FUNCTION(int(intersect_address()))
+        self.record = _FUNCTION(self._record)
+
+    def _record(self, valid: int, scene: int, rays: int, arguments: int) -> None:
+        ctypes.memmove(self._room.ctypes.data + 4 * _WORDS * self._count, rays, 4 * _WORDS)
+        self._scene[self._count] = scene
+        self._count += 1
+        if self._count == _HELD:
+            self._flush()
+        self._real(valid, scene, rays, arguments)
+
+    def _flush(self) -> None:
+        self._packets.append((self._room[: self._count].copy(), self._scene[: self._count].copy()))
+        self._count = 0
+
+    def rays(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Give the triangles (t, 3, 3) of each scene, and origins and directions (n, 3) of the rays cast at it."""
+        self._flush()
+        packets, scene = (np.concatenate(x) for x in zip(*self._packets, strict=True))
+        every = packets.reshape(len(packets), -1, LANES)[:, :, : 1 + COMPANIONS]
+        first, then = ORIGIN // LANES, DIRECTION // LANES
+        for made, corners in self.scenes:
+            mine = every[scene == made.address].transpose(0, 2, 1)
+            origin, direction = (mine[:, :, i : i + 3].reshape(-1, 3) for i in (first, then))
+            yield corners, np.ascontiguousarray(origin), np.ascontiguousarray(direction)
+
+
+_made: list[Casts] = []  # for ever: compiled code may hold the addresses of their functions
 
 
 @contextmanager
-def recorded() -> Iterator[list[Cast]]:
-    """Give the list to which every cast inside the block goes: caster, origins and directions (n, 3) float32.
+def recorded() -> Iterator[Casts]:
+    """Give what records every packet of rays cast inside the block, on one thread, at scenes that are made inside it.
 
-    What is cast again from farther on, or behind a layer, is not in it: some percent of the rays.
+    Scenes that are made inside the block go on being recorded: time other ones.
     """
-    casts: list[Cast] = []
-    real = RayCaster._follow
+    casts = Casts()
+    _made.append(casts)
+    address, scene = triangle_groups.intersect_address, triangle_groups.EmbreeScene
 
-    def recorder(caster: RayCaster, rays: CastRays, targets: ShadowTargets, met: MetFacets) -> None:
-        left = ~met.reached if len(met.reached) else slice(None)
-        origin, direction = (
-            (x[left] - c).astype(np.float32) for x, c in ((rays.origin, _middle(caster)), (rays.direction, 0.0))
-        )
-        casts.append((caster, origin, direction))
-        real(caster, rays, targets, met)
+    def made(corners: np.ndarray) -> OwnScene:
+        built = scene(corners)
+        casts.scenes.append((built, corners))
+        return built
 
-    RayCaster._follow = recorder  # type: ignore[method-assign]
+    triangle_groups.intersect_address = lambda: np.uintp(ctypes.cast(casts.record, ctypes.c_void_p).value)  # type: ignore
+    triangle_groups.EmbreeScene = made  # type: ignore[assignment, misc]
+    parallel.set_threads(1)
     try:
         yield casts
     finally:
-        RayCaster._follow = real  # type: ignore[method-assign]
+        triangle_groups.intersect_address, triangle_groups.EmbreeScene = address, scene  # type: ignore[misc]
+        parallel.set_threads(None)
 
 
-def _middle(caster: RayCaster) -> np.ndarray:
-    return caster.facets.vertices.reshape(-1, 3).mean(axis=0)
-
-
-def replay(casts: list[Cast]) -> tuple[Callable[[], None], int]:
-    """Return a call that casts recorded rays again with embreex, each three times as it has two companions, all that
-    meet one scene together, on both cores; and their number.
+def replay(casts: Casts) -> tuple[Callable[[], None], int]:
+    """Return a call that casts recorded rays again with embreex, all that meet one scene together, on both cores; and
+    their number.
 
     This is the least that a computation which casts them could take.
     """
-    casters = {id(caster): caster for caster, _, _ in casts}
     jobs = []
-    for key, caster in casters.items():
+    for corners, origins, directions in casts.rays():
+        if not len(origins):
+            continue
         scene = EmbreeScene(robust=True)
-        TriangleMesh(scene, (caster.facets.vertices - _middle(caster)).astype(np.float32))
-        mine = [(o, d) for c, o, d in casts if id(c) == key]
-        origins, directions = (np.repeat(np.concatenate(x), _EACH, axis=0) for x in zip(*mine, strict=True))
+        TriangleMesh(scene, corners.astype(np.float32))
         starts = range(0, len(origins), _CHUNK)
         jobs += [(scene, origins[i : i + _CHUNK], directions[i : i + _CHUNK]) for i in starts]
         scene.run(origins[:1], directions[:1])  # built

