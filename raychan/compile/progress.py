@@ -12,7 +12,7 @@ from numba.core import event
 from raychan.compile.code_cache import unkept
 from raychan.compile.jit import KERNELS, Kernel
 
-_EACH = 0.07  # s a kernel in a cold run, two processes on two quiet cores, until this run has a mean of its own
+_EACH = 0.08  # s a kernel in a cold run, two processes on two quiet cores, until this run has a mean of its own
 _OWN = 20  # kernels after which that is so
 
 Told = Callable[[int, int, float], None]
