@@ -128,14 +128,6 @@ def _search(
     parallel_for(len(rows), some, _PARALLEL_FROM)
 
 
-def on_facets(geometry: Geometry, tubes: Tubes) -> Floats:
-    """Return the points (n, 4, 3) [m] of tubes on their first surface, projected to the flat facets that rays meet."""
-    if not geometry.curved[tubes.facet].any():
-        return tubes.points
-    found: Floats = project_to_facets(tubes.points, tubes.facet, tubes.bary, geometry.curved, geometry.facets.vertices)
-    return found
-
-
 @njit(cache=True, nogil=True)
 def project_to_facets(points, facet, bary, curved, vertices):  # type: ignore[no-untyped-def]
     """Return the points (n, 4, 3), those on curved facets moved to the flat ones by their corners' bary (n, 3, 3)."""
