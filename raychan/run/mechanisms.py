@@ -12,7 +12,7 @@ from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, TRANSMIT, Paths
 from raychan.run.ledger import NOTHING, ModelChoice
-from raychan.run.receiver import noise_of_beam, quiet_map
+from raychan.run.receiver import FAINT, noise_of_beam, quiet_map
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb
 
@@ -20,7 +20,6 @@ Floats = NDArray[np.float64]
 
 _SHARE = 0.5  # of the tolerance, as an amplitude: what is left out of bounces, and of layers; not measured
 QUIET = 0.87  # of the least detection: noise of its cell raises a level by more (1.2 dB) once in 40 times
-_FAINT = 1e-8  # of the strongest cell: the weakest detection possible where there is no noise; not measured
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of the transform that gives a mechanism's level (not measured)
 
 
@@ -92,7 +91,7 @@ class _Chances:
     def __init__(self, paths: Paths, radar: Radar, settings: Any, tolerance_db: float) -> None:
         self._paths, self._radar, self._settings, self._tolerance_db = paths, radar, settings, tolerance_db
         total = _levels(paths, np.ones(len(paths.delay), bool), radar, settings)
-        self.least = least_detection(radar, settings) or _FAINT * float(total.max())
+        self.least = least_detection(radar, settings) or FAINT * float(total.max())
         self._total, self._weak = np.sqrt(total), QUIET * np.sqrt(self.least)
         self.why: list[str] = []
         self.left_db: float | str = NOTHING

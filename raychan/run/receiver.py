@@ -22,7 +22,7 @@ from raychan.units import C0, undb
 
 Floats = NDArray[np.float64]
 
-_FAINT = 1e-8  # of the strongest cell: the weakest shoulder possible where there is no noise; not measured
+FAINT = 1e-8  # of the strongest cell: the weakest detection or shoulder possible where there is no noise; not measured
 
 
 def map_of(cube: Cube, radar: Radar, settings: Any, cross: bool = False) -> RangeDoppler:
@@ -61,7 +61,7 @@ def shoulders_in(
     side lobes, and the power (c,) [W] that makes each a local maximum."""
     power, grid = rdmap.power, Grid.of(rdmap)
     cells = strongest(power, grid)
-    least = max(float(undb(settings.min_snr_db)) * rdmap.noise, _FAINT * float(power.max(initial=0.0)))
+    least = max(float(undb(settings.min_snr_db)) * rdmap.noise, FAINT * float(power.max(initial=0.0)))
     cells = cells[power[tuple(cells.T)] >= least]
     cells = cells[power[tuple(cells.T)] >= least_in(rdmap, cells, radar, settings)]
     lobes = SideLobes(grid, (settings.rate_window, settings.range_window))

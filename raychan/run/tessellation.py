@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from raychan.geometry.triangles import edge_curvatures
 from raychan.radar.radar import Radar
@@ -14,8 +13,6 @@ from raychan.records import BLOCKER, Paths
 from raychan.run.mechanisms import peak
 from raychan.world.geometry import Geometry
 from raychan.world.mesh import Mesh
-
-Floats = NDArray[np.float64]
 
 _OPPOSED = 2.0  # of a field's amplitude: largest change by a phase, at pi
 
@@ -34,11 +31,9 @@ def strongest_bend(
     for body, name in enumerate(f.body_names):
         if name not in meshes or f.role[body] == BLOCKER:
             continue
-        curvature, area = _curved(geometry, body, meshes[name])
-        if not len(area):
+        phase = 2.0 * k * _sag(meshes[name])
+        if phase == 0.0:
             continue
-        sag = 0.25 * np.linalg.norm(curvature, axis=2)
-        phase = 2.0 * k * float(np.sqrt(np.average((sag**2).mean(axis=1), weights=area)))
         met = ((paths.trajectories.body == body) & (paths.trajectories.kind > 0)).any(axis=1)[paths.trajectory]
         changed = min(phase, _OPPOSED) ** 2 * peak(paths, met, radar, settings)
         if changed > found[2]:
@@ -46,12 +41,11 @@ def strongest_bend(
     return found
 
 
-def _curved(geometry: Geometry, body: int, mesh: Mesh) -> tuple[Floats, Floats]:
-    """Return the edge curvatures (n, 3, 3) [m] and areas (n,) [m^2] of a body's curved facets: those of its whole mesh,
-    also where fewer are traced."""
-    own = geometry.facets.body == body
-    if np.count_nonzero(own) == len(mesh.faces):
-        rows = np.flatnonzero(own & geometry.curved)
-        return geometry.edge_curvature[rows], geometry.area[rows]
-    curvature, curved = edge_curvatures(mesh.corners, mesh.normals)
-    return curvature[curved], mesh.areas[curved]
+def _sag(mesh: Mesh) -> float:
+    """Return the rms sag [m] of a body's curved facets, 0 where none is: of its whole mesh, also where fewer are
+    traced; kept with the mesh."""
+    if "sag" not in mesh.memo:
+        curvature, curved = edge_curvatures(mesh.corners, mesh.normals)
+        sag, area = 0.25 * np.linalg.norm(curvature[curved], axis=2), mesh.areas[curved]
+        mesh.memo["sag"] = float(np.sqrt(np.average((sag**2).mean(axis=1), weights=area))) if len(area) else 0.0
+    return float(mesh.memo["sag"])

@@ -15,7 +15,8 @@ _NAMED = 3  # cells that a line names
 @dataclass(frozen=True)
 class Unreached:
     """A cell that a budget left above the tolerance: range [m], rate [m/s], whether it is `deep` tubes, those that
-    bounced, that change most, and whether it is `weak`: below the detector's threshold, and may still rise above."""
+    bounced, that change most, and whether it is `weak`: no detection (below the detector's threshold, or on the slope
+    of a stronger echo), but may still become one."""
 
     range: float
     rate: float
@@ -43,7 +44,7 @@ def unreached_notes(unreached: tuple[Unreached, ...], steps: int, ended: str, to
     said, how = [], f"refined {'once' if steps == 1 else f'{steps} times'}, ended by {ended}"
     for weak, what in (
         (False, f"the level still changes by more than {tolerance_db:g} dB at"),
-        (True, "below the detector's threshold, what may still change reaches it at"),
+        (True, "where nothing is detected yet, what may still change makes a detection at"),
     ):
         some = [u.text for u in unreached if u.weak == weak]
         if some:

@@ -21,7 +21,7 @@ def test_weak_cells_are_told_apart_from_detections():
         "refined 2 times, ended by 8 steps: the level still changes by more than 0.5 dB at 10.00 m, +1.00 m/s "
         "(first surfaces)"
     )
-    assert "below the detector's threshold" in weak and "20.00 m, -2.00 m/s (tubes that bounced)" in weak
+    assert "where nothing is detected yet" in weak and "20.00 m, -2.00 m/s (tubes that bounced)" in weak
 
 
 def test_nothing_is_said_where_all_is_reached_and_three_cells_are_named():
