@@ -220,6 +220,8 @@ class SceneRefinement:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
             own, sums = held.sums_of(*self._again(launch, held, wanted, rays, rings), response, cells.place)
             _each(sums, lambda i, change, own=own: cells.changed(i, own, change))  # type: ignore[misc]
+            if not steps:
+                cells.traced(own)
             steps += 1
             cells.stepped()
             budget.stepped(self.stats)
@@ -259,6 +261,8 @@ def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> Sour
     def one(i: int, x: Complexes) -> None:
         feeding = feeding_sources(own, x, float(allowed[i]))
         cells.left[i] = x[deep & ~feeding].sum()
+        weak = ~deep & ~feeding & (own != EXACT) & (x != 0.0)
+        cells.weak(i, own[weak], x[weak])
         # Not by BLAS, whose sums depend on how many threads it takes.
         cells.tubes[i] = math.sqrt((np.abs(x[tubes:]) ** 2).sum())
         found[feeding] = True
