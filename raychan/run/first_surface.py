@@ -33,7 +33,7 @@ def first_surface(
     behind the body. What stands there is in its shadow already, so the latter is never blocked.
     Source: Ufimtsev, Fundamentals of the Physical Theory of Diffraction, 2014, ch. 1.
     """
-    seen, corners, passed = resolve_return_leg(geometry, leg, out, tubes, found, True, which=LIT)
+    seen, corners, passed = resolve_return_leg(geometry, leg, out, tubes, found, True, LIT)
     yield seen.facet, _radiated(geometry, leg, out, seen, (corners, passed), frequency, basis, REFLECTED)
     free = np.zeros((len(tubes), 0, 3)), np.full((len(tubes), 1), -1, np.int32)
     yield tubes.facet, _radiated(geometry, leg, out, tubes, free, frequency, basis, SHADOW)

@@ -7,8 +7,6 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import REFLECT, TRANSMIT
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -54,18 +52,6 @@ class History:
             here = at[rows]
             facet[rows] = np.where(self._kind[here] == kind, self._facet[here], -1)
             at[rows] = self._before[here]
-
-    def behind_layer(self, last: Ints) -> NDArray[np.bool_]:
-        """Tell for which rows `last` (n,) the vertex before the newest reflection is a layer that was passed."""
-        at = last.copy()
-        while True:
-            rows = np.flatnonzero(at >= 0)
-            rows = rows[self._kind[at[rows]] != REFLECT]
-            if not len(rows):
-                break
-            at[rows] = self._before[at[rows]]
-        before = np.where(at >= 0, self._before[at], -1)
-        return np.asarray((before >= 0) & (self._kind[before] == TRANSMIT))
 
     @property
     def rows(self) -> tuple[Floats, Floats, Ints, NDArray[np.int8], Ints]:

@@ -182,15 +182,17 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
 
 
 def write_leg(geometry: Geometry, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints, rule: Refinement) -> None:
-    """Write the leg's mirrors, met at corners (n, m, 3) [m], and the layers passed (n, l) into the tubes' history."""
-    every = np.arange(len(tubes))
+    """Write the leg's mirrors, met at corners (n, m, 3) [m], and the layers passed (n, l) (see `leg_rays.follow_leg`)
+    into the tubes' history."""
+    every, per = np.arange(len(tubes)), passed.shape[1] // (len(leg.mirrors) + 1)
     for i, m in enumerate(leg.mirrors):
         facet = np.full(len(tubes), m.facet, np.int32)
+        d = unit(corners[:, i] - (corners[:, i - 1] if i else leg.end))
+        write_layers(geometry, tubes, corners[:, i], d, passed[:, i * per : (i + 1) * per], rule)
         tubes.append(every, corners[:, i], m.normal, facet, REFLECT)
-        before = corners[:, i - 1] if i else leg.end
-        d = unit(corners[:, i] - before)
         tubes.strength = tubes.strength * geometry.strength(facet, np.abs(d @ m.normal), rule.wavenumber)
-    write_layers(geometry, tubes, tubes.points[:, CENTRE], tubes.k[:, CENTRE], passed, rule)
+    own = passed[:, len(leg.mirrors) * per :]
+    write_layers(geometry, tubes, tubes.points[:, CENTRE], tubes.k[:, CENTRE], own, rule)
 
 
 def write_layers(geometry: Geometry, tubes: Tubes, point: Floats, k: Floats, passed: Ints, rule: Refinement) -> None:

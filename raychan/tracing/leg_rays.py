@@ -1,8 +1,7 @@
 """Rays along legs: whether an end sees points over its mirrors and through layers (numba kernels).
 
 A ray is followed from the end to the first mirror, from mirror to mirror, and to its point. It ends where a stretch of
-its way does not lie on the lit sides of its mirrors, or meets something else first; on the last stretch it passes
-layers.
+its way does not lie on the lit sides of its mirrors, or meets something else first than layers, which it passes.
 """
 
 from __future__ import annotations
@@ -86,7 +85,8 @@ def _stretch(i, p, corners, leg, reach):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def follow_leg(p, target, slack, inside, leg, reach, caster, packet, corners, passed):  # type: ignore[no-untyped-def]
-    """Write the mirror points (m, 3) [m] on the way to p (3,) and the layers passed (l,) on its last stretch.
+    """Write the mirror points (m, 3) [m] on the way to p (3,), and the layers passed, as many on each of the m + 1
+    stretches of the way at most, from the end on: (l (m + 1),), -1 for none.
 
     Args: target facet on which p lies, -1 for none; slack [m] by which its smooth surface may lie before p; inside body
     in which p lies, -1 for none; leg as `LegChain`; reach [m] from which rays come when far; caster as
@@ -96,6 +96,7 @@ def follow_leg(p, target, slack, inside, leg, reach, caster, packet, corners, pa
     groups, shapes, surfaces, hides_nothing = caster
     floats, words = packet
     m, casts, skip = len(leg.at), 0, np.int32(-1)
+    layers = len(passed) // (m + 1)
     for q in range(len(passed)):
         passed[q] = -1
     if not _over_mirrors(p, leg, corners):
@@ -112,17 +113,19 @@ def follow_leg(p, target, slack, inside, leg, reach, caster, packet, corners, pa
             a, t, tries = first_hit(x, d, skip, start, groups, shapes, floats, words)
             casts += tries
             if i < m:
-                # The mirror itself is hit first.
-                if a < 0 or surfaces.plane[a] != surfaces.plane[leg.facet[i]]:
-                    return False, np.int32(-1), casts
+                free = a >= 0 and surfaces.plane[a] == surfaces.plane[leg.facet[i]]
+            else:
+                free = is_clear(a, t, x, d, target, length, slack, surfaces)
+                free = free or (inside >= 0 and surfaces.body[a] == inside)
+            layer, own = -1, passed[i * layers : (i + 1) * layers]
+            if a >= 0 and not free and len(surfaces.is_layer) and surfaces.is_layer[a]:
+                layer = unused(own)
+            if layer < 0 and (i == m or not free):
+                return free, np.int32(a if i == m and not free else -1), casts
+            if layer < 0:
                 skip = np.int32(a)
                 break
-            free = is_clear(a, t, x, d, target, length, slack, surfaces)
-            free = free or (inside >= 0 and surfaces.body[a] == inside)
-            layer = -1 if free or not len(surfaces.is_layer) or not surfaces.is_layer[a] else unused(passed)
-            if layer < 0:
-                return free, np.int32(-1 if free else a), casts
             # Behind a thin layer the ray goes on.
-            passed[layer] = a
+            own[layer] = a
             start = t + shapes.nearest
     return False, np.int32(-1), casts

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.beam_table import Beam
-from raychan.records import BLOCKER, MIRROR
+from raychan.records import BLOCKER, MIRROR, REFLECT, TRANSMIT
 from raychan.tracing.cache import cache_of
 from raychan.tracing.image_paths import may_leave, may_reach, mirror_points, rays_from, weights
 from raychan.tracing.leg_rays import LegChain
@@ -30,7 +30,7 @@ _MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not 
 @dataclass(frozen=True, eq=False)
 class View:
     """How points are seen over a leg: `seen` (n,), mirror points `corners` (n, m, 3) [m], end's side first, layers
-    `passed` (n, l) on the last stretch, and the facet `blocker` (n,) that hides it, -1 for none."""
+    `passed` (n, l) (see `leg_rays.follow_leg`), and the facet `blocker` (n,) that hides it, -1 for none."""
 
     seen: Bools
     corners: Floats
@@ -176,9 +176,25 @@ class Leg:
         """Return which points the end sees over this leg, and through which layers.
 
         Args: points (n, 3) [m] on facets (n,); slack (n,) [m] by which the points' own smooth surface may lie before
-        them; layers that the last stretch may pass; inside (n,) bodies in which the points lie, which do not hide them.
+        them; layers that each stretch may pass; inside (n,) bodies in which the points lie, which do not hide them.
         """
         return View.of(points_seen(geometry, self.chain, points, facet, slack, layers, inside))
+
+    def stops(self, geometry: Geometry, view: View, row: int, point: Floats) -> list[tuple[Floats, Floats, int, int]]:
+        """Return the interactions on the way to a point (3,) [m], seen as row of a view, in order: place, normal (3,),
+        facet, kind."""
+        found, start, per = [], self.end, view.passed.shape[1] // (len(self.mirrors) + 1)
+        for i in range(len(self.mirrors) + 1):
+            stop = view.corners[row, i] if i < len(self.mirrors) else point
+            for f in view.passed[row, i * per : (i + 1) * per]:
+                if f >= 0:
+                    d = stop - start
+                    t = geometry.distance(np.array([f]), start[None], d[None])[0]
+                    found.append((start + t * d, geometry.normal[f], int(f), int(TRANSMIT)))
+            if i < len(self.mirrors):
+                found.append((stop, self.mirrors[i].normal, self.mirrors[i].facet, int(REFLECT)))
+            start = stop
+        return found
 
 
 def planes_that_mirror(geometry: Geometry, end: Floats) -> list[Mirror]:

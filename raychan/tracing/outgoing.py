@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +47,7 @@ class _OutgoingLegs(NamedTuple):
 class _LeavingTubes(NamedTuple):
     """Columns of `tubes.Tubes` by which these leave, and what of them is to be found: which `scatter` (n,), and which
     are `twice` (n,), returned by legs over mirrors already (but over a leg without a mirror that scatters if
-    `but_plain`): of these only what passes a layer is left."""
+    `but_plain`)."""
 
     points: Floats
     k: Floats
@@ -61,9 +62,8 @@ class Leaving:
     """Which tubes may leave over each of some legs.
 
     Args: outs all legs; wanted numbers of those that are asked for; scatter (n,) tubes that return; twice (n,) those
-    that legs over mirrors carry, of which only what passes a layer is left, but_plain: but over a leg without a mirror
-    that scatters; which of them radiate (see `tracing.radiation`), no matter which over the leg `any_over`.
-    """
+    that legs over mirrors carry, but_plain: but over a leg without a mirror that scatters; which of them radiate
+    (see `tracing.radiation`), no matter which over the leg `any_over`."""
 
     def __init__(
         self,
@@ -81,24 +81,23 @@ class Leaving:
         given = _LeavingTubes(tubes.points, tubes.k, tubes.normals, tubes.facet, scatter, twice, but_plain)
         numbers = np.array(wanted, np.int64)
         every = np.array([outs[i] is any_over for i in wanted], bool)
-        self._rows: dict[int, tuple[Rows, Rows]] = {}
+        self._rows: dict[int, Rows] = {}
 
         def some(part: slice) -> None:
             of = numbers[part]
-            rows, ends = _leaving(given, geometry.piece, legs, of, every[part], geometry.has_layers, which)
-            for i, (begin, middle, end) in zip(of, ends, strict=True):
-                self._rows[int(i)] = rows[begin:middle], rows[middle:end]
+            rows, ends = _leaving(given, geometry.piece, legs, of, every[part], which)
+            for i, (begin, end) in zip(of, pairwise(ends), strict=True):
+                self._rows[int(i)] = rows[begin:end]
 
         parallel_for(len(numbers), some, max(2, _PARALLEL_FROM // max(len(tubes), 1)))
 
-    def over(self, i: int) -> tuple[Rows, Rows]:
-        """Return the tubes that may leave over leg i: those of which all counts, and those of which only what passes a
-        layer does."""
+    def over(self, i: int) -> Rows:
+        """Return the tubes that may leave over leg i."""
         return self._rows[i]
 
     def any_over(self, i: int) -> bool:
         """Tell whether any tube may leave over leg i."""
-        return any(map(len, self._rows[i]))
+        return len(self._rows[i]) > 0
 
 
 def _packed(geometry: Geometry, outs: list[Leg]) -> _OutgoingLegs:
@@ -127,15 +126,15 @@ def _packed(geometry: Geometry, outs: list[Leg]) -> _OutgoingLegs:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _leaving(tubes, piece, legs, wanted, every, layers, which):  # type: ignore[no-untyped-def]
-    """Return the rows of tubes that may leave, leg by leg, and where those of each of the wanted legs begin, where its
-    rows of tubes that are returned already begin, and where they end (k, 3).
+def _leaving(tubes, piece, legs, wanted, every, which):  # type: ignore[no-untyped-def]
+    """Return the rows of tubes that may leave, leg by leg, and where those of each of the wanted legs begin, and the
+    last ones end (k + 1,).
 
     Args: tubes as `_LeavingTubes`; piece (f,) of facets; legs as `_OutgoingLegs`; wanted (k,) numbers of legs; every
-    (k,) over which also tubes leave that do not radiate; layers whether tubes may pass any; which of them radiate.
+    (k,) over which also tubes leave that do not radiate; which of them radiate.
     """
     n, m, w = len(tubes.facet), legs.at.shape[1], legs.windows.shape[1]
-    rows, bounds, end = np.empty(4 * n, np.int64), np.empty((len(wanted), 3), np.int64), 0
+    rows, bounds, end = np.empty(4 * n, np.int64), np.zeros(len(wanted) + 1, np.int64), 0
     found, ok = np.empty(n, np.int64), np.empty(n, np.bool_)
     # Tubes that do not scatter stand on no piece.
     own, present = np.empty(n, np.int32), np.zeros(legs.pieces.shape[1], np.bool_)
@@ -154,18 +153,14 @@ def _leaving(tubes, piece, legs, wanted, every, layers, which):  # type: ignore[
         i = wanted[o]
         count = 0
         if _any_of(present, legs.pieces[i]):
-            count = _candidates(tubes, own, legs, i, every[o], layers, which, found)
+            count = _candidates(tubes, own, legs, i, every[o], which, found)
         if legs.mirrors[i]:
             _each_may_leave(tubes.points, found[:count], legs, i, polygons, planes, ok)
-        bounds[o, 0] = end
-        for behind in range(2):
-            for j in range(count):
-                row = found[j]
-                carried = tubes.twice[row] and not (tubes.but_plain and not legs.over[i])
-                if carried == (behind == 1) and (ok[j] or not legs.mirrors[i]):
-                    rows[end] = row
-                    end += 1
-            bounds[o, 1 + behind] = end
+        for j in range(count):
+            if ok[j] or not legs.mirrors[i]:
+                rows[end] = found[j]
+                end += 1
+        bounds[o + 1] = end
     return rows[:end], bounds
 
 
@@ -179,13 +174,13 @@ def _any_of(some, others):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
-def _candidates(tubes, piece, legs, i, every, layers, which, found):  # type: ignore[no-untyped-def]
+def _candidates(tubes, piece, legs, i, every, which, found):  # type: ignore[no-untyped-def]
     """Write the rows of tubes, on pieces (n,), of which leg i can carry a return, and that radiate to its end, or
     `every`; return their number."""
     count, image, far, allowed = 0, legs.images[i, legs.mirrors[i]], legs.far[i], legs.pieces[i]
     plain = tubes.but_plain and not legs.over[i]
     for j in range(len(piece)):
-        if piece[j] < 0 or not allowed[piece[j]] or (tubes.twice[j] and not (layers or plain)):
+        if piece[j] < 0 or not allowed[piece[j]] or (tubes.twice[j] and not plain):
             continue
         if every or radiates(tubes.points[j, 3], tubes.k[j, 3], tubes.normals[j, 3], image, far, which)[0] > 0.0:
             found[count] = j

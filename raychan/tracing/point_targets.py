@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
-from raychan.records import DIFFRACT, POINT, REFLECT, TRANSMIT, DiffractedRoutes, Points, Routes
+from raychan.records import DIFFRACT, POINT, DiffractedRoutes, Points, Routes
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.vectors import Vec, cross, dot
@@ -61,29 +61,11 @@ def _route(geometry, points, p, leg, out, seen_in, seen_out, slots):  # type: ig
     """Return the columns of `Routes` for point p over a leg in and a leg out."""
     at = points.position[p]
     (k_in, l_in), (k_out, l_out) = leg.rays(at[None]), out.rays(at[None])
-    vertices, normals, facets, kinds = [], [], [], []
 
-    def add(vertex, normal, facet, kind):  # type: ignore[no-untyped-def]
-        vertices.append(vertex)
-        normals.append(normal)
-        facets.append(facet)
-        kinds.append(kind)
-
-    def add_leg(over, seen, k):  # type: ignore[no-untyped-def]
-        for m, spot in zip(over.mirrors, seen.corners[p], strict=True):
-            add(spot, m.normal, m.facet, REFLECT)
-        for facet in seen.passed[p]:
-            if facet >= 0:
-                t = geometry.distance(np.array([facet]), at[None], k)
-                add(at + t[0] * k[0], geometry.normal[facet], facet, TRANSMIT)
-
-    add_leg(leg, seen_in, k_in)
-    scatter = len(vertices)
-    add(at, np.zeros(3), -1, POINT)
-    head = len(vertices)
-    add_leg(out, seen_out, k_out)
-    for column in (vertices, normals, facets, kinds):
-        column[head:] = column[head:][::-1]
+    before, after = leg.stops(geometry, seen_in, p, at), out.stops(geometry, seen_out, p, at)[::-1]
+    scatter = len(before)
+    stops = [*before, (at, np.zeros(3), -1, int(POINT)), *after]
+    vertices, normals, facets, kinds = map(list, zip(*stops, strict=True))
     used, free = len(vertices), slots - len(vertices)
     body = [int(geometry.facets.body[f]) if f >= 0 else int(points.body[p]) for f in facets]
     length = float(l_in[0] + l_out[0])

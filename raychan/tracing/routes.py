@@ -36,9 +36,9 @@ class RouteTubes(NamedTuple):
 
 
 class ReturnLegs(NamedTuple):
-    """The leg out: mirror points (n, m, 3) [m], normals (m, 3) and facets (m,) of the mirrors, end's side first; layers
-    passed (n, l) on the last stretch; image (3,) of the end, or the direction to it when far; end (3,) [m], which fills
-    unused slots."""
+    """The leg out: mirror points (n, m, 3) [m], normals (m, 3) and facets (m,) of the mirrors, end's side first;
+    layers passed (n, l) (see `leg_rays.follow_leg`); image (3,) of the end, or the direction to it when far; end
+    (3,) [m], which fills unused slots."""
 
     corners: Floats
     normals: Floats
@@ -65,7 +65,7 @@ def routes_of(
     """Return the routes of tubes that scatter on their present footprint and leave over `out`.
 
     Args: first whether this is their first surface; corners (n, m, 3) [m] mirror points of the leg out, receiver's side
-    first; passed (n, l) layers on its last stretch. All routes have as many slots as the longest.
+    first; passed (n, l) layers on it (see `leg_rays.follow_leg`). All routes have as many slots as the longest.
     """
     n, m, f = len(tubes), len(out.mirrors), geometry.facets
     end = np.asarray(out.end, float)
@@ -152,30 +152,32 @@ def leg_of_arrival(tubes: Tubes, mirrors: int, layers: int) -> tuple[Floats, Int
     """Return the mirror points (n, m, 3) [m] and the layers (n, l) on the leg out of first-bounce tubes that leave by
     the leg over which they came, from their history."""
     corners = np.zeros((len(tubes), mirrors, 3))
-    passed = np.empty((len(tubes), layers), np.int32)
+    passed = np.empty((len(tubes), layers * (mirrors + 1)), np.int32)
     same_leg_out(tubes.last, tubes.slots, tubes.history.rows, mirrors, corners, passed)
     return corners, passed
 
 
 @njit(cache=True, nogil=True, uncounted=True)
 def same_leg_out(last, slots, history, mirrors, corners, passed):  # type: ignore[no-untyped-def]
-    """Write the mirror points (n, m, 3) at the start of each history, and the layers (n, l) right behind them, -1 for
+    """Write the mirror points (n, m, 3) of each history, and the layers (n, l) on each stretch between them, -1 for
     none.
 
     Args: last row of each history and how many rows it has, slots (n,); history place, normal (h, 3), facet, kind,
     before (h,); mirrors how many there are.
     """
     place, _, facet, kind, before = history
-    layers = passed.shape[1]
+    layers = passed.shape[1] // (mirrors + 1)
     for i in range(len(last)):
-        at = last[i]
-        for c in range(layers):
+        at, stretch, free = last[i], mirrors, layers
+        for c in range(passed.shape[1]):
             passed[i, c] = -1
-        for s in range(slots[i] - 1, -1, -1):
-            if s < mirrors:
-                copy_to(corners[i, s], place[at])
-            elif s < mirrors + layers and kind[at] == _TRANSMIT:
-                passed[i, s - mirrors] = facet[at]
+        for _ in range(slots[i]):
+            if kind[at] == _TRANSMIT and free > 0:
+                free -= 1
+                passed[i, stretch * layers + free] = facet[at]
+            elif kind[at] == _REFLECT and stretch > 0:
+                stretch, free = stretch - 1, layers
+                copy_to(corners[i, stretch], place[at])
             at = before[at]
 
 
@@ -208,17 +210,17 @@ def _write_history(i, used, tubes, history, retrace, planes, out):  # type: igno
 
 
 @njit(cache=True, forceinline=True, uncounted=True)
-def _write_layers_out(i, used, here, planes, legs, out):  # type: ignore[no-untyped-def]
-    """Write the layers that the ray from `here` (3,) to the end passes, from slot `used` on; return the next slot."""
+def _write_layers_out(i, used, here, to, far, own, planes, out):  # type: ignore[no-untyped-def]
+    """Write the layers `own` (l,) that the ray from `here` (3,) to a point (3,), or in this direction if far, passes,
+    the last first, from slot `used` on; return the next slot."""
     first, normal, _ = planes
-    image = legs.image
-    wx, wy, wz = -image[0], -image[1], -image[2]
-    if not legs.far:
-        wx, wy, wz = here[0] - image[0], here[1] - image[1], here[2] - image[2]
+    wx, wy, wz = -to[0], -to[1], -to[2]
+    if not far:
+        wx, wy, wz = here[0] - to[0], here[1] - to[1], here[2] - to[2]
         size = (wx * wx + wy * wy + wz * wz) ** 0.5
         wx, wy, wz = wx / size, wy / size, wz / size
-    for j in range(legs.passed.shape[1] - 1, -1, -1):
-        f = legs.passed[i, j]
+    for j in range(len(own) - 1, -1, -1):
+        f = own[j]
         if f < 0:
             continue
         t = plane_distance(normal[f], first[f], here, 0.0, (-wx, -wy, -wz))
@@ -242,7 +244,8 @@ def interactions(tubes, history, retrace, planes, legs, out):  # type: ignore[no
     """
     body_of = planes[2]
     vertices, normals, facet, body, kind = out
-    d = kind.shape[1]
+    d, m = kind.shape[1], len(legs.facets)
+    layers = legs.passed.shape[1] // (m + 1)
     for i in range(len(tubes.facet)):
         used, here = tubes.slots[i], tubes.points[i, 3]
         _write_history(i, used, tubes, history, retrace, planes, out)
@@ -250,12 +253,18 @@ def interactions(tubes, history, retrace, planes, legs, out):  # type: ignore[no
             vertices[i, used, c], normals[i, used, c] = here[c], tubes.normals[i, 3, c]
         facet[i, used], kind[i, used] = tubes.facet[i], _SCATTER
         used += 1
-        if legs.passed.shape[1] > 0:
-            used = _write_layers_out(i, used, here, planes, legs, out)
-        for j in range(len(legs.facets) - 1, -1, -1):
+        for j in range(m, -1, -1):
+            own, to = legs.passed[i, j * layers : (j + 1) * layers], legs.image if j == m else legs.end
+            if 0 < j < m:
+                to = legs.corners[i, j - 1]
+            if layers:
+                used = _write_layers_out(i, used, here, to, legs.far, own, planes, out)
+            if not j:
+                break
+            here = legs.corners[i, j - 1]
             for c in range(3):
-                vertices[i, used, c], normals[i, used, c] = legs.corners[i, j, c], legs.normals[j, c]
-            facet[i, used], kind[i, used] = legs.facets[j], _REFLECT
+                vertices[i, used, c], normals[i, used, c] = here[c], legs.normals[j - 1, c]
+            facet[i, used], kind[i, used] = legs.facets[j - 1], _REFLECT
             used += 1
         for s in range(used):
             body[i, s] = body_of[facet[i, s]] if facet[i, s] >= 0 else -1

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -127,7 +126,7 @@ class _Wave(Generic[T]):
             # Mirrors such as the ground return by their exact foot points, not by tubes.
             scatters = geometry.facets.role[geometry.facets.body[tubes.facet]] != MIRROR
             share = 1.0 / min(max(len(outs), 1), _SHARES)
-            twice, which = self.images.returns(geometry, self.leg, tubes, first), OBLIQUE if first else FACING
+            twice, which = self.images.returns(geometry, tubes, first), OBLIQUE if first else FACING
             any_over = self.leg if first else None
             leaving = Leaving(geometry, self.outs, outs, tubes, scatters, twice, first, which, any_over)
             outs = [i for i in outs if leaving.any_over(i)]
@@ -153,13 +152,11 @@ class _Wave(Generic[T]):
 
     def _left(self, tubes: Tubes, leaving: Leaving, depth: int, i: int, found: Contributions) -> list[T]:
         """Return what is made of the routes over leg out i of tubes on their surface number `depth`."""
-        own, behind = (tubes.only(rows) for rows in leaving.over(i))
-        leg, out, first = self.leg, self.outs[i], depth == 1
-        parts = (
-            _returned(self.geometry, leg, out, own, first, False, found),
-            _returned(self.geometry, leg, out, behind, first, True, found),
-        )
-        return [self.each(routes, depth, i) for routes in chain(*parts)]
+        own = tubes.only(leaving.over(i))
+        return [
+            self.each(routes, depth, i)
+            for routes in _returned(self.geometry, self.leg, self.outs[i], own, depth == 1, found)
+        ]
 
     def _bounced(self, tubes: Tubes, count: int, depth: int, found: Contributions, landed: list[Tubes]) -> list[T]:
         """Put tubes after their next reflection into `landed`."""
@@ -172,21 +169,20 @@ class _Wave(Generic[T]):
 
 
 def _returned(
-    geometry: Geometry, leg: Leg, out: Leg, some: Tubes, first: bool, behind: bool, found: Contributions
+    geometry: Geometry, leg: Leg, out: Leg, some: Tubes, first: bool, found: Contributions
 ) -> Iterator[Routes]:
-    """Yield the routes of those tubes that an outgoing leg sees; `behind`: only those that it sees through a layer."""
+    """Yield the routes of those tubes that an outgoing leg sees."""
     rule = found.rule
     if not len(some):
         return
-    if first and out == leg and not behind:
+    if first and out == leg:
         corners, passed = leg_of_arrival(some, len(leg.mirrors), rule.layers)
         if not geometry.convex_alone:
             ph = phases_of(geometry, leg, out, some, rule)
             found.add(ph)
     else:
-        some, corners, passed = resolve_return_leg(
-            geometry, leg, out, some, found, first, behind, OBLIQUE if first else FACING
-        )
+        which = OBLIQUE if first else FACING
+        some, corners, passed = resolve_return_leg(geometry, leg, out, some, found, first, which)
     if len(some):
         yield routes_of(geometry, leg, out, some, first, corners, passed)
 
@@ -198,15 +194,13 @@ def resolve_return_leg(
     tubes: Tubes,
     found: Contributions,
     first: bool = False,
-    behind: bool = False,
     which: int = FACING,
 ) -> tuple[Tubes, Floats, Ints]:
     """Subdivide tubes until their phase over `out` is quadratic and its end sees all or nothing of each.
 
-    Args: first whether they stand on their first surface; behind: only what is seen through a layer is returned; which
-    of them radiate (see `tracing.radiation`). What is seen is added to `found`. Returns: the tubes that are seen, and
-    mirror points (n, m, 3) [m] and layers (n, l) of their leg out.
-    """
+    Args: first whether they stand on their first surface; which of them radiate (see `tracing.radiation`). What is
+    seen is added to `found`. Returns: the tubes that are seen, and mirror points (n, m, 3) [m] and layers (n, l) of
+    their leg out."""
     resolved: list[tuple[Tubes, View, Phases]] = []
     rule = found.rule
     for level in range(rule.levels + 1):
@@ -228,8 +222,6 @@ def resolve_return_leg(
         tested = matters if which == LIT else matters & facing
         view = tube_visibility(geometry, out, tubes, tested, first, rule, level, facing_away=~facing)
         cut = matters if level < rule.levels else np.zeros_like(matters)
-        if behind:
-            view.centre.seen[(view.centre.passed < 0).all(axis=1)] = False
         how = facing, view.centre.seen, view.some, view.mixed, ph.rough
         what = choose_actions(*how, cut)
         wanted = what >= BISECT
@@ -269,8 +261,7 @@ class Images:
     """Returns that legs over mirrors carry already and tubes must not carry again; `planes` (p,) are the mirrors of
     legs in, `outward` (p,) those of legs out.
 
-    Over several such mirrors in a row a wave scatters at the last one. Legs pass layers on their last stretch only:
-    routes through a layer before it are left to the tubes.
+    Over several such mirrors in a row a wave scatters at the last one.
     """
 
     planes: Bools
@@ -284,16 +275,16 @@ class Images:
             used[geometry.plane[[m.facet for leg in legs for m in leg.mirrors]]] = True
         return Images(planes, outward)
 
-    def returns(self, geometry: Geometry, leg: Leg, tubes: Tubes, first: bool) -> Bools:
+    def returns(self, geometry: Geometry, tubes: Tubes, first: bool) -> Bools:
         """Tell which tubes (n,) stand on a mirror whose image carries their return: on their first surface those that
         leave over other mirrors, later all that came from another piece."""
         plane = geometry.plane[tubes.facet]
         if first:
-            return self.planes[plane] & (tubes.slots == len(leg.mirrors))
+            return self.planes[plane]
         return self.outward[plane] & (geometry.piece[tubes.came_from()] != geometry.piece[tubes.facet])
 
     def carry(self, geometry: Geometry, tubes: Tubes) -> Bools:
         """Tell which tubes (n,) a leg covers: it leads over the mirror where they bounced first to where they are."""
         before = tubes.came_from()
         moved = geometry.piece[before] != geometry.piece[tubes.facet]
-        return self.planes[geometry.plane[before]] & moved & ~tubes.history.behind_layer(tubes.last)
+        return self.planes[geometry.plane[before]] & moved

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.beam_table import Beam
-from raychan.records import MIRROR, REFLECT, TRANSMIT, DiffractedRoutes, Points, Routes
+from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
 from raychan.tracing.legs import Leg, legs_over, reachable
 from raychan.tracing.lit_legs import lit_legs
@@ -238,7 +238,7 @@ def _direct_routes(geometry: Geometry, legs: list[Leg], rx: Floats, slots: int, 
     """Return the exact routes to a receiver elsewhere, at rx (3,) [m], over legs whose mirrors only reflect: line of
     sight, and over the ground; None if there is none.
 
-    Other surfaces reflect by their tubes. Args: slots for interactions; layers that the last stretch may pass.
+    Other surfaces reflect by their tubes. Args: slots for interactions; layers that each stretch may pass.
     """
     body_role, rows = geometry.facets.role, []
     for leg in legs:
@@ -247,15 +247,7 @@ def _direct_routes(geometry: Geometry, legs: list[Leg], rx: Floats, slots: int, 
         view = leg.visible(geometry, rx[None], np.array([-1], np.int32), np.full(1, 1e-6), layers)
         if not view.seen[0]:
             continue
-        heading, length = leg.rays(rx[None])
-        stops = [(spot, m.normal, m.facet, REFLECT) for spot, m in zip(view.corners[0], leg.mirrors, strict=True)]
-        start = view.corners[0, -1] if leg.mirrors else leg.end
-        through = []
-        for facet in view.passed[0][view.passed[0] >= 0]:
-            t = geometry.distance(np.array([facet]), start[None], heading)[0]
-            through.append((float(t), (start + t * heading[0], geometry.normal[facet], int(facet), TRANSMIT)))
-        stops += [stop for _, stop in sorted(through, key=lambda pair: pair[0])]
-        rows.append((float(length[0]), stops))
+        rows.append((float(leg.rays(rx[None])[1][0]), leg.stops(geometry, view, 0, rx)))
     if not rows:
         return None
     n = len(rows)

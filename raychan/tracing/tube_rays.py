@@ -28,11 +28,11 @@ _NO_BODY = np.zeros(0, np.int64)
 class ShadowRays(NamedTuple):
     """Rays to the corners and centres of tubes, to be written.
 
-    Fields: `points` (n, 4, 3) [m] at which they end, on facets `target` (n, 4), before which their own smooth surface
-    may lie by `slack` (n,) [m]. Of centres `seen` (n,), the facet `blocker` (n,) in the way, -1 for none, mirror points
-    `corners` (n, m, 3) [m], layers `passed` (n, l); of corners `corner_seen`, `corner_blocker` (n, 3), where they are
-    tested. `some` (n,) ray is seen; only a part is, `mixed` (n,); whether to `search` (n,) for a shadow edge.
-    """
+    Fields: `points` (n, 4, 3) [m] at which they end, on facets `target` (n, 4), before which their own smooth
+    surface may lie by `slack` (n,) [m]. Of centres `seen` (n,), the facet `blocker` (n,) in the way, -1 for none,
+    mirror points `corners` (n, m, 3) [m], layers `passed` (n, l) (see `leg_rays.follow_leg`); of corners
+    `corner_seen`, `corner_blocker` (n, 3), where they are tested. `some` (n,) ray is seen; only a part is, `mixed`
+    (n,); whether to `search` (n,) for a shadow edge."""
 
     points: Floats
     target: Ints
@@ -49,10 +49,10 @@ class ShadowRays(NamedTuple):
 
     @staticmethod
     def room(n: int, mirrors: int, layers: int) -> ShadowRays:
-        """Return rays to n tubes over so many mirrors, through at most so many layers on the last stretch."""
+        """Return rays to n tubes over so many mirrors, through at most so many layers on each stretch."""
         points, target, slack = np.empty((n, 4, 3)), np.empty((n, 4), np.int32), np.empty(n)
         seen, some, mixed, search = np.zeros((4, n), bool)
-        centre = seen, np.empty(n, np.int32), np.empty((n, mirrors, 3)), np.empty((n, layers), np.int32)
+        centre = seen, np.empty(n, np.int32), np.empty((n, mirrors, 3)), np.empty((n, layers * (mirrors + 1)), np.int32)
         corner = np.empty((n, 3), bool), np.empty((n, 3), np.int32)
         return ShadowRays(points, target, slack, *centre, *corner, some, mixed, search)
 
