@@ -22,6 +22,7 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
+Stop = tuple[Floats, Floats, int, int]
 
 _LEAST_AREA = 0.5  # m^2 of a mirror; at street distances smaller faces lie within a few Fresnel zones
 _MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not measured
@@ -180,10 +181,10 @@ class Leg:
         """
         return View.of(points_seen(geometry, self.chain, points, facet, slack, layers, inside))
 
-    def stops(self, geometry: Geometry, view: View, row: int, point: Floats) -> list[tuple[Floats, Floats, int, int]]:
+    def stops(self, geometry: Geometry, view: View, row: int, point: Floats) -> list[Stop]:
         """Return the interactions on the way to a point (3,) [m], seen as row of a view, in order: place, normal (3,),
         facet, kind."""
-        found, start, per = [], self.end, view.passed.shape[1] // (len(self.mirrors) + 1)
+        found, start, per = list[Stop](), self.end, view.passed.shape[1] // (len(self.mirrors) + 1)
         for i in range(len(self.mirrors) + 1):
             stop = view.corners[row, i] if i < len(self.mirrors) else point
             for f in view.passed[row, i * per : (i + 1) * per]:

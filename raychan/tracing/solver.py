@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
-from raychan.tracing.legs import Leg, legs_over, reachable
+from raychan.tracing.legs import Leg, Stop, legs_over, reachable
 from raychan.tracing.lit_legs import lit_legs
 from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
@@ -211,27 +211,18 @@ def _added(a: Ints, b: Ints) -> Ints:
 
 def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Routes | None:
     """Return the exact routes to the ground's foot points and back: a plane mirror too large for tubes."""
-    f = geometry.facets
-    rows = []
+    f, direct, rows = geometry.facets, legs[0], list[tuple[float, list[Stop]]]()
     for leg in legs:
         if len(leg.mirrors) != 1 or f.role[leg.mirrors[0].body] != MIRROR:
             continue
         m = leg.mirrors[0]
         height = float((leg.end - m.point) @ m.normal)
         foot = leg.end - height * m.normal
-        hit, _ = geometry.cast(leg.end[None], -m.normal[None], np.array([-1], np.int32))
-        if hit[0] >= 0 and geometry.plane[hit[0]] == geometry.plane[m.facet]:
-            rows.append((foot, m, height))
-    if not rows:
-        return None
-    n, d = len(rows), rule.slots
-    vertices = np.broadcast_to(legs[0].end, (n, d, 3)).copy()
-    normals, facet = np.zeros((n, d, 3)), np.full((n, d), -1, np.int32)
-    kind, body = np.zeros((n, d), np.int8), np.full((n, d), -1, np.int16)
-    for i, (foot, m, _) in enumerate(rows):
-        vertices[i, 0], normals[i, 0], facet[i, 0], kind[i, 0], body[i, 0] = foot, m.normal, m.facet, REFLECT, m.body
-    length = np.array([2.0 * height for _, _, height in rows])
-    return ray_routes(legs[0].end, legs[0].end, Interactions(vertices, normals, facet, body, kind), length)
+        view = direct.visible(geometry, foot[None], np.array([m.facet], np.int32), np.full(1, 1e-6), rule.layers)
+        if view.seen[0]:
+            down = direct.stops(geometry, view, 0, foot)
+            rows.append((2.0 * height, [*down, (foot, m.normal, m.facet, int(REFLECT)), *down[::-1]]))
+    return _specular(geometry, direct.end, direct.end, rows, rule.slots)
 
 
 def _direct_routes(geometry: Geometry, legs: list[Leg], rx: Floats, slots: int, layers: int) -> Routes | None:
@@ -248,6 +239,16 @@ def _direct_routes(geometry: Geometry, legs: list[Leg], rx: Floats, slots: int, 
         if not view.seen[0]:
             continue
         rows.append((float(leg.rays(rx[None])[1][0]), leg.stops(geometry, view, 0, rx)))
+    return _specular(geometry, legs[0].end, rx, rows, slots)
+
+
+def _specular(
+    geometry: Geometry, tx: Floats, rx: Floats, rows: list[tuple[float, list[Stop]]], slots: int
+) -> Routes | None:
+    """Return the routes of single rays from tx to rx (3,) [m], of such lengths [m] and stops; None if there is none.
+
+    Args: slots for interactions.
+    """
     if not rows:
         return None
     n = len(rows)
@@ -259,4 +260,4 @@ def _direct_routes(geometry: Geometry, legs: list[Leg], rx: Floats, slots: int, 
     body = geometry.facets.body[np.maximum(facet, 0)] if len(geometry.facets.body) else facet
     length = np.array([r[0] for r in rows])
     met = Interactions(vertices, normals, facet, np.where(facet >= 0, body, -1).astype(np.int16), kind)
-    return ray_routes(legs[0].end, rx, met, length)
+    return ray_routes(tx, rx, met, length)

@@ -128,3 +128,15 @@ def test_the_way_through_layers_is_as_long_as_its_path():
     strong = through & (np.abs(paths.amplitude) > 1e-3 * np.abs(paths.amplitude).max())
     assert strong.any()
     assert np.abs(length[paths.trajectory] - paths.length)[strong].max() < 0.15
+
+
+def test_the_ground_below_returns_through_a_layer():
+    sheet = trimesh.Trimesh(
+        [[-1, -1, 0.4], [1, -1, 0.4], [1, 1, 0.4], [-1, 1, 0.4]], [[0, 1, 2], [0, 2, 3]], process=False
+    )
+    free = found([floor(None)], 2).paths
+    behind = found([floor(None), rc.Body(name="sheet", mesh=sheet, material=AIR)], 2).paths
+    below = np.isclose(behind.length, 1.6) & (behind.trajectories.kind == TRANSMIT).any(axis=1)[behind.trajectory]
+    assert len(free.length) == 1
+    assert np.abs(behind.amplitude[below]).sum() == pytest.approx(np.abs(free.amplitude).sum(), rel=1e-4)
+    assert (behind.trajectories.kind[behind.trajectory[below]] == TRANSMIT).sum() == 2
