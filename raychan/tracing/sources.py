@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.parallel import parallel_for
 from raychan.records import TRANSMIT, Routes
 from raychan.tracing.shooting import Wanted
 from raychan.world.geometry import Geometry
@@ -19,6 +20,7 @@ Bools = NDArray[np.bool_]
 
 EXACT = -1
 """Source of routes that are not of tubes."""
+_MANY = 20_000  # sources from which on a second thread pays; not measured
 _LEG, _DEPTH, _FACET = 14, 4, 31  # bits of each of two legs, of the bounce, of the facet
 
 
@@ -118,6 +120,16 @@ class Rings:
 
 def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
     """Tell which sources (n,) some launches trace again."""
+    found = np.empty(len(source), bool)
+
+    def some(at: slice) -> None:
+        found[at] = _covered(source[at], by)
+
+    parallel_for(len(source), some, _MANY)
+    return found
+
+
+def _covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
     found, launch = np.zeros(len(source), bool), _launch_of(source)
     for i, wanted in by:
         rows = np.flatnonzero(launch == (i << _DEPTH | wanted.depth))
