@@ -111,11 +111,12 @@ class Rings:
     def _beside(self, wanted: Bools) -> Bools:
         """Return the facets (f,) of the same planes, and across the edges, of some (f,)."""
         of_plane = np.zeros(int(self._plane.max(initial=-1)) + 1, bool)
-        of_plane[self._plane[wanted]] = True
-        every = of_plane[self._plane]
-        met = self._across[wanted]
+        rows = np.flatnonzero(wanted)
+        of_plane[self._plane[rows]] = True
+        every = of_plane.take(self._plane)
+        met = self._across[rows]
         every[met[met >= 0]] = True
-        return np.asarray(every)
+        return every
 
 
 def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
