@@ -16,8 +16,8 @@ from raychan.geometry.curved_patches import edge_of_fan, edge_to_cut, halved
 from raychan.geometry.lit_parts import lit_parts
 from raychan.poses import sizes
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
-from raychan.tracing.contributions import Contributions
 from raychan.tracing.cache import cache_of
+from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.image_paths import ON_PLANE
 from raychan.tracing.legs import Leg, View
