@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Tr
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
+_Kind = TypeVar("_Kind", bound=np.generic)
 
 _SMALL = 1e-3
 """Of the noise in a map cell: by so much the samples may be off for each footprint that is long in range but is one
@@ -182,10 +183,12 @@ def join(parts: Sequence[Paths], keep: Sequence[NDArray[np.bool_]] | None = None
         rows = [np.flatnonzero(k) for k in keep]
     some = [np.arange(len(p.trajectory)) for p in parts]
     if keep is not None:
-        some = [np.flatnonzero(k[p.trajectory]) for p, k in zip(parts, keep, strict=True)]
+        some = [np.flatnonzero(_at(k, p.trajectory)) for p, k in zip(parts, keep, strict=True)]
     begin, number = np.cumsum([0, *map(len, rows)]), list[NDArray[np.int32]]()
     for i, p in enumerate(parts):
-        new = p.trajectory if keep is None else (np.cumsum(keep[i], dtype=np.int32) - 1)[p.trajectory[some[i]]]
+        new = p.trajectory
+        if keep is not None:
+            new = _at(np.cumsum(keep[i], dtype=np.int32) - 1, _at(new, some[i]))
         number.append(new + np.int32(begin[i]))
     copies = list[Callable[[], None]]()
     columns = {
@@ -206,6 +209,18 @@ def join(parts: Sequence[Paths], keep: Sequence[NDArray[np.bool_]] | None = None
     return parts[0].rebuilt(
         **columns, trajectory=np.concatenate(number), trajectories=parts[0].trajectories.rebuilt(**way)
     )
+
+
+def _at(values: NDArray[_Kind], rows: NDArray[np.integer[Any]]) -> NDArray[_Kind]:
+    """Return some rows of values (n,), by all threads."""
+    out = np.empty(len(rows), values.dtype)
+
+    def some(at: slice) -> None:
+        # With mode "clip" numpy writes straight to `out`; all numbers are in range.
+        values.take(rows[at], out=out[at], mode="clip")
+
+    parallel_for(len(rows), some, _MANY)
+    return out
 
 
 def _joined(

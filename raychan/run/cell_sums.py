@@ -13,6 +13,10 @@ from raychan.vectors import copy_to
 
 _BLOCK = 512  # echoes whose places are held at once, in a processor's nearest cache; others not measured
 _NEXT = np.uint64(1)
+# Where in one row of numbers each quantity of the echoes of a block begins: within one row the compiler sees that none
+# overlaps another, and uses vector units.
+_SECTIONS = 8
+_RANGE, _RATE, _MOVED, _WEIGHT, _AWAY, _APART, _FAR, _SLOW = (i * _BLOCK for i in range(_SECTIONS))
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -123,7 +127,33 @@ def _apart(cells, n):  # type: ignore[no-untyped-def]
     """Return the distance in cells, 0 or more, from the nearest peak of a response of period n cells."""
     cells = abs(cells)
     cells -= n * math.floor(cells * (1.0 / n))
-    return max(min(cells, n - cells), 0.0)
+    cells = cells if cells < n - cells else n - cells
+    return cells if cells > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _far_off(held, some, cell, scales, sizes):  # type: ignore[no-untyped-def]
+    """Write by how many cells the echoes of a block stand off a cell, and off its nearest peaks at least."""
+    (at_range, at_rate), (shift, per_range, per_rate, _), (samples, chirps, _) = cell, scales, sizes
+    for j in range(some):
+        off = held[_RATE + j] - at_rate
+        away, apart = (held[_RANGE + j] - at_range + off * shift) * per_range, off * per_rate
+        far = _apart(away, samples) - 0.5 * abs(held[_MOVED + j]) * chirps
+        held[_AWAY + j], held[_APART + j] = away, apart
+        held[_FAR + j], held[_SLOW + j] = far if far > 0.0 else 0.0, _apart(apart, chirps)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
+def _that_count(held, near, some, enough, over_ranges, over_rates):  # type: ignore[no-untyped-def]
+    """Write the numbers of the echoes of a block that may count, without a branch that nothing foretells; return how
+    many there are."""
+    found = 0
+    for j in range(some):
+        near[found] = j
+        far, slow = np.uint64(held[_FAR + j]), np.uint64(held[_SLOW + j])
+        late = over_rates[0, slow] + abs(held[_MOVED + j]) * over_rates[1, slow]
+        found += 1 if held[_WEIGHT + j] * over_ranges[far] * late >= enough else 0
+    return found
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -136,39 +166,32 @@ def sums_in_cells(  # type: ignore[no-untyped-def]
     Args: least (c,) contribution that counts; beyond (s,) and (2, m) upper bounds of the range and rate responses by
     cells from the peak; else as for `cell_waves` and `cell_sums`.
     """
-    samples, chirps, _ = sizes
-    shift, per_range, per_rate, per_ramp = _scales(ramp, chirps)
+    scales = _scales(ramp, sizes[1])
+    per_ramp = scales[3]
     # Taken out of the tuples once: each access counts a reference.
     (over_ranges, over_rates), (tables, middles) = beyond, along
     total[:], size[:], strongest[:], most[:] = 0.0, 0.0, -1, -1.0
-    count, place, waves = np.zeros(total.shape[1]), np.empty((5, _BLOCK)), np.empty(_BLOCK, np.complex128)
-    ranges, away, apart, moved, weight = place
+    count, held, waves = np.zeros(total.shape[1]), np.empty(_SECTIONS * _BLOCK), np.empty(_BLOCK, np.complex128)
     near = np.empty(_BLOCK, np.int64)
     for first in range(0, delay.size, _BLOCK):
         some = min(_BLOCK, delay.size - first)
         for j in range(some):
             i = first + j
             count[group[i]] += 1.0
-            ranges[j], turn = _stands(delay[i], rate[i], ramp)
-            moved[j] = rate[i] * per_ramp
+            held[_RANGE + j], turn = _stands(delay[i], rate[i], ramp)
+            held[_RATE + j], held[_MOVED + j] = rate[i], rate[i] * per_ramp
             waves[j] = amplitude[i] * turn
-            weight[j] = math.sqrt(amplitude[i].real * amplitude[i].real + amplitude[i].imag * amplitude[i].imag)
+            weight = amplitude[i].real * amplitude[i].real + amplitude[i].imag * amplitude[i].imag
+            held[_WEIGHT + j] = math.sqrt(weight)
         for c in range(len(cells)):
-            # Those that count first, without a branch that nothing foretells.
-            found, enough = 0, least[c]
-            for j in range(some):
-                off, drift = rate[first + j] - cells[c, 1], abs(moved[j])
-                away[j], apart[j] = (ranges[j] - cells[c, 0] + off * shift) * per_range, off * per_rate
-                far = int(max(_apart(away[j], samples) - 0.5 * drift * chirps, 0.0))
-                slow = int(_apart(apart[j], chirps))
-                near[found] = j
-                bound = weight[j] * over_ranges[far] * (over_rates[0, slow] + drift * over_rates[1, slow])
-                found += 1 if bound >= enough else 0
+            _far_off(held, some, (cells[c, 0], cells[c, 1]), scales, sizes)
+            found = _that_count(held, near, some, least[c], over_ranges, over_rates)
             for k in range(found):
                 j = near[k]
                 i = first + j
-                wave = waves[j] * _answer(away[j], apart[j], moved[j], sizes, across, tables, middles)
-                _count(c, group[i], i, wave, ranges[j], rate[i], total, size, strongest, most)
+                away, apart, moved = held[_AWAY + j], held[_APART + j], held[_MOVED + j]
+                wave = waves[j] * _answer(away, apart, moved, sizes, across, tables, middles)
+                _count(c, group[i], i, wave, held[_RANGE + j], rate[i], total, size, strongest, most)
     for c in range(len(cells)):
         copy_to(size[c, 0], count)
 

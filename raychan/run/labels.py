@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.parallel import parallel_for
 from raychan.radar.waveform import Waveform
 from raychan.records import TRANSMIT, Detections, InteractionType, Paths, RangeDoppler
 from raychan.run.cell_sums import cell_sums
@@ -25,6 +26,7 @@ Floats = NDArray[np.float64]
 _LEAST_SHARE = 0.005  # of a cell's power: weaker chains are not listed (not measured)
 _DIGITS = 9  # decimals to which shares are compared: a chain and its reverse differ by rounding
 _DEPTH = 0.3  # m: an echo over the ground less than this behind its target, the depth of a person, is no ghost
+_MANY = 20_000  # trajectories from which on a second thread pays; not measured
 _UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
 
@@ -213,11 +215,8 @@ def _alike(paths: Paths) -> tuple[Ints, Ints]:
         if most > np.iinfo(np.int64).max // width:
             code = np.unique(code, return_inverse=True)[1].astype(np.int64)
             most = int(code.max(initial=0)) + 1
-        slot = (body.astype(number) + number(1)) * number(parts) + part
-        slot = (slot + number(1)) * number(len(InteractionType)) + kind
-        slot[kind == 0] = 0
-        code *= width
-        code += slot
+        links = partial(_add_links, code, width, number, parts, body, part, kind)
+        parallel_for(len(code), links, _MANY)
         most *= width
     taken = np.zeros(len(code), bool)
     taken[paths.trajectory] = True
@@ -228,6 +227,24 @@ def _alike(paths: Paths) -> tuple[Ints, Ints]:
     _, first, inverse = np.unique(taken_codes[heads], return_index=True, return_inverse=True)
     chain[rows] = np.repeat(inverse, np.diff(heads, append=len(rows)))
     return rows[heads[first]], chain[paths.trajectory]
+
+
+def _add_links(
+    code: Ints,
+    width: int,
+    number: Any,
+    parts: int,
+    body: NDArray[Any],
+    part: NDArray[Any],
+    kind: NDArray[Any],
+    at: slice,
+) -> None:
+    """Add one slot (n,) of some chains to their codes (n,), of numbers of such a kind."""
+    slot = (body[at].astype(number) + number(1)) * number(parts) + part[at]
+    slot = (slot + number(1)) * number(len(InteractionType)) + kind[at]
+    slot[kind[at] == 0] = 0
+    code[at] *= width
+    code[at] += slot
 
 
 def _sums(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from functools import cached_property
 from itertools import chain
 from typing import Any
 
@@ -39,6 +40,11 @@ class _Part:
     state: NDArray[np.int8]
     first: bool
 
+    @cached_property
+    def deep(self) -> NDArray[np.bool_]:
+        """Which trajectories (w,) are of deep tubes."""
+        return np.asarray(depth_of(self.source) >= DEEP)
+
 
 class SourcedPaths:
     """The paths of a first launch, with the source (w,) of each trajectory, and of further ones that replace some.
@@ -59,7 +65,7 @@ class SourcedPaths:
         for part in self._parts:
             hit = covered(part.source, launches)
             old = hit & (part.state == _NOW)
-            shallow = old & (depth_of(part.source) < DEEP)
+            shallow = old & ~part.deep
             if part.first and shallow.any():
                 self._moved += _powers(part, shallow, paths, source)
             changed.append(_negative(of_trajectories(self._needed(part.paths), old)))
@@ -106,16 +112,15 @@ class SourcedPaths:
         and of other tubes never traced again the share that those traced again changed by, in unrelated phases."""
         held = [self._needed(p.paths) for p in self._parts]
         parts, keep = [held[0]], [self._untouched]
-        factor: list[NDArray[Any]] = [self._share]
+        factor: list[NDArray[Any]] = [self._share(keep[0])]
         for p, paths in zip(self._parts, held, strict=True):
-            new = (p.state == _NOW) & (depth_of(p.source) >= DEEP if p.first else True)
-            doubts = self._factor(p.source)
+            new = (p.state == _NOW) & (p.deep if p.first else True)
             for rows, sign in ((new, 1.0), (p.state == _BEFORE, -1.0)):
                 parts.append(paths)
                 keep.append(rows)
-                factor.append(sign * doubts)
+                factor.append(sign * self._factor(p.source[rows]))
         every = join(parts, keep)
-        return scaled(every, np.concatenate([f[k] for f, k in zip(factor, keep, strict=True)])[every.trajectory])
+        return scaled(every, np.concatenate(factor).take(every.trajectory))
 
     @property
     def _untouched(self) -> NDArray[np.bool_]:
@@ -123,10 +128,9 @@ class SourcedPaths:
         first = self._parts[0]
         return np.asarray((first.state == _NOW) & (depth_of(first.source) == 1) & (self._moved[1] > 0.0))
 
-    @property
-    def _share(self) -> Complexes:
-        """The share (w,) of them by which those traced again changed, in unrelated phases."""
-        turn = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, len(self._parts[0].source))
+    def _share(self, rows: NDArray[np.bool_]) -> Complexes:
+        """Return the share (m,) by which those traced again changed, in unrelated phases, for some (w,) of them."""
+        turn = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, len(rows))[rows]
         share = np.sqrt(self._moved[1] / self._moved[0]) if self._moved[0] > 0.0 else 0.0
         return np.asarray(share * np.exp(1j * turn))
 
@@ -139,7 +143,10 @@ class SourcedPaths:
     ) -> tuple[Sources, Iterator[Complexes]]:
         """Return the sources (s,), in order, of the trajectories (w,) of paths, and the sums of its paths, (some, s) at
         a time: in each of the cells (c, 3) at the phase centres, then in each at the first probe, and so on."""
-        own, group = np.unique(source, return_inverse=True)
+        # Neighbours are mostly alike: one of each run is sorted.
+        heads = np.flatnonzero(np.diff(source, prepend=source[:1] - 1))
+        own, group = np.unique(source[heads], return_inverse=True)
+        group = np.repeat(group, np.diff(heads, append=len(source)))
         most = max(1, _SUMS // max(len(own), 1))
         seen = chain([paths], (p.seen(paths) for p in self._probes))
         return own, (
@@ -149,11 +156,11 @@ class SourcedPaths:
 
 def _powers(first: _Part, rows: NDArray[np.bool_], paths: Paths, source: Sources) -> Floats:
     """Return the power of the sources of some trajectories (w,) of a launch, and that by which new paths change it."""
-    old, new = (
-        (p, s[p.trajectory]) for p, s in ((of_trajectories(first.paths, rows), first.source[rows]), (paths, source))
-    )
-    own = np.unique(old[1])
-    sums = [_by(own, s, p.amplitude) for p, s in (old, new)]
+    held = first.paths
+    old = np.flatnonzero(rows[held.trajectory])
+    waves = (first.source[held.trajectory[old]], held.amplitude[old]), (source[paths.trajectory], paths.amplitude)
+    own = np.unique(waves[0][0])
+    sums = [_by(own, *x) for x in waves]
     return np.array([(np.abs(sums[0]) ** 2).sum(), (np.abs(sums[1] - sums[0]) ** 2).sum()])
 
 

@@ -54,7 +54,7 @@ ROOM = 1 << 28  # bytes of a grid: beyond, the echoes are split over several gri
 CHUNK = 1 << 18  # echoes spread at a time
 _BOX = 8, 8  # rows and columns of a box by which echoes are sorted, so that neighbours share cells in the cache
 _READ, _READY = 4.0, 4  # cost of reading a sample off a plane, in cells transformed; planes that setting it up costs
-_MANY = 20_000  # echoes from which on a second thread pays (not measured)
+_MANY = 20_000  # echoes or samples from which on a second thread pays (not measured)
 _CROWD = 64  # echoes in a box up to which they are summed in single precision: it errs by 3e-7 of their sum
 
 
@@ -137,12 +137,8 @@ class Keystone:
         self.terms = _terms(*self.rest_turn, small)
         self.orders = int(self.terms.max()), len(self.terms) - 1
         self.planes = int(self.terms.sum()) + len(self.terms)
-        self.rest = np.array(
-            [
-                [middle, 1.0 / half if n else 0.0, n, half]
-                for (middle, half), n in zip(((far, far_span), (late, late_span)), self.orders, strict=True)
-            ]
-        )
+        spans = zip((far, late), (far_span, late_span), self.orders, strict=True)
+        self.rest = np.array([[middle, 1.0 / half if n else 0.0, n, half] for middle, half, n in spans])
 
         longest = max(m * (1.0 + self.stretch * t) + self.stretch * t * t, self.step)
         self.dense = 2.0 * OVER * longest
@@ -179,6 +175,9 @@ class Keystone:
 
         # Sorted by boxes, so that neighbours add to cells that are in the cache: rows first, for the stripes.
         parallel_for(len(box), boxed, _MANY)
+        order, most = counting_sort(box, (self.rows // _BOX[0] + 1) * across)
+        # Where many echoes add up in one cell, single precision would round too coarsely.
+        self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
         self.polynomials = kernel_polynomials(self.width)
         k, s = np.arange(self.rows) - self.rows // 2, np.arange(wave.n_samples) - wave.n_samples // 2
         # The sign moves the transform's middle to the middle of its length: nothing is read across its end.
@@ -187,13 +186,14 @@ class Keystone:
         shape = wave.n_chirps, wave.n_samples
         place, self.factor = np.empty(shape), buffer[: self.factors].reshape(self.planes, *shape)
         frame = np.array([wave.repetition, self.step, self.stretch, self.shift, self.dense, OVER, self.length])
-        place_samples(place, self.factor, frame, self.rest, self.terms, deconvolution_polynomial(self.width))
-        self.first = np.empty(shape, np.int64)
+        falloff, self.first = deconvolution_polynomial(self.width), np.empty(shape, np.int64)
         self.weight = np.empty((*shape, self.width), np.float32 if self.single else np.float64)
-        kernel_weights(self.first, self.weight, place, self.polynomials)
-        order, most = counting_sort(box, (self.rows // _BOX[0] + 1) * across)
-        # Where many echoes add up in one cell, single precision would round too coarsely.
-        self.sort = np.complex64 if self.single and most <= _CROWD else np.complex128
+
+        def read(at: slice) -> None:
+            place_samples(place, self.factor, (at.start, at.stop), frame, self.rest, self.terms, falloff)
+            kernel_weights(self.first[at], self.weight[at], place[at], self.polynomials)
+
+        parallel_for(wave.n_chirps, read, max(1, _MANY // wave.n_samples))
         return echoes.in_order(order)
 
     def add(self, out: Complexes, echoes: Echoes, elements: tuple[Floats, Floats], chunk: int = CHUNK) -> None:

@@ -80,19 +80,19 @@ def place_sources(x, y, strength, amplitude, delay, delay_rate, later, ramp, gri
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def place_samples(place, factor, frame, rest, terms, falloff):  # type: ignore[no-untyped-def]
+def place_samples(place, factor, some, frame, rest, terms, falloff):  # type: ignore[no-untyped-def]
     """Write at which place of the transforms over shifts each sample (m, s) is read off, and its factors (p, m, s).
 
-    Args: frame repetition, step [s], stretch [1/s], middle shift [Hz], rows per Hz, oversampling, length of the
-    transform; rest and terms as for `place_sources`; falloff, coefficients of the polynomial that divides by the
-    kernel's transform.
+    Args: some, the first chirp to write and the one after the last; frame repetition, step [s], stretch [1/s], middle
+    shift [Hz], rows per Hz, oversampling, length of the transform; rest and terms as for `place_sources`; falloff,
+    coefficients of the polynomial that divides by the kernel's transform.
     """
     repetition, step, stretch, shift, dense, over, length = frame
     chirps, samples = place.shape
     order_b, order_a = int(rest[0, 2]), int(rest[1, 2])
     turns_b, turns_a = 2.0 * math.pi * rest[0, 3], 2.0 * math.pi * rest[1, 3]
     size_b, size_a = np.ones(order_b + 1), np.ones(order_a + 1)
-    for m in range(chirps):
+    for m in range(some[0], some[1]):
         late = (m - chirps // 2) * repetition
         for s in range(samples):
             t = (s - samples // 2) * step

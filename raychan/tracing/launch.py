@@ -16,6 +16,7 @@ from raychan.geometry.curved_patches import edge_of_fan, edge_to_cut, halved
 from raychan.geometry.lit_parts import lit_parts
 from raychan.poses import sizes
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
+from raychan.tracing.cache import cache_of
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.image_paths import ON_PLANE
@@ -53,7 +54,7 @@ def launch(
     images = leg.image, leg.far, out.image, out.far
     allowed = pieces & (geometry.piece_role == SCATTERER)
     allowed[leg.pieces(geometry)] = False
-    facet = seed_facets(geometry, leg, allowed)
+    facet = _seeds(geometry, leg, allowed)
     if only is not None:
         facet = facet[only[facet]]
     for part, bary in _bisect_for_phase(geometry, facet, shape, images, found, not more):
@@ -62,6 +63,12 @@ def launch(
         if leg.mirrors:
             tubes = _prune_facing_away(geometry, leg, out, others, tubes, found)
         yield _clip_at_shadows(geometry, leg, out, tubes, found, more)
+
+
+def _seeds(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
+    """Return the `seed_facets` of a leg, kept with it: launches that refine start from some of the same."""
+    known, found = cache_of(geometry).by_leg("seeds", leg, lambda: (pieces, seed_facets(geometry, leg, pieces)))
+    return found if np.array_equal(known, pieces) else seed_facets(geometry, leg, pieces)
 
 
 def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -> Tubes:

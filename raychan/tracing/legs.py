@@ -127,7 +127,7 @@ class Leg:
         for m in self.mirrors:
             found = found - 2.0 * np.outer(found @ m.normal, m.normal)
             to = m.corners - self.chain.images[1 + len(found) // 4]
-            sides = np.cross(to, np.roll(to, -1, axis=0))
+            sides = np.cross(to, to[[1, 2, 3, 0]])
             sides *= np.sign(sides @ to.mean(axis=0))[:, None]
             found = np.concatenate([found, sides / np.linalg.norm(sides, axis=1)[:, None]])
         return found
@@ -206,11 +206,12 @@ def planes_that_mirror(geometry: Geometry, end: Floats) -> list[Mirror]:
         return []
     usable = ~geometry.curved & (f.role[f.body] != BLOCKER)
     area = np.bincount(geometry.plane, weights=np.where(usable, geometry.area, 0.0))
-    largest = np.full(len(area), -1, np.int64)
-    order = np.argsort(geometry.area, kind="stable")
+    largest, large = np.full(len(area), -1, np.int64), area >= _LEAST_AREA
+    rows = np.flatnonzero(large.take(geometry.plane))
+    order = rows[np.argsort(geometry.area[rows], kind="stable")]
     largest[geometry.plane[order]] = order
     found: list[tuple[float, Mirror]] = []
-    for plane in np.flatnonzero(area >= _LEAST_AREA):
+    for plane in np.flatnonzero(large):
         facet = int(largest[plane])
         body = int(f.body[facet])
         height = float((end - geometry.first[facet]) @ geometry.normal[facet])

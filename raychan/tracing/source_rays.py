@@ -35,18 +35,19 @@ class SourceRays:
 
     def learn(self, step: int, launched: list[tuple[int, Wanted]], source: Sources, rays: int) -> None:
         """Note what launches brought, the source (w,) of each route, and how many rays they took."""
-        routes, own = dict[tuple[int, int], Floats](), source[source != EXACT]
+        routes, own = dict[tuple[int, int], Ints](), source[source != EXACT]
         for key, rows in by_launch(own):
-            routes[key] = np.bincount(facet_of(own[rows]), minlength=self._facets).astype(float)
+            routes[key] = np.bincount(facet_of(own[rows]), minlength=self._facets)
         found = {}
         for i, wanted in launched:
+            facets = np.flatnonzero(wanted.facets)
             # A facet without a route takes rays, too.
-            brought = np.maximum(routes.get((i, wanted.depth), np.zeros(self._facets)), 1.0)
-            found[i, wanted.depth] = wanted.facets, brought * wanted.facets
+            some = routes.get((i, wanted.depth))
+            found[i, wanted.depth] = facets, np.ones(len(facets)) if some is None else np.maximum(some[facets], 1.0)
         each = rays / max(sum(float(brought.sum()) for _, brought in found.values()), 1.0)
         for key, (facets, brought) in found.items():
             self._step.setdefault(key, np.zeros(self._facets, np.int64))[facets] = step
-            self._rays.setdefault(key, np.zeros(self._facets))[facets] = each * brought[facets]
+            self._rays.setdefault(key, np.zeros(self._facets))[facets] = each * brought
 
     def step_of(self, source: Sources) -> Ints:
         """Return the step (n,) at which each source was traced last; 0 for those of the first launch."""

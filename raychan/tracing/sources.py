@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.parallel import parallel_for
 from raychan.records import TRANSMIT, Routes
 from raychan.tracing.shooting import Wanted
 from raychan.world.geometry import Geometry
@@ -19,6 +20,7 @@ Bools = NDArray[np.bool_]
 
 EXACT = -1
 """Source of routes that are not of tubes."""
+_MANY = 20_000  # sources from which on a second thread pays; not measured
 _LEG, _DEPTH, _FACET = 14, 4, 31  # bits of each of two legs, of the bounce, of the facet
 
 
@@ -109,15 +111,26 @@ class Rings:
     def _beside(self, wanted: Bools) -> Bools:
         """Return the facets (f,) of the same planes, and across the edges, of some (f,)."""
         of_plane = np.zeros(int(self._plane.max(initial=-1)) + 1, bool)
-        of_plane[self._plane[wanted]] = True
-        every = of_plane[self._plane]
-        met = self._across[wanted]
+        rows = np.flatnonzero(wanted)
+        of_plane[self._plane[rows]] = True
+        every = of_plane.take(self._plane)
+        met = self._across[rows]
         every[met[met >= 0]] = True
-        return np.asarray(every)
+        return every
 
 
 def covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
     """Tell which sources (n,) some launches trace again."""
+    found = np.empty(len(source), bool)
+
+    def some(at: slice) -> None:
+        found[at] = _covered(source[at], by)
+
+    parallel_for(len(source), some, _MANY)
+    return found
+
+
+def _covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]:
     found, launch = np.zeros(len(source), bool), _launch_of(source)
     for i, wanted in by:
         rows = np.flatnonzero(launch == (i << _DEPTH | wanted.depth))
