@@ -119,16 +119,6 @@ def followed(heir):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True)
-def corners_at(faces, count):  # type: ignore[no-untyped-def]
-    """Return a corner 3 f + k of faces (m, 3) at each of `count` vertices: the last of the highest k."""
-    out = np.empty(count, np.int32)
-    for k in range(3):
-        for f in range(len(faces)):
-            out[faces[f, k]] = 3 * f + k
-    return out
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def pair_up(v, faces, n, part, fixed, left, begin, stop, mate):  # type: ignore[no-untyped-def]
     """Write the other side of each half edge of some facets into mate (3 m,), where both are of one smooth patch;
