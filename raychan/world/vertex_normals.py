@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 from raychan.geometry.normal_fits import eliminated
+from raychan.world.pieces import pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
@@ -72,9 +72,8 @@ def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> 
 
 def components(links: Ints, n: int) -> NDArray[np.int64]:
     """Return the number (n,) of the connected component of each of n nodes with links (e, 2)."""
-    a, b = links.T
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    one, other = links.T
+    return pieces(one, other, n)
 
 
 def _corrected(place: Floats, first: Floats, rows: Ints, near: csr_matrix, power: float) -> Floats:
