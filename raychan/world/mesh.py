@@ -26,7 +26,8 @@ Ints = NDArray[np.signedinteger[Any]]
 CREASE_DEG = 20.0
 """Crease angle [deg] where none is given: sections of a cylinder are smooth from 19 on (not measured against
 others)."""
-_KEPT = 200_000  # faces up to which a mesh keeps their planes: 10 MB
+_ROUNDED = 2e-6  # of the largest coordinates: what single precision makes of a height, at most (7 roundings of 6e-8 of
+# up to 3 of them)
 _ALIKE = 5e-4  # of the crease angle: equal folds are treated equally although files round their vertices
 
 
@@ -113,19 +114,24 @@ class Mesh:
         """Lowest and highest corner (2, 3) [m]."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
-    @property
-    def planes(self) -> tuple[Floats, Floats, Floats]:
-        """A corner (f, 3) [m] of each face, its unit normal (f, 3), zero where it has no area, and how far along it the
-        plane lies from the origin (f,) [m]; kept, 56 bytes a face, of meshes that are small enough."""
-        if "planes" in self.memo:
-            kept: tuple[Floats, Floats, Floats] = self.memo["planes"]
-            return kept
-        corners = self.corners
+    def planes_near(self, point: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return a corner (p, 3) [m] of each face in whose plane a point (3,) [m] may lie, its unit normal (p, 3), zero
+        where it has no area, and how far along it the plane lies from the origin (p,) [m].
+
+        A mesh keeps its planes once they were asked for, 16 bytes a face.
+        """
+        if "planes" not in self.memo:
+            _, normal, level = self._planes_of(slice(None))
+            self.memo["planes"] = normal.astype(np.float32), level.astype(np.float32)
+        normal, level = self.memo["planes"]
+        room = _ROUNDED * float(np.abs(point).max() + np.abs(self.bounds).max())
+        return self._planes_of(np.flatnonzero(~(np.abs(normal @ point.astype(np.float32) - level) > room)))
+
+    def _planes_of(self, rows: Any) -> tuple[Floats, Floats, Floats]:
+        """Return the planes of some faces, as `planes_near` does."""
+        corners = self.vertices[self.faces[rows]]
         first, normal = np.ascontiguousarray(corners[:, 0]), planes_of(corners)[0]
-        found = first, normal, np.einsum("ij,ij->i", first, normal)
-        if len(corners) <= _KEPT:
-            self.memo["planes"] = found
-        return found
+        return first, normal, np.einsum("ij,ij->i", first, normal)
 
     @property
     def areas(self) -> Floats:
