@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 
 from raychan.geometry.normal_fits import eliminated
+from raychan.parallel import parallel_tasks
 from raychan.world.pieces import pieces
 
 Floats = NDArray[np.float64]
@@ -64,8 +65,12 @@ def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> 
     place[group] = c.reshape(-1, 3)
     shared = np.flatnonzero((np.bincount(group) > 1) & ~lost)
     near = _neighbours(group.reshape(n, 3), len(total))
-    for some in np.array_split(shared, len(shared) // _CHUNK + 1):
-        total[some] = _corrected(place, total, some, near[some], power)
+    chunks = np.array_split(shared, len(shared) // _CHUNK + 1)
+
+    def correct(i: int) -> None:
+        total[chunks[i]] = _corrected(place, total, chunks[i], near[chunks[i]], power)
+
+    parallel_tasks(len(chunks), correct)
     own = np.repeat(_unit(_cross(vertices, faces)), 3, axis=0)
     return np.asarray(np.where(lost[group][:, None], own, total[group]).reshape(n, 3, 3))
 
