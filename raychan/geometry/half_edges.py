@@ -119,16 +119,6 @@ def followed(heir):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True)
-def corners_at(faces, count):  # type: ignore[no-untyped-def]
-    """Return a corner 3 f + k of faces (m, 3) at each of `count` vertices: the last of the highest k."""
-    out = np.empty(count, np.int32)
-    for k in range(3):
-        for f in range(len(faces)):
-            out[faces[f, k]] = 3 * f + k
-    return out
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def pair_up(v, faces, n, part, fixed, left, begin, stop, mate):  # type: ignore[no-untyped-def]
     """Write the other side of each half edge of some facets into mate (3 m,), where both are of one smooth patch;
@@ -143,12 +133,14 @@ def pair_up(v, faces, n, part, fixed, left, begin, stop, mate):  # type: ignore[
         for k in range(3):
             a, b = faces[f, k], faces[f, (k + 1) % 3]
             alike, found = 0, -1
-            for i in range(first[a], first[a + 1]):
-                alike += end[i] == b
             for i in range(first[b], first[b + 1]):
                 if end[i] == a:
                     alike, found = alike + 1, i
-            if alike != 2 or found < 0:
+            # The lower vertex's half edge sees to both; the other one only has to have it.
+            if a < b:
+                for i in range(first[a], first[a + 1]):
+                    alike += end[i] == b
+            if found < 0 or (a < b and alike != 2):
                 height = np.inf
             elif a < b:
                 h, g, c = 3 * f + k, half[found] // 3, half[found] % 3

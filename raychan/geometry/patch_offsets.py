@@ -18,6 +18,9 @@ from raychan.vectors import cross, dot, less, row
 _OUTSIDE = -1e-9  # barycentric coordinate from which a point lies beyond an edge: rounding
 _STEPS = 3  # of the search for a foot point; each leaves a few hundredths of the last one's error
 _WALK = 400  # facets passed in search of a point's own; beyond, it is lost
+# Largest deviation anywhere on a facet over that of the points checked: 1.53 at most on spheres and tori of 20,000 to
+# 100,000 facets at 0.05 to 1 dB, against their closed forms (command not noted).
+_BETWEEN = 1.6
 
 
 @njit(cache=True, forceinline=True)
@@ -97,32 +100,40 @@ def _corners(v, f):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def offsets(place, normal, facet, patches, mate, number, off, turned):  # type: ignore[no-untyped-def]
-    """Find the patch above or below each point, and how far the point is off it.
+def offsets(place, normal, begin, net, most, found, off, excess):  # type: ignore[no-untyped-def]
+    """Find the patch above or below each point, and how far the point is off it; return the largest off [m] and excess.
 
-    Args: place, normal (s, 3); facet (s,) at which to begin, the one found is written; patches v, n, b (m, 3, 3); mate
-    (3 f,) the half edge on the other side, by facet; number (f,) of each facet's patch; off (s,) [m] and turned (s,)
-    [rad] are written, inf for a point that has no patch.
+    Args: place, normal (s, 3); begin (s,) the facet at which each search begins, by its heir; net: heir (f,) of facets,
+    patches v, n, b (m, 3, 3) of those there are, mate (3 f,) the half edge on the other side, number (f,) of each
+    facet's patch, same (f,) whether it is as it was when the points were last found; most: deviation [m], normal [rad]
+    allowed; found (s,) facets, off (s,) [m] and excess (s,), over what is allowed, are written, inf for a point that
+    has no patch. They hold what was found last: a point on a facet that is the same stays.
     """
-    v, n, b = patches
+    heir, (v, n, b), mate, number, same = net
+    farthest, worst = 0.0, 0.0
     for i in range(len(place)):
-        p, up = row(place, i), row(normal, i)
-        f, steps, s, t = facet[i], 0, 0.0, 0.0
-        while steps < _WALK:
-            k, s, t = beyond(p, up, _corners(v, number[f]))
-            if k < 0:
-                break
-            # The edge opposite to corner k is the half edge from the corner after it.
-            other = mate[3 * f + (k + 1) % 3]
-            if other < 0:
-                break
-            f, steps = other // 3, steps + 1
-        facet[i] = f
-        if steps == _WALK:
-            off[i], turned[i] = np.inf, np.inf
-        else:
-            m = number[f]
-            off[i], turned[i] = _offset(p, up, _corners(v, m), _corners(n, m), _corners(b, m), s, t)
+        if not same[found[i]]:
+            p, up = row(place, i), row(normal, i)
+            f, steps, s, t = heir[begin[i]], 0, 0.0, 0.0
+            while steps < _WALK:
+                k, s, t = beyond(p, up, _corners(v, number[f]))
+                if k < 0:
+                    break
+                # The edge opposite to corner k is the half edge from the corner after it.
+                other = mate[3 * f + (k + 1) % 3]
+                if other < 0:
+                    break
+                f, steps = other // 3, steps + 1
+            found[i] = f
+            if steps == _WALK:
+                off[i], excess[i] = np.inf, np.inf
+            else:
+                m = number[f]
+                far, turned = _offset(p, up, _corners(v, m), _corners(n, m), _corners(b, m), s, t)
+                off[i] = _BETWEEN * far
+                excess[i] = max(off[i] / most[0], turned / most[1])
+        farthest, worst = max(farthest, off[i]), max(worst, excess[i])
+    return farthest, worst
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

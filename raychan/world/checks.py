@@ -86,7 +86,8 @@ def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:
     """Return a warning for each body that has facets in whose plane the radar lies."""
     said = []
     for body in bodies:
-        count = in_plane_of(body.geometry.planes, body.motion.to_body(np.array(radar.position)))
+        at = body.motion.to_body(np.array(radar.position))
+        count = in_plane_of(body.geometry.planes_near(at), at)
         if count:
             said.append(f"radar lies in the plane of {count} facets of '{body.name}': edge-on, they return nothing")
     return said

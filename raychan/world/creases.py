@@ -192,27 +192,27 @@ def _uneven(mesh: Mesh, pair: Ints) -> Floats:
 def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
     """Return which smooth folds (e,) may be edges: those of patches that fold strongly or whose facets are uneven, in
     the mean over the patch weighted by fold times length."""
-    one = pair[:, 0]
-    weight = fold * np.linalg.norm(_spans(mesh, pair), axis=1)
+    one, span = pair[:, 0], _spans(mesh, pair)
+    weight = fold * np.linalg.norm(span, axis=1)
     of_facet = components(pair // 3, len(mesh.faces))
     patch, crease = of_facet[one // 3], crease_angle(mesh.crease_deg or 0.0)
 
     def mean(x: Floats) -> Floats:
         return np.asarray(np.bincount(patch, weight * x) / np.maximum(np.bincount(patch, weight), 1e-300))
 
-    wide = crease * np.where(_one_way(mesh, pair, fold, of_facet)[: patch.max() + 1], _STRIPS, _WIDE)
+    wide = crease * np.where(_one_way(mesh, pair, span, fold, of_facet)[: patch.max() + 1], _STRIPS, _WIDE)
     uncertain = (mean(_uneven(mesh, pair)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
     return np.asarray(uncertain[patch])
 
 
-def _one_way(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> Bools:
-    """Return which patches are singly curved, given the patch (f,) of each facet.
+def _one_way(mesh: Mesh, pair: Ints, span: Floats, fold: Floats, patch: NDArray[np.int64]) -> Bools:
+    """Return which patches are singly curved, given the vectors span (e, 3) [m] along edges, their folds (e,) [rad] and
+    the patch (f,) of each facet.
 
     A facet bends across each of its edges by the fold times the edge's length; on a singly curved patch the tensor of
     that has one nonzero eigenvalue. Source: Cohen-Steiner, Morvan, Restricted Delaunay triangulations and normal cycle,
     Proc. SCG 2003.
     """
-    span = _spans(mesh, pair)
     length = np.linalg.norm(span, axis=1)
     along = span / np.maximum(length, 1e-300)[:, None]
     weight, facet, across, v = fold * length, pair.T.ravel() // 3, [], mesh.corners

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from raychan.geometry.triangles import planes_of
 from raychan.world import degenerate_faces
 from raychan.world.errors import SceneError
 from raychan.world.inner_spheres import inner_spheres_of
 from raychan.world.merge_coplanar import merge_flat
+from raychan.world.pieces import edges, pieces
 from raychan.world.scene_topology import closed_pieces
 from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
 from raychan.world.vertex_normals import folds, smoothed
@@ -27,7 +26,8 @@ Ints = NDArray[np.signedinteger[Any]]
 CREASE_DEG = 20.0
 """Crease angle [deg] where none is given: sections of a cylinder are smooth from 19 on (not measured against
 others)."""
-_KEPT = 200_000  # faces up to which a mesh keeps their planes: 10 MB
+_ROUNDED = 2e-6  # of the largest coordinates: what single precision makes of a height, at most (7 roundings of 6e-8 of
+# up to 3 of them)
 _ALIKE = 5e-4  # of the crease angle: equal folds are treated equally although files round their vertices
 
 
@@ -114,19 +114,24 @@ class Mesh:
         """Lowest and highest corner (2, 3) [m]."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
-    @property
-    def planes(self) -> tuple[Floats, Floats, Floats]:
-        """A corner (f, 3) [m] of each face, its unit normal (f, 3), zero where it has no area, and how far along it the
-        plane lies from the origin (f,) [m]; kept, 56 bytes a face, of meshes that are small enough."""
-        if "planes" in self.memo:
-            kept: tuple[Floats, Floats, Floats] = self.memo["planes"]
-            return kept
-        corners = self.corners
+    def planes_near(self, point: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return a corner (p, 3) [m] of each face in whose plane a point (3,) [m] may lie, its unit normal (p, 3), zero
+        where it has no area, and how far along it the plane lies from the origin (p,) [m].
+
+        A mesh keeps its planes once they were asked for, 16 bytes a face.
+        """
+        if "planes" not in self.memo:
+            _, normal, level = self._planes_of(slice(None))
+            self.memo["planes"] = normal.astype(np.float32), level.astype(np.float32)
+        normal, level = self.memo["planes"]
+        room = _ROUNDED * float(np.abs(point).max() + np.abs(self.bounds).max())
+        return self._planes_of(np.flatnonzero(~(np.abs(normal @ point.astype(np.float32) - level) > room)))
+
+    def _planes_of(self, rows: Any) -> tuple[Floats, Floats, Floats]:
+        """Return the planes of some faces, as `planes_near` does."""
+        corners = self.vertices[self.faces[rows]]
         first, normal = np.ascontiguousarray(corners[:, 0]), planes_of(corners)[0]
-        found = first, normal, np.einsum("ij,ij->i", first, normal)
-        if len(corners) <= _KEPT:
-            self.memo["planes"] = found
-        return found
+        return first, normal, np.einsum("ij,ij->i", first, normal)
 
     @property
     def areas(self) -> Floats:
@@ -178,13 +183,13 @@ def make_mesh(
     flipped = 0
     if normals is None:
         f, flipped = _wind(v, f)
-        f, merged = merge_flat(v, f, kind.astype(np.int64), _edge_pairs, _components)
+        f, merged = merge_flat(v, f, kind.astype(np.int64), _edge_pairs, pieces)
         kind = merged.astype(np.int32)
         corner_normals = smooth_normals(v, f, crease_deg)
     else:
         corner_normals = np.asarray(normals, float)[keep]
-    used, f = np.unique(f, return_inverse=True)
-    v, f = v[used], f.reshape(-1, 3).astype(np.int32)
+    v, f = degenerate_faces.named(v, f)
+    f = f.astype(np.int32)
     report = _report(v, f, zero, twins, flipped)
     crease = crease_deg if normals is None else None
     return Mesh(v, f, kind, part_names, corner_normals, report, part_materials, crease)
@@ -219,27 +224,14 @@ def _cross(v: Floats, f: Ints) -> Floats:
     return np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
 
 
-def _edges(f: Ints) -> tuple[Ints, NDArray[np.bool_], Ints]:
-    """Return the order that sorts the 3 f half edges by their ends, their direction, and the edge number of each."""
-    start, end = f.ravel().astype(np.int64), np.roll(f, -1, axis=1).ravel().astype(np.int64)
-    key = np.minimum(start, end) * (int(f.max(initial=0)) + 1) + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
-    run = np.concatenate([[0], np.cumsum(np.diff(key[order]) != 0)]) if len(order) else order
-    return order, start < end, run
-
-
 def _edge_pairs(f: Ints) -> tuple[Ints, Ints, Ints, Ints, NDArray[np.bool_]]:
     """Return, for edges of exactly two faces, the faces, their local edges, and whether the directions are opposite."""
-    order, sense, run = _edges(f)
-    twice = np.flatnonzero(np.bincount(run) == 2)
-    first = np.searchsorted(run, twice)
+    order, run = edges(f)
+    uses = np.bincount(run)
+    first = (np.cumsum(uses) - uses)[uses == 2]
     h, g = order[first], order[first + 1]
-    return h // 3, g // 3, h % 3, g % 3, sense[h] != sense[g]
-
-
-def _components(a: Ints, b: Ints, n: int) -> Ints:
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    start = f.ravel()
+    return h // 3, g // 3, h % 3, g % 3, start[h] != start[g]
 
 
 def _wind(v: Floats, f: Ints) -> tuple[Ints, int]:
@@ -248,15 +240,15 @@ def _wind(v: Floats, f: Ints) -> tuple[Ints, int]:
     a, b, _, _, opposed = _edge_pairs(f)
     # Graph of 2 n nodes: f is the face as it is, n + f the face turned; consistent neighbours share a component.
     turn = np.where(opposed, 0, n)
-    cover = _components(np.concatenate([a, a + n]), np.concatenate([b + turn, b + n - turn]), 2 * n)
-    piece = _components(a, b, n)
+    cover = pieces(np.concatenate([a, a + n]), np.concatenate([b + turn, b + n - turn]), 2 * n)
+    piece = pieces(a, b, n)
     _, root = np.unique(piece, return_index=True)
     flip = cover[:n] != cover[root][piece]
     # The smallest change: most faces of a piece keep their winding.
     count = np.bincount(piece)
     flip ^= (2 * np.bincount(piece, flip) > count)[piece]
     out = np.where(flip[:, None], f[:, ::-1], f)
-    order, _, run = _edges(out)
+    order, run = edges(out)
     uses = np.bincount(run)[run]
     closed = np.bincount(piece, np.bincount(order[uses != 2] // 3, minlength=n)) == 0
     c = v[out] - v.mean(axis=0)
@@ -267,17 +259,17 @@ def _wind(v: Floats, f: Ints) -> tuple[Ints, int]:
 
 
 def _report(v: Floats, f: Ints, zero: int, twins: int, flipped: int) -> MeshReport:
-    order, _, run = _edges(f)
+    order, run = edges(f)
     uses = np.bincount(run)
-    opposed = _edge_pairs(f)[-1]
-    same = run[1:] == run[:-1]
-    bodies = len(np.unique(_components(order[:-1][same] // 3, order[1:][same] // 3, len(f))))
+    same, start = run[1:] == run[:-1], f.ravel()[order]
+    facing = start[1:][same] != start[:-1][same]
+    bodies = int(pieces(order[:-1][same] // 3, order[1:][same] // 3, len(f)).max()) + 1
     size = np.ptp(v, axis=0)
     return MeshReport(
         vertices=len(v),
         faces=len(f),
         bodies=bodies,
-        watertight=bool((uses == 2).all() and opposed.all()),
+        watertight=bool((uses == 2).all() and facing.all()),
         open_edges=int((uses == 1).sum()),
         non_manifold_edges=int((uses > 2).sum()),
         size=(float(size[0]), float(size[1]), float(size[2])),

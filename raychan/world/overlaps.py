@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -55,10 +55,12 @@ def overlaps(bodies: Sequence[Body], opaque: Sequence[bool], kept: Kept | None =
     """
     said, kept = [], {} if kept is None else kept
     solid = [i for i, body in enumerate(bodies) if body.resolved_role != MIRROR]
-    boxes = {i: _found(kept, (bodies[i],), _box) for i in solid}
+    around = {i: _box(bodies[i], _corners(bodies[i].geometry.bounds)) for i in solid}
     for i, k in combinations(solid, 2):
-        low, high = np.maximum(boxes[i][0], boxes[k][0]), np.minimum(boxes[i][1], boxes[k][1])
-        if (high - low > _DEPTH).all() and not alike(bodies[i], bodies[k]):
+        # Only where the boxes about those of the body frames meet, all vertices are worth the time.
+        if not _meet(around[i], around[k]) or alike(bodies[i], bodies[k]):
+            continue
+        if _meet(*(_found(kept, (bodies[j],), lambda b: _box(b, b.geometry.vertices)) for j in (i, k))):
             said += _found(kept, (bodies[i], bodies[k]), lambda a, b, i=i, k=k: _told(a, b, opaque[i], opaque[k]))
     return said
 
@@ -91,9 +93,20 @@ def _told(one: Body, other: Body, one_opaque: bool, other_opaque: bool) -> list[
     ]
 
 
-def _box(body: Body) -> Floats:
-    at = body.motion.to_world(body.geometry.vertices)
+def _meet(one: Floats, other: Floats) -> bool:
+    """Return whether two boxes (2, 3) [m] overlap by more than rounding."""
+    return bool((np.minimum(one[1], other[1]) - np.maximum(one[0], other[0]) > _DEPTH).all())
+
+
+def _box(body: Body, points: Floats) -> Floats:
+    """Return the box (2, 3) [m], world axes, about points (n, 3) [m] of a body in its own frame."""
+    at = body.motion.to_world(points)
     return np.array([at.min(axis=0), at.max(axis=0)])
+
+
+def _corners(bounds: Floats) -> Floats:
+    """Return the corners (8, 3) of a box (2, 3)."""
+    return np.array(list(product(*bounds.T)))
 
 
 def _inside(body: Body, other: Body) -> float:

@@ -167,31 +167,30 @@ class _Rounds:
             for i in range(_FLIPS):
                 self._flip(now, live, slabs[(self._stage + i) % 3][0])
             for every in (self._few, 1) if self._far else (1,):
-                facet, off, excess = self._check(every)(now, heir, self._limits)
-                most = excess.max(initial=0.0)
+                off, most = self._check(every)(now, heir, self._limits)
                 if most < _FAR or most > 1.0:
                     break
             if not most > 1.0:
-                self._far, self.deviation = most < _FAR, float(off.max(initial=0.0))
-                self._take(now, heir, every, facet)
+                self._far, self.deviation = most < _FAR, off
+                self._take(now, heir, every)
                 return True
             if self._far:
                 self._far = False
                 continue
             if len(live) > _TOO_MANY * len(self.net.faces):
                 return False
-            self._check(1).shorten(self.net, now, self.vertex, (facet, excess), redo < _SHRINKS)
+            self._check(1).shorten(self.net, now, self.vertex, redo < _SHRINKS)
         return False
 
     def all_checked(self) -> bool:
         """Tell whether all points are within the limits; find the deviation and the home of each facet."""
         check = self._check(1)
         if not self._checked:
-            check.facet, off, excess = check(self.net, self.net.heir, self._limits)
-            if excess.max(initial=0.0) > 1.0:
+            self.deviation, most = check(self.net, self.net.heir, self._limits)
+            if most > 1.0:
                 return False
-            self.deviation = float(off.max(initial=0.0))
-        self.home[check.rows] = check.facet[len(check.vertex) :]
+            check.taken(self.net.heir, self.net.heir)
+        self.home[check.rows] = check.home
         return True
 
     def _check(self, every: int) -> Check:
@@ -200,16 +199,15 @@ class _Rounds:
             self._checks[every] = Check(self._whole, self.home, every)
         return self._checks[every]
 
-    def _take(self, now: Net, heir: Ints, every: int, facet: Ints) -> None:
-        """Go on with a net of which the last heirs (m,) are given, after a check that found the facet (s,) of each of
-        its points."""
+    def _take(self, now: Net, heir: Ints, every: int) -> None:
+        """Go on with a net of which the last heirs (m,) are given, after a check of every so manieth point."""
         self.net, live, stays = now.packed()
         number = np.zeros(len(now.faces), np.int32)
         number[live] = np.arange(len(live))
         then = number[heir]
-        for check in self._checks.values():
-            check.facet = then[check.facet]
-        self._checks[every].facet, self._checked = number[facet], every == 1
+        for kept, check in self._checks.items():
+            check.taken(then, number if kept == every else None)
+        self._checked = every == 1
         self.home = then[self.home]
         self.vertex, self.facet = self.vertex[stays], self.facet[live]
         self.corner = self.corner[now.corner[live].ravel()]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.collapses import Limits
-from raychan.geometry.half_edges import Net, corners_at
+from raychan.geometry.half_edges import Net
 from raychan.geometry.patch_offsets import centres, offsets
 from raychan.geometry.triangles import edge_curvatures
 from raychan.parallel import parallel_for
@@ -18,9 +18,6 @@ Ints = NDArray[np.signedinteger[Any]]
 
 _SHRINK = 0.4, 0.85  # least and largest factor on edges where a check failed
 _ORDER = 3.0  # power of the edge with which curved facets deviate, at least (Nagata 2005)
-# Largest deviation anywhere on a facet over that of the points checked: 1.53 at most on spheres and tori of 20,000 to
-# 100,000 facets at 0.05 to 1 dB, against their closed forms (command not noted).
-_BETWEEN = 1.6
 
 
 class Check:
@@ -29,13 +26,17 @@ class Check:
 
     def __init__(self, whole: Net, facet: Ints, every: int = 1) -> None:
         """Take the points of a whole mesh, or every so manieth; facet (n,) on which the centre of each facet lies."""
-        self.vertex = np.flatnonzero(~whole.locked)[::every]
-        a, b, c = whole.faces.T
-        self.rows = np.flatnonzero(~(whole.locked[a] & whole.locked[b] & whole.locked[c]))[::every]
-        corner, begin = corners_at(whole.faces, len(whole.v))[self.vertex], len(self.vertex)
-        self.facet = facet[np.concatenate([corner // 3, self.rows])]
-        self._place, self._normal = np.empty((len(self.facet), 3)), np.empty((len(self.facet), 3))
+        self.vertex, inside = np.flatnonzero(~whole.locked)[::every], np.arange(0, len(whole.faces), every)
+        if whole.locked.any():
+            a, b, c = whole.faces.T
+            inside = np.flatnonzero(~(whole.locked[a] & whole.locked[b] & whole.locked[c]))[::every]
+        self.rows, begin = inside, len(self.vertex)
+        corner = whole.half[self.vertex]
+        self._facet, count = facet[np.concatenate([corner // 3, self.rows])], begin + len(self.rows)
+        self._place, self._normal = np.empty((count, 3)), np.empty((count, 3))
         self._place[:begin], self._normal[:begin] = whole.v[self.vertex], whole.n[corner]
+        self._found, self._off, self._excess = np.zeros(count, np.int32), np.empty(count), np.empty(count)
+        self._last: Net | None = None
         place, normal = self._place[begin:], self._normal[begin:]
 
         def some(r: slice) -> None:
@@ -43,33 +44,52 @@ class Check:
 
         parallel_for(len(self.rows), some)
 
-    def __call__(self, net: Net, heir: Ints, limits: Limits) -> tuple[Ints, Floats, Floats]:
-        """Return the facet of each point, how far points about it may be off [m], and how far off they are in place or
-        normal over the limit; heir (m,) the last heir of each facet of the net."""
+    def __call__(self, net: Net, heir: Ints, limits: Limits) -> tuple[float, float]:
+        """Return how far points of the surface may be off [m], and how far off points are in place or normal over the
+        limit, at most; heir (m,) the last heir of each facet of the net."""
         live = np.flatnonzero(net.faces[:, 0] >= 0)
         number = np.zeros(len(net.faces), np.int32)
         number[live] = np.arange(len(live))
         v, n = net.v[net.faces[live]], net.n[net.corner[live]]
-        patches = v, n, edge_curvatures(v, n)[0]
-        facet = heir[self.facet]
-        off, turned = np.empty(len(facet)), np.empty(len(facet))
+        shape = heir, (v, n, edge_curvatures(v, n)[0]), net.mate, number, self._same(net)
+        most = limits.deviation, limits.normal
+        ends = list[tuple[float, float]]()
 
         def some(r: slice) -> None:
-            offsets(self._place[r], self._normal[r], facet[r], patches, net.mate, number, off[r], turned[r])
+            points = self._place[r], self._normal[r], self._facet[r]
+            ends.append(offsets(*points, shape, most, self._found[r], self._off[r], self._excess[r]))
 
-        parallel_for(len(facet), some)
-        off *= _BETWEEN
-        return facet, off, np.maximum(off / limits.deviation, turned / limits.normal)
+        parallel_for(len(self._facet), some)
+        self._last = net
+        return max((off for off, _ in ends), default=0.0), max((excess for _, excess in ends), default=0.0)
 
-    def shorten(self, net: Net, failed: Net, vertex: Ints, found: tuple[Ints, Floats], some: bool) -> None:
-        """Shorten the edges that may come on a net where facets of what became of it failed.
+    def _same(self, net: Net) -> NDArray[np.bool_]:
+        """Return which facets (m,) of a net are those of the net before, if both come of one."""
+        if self._last is None:
+            return np.zeros(len(net.faces), bool)
+        faces, corner = net.faces == self._last.faces, net.corner == self._last.corner
+        return np.asarray((faces & corner).all(axis=1))
 
-        Args: vertex (k,) numbers in the whole mesh of the net's vertices, ascending; found the facet and the excess
-        (s,) of each point on the failed net; some: whether any may come at all.
+    def taken(self, then: Ints, found: Ints | None = None) -> None:
+        """Go on from another net, whose facets then (m,) are those in whose places the facets of this one are looked
+        for; found (m,) the same of the net that was checked last, if it was by these points."""
+        self._facet = then[self._facet] if found is None else found[self._found]
+        # Numbers of facets of that net mean nothing in this one.
+        self._found[:], self._last = 0, None
+
+    @property
+    def home(self) -> Ints:
+        """The facet (q,) of the net taken last on which the centre of each of `rows` lies."""
+        return self._facet[len(self.vertex) :]
+
+    def shorten(self, net: Net, failed: Net, vertex: Ints, some: bool) -> None:
+        """Shorten the edges that may come on a net where facets of what became of it failed, which was checked last.
+
+        Args: vertex (k,) numbers in the whole mesh of the net's vertices, ascending; some: whether any may come at all.
         """
-        facet, excess = found
+        bad = np.flatnonzero(self._excess > 1.0)
         worst = np.zeros(len(net.faces))
-        np.maximum.at(worst, facet, excess)
+        np.maximum.at(worst, self._found[bad], self._excess[bad])
         rows = np.flatnonzero(worst > 1.0)
         corners = failed.faces[rows]
         reach = np.zeros(len(rows))
@@ -82,5 +102,9 @@ class Check:
         allowed[rows] = reach
         for k in range(3):
             np.minimum.at(net.reach, corners[:, k], reach)
-        _, at, own = np.intersect1d(vertex, self.vertex, assume_unique=True, return_indices=True)
-        net.reach[at] = np.minimum(net.reach[at], allowed[facet[own]])
+        # The vertices that lie on these facets, those among them that the net still has.
+        on = np.flatnonzero(worst[self._found[: len(self.vertex)]] > 1.0)
+        at = np.minimum(np.searchsorted(vertex, self.vertex[on]), len(vertex) - 1)
+        here = vertex[at] == self.vertex[on]
+        at, own = at[here], on[here]
+        net.reach[at] = np.minimum(net.reach[at], allowed[self._found[own]])

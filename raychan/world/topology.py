@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from raychan.geometry.triangles import edge_folds, planes_of
+from raychan.world.pieces import edges, pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -88,11 +87,9 @@ def mesh_topology(
     """
     n = len(v)
     normal, area = planes_of(v)
-    end = np.roll(vertex, -1, axis=1)
-    edge = (np.minimum(vertex, end) * (3 * n) + np.maximum(vertex, end)).ravel()
-    order = np.argsort(edge, kind="stable")
-    same = np.diff(edge[order]) == 0
-    use = np.bincount(np.concatenate([[0], np.cumsum(~same)]))
+    order, run = edges(vertex)
+    same = run[1:] == run[:-1]
+    use = np.bincount(run)
     rim = order[np.repeat(use != 2, use)]
     pair = np.stack([order[:-1][same], order[1:][same]], axis=1).astype(np.int32)
     flat, soft, bent, sharp, height = edge_folds(pair, v, normals, normal, area)
@@ -144,8 +141,7 @@ def _unpaired(pair: Ints, n: int) -> Bools:
 def _components(pair: Ints, n: int) -> Ints:
     """Return the number (n,) of the component to which each of n facets belongs, connected by pairs of half edges."""
     a, b = pair.T // 3
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int32)
+    return pieces(a, b, n).astype(np.int32)
 
 
 def _along_curve(at: Floats) -> Ints:

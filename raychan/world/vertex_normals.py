@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 from raychan.geometry.normal_fits import eliminated
+from raychan.parallel import parallel_tasks
+from raychan.world.pieces import pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
@@ -64,17 +65,20 @@ def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> 
     place[group] = c.reshape(-1, 3)
     shared = np.flatnonzero((np.bincount(group) > 1) & ~lost)
     near = _neighbours(group.reshape(n, 3), len(total))
-    for some in np.array_split(shared, len(shared) // _CHUNK + 1):
-        total[some] = _corrected(place, total, some, near[some], power)
+    chunks = np.array_split(shared, len(shared) // _CHUNK + 1)
+
+    def correct(i: int) -> None:
+        total[chunks[i]] = _corrected(place, total, chunks[i], near[chunks[i]], power)
+
+    parallel_tasks(len(chunks), correct)
     own = np.repeat(_unit(_cross(vertices, faces)), 3, axis=0)
     return np.asarray(np.where(lost[group][:, None], own, total[group]).reshape(n, 3, 3))
 
 
 def components(links: Ints, n: int) -> NDArray[np.int64]:
     """Return the number (n,) of the connected component of each of n nodes with links (e, 2)."""
-    a, b = links.T
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    one, other = links.T
+    return pieces(one, other, n)
 
 
 def _corrected(place: Floats, first: Floats, rows: Ints, near: csr_matrix, power: float) -> Floats:
