@@ -1,8 +1,9 @@
 """Code that is only linked into the code of others: no machine code is made of it until something asks for it.
 
-Numba makes machine code of every function at once, also of those that only compiled functions call, and copies the
-code of these into each caller anyway. This rests on how numba's `JITCodeLibrary` is built; with a version of numba that
-it was not tested with, numba makes machine code of everything.
+Numba optimises every function with all that it calls and makes machine code of it at once, also of those that only
+compiled functions call, and copies the code of these into each caller, to be optimised there again. Here that is done
+once, where machine code is made. This rests on how numba's `JITCodeLibrary` is built; with a version of numba that it
+was not tested with, numba makes machine code of everything.
 """
 
 from __future__ import annotations
@@ -12,18 +13,43 @@ from collections.abc import Iterator
 from typing import Any
 
 import numba
+from llvmlite.binding.newpassmanagers import create_new_module_pass_manager
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import lookup_environment
 
 _TESTED = "0.68."  # to raise it: tests/compile with the new version, and code of a cold run that keeps its results
 FITS = numba.__version__.startswith(_TESTED)  # this and `compile.typing_memo` may reach into numba
 _ENVIRONMENT = "_ZN08NumbaEnv"
+_WRAPPER = "_ZN7cpython"
 
 
 class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc,no-any-unimported]
     """The code of a function, made into machine code when the address of one of its functions is asked for."""
 
     _made = False
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Add code; what takes arguments from Python stays as it is, without a copy of the function inside."""
+        for function in ir_module.functions:
+            if function.name.startswith(_WRAPPER) and not function.is_declaration:
+                function.attributes.add("noinline")
+                function.attributes.add("optnone")
+        super().add_ir_module(ir_module)
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Optimise each function by itself: numba sets up all passes for functions too of which only the name is there,
+        most of them."""
+        ll_module.data_layout = self._codegen._data_layout
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes, builder = self._codegen._function_pass_manager()
+                passes.run(function, builder)
+
+    def _optimize_final_module(self) -> None:
+        """Remove what nothing reads: numba does not keep code that names addresses of this process."""
+        passes = create_new_module_pass_manager()
+        passes.add_global_dead_code_eliminate_pass()
+        passes.run(self._final_module, self._codegen._pass_builder())
 
     def _finalize_final_module(self) -> None:
         if getattr(self, "_compiled_object", None) is not None:  # from the cache
@@ -39,6 +65,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc,no-any-unimported]
         self._ensure_finalized()
         if not self._made and self._defines(name):
             self._made = True
+            super()._optimize_final_module()
             super()._finalize_final_module()
             self._set_environments()
         return super().get_pointer_to_function(name) if self._made else 0  # type: ignore[no-any-return]
