@@ -20,6 +20,7 @@ import sys, time
 import raychan as rc
 scene, tolerance = rc.Scene.load(sys.argv[1]), float(sys.argv[2])
 rc.simulate(scene, tolerance_db=tolerance)
+print(0.0, flush=True)
 for _ in sys.stdin:
     start = time.perf_counter()
     rc.simulate(scene, tolerance_db=tolerance)
@@ -35,6 +36,8 @@ def before(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
         try:
             for tolerance, bar in ((3.0, 1.0 / 6.0), (0.5, 1.0 / 3.0)):
                 with _runner(_ROOT, tolerance) as ours, _runner(Path(there), tolerance) as theirs:
+                    for process in (ours, theirs):
+                        _answer(process)  # both have compiled, and none runs beside the other
                     pairs = [(_next(ours), _next(theirs)) for _ in range(repeats)]
                 row = paired("before", f"urban, {tolerance:g} dB", pairs, f"commit {COMMIT}")
                 yield barred(row, f"<= {bar:.2f}", row.ratio <= bar)
@@ -56,7 +59,12 @@ def _runner(root: Path, tolerance: float) -> Iterator[subprocess.Popen[str]]:
 
 
 def _next(process: subprocess.Popen[str]) -> float:
-    assert process.stdin is not None and process.stdout is not None
+    assert process.stdin is not None
     process.stdin.write("\n")
     process.stdin.flush()
+    return _answer(process)
+
+
+def _answer(process: subprocess.Popen[str]) -> float:
+    assert process.stdout is not None
     return float(process.stdout.readline())
