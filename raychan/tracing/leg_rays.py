@@ -1,7 +1,7 @@
 """Rays along legs: whether an end sees points over its mirrors and through layers (numba kernels).
 
 A ray is followed from the end to the first mirror, from mirror to mirror, and to its point. It ends where a stretch of
-its way does not lie on the lit sides of its mirrors, or meets something else first than layers, which it passes.
+its way does not lie on the lit sides of its mirrors, or where something but a thin layer comes first; it passes layers.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def _stretch(i, p, corners, leg, reach):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def follow_leg(p, target, slack, inside, leg, reach, caster, packet, corners, passed):  # type: ignore[no-untyped-def]
-    """Write the mirror points (m, 3) [m] on the way to p (3,), and the layers passed, as many on each of the m + 1
-    stretches of the way at most, from the end on: (l (m + 1),), -1 for none.
+    """Write the mirror points (m, 3) [m] on the way to p (3,), and the layers passed (l (m + 1),): l places for each of
+    the m + 1 stretches, the end's first, -1 where there is none.
 
     Args: target facet on which p lies, -1 for none; slack [m] by which its smooth surface may lie before p; inside body
     in which p lies, -1 for none; leg as `LegChain`; reach [m] from which rays come when far; caster as

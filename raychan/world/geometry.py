@@ -205,11 +205,6 @@ class Geometry(RayCaster):
         owner = np.repeat(np.arange(len(found), dtype=np.int32), [len(r) for _, r in found])
         return np.concatenate([c for c, _ in found]), np.concatenate([r for _, r in found]), owner
 
-    @property
-    def has_layers(self) -> bool:
-        """Whether any facet is a thin layer that lets a wave through."""
-        return self._any_layer
-
     @cached
     def piece_role(self) -> NDArray[np.int8]:
         """Role (p,) of each piece's body."""

@@ -13,6 +13,8 @@ WAVE = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps
 AIR = rc.Material(1.0001, 0.0, thickness=1e-3, name="air")
 GLASS = rc.Material(6.3, 0.02, thickness=5e-3, name="glass")
 RADAR = np.array([0.0, 0.0, 0.8])
+SIZE = {"length": 8.0, "width": 0.2, "height": 4.0}
+WALL = rc.Body(name="wall", shape="box", params=SIZE, position=(4.0, 2.6, 0.0), material="pec")
 
 
 def pane(x, material, low=0.0, high=2.0, name="pane"):
@@ -77,14 +79,7 @@ def test_other_modes_see_through_it_too(mode):
 
 def test_layers_on_every_stretch_between_two_mirrors():
     """Over a wall and the ground, through a layer before, between and behind them."""
-    wall = rc.Body(
-        name="wall",
-        shape="box",
-        params={"length": 8.0, "width": 0.2, "height": 4.0},
-        position=(4.0, 2.6, 0.0),
-        material="pec",
-    )
-    bodies = [floor(None), wall, target("point")]
+    bodies = [floor(None), WALL, target("point")]
     sheets = [pane(1.0, AIR, name="a"), pane(6.9, AIR, name="b")]
     free, behind = found(bodies, 5), found([*bodies, *sheets], 5)
     assert total(behind) == pytest.approx(total(free), abs=1e-3)
@@ -108,14 +103,7 @@ def test_the_way_to_a_receiver_through_a_pane_is_the_specular_one(receiver):
 
 def test_the_way_through_layers_is_as_long_as_its_path():
     """Its vertices lie on it in order: their distances add up to the length."""
-    wall = rc.Body(
-        name="wall",
-        shape="box",
-        params={"length": 8.0, "width": 0.2, "height": 4.0},
-        position=(4.0, 2.6, 0.0),
-        material="pec",
-    )
-    result = found([floor(None), wall, target("sphere"), pane(1.0, AIR, name="a"), pane(6.9, AIR, name="b")], 3)
+    result = found([floor(None), WALL, target("sphere"), pane(1.0, AIR, name="a"), pane(6.9, AIR, name="b")], 3)
     paths = result.paths
     way = paths.trajectories
     stops = np.concatenate(
