@@ -67,9 +67,10 @@ def over_mirrors(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def incidences(points, end, i, first, stop, step, vertices, normals, kind, out):  # type: ignore[no-untyped-def]
+def incidences(points, end, i, first, stop, step, vertices, normals, kind, out, starts):  # type: ignore[no-untyped-def]
     """Write the cosines of incidence (3, d) on the surfaces first, first + step, ... up to the footprint in slot
-    `stop` of route i for the rays that come from `end` over the same planes to its corners, points (n, 6, 3)."""
+    `stop` of route i for the rays that come from `end` over the same planes to its corners, points (n, 6, 3), and the
+    unit directions (3, 3) in which they leave that end."""
     image = vec(end)
     for j in range(first, stop, step):
         if kind[i, j] != TRANSMIT:
@@ -82,6 +83,7 @@ def incidences(points, end, i, first, stop, step, vertices, normals, kind, out):
             out[c, j] = cosine(ahead, n)
             if kind[i, j] != TRANSMIT:
                 ahead = mirrored(ahead, (0.0, 0.0, 0.0), n)
+        starts[c, 0], starts[c, 1], starts[c, 2] = ahead
 
 
 @njit(cache=True, forceinline=True)

@@ -17,7 +17,7 @@ from raychan.em.phase_integral import triangle_terms
 from raychan.em.phasor import times
 from raychan.em.physical_optics import coupled, incident, reflected_wave, shadow_wave
 from raychan.parallel import parallel_for
-from raychan.records import LAYER, POINT, REFLECT, SCATTER, Facets, Materials, Routes
+from raychan.records import POINT, REFLECT, SCATTER, Facets, Materials, Routes
 from raychan.units import C0
 from raychan.vectors import dot, row
 
@@ -52,11 +52,17 @@ def transfer(
 ) -> Complexes:
     """Return the gain (n, q, p) of each route: received over transmitted wave, with lambda / 4 pi and carrier phase.
 
+    Fields and coefficients are those of the rays to the corners of a footprint over plane mirrors, of the ray to its
+    centre over curved ones.
+
     Args: tx_field, rx_field vector fields of p and q polarisations; corners: return (n, q, p, 3), the parts that belong
     to the three footprint corners and sum to the gain; wave which currents radiate; unless it is HUYGENS, elements
     (n, 3, 3) [m^2] are the vector area elements at the corners, in place of taper and area.
     """
-    away, look = departures(routes)
+    first, away, look = _directions(
+        routes.tx, routes.rx, routes.far or wave != HUYGENS, routes.vertices, routes.normals, routes.kind, routes.facet,
+        routes.scatter, routes.points, facets.normals, *departures(routes),
+    )  # fmt: skip
     e_tx = np.ascontiguousarray(tx_field(away), dtype=np.complex128)
     e_rx = np.ascontiguousarray(rx_field(look), dtype=np.complex128)
     m: Materials = facets.materials
@@ -65,14 +71,14 @@ def transfer(
     out = np.zeros((len(routes.kind), e_rx.shape[1], e_tx.shape[1], 3 if corners else 1), np.complex128)
     columns = (
         routes.vertices, routes.normals, routes.kind, routes.facet, routes.scatter, routes.lengths, routes.length,
-        routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma, e_tx, e_rx,
+        routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma,
         np.zeros((len(out), 0, 3)) if elements is None else elements, out, routes.points,
     )  # fmt: skip
 
     def some(at: slice) -> None:
         _transfer(
-            (routes.tx, routes.rx, routes.far), facets.material, table, facets.normals, k, wave,
-            *(c[at] for c in columns),
+            (routes.tx, routes.rx, routes.far), facets.material, table, k, wave, e_tx, e_rx,
+            first[at.start : at.stop + 1], *(c[at] for c in columns),
         )  # fmt: skip
 
     parallel_for(len(out), some)
@@ -118,40 +124,38 @@ def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-unt
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _transfer(  # type: ignore[no-untyped-def]
-    ends, material, table, facet_normals, k, wave, vertices, normals, kind, facet, scatter, lengths, length, taper,
-    area, spread_in, spread_out, caustics, sigma, e_tx, e_rx, elements, out, points,
+    ends, material, table, k, wave, e_tx, e_rx, first, vertices, normals, kind, facet, scatter, lengths, length, taper,
+    area, spread_in, spread_out, caustics, sigma, elements, out, points,
 ):  # fmt: skip
-    # Taken out of the tuples once: each access counts a reference.
-    (tx, rx, far), (kinds, _, _, _) = ends, table
+    tx, rx, far = ends  # taken out of the tuple once: each access counts a reference
     n, d = kind.shape
     terms, phases = np.empty(3, np.complex128), np.empty(6)
     # The fields of the centre, or of the three corners one after the other.
     arriving = np.empty((3 * e_tx.shape[1], 3), np.complex128)
     leaving = np.empty((3 * e_rx.shape[1], 3), np.complex128)
-    cos_in, cos_out = np.empty((3, d)), np.empty((3, d))
+    cos_in, cos_out, starts = np.empty((3, d)), np.empty((3, d)), np.empty((3, 3))
     for i in range(n):
         used, wavelength_4pi = 0, 0.5 / k
         while used < d and kind[i, used] > 0:
             used += 1
         at = scatter[i] if scatter[i] >= 0 else used
         k_in, k_out = _outward(tx, rx, far, vertices, i, used)
-        each = wave == HUYGENS and not far and at < used and kind[i, at] == SCATTER
-        ways = 3 if each and _by_corner(i, used, kind, facet, material, kinds, facet_normals) else 1
+        ways = first[i + 1] - first[i]
         if ways == 3:
-            incidences(points, tx, i, 0, at, 1, vertices, normals, kind, cos_in)
-            incidences(points, rx, i, used - 1, at, -1, vertices, normals, kind, cos_out)
+            incidences(points, tx, i, 0, at, 1, vertices, normals, kind, cos_in, starts)
+            incidences(points, rx, i, used - 1, at, -1, vertices, normals, kind, cos_out, starts)
         # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
-        _begin(arriving, e_tx, i, ways)
+        _begin(arriving, e_tx, first[i], ways)
         k_in = over_mirrors(
             arriving, ways, k_in, i, 0, at, 1, vertices, normals, kind, facet, material, used, rx, table, k, cos_in
         )  # fmt: skip
         if at == used:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
-            _begin(leaving, e_rx, i, 1)
+            _begin(leaving, e_rx, first[i], 1)
             _couple(i, out, whole, leaving, arriving)
             continue
         # Out: the receiver's field by reciprocity, over the rest of the route backwards.
-        _begin(leaving, e_rx, i, ways)
+        _begin(leaving, e_rx, first[i], ways)
         k_out = over_mirrors(
             leaving, ways, k_out, i, used - 1, at, -1, vertices, normals, kind, facet, material, used, rx, table, k,
             cos_out,
@@ -179,27 +183,51 @@ def _transfer(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _begin(held, fields, i, ways):  # type: ignore[no-untyped-def]
-    """Write the fields (p, 3) that an end has of route i, so many times one after the other."""
+def _begin(held, fields, row, ways):  # type: ignore[no-untyped-def]
+    """Write the fields (p, 3) that an end has of so many ways, from a row on, one after the other."""
     count = fields.shape[1]
     for w in range(ways):
         for f in range(count):
             for c in range(3):
-                held[w * count + f, c] = fields[i, f, c]
+                held[w * count + f, c] = fields[row + w, f, c]
 
 
 @njit(cache=True)
-def _by_corner(i, used, kind, facet, material, kinds, normals):  # type: ignore[no-untyped-def]
-    """Tell whether each corner of the footprint of route i has Fresnel coefficients of its own, for the ray that leads
-    to it: over layers and plane mirrors. In a layer waves interfere, and it turns quickly with angle."""
-    layers = False
+def _by_corner(i, used, kind, facet, scatter, normals):  # type: ignore[no-untyped-def]
+    """Tell whether each corner of a footprint of route i has fields of its own, of the ray that leads to it: over
+    layers and plane mirrors. Fields of the centre alone would jump from tube to tube, and what off the mirror direction
+    should cancel where tubes meet would not."""
+    plane = scatter[i] >= 0 and kind[i, scatter[i]] == SCATTER
     for j in range(used):
-        layers |= facet[i, j] >= 0 and kinds[material[facet[i, j]]] == LAYER
-    if layers:
-        for j in range(used):
-            if kind[i, j] == REFLECT and facet[i, j] >= 0 and curved(normals, facet[i, j]):
-                return False
-    return layers
+        plane &= kind[i, j] != REFLECT or facet[i, j] < 0 or not curved(normals, facet[i, j])
+    return plane
+
+
+@njit(cache=True, nogil=True)
+def _directions(  # type: ignore[no-untyped-def]
+    tx, rx, apart, vertices, normals, kind, facet, scatter, points, facet_normals, away, look
+):
+    """Return the first of the rows of each route, (n + 1,) with the end of the last, and the rows (m, 3): unit
+    directions in which the transmitter radiates and to which the receiver looks, one for a route, away and look (n, 3),
+    or unless all are `apart` one for each corner of its footprint."""
+    n, d = kind.shape
+    first, slots = np.zeros(n + 1, np.int64), np.empty(n, np.int64)
+    for i in range(n):
+        used = 0
+        while used < d and kind[i, used] > 0:
+            used += 1
+        slots[i] = used
+        corners = not apart and _by_corner(i, used, kind, facet, scatter, facet_normals)
+        first[i + 1] = first[i] + (3 if corners else 1)
+    out, back, cosines = np.empty((first[n], 3)), np.empty((first[n], 3)), np.empty((3, d))
+    for i in range(n):
+        begin, end, at = first[i], first[i + 1], scatter[i]
+        if end == begin + 1:
+            out[begin], back[begin] = away[i], look[i]
+            continue
+        incidences(points, tx, i, 0, at, 1, vertices, normals, kind, cosines, out[begin:end])
+        incidences(points, rx, i, slots[i] - 1, at, -1, vertices, normals, kind, cosines, back[begin:end])
+    return first, out, back
 
 
 @njit(cache=True, forceinline=True)
