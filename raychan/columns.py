@@ -69,6 +69,12 @@ class Record(Described):
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 
 
+def row_numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:
+    """Return the numbers of the rows at `index` (mask or numbers); numpy takes rows by number up to ten times
+    faster."""
+    return np.flatnonzero(index) if index.dtype == np.bool_ else np.asarray(index, np.intp)
+
+
 R = TypeVar("R", bound=Record)
 
 

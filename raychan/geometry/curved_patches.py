@@ -212,23 +212,25 @@ def edge_of_fan(facet, bary, n, fan):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def halved(facet, bary, edge, jitter, level):  # type: ignore[no-untyped-def]
-    """Return (facet, bary) of both halves of patches cut from a point of `edge` (m,) to the opposite corner.
+def halved(facet, bary, edge, rows, jitter, level):  # type: ignore[no-untyped-def]
+    """Return (facet, bary) of both halves of the patches `rows` (m,), cut from a point of `edge` (n,) to the opposite
+    corner.
 
     The point is the middle, or a share `jitter` of the edge to either side of it.
     """
-    m = len(facet)
+    m = len(rows)
     facets, barys = np.empty(2 * m, facet.dtype), np.empty((2 * m, 3, 3))
-    for i in range(m):
+    for j in range(m):
+        i = rows[j]
         a, c = edge[i], (edge[i] + 1) % 3
         # To which side is pseudo-random, by facet and level, and the same in every run.
         share = 0.5 + (jitter if ((facet[i] * 40503 >> 7) + level) & 1 else -jitter)
-        facets[2 * i], facets[2 * i + 1] = facet[i], facet[i]
-        copy_corners(barys[2 * i], bary[i])
-        copy_corners(barys[2 * i + 1], bary[i])
+        facets[2 * j], facets[2 * j + 1] = facet[i], facet[i]
+        copy_corners(barys[2 * j], bary[i])
+        copy_corners(barys[2 * j + 1], bary[i])
         for x in range(3):
             cut = share * bary[i, a, x] + (1.0 - share) * bary[i, c, x]
-            barys[2 * i, c, x], barys[2 * i + 1, a, x] = cut, cut
+            barys[2 * j, c, x], barys[2 * j + 1, a, x] = cut, cut
     return facets, barys
 
 

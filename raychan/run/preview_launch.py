@@ -229,5 +229,5 @@ def _cut(geometry: Geometry, leg: Leg, out: Leg, facet: Ints, rule: Refinement) 
             done.append((facet, bary))
             break
         done.append((facet[~more], bary[~more]))
-        facet, bary = halved(facet[more], bary[more], edge[more], 0.0, level)
+        facet, bary = halved(facet, bary, edge, np.flatnonzero(more), 0.0, level)
     return np.concatenate([x for x, _ in done]), np.concatenate([x for _, x in done])

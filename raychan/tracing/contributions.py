@@ -48,9 +48,12 @@ class Budget:
 
     def affords(self, geometry: Geometry, facet: Ints, wanted: Bools, weight: float = 1.0) -> Bools:
         """Return which tubes (n,) may be subdivided for visibility: none once `rule.max_cuts` are made, each counted by
-        its weight, or `rule.max_rays` cast by this launch."""
+        its weight, or `rule.max_rays` cast by this launch; `wanted` itself where all may."""
         rest = 0.0 if self.spent(geometry) else (self.rule.max_cuts - self._cuts) / weight
-        self._cuts += weight * np.count_nonzero(wanted)
+        count = np.count_nonzero(wanted)
+        self._cuts += weight * count
+        if count <= rest:
+            return wanted
         within = wanted & (np.cumsum(wanted) <= rest)
         return within | self._within(geometry, facet, wanted & ~within, True)
 
@@ -203,11 +206,11 @@ class Contributions:
         share = bound / self.prune_threshold(length)
         # The weakest few are enough: none that alone exceeds the sum is looked at.
         weak = np.flatnonzero(share < SHARE)
-        cell = self._cell(length[weak])
-        order = np.lexsort((share[weak], cell))
-        cell, running = cell[order], np.cumsum(share[weak[order]])
-        first = np.searchsorted(cell, cell)
-        running -= np.where(first > 0, running[first - 1], 0.0)
+        share, cell = share.take(weak), self._cell(length.take(weak))
+        # Numbers of two bytes or less are sorted in linear time.
+        order = np.lexsort((share, cell.astype(np.min_scalar_type(cell.max(initial=0)))))
+        running, count = np.cumsum(share.take(order)), np.bincount(cell)
+        running -= np.repeat(np.append(0.0, running).take(np.cumsum(count) - count), count)
         keep = np.ones(len(bound), bool)
-        keep[weak[order[running <= SHARE]]] = False
+        keep[weak.take(order[running <= SHARE])] = False
         return np.flatnonzero(keep)

@@ -126,14 +126,14 @@ def _bisect_for_phase(
         if level < rule.least:
             edge = np.where((edge < 0) & (geometry.curved[facet] | (not across)), _longest(facet, bary, shape[0]), edge)
         more = found.budget.affords_phase(geometry, facet, edge >= 0)
-        ready = ~more
-        if held + np.count_nonzero(ready) > rule.batch:
+        ready, rows = np.flatnonzero(~more), np.flatnonzero(more)
+        if held + len(ready) > rule.batch:
             yield _joined(done)
             done, held = [], 0
-        done.append((facet[ready], bary[ready]))
-        held += len(done[-1][0])
-        if more.any():
-            left.append((*halved(facet[more], bary[more], edge[more], rule.jitter, level), level + 1))
+        done.append((facet.take(ready), bary.take(ready, axis=0)))
+        held += len(ready)
+        if len(rows):
+            left.append((*halved(facet, bary, edge, rows, rule.jitter, level), level + 1))
     if held:
         yield _joined(done)
 
@@ -156,8 +156,10 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     rule = found.rule
 
     def take_seen(view: View, ready: Bools) -> None:
-        parts.append(tubes.take(ready))
-        write_leg(geometry, parts[-1], leg, view.corners[ready], view.passed[ready], rule)
+        rows = np.flatnonzero(ready)
+        if len(rows) or not parts:
+            parts.append(tubes.take(rows))
+            write_leg(geometry, parts[-1], leg, view.corners.take(rows, axis=0), view.passed.take(rows, axis=0), rule)
 
     ph = phases_of(geometry, leg, out, tubes, rule)
     # What returns little by itself may still carry the next bounces.
@@ -173,8 +175,9 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     carries = more and rule.coarse == 1.0
     matters = ((ph.in_phase if carries else ph.bound) > found.prune_threshold(ph.length)) & (not ready)
     take_seen(view, view.seen & ~matters)
-    known: View | None = view.take(matters)
-    tubes, matters = tubes.take(matters), matters[matters]
+    rows = np.flatnonzero(matters)
+    known: View | None = view.take(rows)
+    tubes, matters = tubes.take(rows), matters[rows]
     for level in range(rule.levels + 1):
         if not len(tubes):
             break

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import row_numbers
 from raychan.radar.beam_table import Beam
 from raychan.records import BLOCKER, MIRROR, REFLECT, TRANSMIT
 from raychan.tracing.cache import cache_of
@@ -38,9 +39,10 @@ class View:
     passed: Ints
     blocker: Ints
 
-    def take(self, index: NDArray[np.generic] | slice) -> View:
-        """Return how the points at `index` (mask, numbers or slice) are seen."""
-        return View(self.seen[index], self.corners[index], self.passed[index], self.blocker[index])
+    def take(self, index: NDArray[np.generic]) -> View:
+        """Return how the points at `index` (mask or numbers) are seen."""
+        rows = row_numbers(index)
+        return View(*(getattr(self, f.name).take(rows, axis=0) for f in fields(View)))
 
     @staticmethod
     def of(rays: ShadowRays) -> View:

@@ -14,13 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import row_numbers
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
 from raychan.geometry.curved_patches import place_on, rise_off_chord
 from raychan.parallel import parallel_for
 from raychan.tracing.image_paths import weight
 from raychan.tracing.legs import Leg
-from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, row_numbers
+from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes
 from raychan.vectors import distance, length_to
 from raychan.world.geometry import Geometry
 

@@ -216,8 +216,10 @@ def resolve_return_leg(
             tubes, ph, facing = tubes.only(rows), ph.take(rows), facing[rows]
         least = found.prune_threshold(ph.length) if first else found.deep_threshold(ph.length)
         # Along an edge flat tubes may err alike though the phase runs over each.
-        alike = tubes.flat & ~geometry.curved[tubes.facet] & rule.by_landing
-        matters = (np.where(alike, ph.in_phase, ph.bound) > least) & (not found.budget.spent(geometry))
+        bound = ph.bound
+        if rule.by_landing:
+            bound = np.where(tubes.flat & ~geometry.curved[tubes.facet], ph.in_phase, bound)
+        matters = (bound > least) & (not found.budget.spent(geometry))
         # In a scene currents beyond the horizon are weak: their visibility is tested by their centres alone.
         tested = matters if which == LIT else matters & facing
         view = tube_visibility(geometry, out, tubes, tested, first, rule, level, facing_away=~facing)
@@ -226,10 +228,11 @@ def resolve_return_leg(
         what = choose_actions(*how, cut)
         wanted = what >= BISECT
         afforded = found.budget.affords(geometry, tubes.facet, wanted)
-        if (wanted & ~afforded).any():
+        if afforded is not wanted:
             what = choose_actions(*how, cut & (~wanted | afforded))
         ready = np.flatnonzero(what == KEEP)
-        resolved.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
+        if len(ready) or not resolved:
+            resolved.append((tubes.take(ready), view.centre.take(ready), ph.take(ready)))
         if not (what >= BISECT).any():
             break
         tubes = _parts_of(geometry, leg, tubes, what, ph, view.side, first, rule.jitter)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import row_numbers
 from raychan.geometry.curved_patches import rays_on
 from raychan.poses import sizes
 from raychan.records import REFLECT
@@ -240,12 +241,6 @@ def clearance(geometry: Geometry, tubes: Tubes) -> Floats:
 def slices(columns: tuple[Any, ...], rows: slice) -> Any:
     """Return the same named tuple of columns, of some rows."""
     return type(columns)(*(x[rows] for x in columns))
-
-
-def row_numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:
-    """Return the numbers of the rows at `index` (mask or numbers); numpy takes rows by number up to ten times
-    faster."""
-    return np.flatnonzero(index) if index.dtype == np.bool_ else np.asarray(index, np.intp)
 
 
 def unit(v: Floats) -> Floats:

@@ -59,7 +59,7 @@ def test_patches_of_a_sphere_are_cut_until_their_reflected_rays_spread_by_the_fa
         assert ((spread > fan) == (edge >= 0)).all()
         if len(rest) == len(facet):
             break
-        one, other = halved(facet[edge >= 0], bary[edge >= 0], edge[edge >= 0], 0.0, level)
+        one, other = halved(facet, bary, edge, np.flatnonzero(edge >= 0), 0.0, level)
         facet, bary = np.concatenate([facet[rest], one]), np.concatenate([bary[rest], other])
     assert level > 0 and (edge < 0).all()
 
