@@ -83,20 +83,21 @@ def _turned(turn: Floats) -> Floats:
 
 
 def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> Complexes:
-    """Return the gains (n,) of routes, with neither carrier phase nor the phase integral over the footprint."""
+    """Return the gains (n, 3) of routes at the corners of their footprints, with neither carrier phase nor the phase
+    integral over these: their sum is the mean. Without a footprint the first is the gain."""
     n = len(routes.kind)
     bare: Routes = routes.replace(lengths=np.zeros((n, 6)), length=np.zeros(n), taper=np.ones((n, 3)))
     ends: list[Any] = [lambda d, f=f: np.asarray(f(d))[:, None] for f in (radar.tx_field, radar.rx_field)]
-    gain = transfer(bare, facets, frequency, *ends)[:, 0, 0]
+    gain = transfer(bare, facets, frequency, *ends, corners=True)[:, 0, 0]
     # The air's loss hardly changes within a frame: 1 m of path is 0.001 dB, in the heaviest rain 0.03 dB.
-    return gain * np.exp(-facets.attenuation * routes.length) if facets.attenuation else gain
+    return gain * np.exp(-facets.attenuation * routes.length)[:, None] if facets.attenuation else gain
 
 
 def extrapolated(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:
     """Return lengths [m] and amplitudes (t, n, 3) of routes at later instants, a part for each corner of the footprint.
 
     Routes without a footprint, or with one that is short in range, have a single part: the others have amplitude 0.
-    Args: strength (n,) from `strengths`; poses of bodies and radar at the instants; frequency [Hz].
+    Args: strength (n, 3) from `strengths`; poses of bodies and radar at the instants; frequency [Hz].
     """
     shape = (len(poses.radar), len(routes.kind), 3)
     lengths, amplitudes = np.empty(shape), np.empty(shape, np.complex128)
@@ -209,7 +210,7 @@ def _carry(  # type: ignore[no-untyped-def]
             out_lengths[t, i, :] = centre
             out[t, i, :] = 0.0
             if at == used or kind[i, at] != SCATTER:
-                out[t, i, 0] = strength[i] * np.exp(-1j * k * centre)
+                out[t, i, 0] = strength[i, 0] * np.exp(-1j * k * centre)
                 continue
             low, high = np.inf, -np.inf
             for c in range(6):
@@ -223,4 +224,4 @@ def _carry(  # type: ignore[no-untyped-def]
             if not split:
                 out_lengths[t, i, :] = centre
             for c in range(3):
-                out[t, i, c if split else 0] += strength[i] * taper[i, c] * terms[c]
+                out[t, i, c if split else 0] += 3.0 * strength[i, c] * taper[i, c] * terms[c]

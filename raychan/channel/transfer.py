@@ -16,6 +16,7 @@ from raychan.em.fresnel import coefficients
 from raychan.em.phase_integral import triangle_terms
 from raychan.em.phasor import times
 from raychan.em.physical_optics import coupled, incident, reflected_wave, shadow_wave
+from raychan.em.polarization import onto
 from raychan.parallel import parallel_for
 from raychan.records import POINT, REFLECT, SCATTER, Facets, Materials, Routes
 from raychan.units import C0
@@ -28,6 +29,8 @@ HUYGENS, REFLECTED, SHADOW = 0, 1, 2
 those of the reflected wave; those of the shadow radiation."""
 
 _LINEAR = 1e-4  # rad: deviation from a linear phase up to which a piece of the footprint is integrated in closed form
+
+_INSIDE = 1e-6  # of the way to the centre: beyond the rounding of cuts, below what a pattern changes by; not measured
 
 FieldOf = Callable[[Floats], Complexes]
 """Function from directions (n, 3) to an antenna's vector fields (n, p, 3), one for each of p polarisations."""
@@ -52,9 +55,6 @@ def transfer(
 ) -> Complexes:
     """Return the gain (n, q, p) of each route: received over transmitted wave, with lambda / 4 pi and carrier phase.
 
-    Fields and coefficients are those of the rays to the corners of a footprint over plane mirrors, of the ray to its
-    centre over curved ones.
-
     Args: tx_field, rx_field vector fields of p and q polarisations; corners: return (n, q, p, 3), the parts that belong
     to the three footprint corners and sum to the gain; wave which currents radiate; unless it is HUYGENS, elements
     (n, 3, 3) [m^2] are the vector area elements at the corners, in place of taper and area.
@@ -77,7 +77,7 @@ def transfer(
 
     def some(at: slice) -> None:
         _transfer(
-            (routes.tx, routes.rx, routes.far), facets.material, table, k, wave, e_tx, e_rx,
+            (routes.tx, routes.rx, routes.far), facets.material, table, k, wave, e_tx, e_rx, away, look,
             first[at.start : at.stop + 1], *(c[at] for c in columns),
         )  # fmt: skip
 
@@ -124,8 +124,8 @@ def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-unt
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _transfer(  # type: ignore[no-untyped-def]
-    ends, material, table, k, wave, e_tx, e_rx, first, vertices, normals, kind, facet, scatter, lengths, length, taper,
-    area, spread_in, spread_out, caustics, sigma, elements, out, points,
+    ends, material, table, k, wave, e_tx, e_rx, away, look, first, vertices, normals, kind, facet, scatter, lengths,
+    length, taper, area, spread_in, spread_out, caustics, sigma, elements, out, points,
 ):  # fmt: skip
     tx, rx, far = ends  # taken out of the tuple once: each access counts a reference
     n, d = kind.shape
@@ -145,17 +145,17 @@ def _transfer(  # type: ignore[no-untyped-def]
             incidences(points, tx, i, 0, at, 1, vertices, normals, kind, cos_in, starts)
             incidences(points, rx, i, used - 1, at, -1, vertices, normals, kind, cos_out, starts)
         # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
-        _begin(arriving, e_tx, first[i], ways)
+        _begin(arriving, e_tx, away, k_in, first[i], ways)
         k_in = over_mirrors(
             arriving, ways, k_in, i, 0, at, 1, vertices, normals, kind, facet, material, used, rx, table, k, cos_in
         )  # fmt: skip
         if at == used:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
-            _begin(leaving, e_rx, first[i], 1)
+            _begin(leaving, e_rx, look, k_out, first[i], 1)
             _couple(i, out, whole, leaving, arriving)
             continue
         # Out: the receiver's field by reciprocity, over the rest of the route backwards.
-        _begin(leaving, e_rx, first[i], ways)
+        _begin(leaving, e_rx, look, k_out, first[i], ways)
         k_out = over_mirrors(
             leaving, ways, k_out, i, used - 1, at, -1, vertices, normals, kind, facet, material, used, rx, table, k,
             cos_out,
@@ -183,13 +183,19 @@ def _transfer(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _begin(held, fields, row, ways):  # type: ignore[no-untyped-def]
-    """Write the fields (p, 3) that an end has of so many ways, from a row on, one after the other."""
+def _begin(held, fields, directions, centre, first, ways):  # type: ignore[no-untyped-def]
+    """Write the fields (p, 3) that an end has of so many ways, rows from the first on, one after the other; those of
+    three ways as turned with their rays into that of the centre."""
     count = fields.shape[1]
     for w in range(ways):
+        k = row(directions, first + w)
+        both = k[0] + centre[0], k[1] + centre[1], k[2] + centre[2]
+        size = 1.0 + dot(k, centre)
         for f in range(count):
+            e = slot(fields, first + w, f)
+            along = onto(e, centre) / size if ways == 3 else 0j
             for c in range(3):
-                held[w * count + f, c] = fields[row + w, f, c]
+                held[w * count + f, c] = e[c] - along * both[c]
 
 
 @njit(cache=True)
@@ -227,6 +233,9 @@ def _directions(  # type: ignore[no-untyped-def]
             continue
         incidences(points, tx, i, 0, at, 1, vertices, normals, kind, cosines, out[begin:end])
         incidences(points, rx, i, slots[i] - 1, at, -1, vertices, normals, kind, cosines, back[begin:end])
+        # Footprints are cut where an antenna's gain ends: corners there lie on the centre's side of that line.
+        out[begin:end] += _INSIDE * (away[i] - out[begin:end])
+        back[begin:end] += _INSIDE * (look[i] - back[begin:end])
     return first, out, back
 
 
