@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 # Tests of the kernels, which `make test` also runs with bounds checked; the rest of the suite: make test-bounds.
 BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py signal/test_nufft.py \
 	world/test_shapes.py world/test_ray_caster.py run/test_provenance.py run/test_preview_bounds.py channel/test_corner_places.py \
-	channel/test_layers_over_a_footprint.py tracing/test_landing_on_curves.py \
+	channel/test_layers_over_a_footprint.py channel/test_fields_over_a_footprint.py tracing/test_landing_on_curves.py \
 	$(addprefix tracing/test_,edge_diffraction.py image_paths.py occluders.py subdivide.py visibility.py))
 # Tests of the kernels that are cheap enough as plain Python; marked `compiled`: what is not, each with its reason.
 NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_doppler.py \
