@@ -55,9 +55,9 @@ def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any 
     waveform = Waveform(
         carrier=w.carrier_ghz * 1e9,
         bandwidth=w.bandwidth_mhz * 1e6,
-        chirp_duration=w.chirp_us * 1e-6,
-        repetition=None if w.stagger_us else (w.repetition_us or w.chirp_us) * 1e-6,  # type: ignore[arg-type]
-        stagger=tuple(t * 1e-6 for t in w.stagger_us or ()),
+        chirp_duration=w.chirp_us / 1e6,
+        repetition=None if w.stagger_us else (w.repetition_us or w.chirp_us) / 1e6,  # type: ignore[arg-type]
+        stagger=tuple(t / 1e6 for t in w.stagger_us or ()),
         n_chirps=w.chirps,
         n_samples=w.samples,
         complex_sampling=w.iq,

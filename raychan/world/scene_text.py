@@ -101,7 +101,7 @@ def _milli(x: float) -> float:
 
 
 def _micro(x: float) -> float:
-    return x * 1e-6
+    return x / 1e6
 
 
 def figure(guess: float, value: float, read: Callable[[float], float]) -> float:
