@@ -41,13 +41,13 @@ def slot(a, i, j):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def over_mirrors(  # type: ignore[no-untyped-def]
-    e, ways, ahead, i, first, stop, step, vertices, normals, kind, facet, material, used, end, table, k, cosines
+    e, ways, ahead, i, first, stop, step, vertices, normals, kind, facet, material, used, end, table, k, cosines, begun
 ):
     """Send fields e (p, 3) of route i that travel along `ahead` over mirrors and layers first, first + step, ... short
     of stop, in place; return the direction in which they leave the last.
 
     Their coefficients are those of the way itself; of three ways, an equal part of the fields for each, those at
-    cosines of incidence (3, d).
+    cosines of incidence (n, d), rows from `begun` on.
     """
     kinds, eps, thickness, roughness = table
     part = len(e) // 3
@@ -56,7 +56,7 @@ def over_mirrors(  # type: ignore[no-untyped-def]
         s, p_in, p_out, _ = incident(ahead, normal)
         p = p_in if through else p_out
         for c in range(ways):
-            at = cosines[c, j] if ways == 3 else cosine(ahead, normal)
+            at = cosines[begun + c, j] if ways == 3 else cosine(ahead, normal)
             r_s, r_p, t_s, t_p = coefficients(kinds[m], eps[m], thickness[m], roughness[m], at, k)
             by_s, by_p = (t_s, t_p) if through else (r_s, r_p)
             for f in range(c * part, (c + 1) * part):
@@ -66,24 +66,11 @@ def over_mirrors(  # type: ignore[no-untyped-def]
     return ahead
 
 
-@njit(cache=True)
-def incidences(points, end, i, first, stop, step, vertices, normals, kind, out, starts):  # type: ignore[no-untyped-def]
-    """Write the cosines of incidence (3, d) on the surfaces first, first + step, ... up to the footprint in slot
-    `stop` of route i for the rays that come from `end` over the same planes to its corners, points (n, 6, 3), and the
-    unit directions (3, 3) in which they leave that end."""
-    image = vec(end)
-    for j in range(first, stop, step):
-        if kind[i, j] != TRANSMIT:
-            image = mirrored(image, slot(vertices, i, j), slot(normals, i, j))
-    for c in range(3):
-        ahead = heading(image, slot(points, i, c))
-        out[c, stop] = cosine(ahead, slot(normals, i, stop))
-        for j in range(stop - step, first - step, -step):
-            n = slot(normals, i, j)
-            out[c, j] = cosine(ahead, n)
-            if kind[i, j] != TRANSMIT:
-                ahead = mirrored(ahead, (0.0, 0.0, 0.0), n)
-        starts[c, 0], starts[c, 1], starts[c, 2] = ahead
+@njit(cache=True, forceinline=True)
+def mirrored(x, on, n):  # type: ignore[no-untyped-def]
+    """Return x mirrored at the plane through `on` of normal n."""
+    h = 2.0 * ((x[0] - on[0]) * n[0] + (x[1] - on[1]) * n[1] + (x[2] - on[2]) * n[2])
+    return x[0] - h * n[0], x[1] - h * n[1], x[2] - h * n[2]
 
 
 @njit(cache=True, forceinline=True)
@@ -93,10 +80,3 @@ def curved(n, f):  # type: ignore[no-untyped-def]
     for c in range(3):
         apart += abs(n[f, 0, c] - n[f, 1, c]) + abs(n[f, 0, c] - n[f, 2, c])
     return apart > 0.0
-
-
-@njit(cache=True, forceinline=True)
-def mirrored(x, on, n):  # type: ignore[no-untyped-def]
-    """Return x mirrored at the plane through `on` of normal n."""
-    h = 2.0 * ((x[0] - on[0]) * n[0] + (x[1] - on[1]) * n[1] + (x[2] - on[2]) * n[2])
-    return x[0] - h * n[0], x[1] - h * n[1], x[2] - h * n[2]

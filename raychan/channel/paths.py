@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.corner_places import corner_places
+from raychan.channel.corner_rays import departures
 from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
 from raychan.channel.pieces import Split, parts_of
 from raychan.channel.rates import rates
 from raychan.channel.slow_time import APART, corner_rates
-from raychan.channel.transfer import corner_gains, departures
+from raychan.channel.transfer import corner_gains
 from raychan.parallel import parallel_for
 from raychan.radar.array import reach
 from raychan.radar.dual_paths import columns_of

@@ -9,8 +9,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.corner_rays import corner_rays, outward, used_of
 from raychan.channel.ends import RadarEnds, rx_fields
-from raychan.channel.fields_along import cosine, curved, heading, incidences, over_mirrors, slot, vec
+from raychan.channel.fields_along import cosine, over_mirrors, slot
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
 from raychan.em.phase_integral import triangle_terms
@@ -18,7 +19,7 @@ from raychan.em.phasor import times
 from raychan.em.physical_optics import coupled, incident, reflected_wave, shadow_wave
 from raychan.em.polarization import onto
 from raychan.parallel import parallel_for
-from raychan.records import POINT, REFLECT, SCATTER, Facets, Materials, Routes
+from raychan.records import POINT, Facets, Materials, Routes
 from raychan.units import C0
 from raychan.vectors import dot, row
 
@@ -30,17 +31,8 @@ those of the reflected wave; those of the shadow radiation."""
 
 _LINEAR = 1e-4  # rad: deviation from a linear phase up to which a piece of the footprint is integrated in closed form
 
-_INSIDE = 1e-6  # of the way to the centre: beyond the rounding of cuts, below what a pattern changes by; not measured
-
 FieldOf = Callable[[Floats], Complexes]
 """Function from directions (n, 3) to an antenna's vector fields (n, p, 3), one for each of p polarisations."""
-
-
-def departures(routes: Routes) -> tuple[Floats, Floats]:
-    """Return the unit directions (n, 3) in which the transmitter radiates and to which the receiver looks."""
-    away, look = np.empty((2, len(routes.kind), 3))
-    _departures(routes.tx, routes.rx, routes.far, routes.vertices, routes.kind, away, look)
-    return away, look
 
 
 def transfer(
@@ -59,12 +51,9 @@ def transfer(
     to the three footprint corners and sum to the gain; wave which currents radiate; unless it is HUYGENS, elements
     (n, 3, 3) [m^2] are the vector area elements at the corners, in place of taper and area.
     """
-    first, away, look = _directions(
-        routes.tx, routes.rx, routes.far or wave != HUYGENS, routes.vertices, routes.normals, routes.kind, routes.facet,
-        routes.scatter, routes.points, facets.normals, *departures(routes),
-    )  # fmt: skip
-    e_tx = np.ascontiguousarray(tx_field(away), dtype=np.complex128)
-    e_rx = np.ascontiguousarray(rx_field(look), dtype=np.complex128)
+    rays = corner_rays(routes, facets, routes.far or wave != HUYGENS)
+    e_tx = np.ascontiguousarray(tx_field(rays.away), dtype=np.complex128)
+    e_rx = np.ascontiguousarray(rx_field(rays.look), dtype=np.complex128)
     m: Materials = facets.materials
     table = m.kind, m.eps, m.thickness, m.roughness
     k = 2.0 * np.pi * frequency / C0
@@ -72,13 +61,13 @@ def transfer(
     columns = (
         routes.vertices, routes.normals, routes.kind, routes.facet, routes.scatter, routes.lengths, routes.length,
         routes.taper, routes.area, routes.spread_in, routes.spread_out, routes.caustics, routes.sigma,
-        np.zeros((len(out), 0, 3)) if elements is None else elements, out, routes.points,
+        np.zeros((len(out), 0, 3)) if elements is None else elements, out,
     )  # fmt: skip
 
     def some(at: slice) -> None:
         _transfer(
-            (routes.tx, routes.rx, routes.far), facets.material, table, k, wave, e_tx, e_rx, away, look,
-            first[at.start : at.stop + 1], *(c[at] for c in columns),
+            (routes.tx, routes.rx, routes.far), facets.material, table, k, wave, e_tx, e_rx,
+            rays._replace(first=rays.first[at.start : at.stop + 1]), *(c[at] for c in columns),
         )  # fmt: skip
 
     parallel_for(len(out), some)
@@ -99,66 +88,38 @@ def corner_gains(routes: Routes, facets: Facets, radar: RadarEnds, frequency: fl
     )[:, :, 0]
 
 
-@njit(cache=True, forceinline=True)
-def _outward(tx, rx, far, vertices, i, used):  # type: ignore[no-untyped-def]
-    """Return the directions in which the transmitter radiates and to which the receiver looks, route i of so many
-    slots."""
-    if far:
-        return (-tx[0], -tx[1], -tx[2]), (-rx[0], -rx[1], -rx[2])
-    if used == 0:
-        return heading(vec(tx), vec(rx)), heading(vec(rx), vec(tx))
-    return heading(vec(tx), slot(vertices, i, 0)), heading(vec(rx), slot(vertices, i, used - 1))
-
-
-@njit(cache=True, nogil=True)
-def _departures(tx, rx, far, vertices, kind, away, look):  # type: ignore[no-untyped-def]
-    n, d = kind.shape
-    for i in range(n):
-        used = 0
-        while used < d and kind[i, used] > 0:
-            used += 1
-        out, back = _outward(tx, rx, far, vertices, i, used)
-        for c in range(3):
-            away[i, c], look[i, c] = out[c], back[c]
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def _transfer(  # type: ignore[no-untyped-def]
-    ends, material, table, k, wave, e_tx, e_rx, away, look, first, vertices, normals, kind, facet, scatter, lengths,
-    length, taper, area, spread_in, spread_out, caustics, sigma, elements, out, points,
+    ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length, taper,
+    area, spread_in, spread_out, caustics, sigma, elements, out,
 ):  # fmt: skip
-    tx, rx, far = ends  # taken out of the tuple once: each access counts a reference
-    n, d = kind.shape
+    # Taken out of their tuples once: each access counts a reference.
+    (tx, rx, far), (first, away, look, cos_in, cos_out) = ends, rays
     terms, phases = np.empty(3, np.complex128), np.empty(6)
     # The fields of the centre, or of the three corners one after the other.
     arriving = np.empty((3 * e_tx.shape[1], 3), np.complex128)
     leaving = np.empty((3 * e_rx.shape[1], 3), np.complex128)
-    cos_in, cos_out, starts = np.empty((3, d)), np.empty((3, d)), np.empty((3, 3))
-    for i in range(n):
-        used, wavelength_4pi = 0, 0.5 / k
-        while used < d and kind[i, used] > 0:
-            used += 1
+    for i in range(len(kind)):
+        used, wavelength_4pi = used_of(kind, i), 0.5 / k
         at = scatter[i] if scatter[i] >= 0 else used
-        k_in, k_out = _outward(tx, rx, far, vertices, i, used)
-        ways = first[i + 1] - first[i]
-        if ways == 3:
-            incidences(points, tx, i, 0, at, 1, vertices, normals, kind, cos_in, starts)
-            incidences(points, rx, i, used - 1, at, -1, vertices, normals, kind, cos_out, starts)
+        k_in, k_out = outward(tx, rx, far, vertices, i, used)
+        begun, ways = first[i], first[i + 1] - first[i]
         # In: from the transmitter over mirrors and layers to the scatterer (or to the receiver).
-        _begin(arriving, e_tx, away, k_in, first[i], ways)
+        _begin(arriving, e_tx, away, k_in, begun, ways)
         k_in = over_mirrors(
-            arriving, ways, k_in, i, 0, at, 1, vertices, normals, kind, facet, material, used, rx, table, k, cos_in
+            arriving, ways, k_in, i, 0, at, 1, vertices, normals, kind, facet, material, used, rx, table, k, cos_in,
+            begun,
         )  # fmt: skip
         if at == used:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
-            _begin(leaving, e_rx, look, k_out, first[i], 1)
+            _begin(leaving, e_rx, look, k_out, begun, 1)
             _couple(i, out, whole, leaving, arriving)
             continue
         # Out: the receiver's field by reciprocity, over the rest of the route backwards.
-        _begin(leaving, e_rx, look, k_out, first[i], ways)
+        _begin(leaving, e_rx, look, k_out, begun, ways)
         k_out = over_mirrors(
             leaving, ways, k_out, i, used - 1, at, -1, vertices, normals, kind, facet, material, used, rx, table, k,
-            cos_out,
+            cos_out, begun,
         )  # fmt: skip
         if kind[i, at] == POINT:
             whole = wavelength_4pi * spread_in[i] * np.exp(-1j * k * length[i])
@@ -176,7 +137,7 @@ def _transfer(  # type: ignore[no-untyped-def]
             terms[c3] *= times(area[i] * taper[i, c3] if wave == HUYGENS else 1.0, scale)
         if wave == HUYGENS:
             _scatter(
-                i, out, terms, ways, arriving, leaving, k_in, k_out, normal, table, m, k, at, cos_in, cos_out
+                i, out, terms, ways, arriving, leaving, k_in, k_out, normal, table, m, k, at, cos_in, cos_out, begun
             )  # fmt: skip
         else:
             _scatter_elements(i, out, terms, wave, arriving, leaving, k_in, k_out, normal, table, m, k, elements)
@@ -198,47 +159,6 @@ def _begin(held, fields, directions, centre, first, ways):  # type: ignore[no-un
                 held[w * count + f, c] = e[c] - along * both[c]
 
 
-@njit(cache=True)
-def _by_corner(i, used, kind, facet, scatter, normals):  # type: ignore[no-untyped-def]
-    """Tell whether each corner of a footprint of route i has fields of its own, of the ray that leads to it: over
-    layers and plane mirrors. Fields of the centre alone would jump from tube to tube, and what off the mirror direction
-    should cancel where tubes meet would not."""
-    plane = scatter[i] >= 0 and kind[i, scatter[i]] == SCATTER
-    for j in range(used):
-        plane &= kind[i, j] != REFLECT or facet[i, j] < 0 or not curved(normals, facet[i, j])
-    return plane
-
-
-@njit(cache=True, nogil=True)
-def _directions(  # type: ignore[no-untyped-def]
-    tx, rx, apart, vertices, normals, kind, facet, scatter, points, facet_normals, away, look
-):
-    """Return the first of the rows of each route, (n + 1,) with the end of the last, and the rows (m, 3): unit
-    directions in which the transmitter radiates and to which the receiver looks, one for a route, away and look (n, 3),
-    or unless all are `apart` one for each corner of its footprint."""
-    n, d = kind.shape
-    first, slots = np.zeros(n + 1, np.int64), np.empty(n, np.int64)
-    for i in range(n):
-        used = 0
-        while used < d and kind[i, used] > 0:
-            used += 1
-        slots[i] = used
-        corners = not apart and _by_corner(i, used, kind, facet, scatter, facet_normals)
-        first[i + 1] = first[i] + (3 if corners else 1)
-    out, back, cosines = np.empty((first[n], 3)), np.empty((first[n], 3)), np.empty((3, d))
-    for i in range(n):
-        begin, end, at = first[i], first[i + 1], scatter[i]
-        if end == begin + 1:
-            out[begin], back[begin] = away[i], look[i]
-            continue
-        incidences(points, tx, i, 0, at, 1, vertices, normals, kind, cosines, out[begin:end])
-        incidences(points, rx, i, slots[i] - 1, at, -1, vertices, normals, kind, cosines, back[begin:end])
-        # Footprints are cut where an antenna's gain ends: corners there lie on the centre's side of that line.
-        out[begin:end] += _INSIDE * (away[i] - out[begin:end])
-        back[begin:end] += _INSIDE * (look[i] - back[begin:end])
-    return first, out, back
-
-
 @njit(cache=True, forceinline=True)
 def _couple(i, out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
     """Write gains (n, q, p, ...) of route i without a footprint: fields arriving (p, 3) onto receiving (q, 3)."""
@@ -249,21 +169,21 @@ def _couple(i, out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def _scatter(  # type: ignore[no-untyped-def]
-    i, out, terms, ways, arriving, leaving, k_in, k_out, normal, table, m, k, at, cos_in, cos_out
+    i, out, terms, ways, arriving, leaving, k_in, k_out, normal, table, m, k, at, cos_in, cos_out, begun
 ):
     """Add to gains (n, q, p, 1 or 3) what the footprint of route i in slot `at`, of material m, scatters: its three
     terms (3,), each with the currents that the wave has there.
 
-    These are those of the centre, or of three ways each corner's own, at its cosines of incidence (3, d), of its own
-    part of the fields arriving and leaving; directions are always those of the centre.
+    These are those of the centre, or of three ways each corner's own, at its cosines of incidence (n, d), rows from
+    `begun` on, of its own part of the fields arriving and leaving; directions are always those of the centre.
     """
     kinds, eps, thickness, roughness = table
     apart, corners = out.shape[3] == 3, ways == 3
     ins, outs = out.shape[2], out.shape[1]
     wave_in, wave_out = incident(k_in, normal), incident(k_out, normal)
     for c in range(ways):
-        there = cos_in[c, at] if corners else cosine(k_in, normal)
-        back = cos_out[c, at] if corners else cosine(k_out, normal)
+        there = cos_in[begun + c, at] if corners else cosine(k_in, normal)
+        back = cos_out[begun + c, at] if corners else cosine(k_out, normal)
         ci = co = coefficients(kinds[m], eps[m], thickness[m], roughness[m], there, k)
         if back != there:
             co = coefficients(kinds[m], eps[m], thickness[m], roughness[m], back, k)

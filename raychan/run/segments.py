@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.corner_places import corner_places
-from raychan.channel.transfer import departures
+from raychan.channel.corner_rays import departures
 from raychan.radar.array import Wavefronts, wavefronts
 from raychan.records import SCATTER, Cube, DiffractedRoutes, Facets, Paths, Routes
 from raychan.units import C0

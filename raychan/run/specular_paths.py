@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from raychan.channel.corner_rays import departures
 from raychan.channel.rates import rates
-from raychan.channel.transfer import departures, transfer
+from raychan.channel.transfer import transfer
 from raychan.poses import theta_phi
 from raychan.records import NONE, REFLECT, TRANSMIT, ExactTrajectories, Facets, Routes, SpecularPaths
 from raychan.tracing.legs import Leg

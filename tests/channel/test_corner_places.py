@@ -10,8 +10,8 @@ import trimesh
 
 import raychan as rc
 from raychan.channel.corner_places import corner_places
+from raychan.channel.corner_rays import departures
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
-from raychan.channel.transfer import departures
 from raychan.radar.array import wavefronts
 from raychan.records import REFLECT, SCATTER, Routes
 from raychan.run.micro_doppler import retraced
