@@ -13,8 +13,9 @@ from raychan.poses import theta_phi
 from raychan.records import Routes
 from raychan.run.first_surface import first_surface
 from raychan.tracing.contributions import Budget, Contributions
+from raychan.tracing.images import Images
 from raychan.tracing.legs import Leg
-from raychan.tracing.shooting import Images, Wanted, numbered_routes
+from raychan.tracing.shooting import Wanted, numbered_routes
 from raychan.tracing.sources import Sources, depth_of, launches, source_of, sources_of
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.units import C0

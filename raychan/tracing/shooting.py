@@ -14,6 +14,7 @@ from raychan.poses import sizes
 from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions
+from raychan.tracing.images import Images
 from raychan.tracing.launch import OBLIQUE_SHARE, launch
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.outgoing import Leaving
@@ -83,19 +84,23 @@ def numbered_routes(
     each: Callable[[Routes, int, int], T],
     first: Callable[[Tubes, Contributions], None] | None = None,
     wanted: Wanted | None = None,
+    back: bool = False,
 ) -> Iterator[T]:
     """Yield what `each` makes of the routes that `tube_routes` yields, of the number of the bounce at which they
     scatter, from 1 on, and of that of the leg over which they leave; it is called by any thread.
 
-    Args: images of all legs in and out; wanted, if not all; else as for `tube_routes`.
+    Args: images of all legs in and out; wanted, if not all; back: this is the other way, from the receiver, of which
+    routes count that the first one has not (see `tracing.ways`); else as for `tube_routes`.
     """
     more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone and (wanted is None or wanted.depth > 1)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
     only = None if wanted is None else wanted.facets
+    if back and not (more or images.one_way(geometry, leg, np.arange(len(geometry.plane))).any()):
+        return
     for tubes in launch(geometry, leg, outs[0], pieces, found, more, others, only):
         if first is not None:
             first(tubes, found)
-        wave = _Wave(geometry, leg, outs, images, bounces, each, wanted)
+        wave = _Wave(geometry, leg, outs, images, bounces, each, wanted, back)
         yield from wave.followed(tubes, found, first is None)
 
 
@@ -110,6 +115,7 @@ class _Wave(Generic[T]):
     bounces: int
     each: Callable[[Routes, int, int], T]
     wanted: Wanted | None
+    back: bool
 
     def followed(self, tubes: Tubes, found: Contributions, single: bool) -> Iterator[T]:
         """Yield what is made of the routes of tubes that stand on their first surface, and of all later bounces;
@@ -125,6 +131,8 @@ class _Wave(Generic[T]):
             ends = count >= self.bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth)
             # Mirrors such as the ground return by their exact foot points, not by tubes.
             scatters = geometry.facets.role[geometry.facets.body[tubes.facet]] != MIRROR
+            if first and self.back:
+                scatters &= self.images.one_way(geometry, self.leg, tubes.facet)
             share = 1.0 / min(max(len(outs), 1), _SHARES)
             twice, which = self.images.returns(geometry, tubes, first), OBLIQUE if first else FACING
             any_over = self.leg if first else None
@@ -257,37 +265,3 @@ def _parts_of(
     if len(shaded):
         parts.append(subdivide(geometry, leg, tubes, shaded, side, first, jitter)[0])
     return Tubes.join(parts)
-
-
-@dataclass(frozen=True)
-class Images:
-    """Returns that legs over mirrors carry already and tubes must not carry again; `planes` (p,) are the mirrors of
-    legs in, `outward` (p,) those of legs out.
-
-    Over several such mirrors in a row a wave scatters at the last one.
-    """
-
-    planes: Bools
-    outward: Bools
-
-    @staticmethod
-    def of(geometry: Geometry, ins: list[Leg], outs: list[Leg]) -> Images:
-        """Return the mirrors of legs in and out."""
-        planes, outward = np.zeros((2, int(geometry.plane.max(initial=-1)) + 1), bool)
-        for used, legs in ((planes, ins), (outward, outs)):
-            used[geometry.plane[[m.facet for leg in legs for m in leg.mirrors]]] = True
-        return Images(planes, outward)
-
-    def returns(self, geometry: Geometry, tubes: Tubes, first: bool) -> Bools:
-        """Tell which tubes (n,) stand on a mirror whose image carries their return: on their first surface those that
-        leave over other mirrors, later all that came from another piece."""
-        plane = geometry.plane[tubes.facet]
-        if first:
-            return self.planes[plane]
-        return self.outward[plane] & (geometry.piece[tubes.came_from()] != geometry.piece[tubes.facet])
-
-    def carry(self, geometry: Geometry, tubes: Tubes) -> Bools:
-        """Tell which tubes (n,) a leg covers: it leads over the mirror where they bounced first to where they are."""
-        before = tubes.came_from()
-        moved = geometry.piece[before] != geometry.piece[tubes.facet]
-        return self.planes[geometry.plane[before]] & moved

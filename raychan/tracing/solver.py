@@ -20,9 +20,10 @@ from raychan.tracing.point_targets import diffracted_routes, point_routes
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.shared_work import all_of
-from raychan.tracing.shooting import Images, Wanted, numbered_routes
+from raychan.tracing.shooting import Wanted, numbered_routes
 from raychan.tracing.sources import EXACT, Sources, sources_of
 from raychan.tracing.tubes import Refinement
+from raychan.tracing.ways import Way
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -88,7 +89,9 @@ class Launch:
             self.outs = self.legs
             if rule.rx is not None:
                 self.outs = list(compress(self.every[1], lit_legs(geometry, self.every[1], layers)))
-        self._images = Images.of(geometry, self.legs, self.outs)
+        # Routes of one bounce, and of a body that no ray meets twice, are alike both ways.
+        both = rule.rx is not None and rule.bounces > 1 and not geometry.convex_alone
+        self._ways = Way.between(geometry, self.legs, self.outs, both)
         self._found: dict[int, Contributions] = {}
 
     def whole(
@@ -102,11 +105,13 @@ class Launch:
         # matter.
         direct = self._found[0] = Contributions(self._limited(self.rule.refinement))
         yield from self._over(0, direct, stats, each)
-        for group in self._groups(range(1, len(self.legs))):
+        count = sum(len(way.legs) for way in self._ways)
+        for group in self._groups(range(1, count)):
             if progress:
-                progress("trace", group[0] / len(self.legs))
+                progress("trace", group[0] / count)
             for i in group:
-                self._found[i] = direct.forked(self.geometry, 1.0 / _SHARES)
+                share = 0.5 if i == len(self.legs) else 1.0 / _SHARES  # the direct leg of the other way
+                self._found[i] = direct.forked(self.geometry, share)
             yield from self._together([(i, self._found[i], None) for i in group], stats, each)
             for i in group:
                 direct.budget.take_back(self._found[i].budget)
@@ -153,17 +158,21 @@ class Launch:
     def _over(
         self, i: int, found: Contributions, stats: Stats, each: Callable[[Batch], T], wanted: Wanted | None = None
     ) -> Iterator[tuple[T, Sources]]:
-        leg = self.legs[i]
+        # Legs of the other way are numbered after those of this one.
+        way = self._ways[i >= len(self.legs)]
+        leg = way.legs[i - way.back * len(self.legs)]
         pieces = reachable(self.geometry, leg)
         if not pieces.any():
             return
 
         def made(routes: Routes, depth: int, out: int) -> tuple[int, T, Sources]:
-            return len(routes.kind), each(routes), sources_of(routes, i, len(leg.mirrors), out, depth)
+            source = sources_of(routes, i, len(leg.mirrors), out, depth)
+            return len(routes.kind), each(way.counted(self.geometry, leg, routes, depth)), source
 
         for tubes, *one in numbered_routes(
-            self.geometry, leg, self.outs, self._images, pieces, self.rule.bounces, found, made, wanted=wanted
-        ):
+            self.geometry, leg, way.outs, way.images, pieces, self.rule.bounces, found, made, wanted=wanted,
+            back=way.back,
+        ):  # fmt: skip
             stats.tubes += tubes
             yield one[0], one[1]
 
