@@ -141,14 +141,16 @@ def _length_across(p, q, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def edge_to_cut(  # type: ignore[no-untyped-def]
-    facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend, across
+    facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend,
+    widest, across,
 ):  # fmt: skip
     """Return at which edge (n,) to bisect each patch so that its two-way phase comes nearer to a quadratic; -1: none.
 
     All limits on phase and normal grow with half the span of phase: where it runs, a patch scatters less.
 
     Args: phase [rad] by which the quadratic through corners and edge middles may miss the centre; turn [rad] of the
-    normal; max_edge [m], across the rays of the first leg if `across`; most_bend [rad] of the phase along an edge.
+    normal; max_edge [m], across the rays of the first leg if `across`; most_bend [rad] of the phase along an edge;
+    widest [rad] under which an end may see an edge.
     """
     out = np.empty(len(facet), np.int8)
     p, normal, total = np.empty((7, 3)), np.empty((4, 3)), np.empty(7)
@@ -193,8 +195,21 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         elif max(e0, e1, e2) > max_edge:
             out[i] = largest(e0, e1, e2)
         else:
-            out[i] = -1
+            out[i] = _widest_edge(p, image, far, widest)
+            if out[i] < 0:
+                out[i] = _widest_edge(p, out_image, out_far, widest)
     return out
+
+
+@njit(cache=True, forceinline=True)
+def _widest_edge(p, image, far, widest):  # type: ignore[no-untyped-def]
+    """Return the edge of a patch of corners p (7, 3) that is seen under the largest angle from the image, if that is
+    larger than `widest`; else -1."""
+    if far or widest == np.inf:
+        return -1
+    e0, e1 = _length_across(p[0], p[1], image, far), _length_across(p[1], p[2], image, far)
+    e2 = _length_across(p[2], p[0], image, far)
+    return largest(e0, e1, e2) if max(e0, e1, e2) > widest * length_to(p[6], image, far) else -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

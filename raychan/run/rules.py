@@ -45,6 +45,9 @@ _FLOOR = 2.0
 # rad: without, echoes over two cylinders, 22 dB over the noise, come out 10 dB weaker and are lost. The three scenes at
 # 0.5 dB cast 0.90 times the rays (command not kept).
 _FAN = 0.1
+# Times `Refinement.relative` squared: the error of the antennas' pattern at the middle of an edge of a first tube, over
+# its peak.
+_PATTERN = 6.0
 _JITTER = 0.13  # of an edge, off its middle: the check launch's own lattice of cuts
 
 
@@ -95,8 +98,10 @@ def _rule(radar: Radar, settings: Any, model: Any, tolerance_db: float, jitter: 
 def rule_of(radar: Radar, noise: float, refined: Refinement, bounces: int, diffraction: bool = False) -> PruneRule:
     """Return the prune rule of a radar: where it is, where its antennas look, and its noise [1/m] (see
     `receiver.noise_equivalent_amplitude`)."""
-    place = np.asarray(radar.position, float)
-    return PruneRule(place, beam_of(radar), refined, bounces, noise, diffraction, radar.rx_position)
+    place, beam = np.asarray(radar.position, float), beam_of(radar)
+    # Along an edge the pattern counts as linear: at its middle it is off by bend * angle^2 / 8 of the peak.
+    widest = refined.relative * np.sqrt(8.0 * _PATTERN / beam.bend) if beam.bend > 0.0 else np.inf
+    return PruneRule(place, beam, replace(refined, widest=widest), bounces, noise, diffraction, radar.rx_position)
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def _bisect_for_phase(
     bounded: tubes that bounce again need to be short along them too.
     """
     rule = found.rule
-    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, across
+    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, across
     left = [(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), 0)]
     done: list[tuple[Ints, Floats]] = []
     held = 0
