@@ -10,6 +10,7 @@ BIN := $(VENV)/bin
 BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py signal/test_nufft.py \
 	world/test_shapes.py world/test_ray_caster.py run/test_provenance.py run/test_preview_bounds.py channel/test_corner_places.py \
 	channel/test_layers_over_a_footprint.py channel/test_fields_over_a_footprint.py tracing/test_landing_on_curves.py \
+	run/test_narrow_beams.py tracing/test_ways.py \
 	$(addprefix tracing/test_,edge_diffraction.py image_paths.py occluders.py subdivide.py visibility.py))
 # Tests of the kernels that are cheap enough as plain Python; marked `compiled`: what is not, each with its reason.
 NOJIT := $(addprefix tests/,em house/test_bounds.py processing/test_range_doppler.py \
