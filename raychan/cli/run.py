@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
@@ -103,10 +104,11 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
 
     with staging(out, CONTENTS) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
-        save_result(result, stage)
         warnings = list(result.warnings)
         if pictures:
-            warnings += _pictures(result, stage, tell)
+            warnings += _pictures(result, stage, tell, lambda: save_result(result, stage))
+        else:
+            save_result(result, stage)
     notes = result_notes(result)
     show.warn(w for w in warnings if w not in notes)
     screen = show.console()
@@ -159,16 +161,24 @@ def _sequence(
     )
 
 
-def _pictures(result: Result, stage: Path, tell) -> list[str]:  # type: ignore[no-untyped-def]
+def _pictures(  # type: ignore[no-untyped-def]
+    result: Result, stage: Path, tell, first: Callable[[], None] = lambda: None
+) -> list[str]:
+    """Draw the pictures of a result and return warnings; `first` is called beside the drawing of the scene."""
+    from raychan.parallel import run_pair
     from raychan.report.direction_figures import direction_pictures
     from raychan.report.figures import profile_picture, rdmap_picture
     from raychan.view.scene import drawing_of, scene_picture
 
+    def plots() -> None:
+        first()
+        profile_picture(result, stage / "profile.png")
+        rdmap_picture(result, stage / "rdmap.png")
+        direction_pictures(result, stage)
+        tell("pictures", 0.4)
+
     tell("pictures", 0.0)
-    warnings = scene_picture(drawing_of(result.scene, result), stage / "scene.png")
-    tell("pictures", 0.6)
-    profile_picture(result, stage / "profile.png")
-    rdmap_picture(result, stage / "rdmap.png")
-    direction_pictures(result, stage)
+    # The scene is drawn by a process of its own.
+    warnings, _ = run_pair(lambda: scene_picture(drawing_of(result.scene, result), stage / "scene.png"), plots)
     tell("pictures", 1.0)
     return warnings

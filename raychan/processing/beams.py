@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import ncx2
 
+from raychan.parallel import parallel_for
 from raychan.radar.aperture import Aperture
 from raychan.radar.windows import window
 
@@ -27,7 +27,7 @@ PER_BEAM = 2
 """Beams per beam width: an echo between two of them reads at most 0.9 dB (a plane array 1.8 dB) low in the detector's
 test, before its direction is refined; three would read 0.4 dB low and take half as much time again (closed form:
 sinc(1/4), sinc(1/6))."""
-_CHUNK = 1 << 23  # beam values made at a time: bounds memory
+_CHUNK = 1 << 18  # beam values made at a time by each thread, some 4 MB: larger arrays are slower
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +67,20 @@ class BeamBank:
     def strongest(self, spectrum: Complexes) -> tuple[Floats, Ints]:
         """Return the power of the strongest beam in each cell (v, r) of a spectrum (a, v, r), and which it is."""
         count, rates, ranges = spectrum.shape
-        power = np.empty((rates, ranges))
-        beam = np.empty((rates, ranges), np.int32)
+        power, beam = np.empty((rates, ranges)), np.empty((rates, ranges), np.int64)
         rows = max(1, _CHUNK // max(1, ranges * len(self.rows)))
-        for at in (slice(v, v + rows) for v in range(0, rates, rows)):
-            wave = self.rows @ np.ascontiguousarray(spectrum[:, at]).reshape(count, -1)
-            level = wave.real**2 + wave.imag**2
-            best = level.argmax(axis=0)
-            shape = beam[at].shape
-            beam[at] = best.reshape(shape)
-            power[at] = level[best, np.arange(len(best))].reshape(shape)
-        return power, beam.astype(np.int64)
+        columns = np.ascontiguousarray(self.rows.T)
+
+        def some(chunks: slice) -> None:
+            for at in (slice(k * rows, (k + 1) * rows) for k in range(chunks.start, chunks.stop)):
+                wave = spectrum[:, at].reshape(count, -1).T @ columns
+                level = wave.real**2 + wave.imag**2
+                best = level.argmax(axis=1)
+                beam[at] = best.reshape(-1, ranges)
+                power[at] = np.take_along_axis(level, best[:, None], axis=1).reshape(-1, ranges)
+
+        parallel_for(-(-rates // rows), some, 2)
+        return power, beam
 
     def towards(self, spectrum: Complexes, cells: Ints) -> Ints:
         """Return which beam (c,) is strongest in cells (c, 2) of a spectrum (a, v, r)."""
@@ -122,6 +125,8 @@ class BeamBank:
 def _together(single: float, correlation: Floats) -> Floats:
     """Return the probability (n,) that noise of given correlations exceeds a level in the second beam, given that it
     does in the first, which it does with probability `single`."""
+    from scipy.stats import ncx2  # takes long to import, and a single receiver needs none of it
+
     rho = np.minimum(correlation.astype(np.float64), 1.0 - 1e-9)
     level = -np.log(single)
     a2 = 2.0 * level / (1.0 - rho**2)

@@ -15,7 +15,7 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import beta, f, gamma
+from scipy.special import betaincinv, gammaincc, gammaincinv
 
 from raychan.radar.side_lobes import correlation
 from raychan.records import RangeDoppler
@@ -146,11 +146,13 @@ def factor(pfa: float, count: float, method: str = "ca", looks: int = 1) -> floa
     if method not in METHODS:
         raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
     if method == "ca":
-        return float(f.isf(pfa, 2 * looks, 2.0 * looks * count))
+        # The quantile of an F distribution of 2 looks and 2 looks count degrees, by that of a beta distribution.
+        share = float(betaincinv(looks * count, looks, pfa))
+        return count * (1.0 - share) / share
     quantiles, weights = _ordered(count, looks)
 
     def excess(log_factor: float) -> float:
-        return float(np.log(max(weights @ gamma.sf(np.exp(log_factor) * quantiles, looks), _TINY) / pfa))
+        return float(np.log(max(weights @ gammaincc(looks, np.exp(log_factor) * quantiles), _TINY) / pfa))
 
     return float(np.exp(brentq(excess, np.log(1e-6), np.log(1e12))))
 
@@ -173,7 +175,7 @@ def quantiles_of(count: float, method: str, looks: int = 1) -> tuple[Floats, Flo
     if method == "os":
         return _ordered(count, looks)
     x, weights = _knots()
-    return np.asarray(gamma.ppf(x, looks * count) / count), weights
+    return np.asarray(gammaincinv(looks * count, x) / count), weights
 
 
 def level(power: Floats, cells: Ints, ring: Training, method: str = "ca") -> Floats:
@@ -201,7 +203,7 @@ def _ordered(count: float, looks: int) -> tuple[Floats, Floats]:
     """Return quantiles and weights for averages over the ordered statistic of `count` sums of `looks` exponentials."""
     x, weights = _knots()
     rank = max(1.0, RANK * count)
-    return np.asarray(gamma.ppf(beta.ppf(x, rank, count - rank + 1.0), looks)), weights
+    return np.asarray(gammaincinv(looks, betaincinv(rank, count - rank + 1.0, x))), weights
 
 
 @cache

@@ -54,9 +54,8 @@ class _Bar:
     factor: float
 
     @classmethod
-    def of(cls, map: RangeDoppler, bank: BeamBank | None, pfa: float, method: str, ring: Training) -> _Bar:
-        """Return the bar of a map as a bank of beams sees it, or of the mean power of its receivers."""
-        seen: DetectorMap = StrongestBeam(map, bank) if bank else MeanPower(map)
+    def of(cls, seen: DetectorMap, pfa: float, method: str, ring: Training) -> _Bar:
+        """Return the bar of a map as a detector sees it."""
         return cls(seen, ring, method, factor(seen.single(pfa), ring.worth, method, seen.looks))
 
     def local(self, cells: Ints) -> Floats:
@@ -72,6 +71,17 @@ class _Bar:
         return np.full(len(local), self.seen.noise) if self.seen.noise > 0.0 else self.estimate(local)
 
 
+def seen_in(
+    map: RangeDoppler, waveform: Waveform | None = None, elements: Floats | None = None, array: Array | None = None
+) -> DetectorMap:
+    """Return a map as `detect` sees it: by a bank of beams, or by the mean power of its receivers; args and errors as
+    there."""
+    array, aperture = array or Array(), _aperture(map, waveform, elements)
+    if aperture and array.beams == "coherent":
+        return StrongestBeam(map, BeamBank(aperture, array.beam_window))
+    return MeanPower(map)
+
+
 def detect(
     map: RangeDoppler,
     *,
@@ -85,6 +95,7 @@ def detect(
     waveform: Waveform | None = None,
     elements: Floats | None = None,
     array: Array | None = None,
+    seen: DetectorMap | None = None,
 ) -> Detections:
     """Return the detections of a map: local maxima over CFAR threshold and minimum SNR that are no side lobes.
 
@@ -93,13 +104,13 @@ def detect(
     ego_speed. Peaks below the window's response to stronger detections are dropped.
     Args: method ca or os; guard [resolution cells], train [cells a side] and windows: all (rate, range), see
     processing.cfar; waveform, for the range migration of movers and, with elements (a, 3) [m], for angles; array, how
-    these are used.
+    these are used; seen, the map as `seen_in` returns it, where it is known.
     Raises: ValueError on bad arguments.
     """
     grid, array, aperture = Grid.of(map), array or Array(), _aperture(map, waveform, elements)
     bank = BeamBank(aperture, array.beam_window) if aperture else None
-    bar = _Bar.of(map, bank if array.beams == "coherent" else None, pfa, method, training(grid, guard, train, windows))
-    seen = bar.seen
+    seen = seen or seen_in(map, waveform, elements, array)
+    bar = _Bar.of(seen, pfa, method, training(grid, guard, train, windows))
 
     cells = seen.maxima(seen.dip * float(undb(min_snr_db)) * seen.noise)
     local = bar.local(cells)
@@ -144,14 +155,14 @@ def least_power(
     waveform: Waveform | None = None,
     elements: Floats | None = None,
     array: Array | None = None,
+    seen: DetectorMap | None = None,
 ) -> Floats:
     """Return the power (c,) [W] that local maxima in map cells (c, 2) need to become detections, side lobes or not.
 
     Args and errors as for `detect`.
     """
-    array, aperture = array or Array(), _aperture(map, waveform, elements)
-    bank = BeamBank(aperture, array.beam_window) if aperture and array.beams == "coherent" else None
-    bar = _Bar.of(map, bank, pfa, method, training(Grid.of(map), guard, train, windows))
+    aperture, seen = _aperture(map, waveform, elements), seen or seen_in(map, waveform, elements, array)
+    bar = _Bar.of(seen, pfa, method, training(Grid.of(map), guard, train, windows))
     local, (_, peak) = bar.local(cells), refine(bar.seen.power, cells)
     above = peak / np.maximum(bar.seen.power[tuple(cells.T)], _TINY)
     loud = float(undb(min_snr_db)) * bar.noise(local) * (bar.seen.dip if aperture else 1.0) / above

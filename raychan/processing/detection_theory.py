@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import gammainc, gammaincc, gammaln
-from scipy.stats import gamma, ncx2
+from scipy.special import gammainc, gammaincc, gammainccinv, gammaln
 
 from raychan.processing.cfar import METHODS, factor, quantiles_of
 from raychan.units import db, undb
@@ -76,6 +75,8 @@ def over_threshold(snr: ArrayLike, threshold: ArrayLike, looks: int = 1, swerlin
     s, t = np.broadcast_arrays(np.asarray(snr, float), np.asarray(threshold, float))
     shape = shape_of(swerling, looks)
     if np.isinf(shape):
+        from scipy.stats import ncx2  # takes long to import, and most runs need none of it
+
         # Beyond, the library's series fails, and nothing is missed any more.
         sure = looks * s > _SURE * (t + 1.0)
         steady = ncx2.sf(2.0 * t, 2 * looks, 2.0 * looks * np.where(sure, 1.0, np.maximum(s, _TINY)))
@@ -118,7 +119,7 @@ def _least(detector: Detector) -> float:
 
 def _threshold(detector: Detector) -> float:
     """Return the threshold of the sum of powers over known noise."""
-    return max(float(gamma.isf(detector.pfa, detector.looks)), _least(detector))
+    return max(float(gammainccinv(detector.looks, detector.pfa)), _least(detector))
 
 
 def albersheim(pd: ArrayLike, pfa: float = 1e-6, looks: int = 1) -> Floats:

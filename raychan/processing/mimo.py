@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing.own_waveform import map_by_waveform
+from raychan.processing.range_doppler import mean_power
 from raychan.processing.staggered import doppler, fold_range, hypotheses, least_power, resolved, staggered_map
 from raychan.radar.radar import Radar
 from raychan.records import Cube, RangeDoppler
@@ -57,12 +58,12 @@ def virtual_range_doppler(
     plain, channels = made(cube, radar, given)
     many = len(radar.tx_elements)
     if not resolve:
-        return replace(plain, spectrum=np.concatenate(list(channels[:many])))
+        return replace(plain, spectrum=channels[:many].reshape(-1, *channels.shape[2:]))
     fold = _folds(channels, radar, plain) if hypotheses(radar) > 1 else np.zeros(plain.power.shape, np.int8)
     spectrum = channels[:many].copy()
     for cells, h in _groups(fold):
         spectrum[:, :, *cells] = _under(channels[:, :, *cells], h, radar)
-    return resolved(plain, np.concatenate(list(spectrum)), fold, plain.noise)
+    return resolved(plain, spectrum.reshape(-1, *spectrum.shape[2:]), fold, plain.noise)
 
 
 def _by_time(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Complexes]:
@@ -95,8 +96,8 @@ def _by_doppler(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Com
         made.append(whole.spectrum[:, rows])
     channels = np.stack(made)
     many = len(radar.tx_elements)
-    power = (np.abs(channels[:many]).astype(np.float64) ** 2).mean(axis=(0, 1))
     flat = channels[:many].reshape(-1, *channels.shape[2:])
+    power = mean_power(flat)
     limit = whole.unambiguous_rate / slots
     return replace(whole, rate=whole.rate[rows], spectrum=flat, power=power, unambiguous_rate=limit), channels
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.fft
 
 from raychan.parallel import threads
-from raychan.processing.range_doppler import range_doppler
+from raychan.processing.range_doppler import mean_power, range_doppler
 from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.radar.windows import window
 from raychan.records import Cube, RangeDoppler
@@ -42,7 +42,7 @@ def map_by_waveform(
         range=np.arange(spectrum.shape[2]) * waveform.range_resolution,
         rate=doppler * metre_per_hertz,
         spectrum=spectrum,
-        power=(np.abs(spectrum).astype(np.float64) ** 2).mean(axis=0),
+        power=mean_power(spectrum),
         noise=cube.noise_power * gain,
         range_resolution=waveform.range_resolution,
         rate_resolution=metre_per_hertz / (chirps * waveform.repetition),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import Record, column
+from raychan.parallel import parallel_for
 from raychan.processing.beams import BeamBank
 from raychan.radar.aperture import Aperture
 from raychan.records import RangeDoppler
@@ -19,6 +21,7 @@ Floats = NDArray[np.float64]
 PER_BEAM = 8
 """Azimuths per beam width: a peak between two reads at most 0.06 dB low (closed form: sinc(1/16))."""
 
+_BLOCK = 256  # ranges of which beams are made at a time: they stay in a cache
 _DRAWN = 24  # beams per beam width of one cell's curve: smooth to the eye
 
 
@@ -52,13 +55,20 @@ def range_azimuth(map: RangeDoppler, elements: Any, wavelength: float, taper: st
         look = np.stack([grid.u, np.full(len(grid.u), w)], axis=1)
         seen = (look**2).sum(axis=1) <= 1.0
         rows = (bank.weight * aperture.steering(look[seen]).conj()).astype(np.complex64)
-        best = np.zeros((int(seen.sum()), len(map.range)))
-        for v in range(len(map.rate)):
-            wave = rows @ map.spectrum[:, v]
-            np.maximum(best, wave.real**2 + wave.imag**2, out=best)
+        best = np.zeros((len(rows), len(map.range)), np.float32)
+        parallel_for(-(-len(map.range) // _BLOCK), partial(_strongest_rate, rows, map.spectrum, best), 2)
         power[seen] = np.maximum(power[seen], best)
     azimuth = np.arcsin(np.clip(grid.u, -1.0, 1.0))
     return RangeAzimuth(map.range, azimuth, power, map.noise * bank.noise_gain)
+
+
+def _strongest_rate(rows: Any, spectrum: Any, best: NDArray[np.float32], blocks: slice) -> None:
+    """Write the power of beams of weights (b, a) in some blocks of ranges, of all rates the strongest, into (b, r)."""
+    for at in (slice(k * _BLOCK, (k + 1) * _BLOCK) for k in range(blocks.start, blocks.stop)):
+        own = best[:, at]
+        for v in range(spectrum.shape[1]):
+            wave = rows @ spectrum[:, v, at]
+            np.maximum(own, wave.real**2 + wave.imag**2, out=own)
 
 
 def beams_of(map: RangeDoppler, cell: Any, aperture: Aperture) -> tuple[Floats, Floats, Floats]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from raychan.parallel import threads
+from raychan.parallel import parallel_for, parallel_tasks, threads
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.records import Cube, RangeDoppler
@@ -16,6 +17,8 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex64]
+
+_BLOCK = 1 << 14  # map cells of which powers are summed at a time: some 0.5 MB
 
 
 def range_doppler(
@@ -42,32 +45,52 @@ def range_doppler(
     taper_r, taper_v = window(range_window, samples), window(rate_window, chirps)
     cells_r = int(pad[0]) * samples
     image = 1.0 if waveform.complex_sampling else 2.0
-    workers = threads()
     doppler, undone = _without_doppler(waveform, range_window, int(pad[1]))
-    cells_v = len(doppler)
+    cells_v, antennas = len(doppler), len(cube.samples)
+    weight = (image * taper_v / taper_v.sum()).astype(np.float32)[:, None]
+    spectrum = np.empty((antennas, cells_v, cells_r if waveform.complex_sampling else cells_r // 2), np.complex64)
+    # By antenna: the arrays between the transforms stay small.
+    workers = threads() if antennas == 1 else 1
 
-    weight = (image * taper_v / taper_v.sum()).astype(np.float32)
-    weighted = cube.samples * weight[:, None]
-    rows = scipy.fft.ifft(weighted, cells_v, axis=1, norm="forward", workers=workers, overwrite_x=True)
-    rows = scipy.fft.fftshift(rows, axes=1)
-    # exp(-j2 pi f_d t) is removed row by row, so that the beat of the delay alone remains.
-    rows *= undone
-    spectrum = scipy.fft.ifft(rows, cells_r, axis=2, norm="forward", workers=workers, overwrite_x=True)
-    spectrum = spectrum[..., : cells_r if waveform.complex_sampling else cells_r // 2]
+    def transformed(a: int) -> None:
+        given: Any = {"norm": "forward", "workers": workers, "overwrite_x": True}
+        rows = scipy.fft.fftshift(scipy.fft.ifft(cube.samples[a] * weight, cells_v, axis=0, **given), axes=0)
+        # exp(-j2 pi f_d t) is removed row by row, so that the beat of the delay alone remains.
+        rows *= undone
+        spectrum[a] = scipy.fft.ifft(rows, cells_r, axis=1, **given)[:, : spectrum.shape[2]]
 
+    parallel_tasks(antennas, transformed)
     gain = float((taper_r**2).sum() / taper_r.sum() ** 2 * (taper_v**2).sum() / taper_v.sum() ** 2)
     metre_per_hertz = 0.5 * C0 / waveform.middle
     return RangeDoppler(
         range=np.arange(spectrum.shape[2]) * waveform.range_resolution / pad[0],
         rate=doppler * metre_per_hertz,
         spectrum=spectrum,
-        power=(spectrum.real.astype(np.float64) ** 2 + spectrum.imag.astype(np.float64) ** 2).mean(axis=0),
+        power=mean_power(spectrum),
         noise=cube.noise_power * gain * (1.0 if waveform.complex_sampling else 2.0),
         range_resolution=waveform.range_resolution,
         rate_resolution=metre_per_hertz / (chirps * waveform.repetition),
         unambiguous_range=waveform.unambiguous_range,
         unambiguous_rate=0.5 * metre_per_hertz / waveform.repetition,
     )
+
+
+def mean_power(spectrum: Complexes) -> Floats:
+    """Return the mean over antennas of the power (v, r) of a spectrum (a, v, r), by blocks that fit a cache."""
+    antennas, rates, ranges = spectrum.shape
+    power = np.zeros((rates, ranges))
+    rows = max(1, _BLOCK // max(ranges, 1))
+
+    def some(blocks: slice) -> None:
+        for k in range(blocks.start, blocks.stop):
+            own = slice(k * rows, (k + 1) * rows)
+            for a in range(antennas):
+                real, imag = (x.astype(np.float64) for x in (spectrum[a, own].real, spectrum[a, own].imag))
+                power[own] += real * real + imag * imag
+
+    parallel_for(-(-rates // rows), some, 2)
+    power /= antennas
+    return power
 
 
 @lru_cache(maxsize=1)

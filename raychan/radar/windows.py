@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import re
 import warnings
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import windows as scipy_windows
 
 Floats = NDArray[np.float64]
 
 NAMES = ("rect", "hann", "hamming", "blackman", "taylor", "chebyshev")
 _SIDE_LOBE = {"taylor": 35.0, "chebyshev": 80.0}
 _TAYLOR_NBAR = 5
+_COSINES = {"hann": (0.5, 0.5), "hamming": (0.54, 0.46), "blackman": (0.42, 0.5, 0.08)}
 
 
 def window(name: str, n: int) -> Floats:
@@ -33,19 +32,19 @@ def window(name: str, n: int) -> Floats:
         )
     if n == 1 or kind == "rect":
         return np.ones(n)
-    made: Any
+    if kind in _COSINES:
+        # Hann's and Blackman's windows are zero at both ends: these samples are left out.
+        k = np.arange(n) if kind == "hamming" else np.arange(1, n + 1)
+        turn = 2.0 * np.pi * k / (n - 1 if kind == "hamming" else n + 1)
+        return np.asarray(sum((-1) ** i * a * np.cos(i * turn) for i, a in enumerate(_COSINES[kind])), np.float64)
+    from scipy.signal import windows  # takes as long to import as the rest of scipy that a run needs
+
     if kind == "taylor":
-        made = scipy_windows.taylor(n, _TAYLOR_NBAR, level)
-    elif kind == "chebyshev":
-        with warnings.catch_warnings():
-            # Below 45 dB scipy warns about spectra; over the elements of an array such levels are common.
-            warnings.simplefilter("ignore", UserWarning)
-            made = scipy_windows.chebwin(n, level)
-    elif kind == "hamming":
-        made = scipy_windows.hamming(n)
-    else:
-        made = getattr(scipy_windows, kind)(n + 2)[1:-1]
-    return np.asarray(made, np.float64)
+        return np.asarray(windows.taylor(n, _TAYLOR_NBAR, level), np.float64)
+    with warnings.catch_warnings():
+        # Below 45 dB scipy warns about spectra; over the elements of an array such levels are common.
+        warnings.simplefilter("ignore", UserWarning)
+        return np.asarray(windows.chebwin(n, level), np.float64)
 
 
 def processing_gain(taper: Floats) -> float:

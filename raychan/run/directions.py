@@ -35,7 +35,11 @@ def angles_in(result: Result) -> RangeAzimuth | None:
     radar = result.scene.radar if result.scene is not None else None
     if radar is None or not aperture_of(radar).scans[0]:
         return None
-    return range_azimuth(result.rdmap, radar)
+    # Kept: it is written and drawn, and takes a second for 32 receivers.
+    if "angles" not in result.__dict__:
+        result.__dict__["angles"] = range_azimuth(result.rdmap, radar)
+    found: RangeAzimuth = result.__dict__["angles"]
+    return found
 
 
 def beam_to(radar: Radar, found: Detections, paths: Paths) -> Callable[[int], Complexes] | None:

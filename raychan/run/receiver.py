@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.parallel import parallel_for
 from raychan.poses import direction
 from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Grid, fitting_guard
-from raychan.processing.detection import Array, detect, least_power
+from raychan.processing.detection import Array, detect, least_power, seen_in
+from raychan.processing.detector_map import DetectorMap
 from raychan.processing.mimo import virtual_range_doppler
 from raychan.processing.peaks import SideLobes, strongest
 from raychan.processing.staggered import hypotheses, unfolded
@@ -21,7 +24,9 @@ from raychan.records import Cube, Detections, MapError, RangeDoppler
 from raychan.units import C0, undb
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex64]
 
+_ROWS = 64  # of a map's errors from which on a second thread pays; not measured
 FAINT = 1e-8  # of the strongest cell: the weakest detection or shoulder possible where there is no noise; not measured
 
 
@@ -43,19 +48,30 @@ def channel(cube: Cube, radar: Radar, cross: bool = False) -> Cube:
     return cube.replace(samples=cube.samples[many:] if cross else cube.samples[:many])
 
 
-def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any) -> Detections:
+def seen_in_map(rdmap: RangeDoppler, radar: Radar, settings: Any) -> DetectorMap:
+    """Return a map as the detector sees it, for the functions below: an array's beams take long."""
+    return seen_in(rdmap, radar.waveform, receivers(radar), _array(settings))
+
+
+def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any, seen: DetectorMap | None = None) -> Detections:
     """Return what the receiver detects in its map; it sees nothing else of the scene."""
-    found = detect(rdmap, ego_speed=radar.ego_speed, **_detector(rdmap, radar, settings))
+    found = detect(rdmap, ego_speed=radar.ego_speed, seen=seen, **_detector(rdmap, radar, settings))
     return unfolded(rdmap, found, radar)
 
 
-def least_in(rdmap: RangeDoppler, cells: NDArray[np.int64], radar: Radar, settings: Any) -> Floats:
+def least_in(
+    rdmap: RangeDoppler, cells: NDArray[np.int64], radar: Radar, settings: Any, seen: DetectorMap | None = None
+) -> Floats:
     """Return the power (c,) [W] that map cells (c, 2) need to become detections."""
-    return least_power(rdmap, cells, **_detector(rdmap, radar, settings))
+    return least_power(rdmap, cells, seen=seen, **_detector(rdmap, radar, settings))
 
 
 def shoulders_in(
-    rdmap: RangeDoppler, peaks: NDArray[np.int64], radar: Radar, settings: Any
+    rdmap: RangeDoppler,
+    peaks: NDArray[np.int64],
+    radar: Radar,
+    settings: Any,
+    seen: DetectorMap | None = None,
 ) -> tuple[NDArray[np.int64], Floats]:
     """Return map cells (c, 2) beside peaks (p, 2) that have the power of detections, but are neither local maxima nor
     side lobes, and the power (c,) [W] that makes each a local maximum."""
@@ -63,7 +79,7 @@ def shoulders_in(
     cells = strongest(power, grid)
     least = max(float(undb(settings.min_snr_db)) * rdmap.noise, FAINT * float(power.max(initial=0.0)))
     cells = cells[power[tuple(cells.T)] >= least]
-    cells = cells[power[tuple(cells.T)] >= least_in(rdmap, cells, radar, settings)]
+    cells = cells[power[tuple(cells.T)] >= least_in(rdmap, cells, radar, settings, seen)]
     lobes = SideLobes(grid, (settings.rate_window, settings.range_window))
     return lobes.shoulders(power, grid.pad, peaks, cells)
 
@@ -83,9 +99,13 @@ def _detector(rdmap: RangeDoppler, radar: Radar, settings: Any) -> dict[str, Any
         "windows": (settings.rate_window, settings.range_window),
         "waveform": radar.waveform,
         "elements": receivers(radar),
-        "array": Array(settings.beams, settings.doa, settings.beam_window),
+        "array": _array(settings),
         **sizes,
     }
+
+
+def _array(settings: Any) -> Array:
+    return Array(settings.beams, settings.doa, settings.beam_window)
 
 
 def receivers(radar: Radar) -> Floats:
@@ -167,23 +187,40 @@ def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapErro
     change = quiet.samples - others.samples
     if bank_of(radar, settings) is None:
         return MapError(quiet_map(change, radar, settings))
-    echo, wrong = (_quiet_spectrum(x, radar, settings) for x in (quiet.samples, change))
-    turned = np.exp(-1j * np.angle(echo))
+    # By receiver: the spectra of all take much memory, and longer to write than to compute.
+    own, off = (channel(Cube(samples=x, noise_power=0.0), radar).samples for x in (quiet.samples, change))
+    towards, mean, count = np.zeros(0, np.complex64), np.zeros(0), 0
+    for k in range(len(own)):
+        echo, wrong = (_quiet_spectrum(x[k : k + 1], radar, settings) for x in (own, off))
+        if not count:
+            towards, mean = np.zeros(echo.shape[1:], np.complex64), np.zeros(echo.shape[1:])
+        count += len(echo)
+        parallel_for(len(mean), partial(_add_towards, echo, wrong, towards, mean), _ROWS)
     # Over as many orthogonal beams as receivers the powers add up to that of all receivers.
-    towards, mean = np.abs((wrong * turned).mean(axis=0)) ** 2, (np.abs(wrong) ** 2).mean(axis=0) / len(wrong)
-    return MapError(np.maximum(towards, mean).astype(np.float64))
+    return MapError(np.maximum(np.abs(towards).astype(np.float64) ** 2, mean) / count**2)
+
+
+def _add_towards(echo: Complexes, wrong: Complexes, towards: Complexes, mean: Floats, rows: slice) -> None:
+    """Add some rows of a spectrum (a, v, r) `wrong`, turned by the phases of another, and its power."""
+    for k in range(len(echo)):
+        own, off = echo[k, rows], wrong[k, rows]
+        size = np.abs(own)
+        turned = own.conj() / np.maximum(size, np.finfo(np.float32).tiny)
+        turned *= off
+        towards[rows] += np.where(size > 0.0, turned, off)
+        mean[rows] += off.real**2 + off.imag**2
 
 
 def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     """Return the powers (v, r) [W] of the map of samples (antenna, chirp, sample) without noise."""
-    return _quiet(samples, radar, settings).power
-
-
-def _quiet_spectrum(samples: Any, radar: Radar, settings: Any) -> Any:
-    return _quiet(samples, radar, settings).spectrum
-
-
-def _quiet(samples: Any, radar: Radar, settings: Any) -> RangeDoppler:
     cube = channel(Cube(samples=np.asarray(samples, np.complex64), noise_power=0.0), radar)
+    return _quiet(cube, radar, settings).power
+
+
+def _quiet_spectrum(samples: Complexes, radar: Radar, settings: Any) -> Complexes:
+    return _quiet(Cube(samples=samples, noise_power=0.0), radar, settings).spectrum
+
+
+def _quiet(cube: Cube, radar: Radar, settings: Any) -> RangeDoppler:
     windows = (settings.range_window, settings.rate_window, settings.pad)
     return virtual_range_doppler(cube, radar, *windows, resolve=False)

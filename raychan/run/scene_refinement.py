@@ -29,7 +29,7 @@ from raychan.run.mechanisms import QUIET, choose, needed
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.probes import probes_of
-from raychan.run.receiver import detections_in, least_in, map_of, noise_amplitude, shoulders_in
+from raychan.run.receiver import detections_in, least_in, map_of, noise_amplitude, seen_in_map, shoulders_in
 from raychan.run.refinement_budget import STEPS, Budget
 from raychan.run.refinement_plan import planned
 from raychan.run.rules import first_rule, step_rule
@@ -191,9 +191,10 @@ class SceneRefinement:
         radar, settings = self.radar, self.settings
         lower = replace(settings, pfa=math.sqrt(settings.pfa), min_snr_db=settings.min_snr_db - _MARGIN_DB)
         rdmap = map_of(noisy(quiet, radar, stream(0, Stage.NOISE)), radar, settings)
-        at = np.unique(detections_in(rdmap, radar, lower).cell, axis=0).astype(np.int64)
+        seen = seen_in_map(rdmap, radar, settings)
+        at = np.unique(detections_in(rdmap, radar, lower, seen).cell, axis=0).astype(np.int64)
         # Where the first launch finds too little of an echo, another one's slope hides it.
-        more, least = shoulders_in(rdmap, at, radar, lower)
+        more, least = shoulders_in(rdmap, at, radar, lower, seen)
         least = np.sqrt(np.append(np.zeros(len(at)), least) / radar.power)
         at = np.concatenate([at, more])
         place = np.stack([rdmap.range[at[:, 1]], rdmap.rate[at[:, 0]], np.zeros(len(at))], axis=1)
@@ -206,7 +207,7 @@ class SceneRefinement:
         place[:, 2] = np.abs(level)
         others = (changes(response, p.seen(paths), alike, place).sum(axis=1) for p in self._probes)
         cells = MapCells(place, np.stack([level, *others]), self.model.tolerance_db)
-        lacking = QUIET * np.sqrt(least_in(rdmap, at[fed], radar, settings) / radar.power)
+        lacking = QUIET * np.sqrt(least_in(rdmap, at[fed], radar, settings, seen) / radar.power)
         cells.spare(np.maximum(lacking, least[fed]))
         return cells
 

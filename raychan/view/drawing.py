@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import LAYER, MIRROR, Facets, Paths, Points
 from raychan.report.canvas import PALETTE
-from raychan.run.labels import chains, response_of, waves_in
-from raychan.run.result import Explanation, Result
 from raychan.units import dbm, undb
+
+if TYPE_CHECKING:  # what draws in a process of its own reads a drawing and needs no run
+    from raychan.run.result import Explanation, Result
 
 Floats = NDArray[np.float64]
 
@@ -177,6 +178,8 @@ def draw(
 
 def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
     """Return the strongest path of each chain behind a detection, weakest first; without detections, of every chain."""
+    from raychan.run.labels import chains
+
     paths, known = result.paths, chains(result.paths, result.receiver.background)
     size = np.abs(paths.amplitude)
     index = {chain: i for i, chain in enumerate(known.names)}
@@ -202,6 +205,8 @@ def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
 
 def rays_in(result: Result, cell: Explanation) -> tuple[Ray, ...]:
     """Return the strongest path of each chain in a map cell, weakest first."""
+    from raychan.run.labels import chains, response_of, waves_in
+
     paths, known = result.paths, chains(result.paths, result.receiver.background)
     size = np.abs(waves_in(paths, response_of(result.receiver), cell.range, cell.rate)[0])
     index = {chain: i for i, chain in enumerate(known.names)}
