@@ -26,6 +26,7 @@ from raychan.records import Cube, Paths, Points
 from raychan.run.ledger import ModelChoice
 from raychan.run.map_cells import ALONG, MapCells, feeding_sources
 from raychan.run.mechanisms import QUIET, choose, needed
+from raychan.run.other_ways import Facets, OtherWays, last_facets
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.probes import probes_of
@@ -41,7 +42,7 @@ from raychan.run.unreached import Unreached, unreached_notes, unreached_of
 from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.solver import Batch, Launch, Stats
 from raychan.tracing.source_rays import SourceRays
-from raychan.tracing.sources import EXACT, Rings, Sources, launches
+from raychan.tracing.sources import EXACT, Rings, Sources
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -117,6 +118,7 @@ class SceneRefinement:
         over = self.radar.rx_position is None or self.model.diffraction
         asked = self.model.model_copy(update={"diffraction": over}) if auto else self.model
         launch = Launch(self.geometry, self.points, first_rule(self.radar, self.settings, asked), lit=auto)
+        self._ways = OtherWays(launch)
         batches = launch.whole(self.stats, self._carried, lambda _, share: self.tell("trace", 0.5 * share))
         found = self._paths(batches, MOST)
         if found is None:
@@ -133,18 +135,19 @@ class SceneRefinement:
             self.launches[0] = counting(self.launches[0], keep)
         return First(launch, of_trajectories(paths, keep), source[keep], chosen, of_trajectories(paths, ~keep))
 
-    def _carried(self, batch: Batch) -> tuple[Batch | None, Paths]:
-        """Return a batch of routes, where they are kept, and their paths."""
+    def _carried(self, batch: Batch) -> tuple[Batch | None, Facets, Paths]:
+        """Return a batch of routes, where they are kept, the facets that they scatter on, and their paths."""
         paths = paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier, self._noise)
-        return (None if self.launches is None else batch), paths
+        return (None if self.launches is None else batch), last_facets(batch), paths
 
     def _paths(
-        self, batches: Iterator[tuple[tuple[Batch | None, Paths], Sources]], most: float = math.inf
+        self, batches: Iterator[tuple[tuple[Batch | None, Facets, Paths], Sources]], most: float = math.inf
     ) -> tuple[Paths, Sources] | None:
         """Return the paths of a launch, and the source of each trajectory; None where there are too many."""
         parts, sources, count = [nothing(self.geometry.facets, self.radar)], [np.zeros(0, np.int64)], 0
         kept: list[Batch] = []
-        for (batch, paths), source in batches:
+        for (batch, last, paths), source in batches:
+            self._ways.add(source, last)
             count += len(source)
             if count > most:
                 return None
@@ -242,7 +245,7 @@ class SceneRefinement:
         """Trace sources again, each half as coarse as before; return what that changes, as `SourcedPaths.replace`."""
         step, changed = rays.next_step(wanted), list[tuple[Paths, Sources]]()
         for k in np.unique(step):
-            by = list(rings.with_those_beside(launches(wanted[step == k], len(self.geometry.facets.body))))
+            by = list(rings.with_those_beside(wanted[step == k], self._ways.missing(wanted[step == k])))
             rule, before = step_rule(self.radar, self.settings, self.model, int(k)), self.stats.rays
             finer = replace(rule.refinement, least=int(k))
             new = self._paths(launch.again(finer, by, self.stats, self._carried))

@@ -21,7 +21,7 @@ from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.shared_work import all_of
 from raychan.tracing.shooting import Wanted, numbered_routes
-from raychan.tracing.sources import EXACT, Sources, sources_of
+from raychan.tracing.sources import EXACT, Sources, depth_of, legs_of, source_of, sources_of
 from raychan.tracing.tubes import Refinement
 from raychan.tracing.ways import Way
 from raychan.world.geometry import Geometry
@@ -138,6 +138,13 @@ class Launch:
                 jobs.append((i, self._found[i].frozen(budgets[-1]), what))
             yield from self._together(jobs, stats, each)
         self._finished(stats, before, budgets)
+
+    def turned_round(self, source: Sources, last: NDArray[np.int32]) -> Sources:
+        """Return the sources (n,) of the same routes the other way round, which start on facets `last` (n,)."""
+        (leg, out), many = legs_of(source), len(self.legs) if len(self._ways) > 1 else 0
+        # Legs of the other way are numbered after those of this one.
+        back = leg >= many if many else np.zeros(len(leg), bool)
+        return source_of(np.where(back, out, many + out), np.where(back, leg - many, leg), depth_of(source), last)
 
     def _groups(self, jobs: range) -> Iterator[range]:
         """Give numbers of jobs in groups that are done at once: their routes are held."""

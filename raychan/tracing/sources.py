@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -36,9 +36,9 @@ def sources_of(routes: Routes, leg: int, mirrors: int, out: int, depth: int) -> 
     return source_of(leg, out, depth, facet)
 
 
-def source_of(leg: int, out: int, depth: int, facet: Ints) -> Sources:
+def source_of(leg: int | Ints, out: int | Ints, depth: int | Ints, facet: Ints) -> Sources:
     """Return the source (n,) of tubes that start on facets (n,) and scatter at the bounce `depth`; numbers of legs."""
-    return np.asarray(((np.int64(leg) << _LEG | out) << _DEPTH | depth) << _FACET | facet.astype(np.int64))
+    return np.asarray(((np.asarray(leg, np.int64) << _LEG | out) << _DEPTH | depth) << _FACET | facet.astype(np.int64))
 
 
 def depth_of(source: Sources) -> Ints:
@@ -100,13 +100,18 @@ class Rings:
         self._plane, self._across = geometry.plane, geometry.scene_topology.beside
         self._traced: dict[tuple[int, int], Bools] = {}
 
-    def with_those_beside(self, launches: Iterable[tuple[int, Wanted]]) -> Iterator[tuple[int, Wanted]]:
-        """Give launches that start also from the facets beside theirs that none before did."""
-        for leg, wanted in launches:
-            before = self._traced.get((leg, wanted.depth), np.zeros_like(wanted.facets))
-            every = wanted.facets | (self._beside(wanted.facets) & ~before)
-            self._traced[leg, wanted.depth] = before | every
-            yield leg, replace(wanted, facets=every)
+    def with_those_beside(self, source: Sources, alone: Sources) -> Iterator[tuple[int, Wanted]]:
+        """Give the `launches` of sources (n,) that start also from the facets beside theirs that none before did, and
+        from those of sources (m,) without any beside."""
+        beside = {
+            (leg, wanted.depth): self._beside(wanted.facets) for leg, wanted in launches(source, len(self._plane))
+        }
+        for leg, wanted in launches(np.union1d(source, alone), len(self._plane)):
+            none = np.zeros_like(wanted.facets)
+            before = self._traced.get((leg, wanted.depth), none)
+            started = wanted.facets | (beside.get((leg, wanted.depth), none) & ~before)
+            self._traced[leg, wanted.depth] = before | started
+            yield leg, replace(wanted, facets=started)
 
     def _beside(self, wanted: Bools) -> Bools:
         """Return the facets (f,) of the same planes, and across the edges, of some (f,)."""

@@ -12,9 +12,8 @@ import raychan as rc
 from raychan.channel.paths import join, paths_of
 from raychan.run.rules import fine_rule
 from raychan.signal.baseband import synthesize
-from raychan.tracing.shooting import Wanted
 from raychan.tracing.solver import Launch, Stats
-from raychan.tracing.sources import EXACT, Rings, covered, depth_of, facet_of, launches
+from raychan.tracing.sources import EXACT, Rings, covered, depth_of, facet_of, launches, source_of
 from raychan.world.geometry import geometry_of
 
 
@@ -113,11 +112,13 @@ def test_beside_facets_lie_the_rest_of_their_plane_and_what_shares_an_edge(whole
             for i in range(len(corners))
         ]
         rings = Rings(geometry)
-        own = [(0, Wanted(wanted, 2, frozenset([0])))]
-        ((_, first),) = rings.with_those_beside(own)
+        own, none = source_of(0, 0, 2, np.array([chosen])), np.zeros(0, np.int64)
+        ((_, alone),) = Rings(geometry).with_those_beside(none, own)
+        assert alone.facets.tolist() == wanted.tolist()
+        ((_, first),) = rings.with_those_beside(own, none)
         assert first.facets.tolist() == slow
         # Each is traced once beside what is wanted, at each bounce.
-        ((_, second),) = rings.with_those_beside(own)
+        ((_, second),) = rings.with_those_beside(own, none)
         assert second.facets.tolist() == wanted.tolist()
-        ((_, other),) = rings.with_those_beside([(0, Wanted(wanted, 3, frozenset([0])))])
+        ((_, other),) = rings.with_those_beside(source_of(0, 0, 3, np.array([chosen])), none)
         assert other.facets.tolist() == slow

@@ -1,0 +1,46 @@
+"""Routes the other way round: a wave over several surfaces goes both ways alike, but a coarse launch may lose one of
+them, where its tube starts on a surface that is partly hidden."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.records import DiffractedRoutes, Routes
+from raychan.tracing.solver import Launch
+from raychan.tracing.sources import EXACT, Sources, depth_of
+
+Facets = NDArray[np.int32]
+
+
+def last_facets(batch: Routes | DiffractedRoutes) -> Facets:
+    """Return the facet (n,) on which each route of tubes scatters, -1 for others."""
+    if isinstance(batch, DiffractedRoutes):
+        return np.full(len(batch.kind), -1, np.int32)
+    rows = np.arange(len(batch.scatter))
+    return np.where(batch.scatter >= 0, batch.facet[rows, batch.scatter], np.int32(-1))
+
+
+class OtherWays:
+    """The sources of deep routes, and those of the same routes the other way round."""
+
+    def __init__(self, launch: Launch) -> None:
+        self._launch, self._tried = launch, np.zeros(0, np.int64)
+        self._found: list[tuple[Sources, Sources]] = []
+
+    def add(self, source: Sources, last: Facets) -> None:
+        """Note routes of sources (n,) that scatter on facets `last` (n,)."""
+        deep = np.flatnonzero((source != EXACT) & (depth_of(source) > 1))
+        source, last = source[deep], last[deep]
+        # Neighbours are mostly alike: one of each run is kept.
+        heads = np.flatnonzero((np.diff(source, prepend=-1) != 0) | (np.diff(last, prepend=-1) != 0))
+        source, last = source[heads], last[heads]
+        self._found.append((source, self._launch.turned_round(source, last)))
+
+    def missing(self, wanted: Sources) -> Sources:
+        """Return the sources, of no route yet, of the routes of some sources (s,) the other way round: each once."""
+        own, turned = (np.concatenate(x) for x in zip(*self._found, strict=True))
+        new = np.unique(turned[np.isin(own, wanted)])
+        new = new[~np.isin(new, own) & ~np.isin(new, self._tried)]
+        self._tried = np.union1d(self._tried, new)
+        return new
