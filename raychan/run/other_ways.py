@@ -22,10 +22,10 @@ def last_facets(batch: Routes | DiffractedRoutes) -> Facets:
 
 
 class OtherWays:
-    """The sources of deep routes, and those of the same routes the other way round."""
+    """The sources of deep routes of launches, and those of the same routes the other way round."""
 
     def __init__(self, launch: Launch) -> None:
-        self._launch, self._tried = launch, np.zeros(0, np.int64)
+        self._launch = launch
         self._found: list[tuple[Sources, Sources]] = []
 
     def add(self, source: Sources, last: Facets) -> None:
@@ -38,9 +38,7 @@ class OtherWays:
         self._found.append((source, self._launch.turned_round(source, last)))
 
     def missing(self, wanted: Sources) -> Sources:
-        """Return the sources, of no route yet, of the routes of some sources (s,) the other way round: each once."""
+        """Return the sources, of no route, of the routes of some sources (s,) the other way round."""
         own, turned = (np.concatenate(x) for x in zip(*self._found, strict=True))
         new = np.unique(turned[np.isin(own, wanted)])
-        new = new[~np.isin(new, own) & ~np.isin(new, self._tried)]
-        self._tried = np.union1d(self._tried, new)
-        return new
+        return new[~np.isin(new, own)]

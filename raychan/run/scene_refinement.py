@@ -51,6 +51,9 @@ Bools = NDArray[np.bool_]
 
 _MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may bring above it
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
+# Steps that trace routes the other way round, too: of the first launch, and of facets beside its own. All steps take
+# 30 % more rays of an urban frame at 3 dB; with the first alone a corner of the living street is 1.3 dB off of 0.5.
+_TURNED = 2
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
 
 
@@ -141,7 +144,9 @@ class SceneRefinement:
         return (None if self.launches is None else batch), last_facets(batch), paths
 
     def _paths(
-        self, batches: Iterator[tuple[tuple[Batch | None, Facets, Paths], Sources]], most: float = math.inf
+        self,
+        batches: Iterator[tuple[tuple[Batch | None, Facets, Paths], Sources]],
+        most: float = math.inf,
     ) -> tuple[Paths, Sources] | None:
         """Return the paths of a launch, and the source of each trajectory; None where there are too many."""
         parts, sources, count = [nothing(self.geometry.facets, self.radar)], [np.zeros(0, np.int64)], 0
@@ -222,7 +227,9 @@ class SceneRefinement:
         budget, rings, steps, ended = Budget(self.model, self.stats), Rings(self.geometry), 0, ""
         while len(wanted) and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
-            own, sums = held.sums_of(*self._again(launch, held, wanted, rays, rings), response, cells.place)
+            alone = self._ways.missing(wanted) if steps < _TURNED else wanted[:0]
+            again = self._again(launch, held, wanted, alone, rays, rings)
+            own, sums = held.sums_of(*again, response, cells.place)
             _each(sums, lambda i, change, own=own: cells.changed(i, own, change))  # type: ignore[misc]
             if not steps:
                 cells.traced(own)
@@ -240,12 +247,13 @@ class SceneRefinement:
         return steps, tuple(unreached_of(cells)), ended
 
     def _again(
-        self, launch: Launch, held: SourcedPaths, wanted: Sources, rays: SourceRays, rings: Rings
+        self, launch: Launch, held: SourcedPaths, wanted: Sources, alone: Sources, rays: SourceRays, rings: Rings
     ) -> tuple[Paths, Sources]:
-        """Trace sources again, each half as coarse as before; return what that changes, as `SourcedPaths.replace`."""
+        """Trace sources again, each half as coarse as before, and others `alone` with the first of them; return what
+        that changes, as `SourcedPaths.replace`."""
         step, changed = rays.next_step(wanted), list[tuple[Paths, Sources]]()
         for k in np.unique(step):
-            by = list(rings.with_those_beside(wanted[step == k], self._ways.missing(wanted[step == k])))
+            by = list(rings.with_those_beside(wanted[step == k], alone if k == step.min() else alone[:0]))
             rule, before = step_rule(self.radar, self.settings, self.model, int(k)), self.stats.rays
             finer = replace(rule.refinement, least=int(k))
             new = self._paths(launch.again(finer, by, self.stats, self._carried))
