@@ -142,15 +142,16 @@ def _length_across(p, q, image, far):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, error_model="numpy")
 def edge_to_cut(  # type: ignore[no-untyped-def]
     facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend,
-    widest, across,
+    widest, across, least,
 ):  # fmt: skip
     """Return at which edge (n,) to bisect each patch so that its two-way phase comes nearer to a quadratic; -1: none.
 
     All limits on phase and normal grow with half the span of phase: where it runs, a patch scatters less.
 
     Args: phase [rad] by which the quadratic through corners and edge middles may miss the centre; turn [rad] of the
-    normal; max_edge [m], across the rays of the first leg if `across`; most_bend [rad] of the phase along an edge;
-    widest [rad] under which an end may see an edge.
+    normal; max_edge [m], across the rays of the first leg if `across`, of patches that may scatter `least` [1/m] or
+    more, all in phase under a unit field at 1 m; most_bend [rad] of the phase along an edge; widest [rad] under which
+    an end may see an edge.
     """
     out = np.empty(len(facet), np.int8)
     p, normal, total = np.empty((7, 3)), np.empty((4, 3)), np.empty(7)
@@ -192,13 +193,29 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
             # Where the phase is quadratic, only a cut across the turn of the normal lessens it.
             n0, n1 = distance(normal[0], normal[1]), distance(normal[1], normal[2])
             out[i] = largest(n0, n1, distance(normal[2], normal[0]))
-        elif max(e0, e1, e2) > max_edge:
+        elif max(e0, e1, e2) > max_edge and _in_phase(p, image, far, out_image, out_far, wavenumber) >= least:
             out[i] = largest(e0, e1, e2)
         else:
             out[i] = _widest_edge(p, image, far, widest)
             if out[i] < 0:
                 out[i] = _widest_edge(p, out_image, out_far, widest)
     return out
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _in_phase(p, image, far, out_image, out_far, wavenumber):  # type: ignore[no-untyped-def]
+    """Return what a patch of corners p (7, 3), the last its centre, may scatter [1/m], all in phase: k A / (2 pi r r')
+    of its area across the rays (see `radiation.phases`)."""
+    ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
+    bx, by, bz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
+    across = (ay * bz - az * by) * (image[0] if far else p[6, 0] - image[0])
+    across += (az * bx - ax * bz) * (image[1] if far else p[6, 1] - image[1])
+    across += (ax * by - ay * bx) * (image[2] if far else p[6, 2] - image[2])
+    if not far:
+        across /= length_to(p[6], image, False) ** 2
+    if not out_far:
+        across /= length_to(p[6], out_image, False)
+    return wavenumber / (4.0 * math.pi) * abs(across)
 
 
 @njit(cache=True, forceinline=True)

@@ -138,7 +138,7 @@ def _gains(
             for facet, gains in first_surface(geometry, leg, out, tubes, found, frequency, _basis):
                 firsts.append((source_of(way, 0, 1, facet), scale * gains))
 
-    def each(routes: Routes, depth: int, _: int) -> tuple[Sources, Complexes]:
+    def each(routes: Routes, depth: int, *_: int) -> tuple[Sources, Complexes]:
         gains = transfer(routes, geometry.facets, frequency, _basis, _basis)
         return sources_of(routes, way, 0, 0, depth), scale * gains
 

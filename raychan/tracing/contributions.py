@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ _THREADS = 1000  # tubes from which on a second thread pays; not measured
 _NOTHING = 1e-100  # 1/m
 _DEPTH = 1e-2  # of the strongest cell: without noise weaker cells are refined as if they held this; not measured
 SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in phase; not measured
+_SILENT = 0.05  # of the floor: what tubes on one body that leave no route may add up to in a stretch `rule.cell`
+_SOME = 256  # tubes from which on leaving out those pays; not measured
 
 
 CUTS, RAYS, BEGUN, BEFORE = 0, 1, 2, 3
@@ -214,3 +217,35 @@ class Contributions:
         keep = np.ones(len(bound), bool)
         keep[weak.take(order[running <= SHARE])] = False
         return np.flatnonzero(keep)
+
+    def that_return(self, ph: Phases, body: NDArray[np.int16], share: Floats | None = None) -> NDArray[np.intp]:
+        """Return the tubes (n,) whose routes are kept: on each body (n,) and in each cell without the weakest, as long
+        as neither the sum of what these scatter nor its rms sum exceeds a small part of the floor.
+
+        Args: share (n,) by which each scatters less than `ph` tells.
+        """
+        limit = _SILENT * self.rule.floor
+        if len(body) < _SOME or limit == 0.0:
+            return np.arange(len(body))
+        each = amplitudes(ph) if share is None else amplitudes(ph) * share
+        size = np.abs(each)
+        weak = np.flatnonzero(size <= limit)
+        cell = self._cell(ph.length.take(weak)) * (int(body.max()) + 1) + body.take(weak)
+        order = np.lexsort((size.take(weak), cell))
+        weak, first = weak.take(order), np.flatnonzero(np.diff(cell.take(order), prepend=-1))
+        return np.delete(np.arange(len(body)), weak[_first_within(each.take(weak), first, limit)])
+
+
+def _first_within(each: Complexes, first: NDArray[np.intp], limit: float) -> Bools:
+    """Return of amplitudes (n,), groups of which begin at `first` (g,), those of each group from its first one on, as
+    many as neither their sum nor its rms sum exceeds the limit of."""
+    size = np.diff(np.append(first, len(each)))
+
+    def running(x: NDArray[Any]) -> NDArray[Any]:
+        whole = np.cumsum(x)
+        return whole - np.repeat(whole.take(first) - x.take(first), size)
+
+    sums = np.maximum(np.abs(running(each)), np.sqrt(np.maximum(running(np.abs(each) ** 2), 0.0)))
+    row = np.arange(len(each))
+    last = np.maximum.reduceat(np.where(sums <= limit, row, -1), first) if len(first) else first
+    return row <= np.repeat(last, size)

@@ -52,9 +52,7 @@ def launch(
     f = geometry.facets
     shape = f.vertices, f.normals, geometry.edge_curvature
     images = leg.image, leg.far, out.image, out.far
-    allowed = pieces & (geometry.piece_role == SCATTERER)
-    allowed[leg.pieces(geometry)] = False
-    facet = _seeds(geometry, leg, allowed)
+    facet = seeds_of(geometry, leg, pieces)
     if only is not None:
         facet = facet[only[facet]]
     for part, bary in _bisect_for_phase(geometry, facet, shape, images, found, not more):
@@ -65,10 +63,13 @@ def launch(
         yield _clip_at_shadows(geometry, leg, out, tubes, found, more)
 
 
-def _seeds(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
-    """Return the `seed_facets` of a leg, kept with it: launches that refine start from some of the same."""
-    known, found = cache_of(geometry).by_leg("seeds", leg, lambda: (pieces, seed_facets(geometry, leg, pieces)))
-    return found if np.array_equal(known, pieces) else seed_facets(geometry, leg, pieces)
+def seeds_of(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
+    """Return the `seed_facets` of a leg on pieces (p,) that may carry a first bounce, kept with the leg: launches that
+    refine start from some of the same."""
+    allowed = pieces & (geometry.piece_role == SCATTERER)
+    allowed[leg.pieces(geometry)] = False
+    known, found = cache_of(geometry).by_leg("seeds", leg, lambda: (allowed, seed_facets(geometry, leg, allowed)))
+    return found if np.array_equal(known, allowed) else seed_facets(geometry, leg, allowed)
 
 
 def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -> Tubes:
@@ -110,7 +111,9 @@ def _bisect_for_phase(
     bounded: tubes that bounce again need to be short along them too.
     """
     rule = found.rule
-    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, across
+    # What hides in tubes that bring less than deep ones are cut for, all in phase, is not looked for.
+    least = rule.coarse * rule.floor
+    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, across, least
     left = [(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), 0)]
     done: list[tuple[Ints, Floats]] = []
     held = 0

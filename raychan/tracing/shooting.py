@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import take
 from raychan.poses import sizes
 from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
@@ -81,16 +82,19 @@ def numbered_routes(
     pieces: Bools,
     bounces: int,
     found: Contributions,
-    each: Callable[[Routes, int, int], T],
+    each: Callable[[Routes, int, int, bool], T],
     first: Callable[[Tubes, Contributions], None] | None = None,
     wanted: Wanted | None = None,
     back: bool = False,
+    turned: bool = False,
 ) -> Iterator[T]:
     """Yield what `each` makes of the routes that `tube_routes` yields, of the number of the bounce at which they
     scatter, from 1 on, and of that of the leg over which they leave; it is called by any thread.
 
     Args: images of all legs in and out; wanted, if not all; back: this is the other way, from the receiver, of which
-    routes count that the first one has not (see `tracing.ways`); else as for `tube_routes`.
+    routes count that the first one has not (see `tracing.ways`); turned: both ends are one, and routes that come over
+    one leg and leave over another, both over grounds alone, stand for those with their ends exchanged, for which `each`
+    is called once more (its last argument tells so); else as for `tube_routes`.
     """
     more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone and (wanted is None or wanted.depth > 1)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
@@ -100,7 +104,7 @@ def numbered_routes(
     for tubes in launch(geometry, leg, outs[0], pieces, found, more, others, only):
         if first is not None:
             first(tubes, found)
-        wave = _Wave(geometry, leg, outs, images, bounces, each, wanted, back)
+        wave = _Wave(geometry, leg, outs, images, bounces, each, wanted, back, turned)
         yield from wave.followed(tubes, found, first is None)
 
 
@@ -113,9 +117,10 @@ class _Wave(Generic[T]):
     outs: list[Leg]
     images: Images
     bounces: int
-    each: Callable[[Routes, int, int], T]
+    each: Callable[[Routes, int, int, bool], T]
     wanted: Wanted | None
     back: bool
+    turned: bool
 
     def followed(self, tubes: Tubes, found: Contributions, single: bool) -> Iterator[T]:
         """Yield what is made of the routes of tubes that stand on their first surface, and of all later bounces;
@@ -138,7 +143,7 @@ class _Wave(Generic[T]):
             any_over = self.leg if first else None
             leaving = Leaving(geometry, self.outs, outs, tubes, scatters, twice, first, which, any_over)
             outs = [i for i in outs if leaving.any_over(i)]
-            left = partial(self._left, tubes, leaving, depth)
+            left = partial(self._left, tubes, leaving, depth, twice)
             # What returns by the leg that it came by counts first, and the others against that.
             same = [i for i in outs if first and self.outs[i] is self.leg]
             for i in same:
@@ -158,13 +163,28 @@ class _Wave(Generic[T]):
                 return
             tubes, depth = landed[0], depth + 1
 
-    def _left(self, tubes: Tubes, leaving: Leaving, depth: int, i: int, found: Contributions) -> list[T]:
-        """Return what is made of the routes over leg out i of tubes on their surface number `depth`."""
-        own = tubes.only(leaving.over(i))
-        return [
-            self.each(routes, depth, i)
-            for routes in _returned(self.geometry, self.leg, self.outs[i], own, depth == 1, found)
-        ]
+    def _left(self, tubes: Tubes, leaving: Leaving, depth: int, twice: Bools, i: int, found: Contributions) -> list[T]:
+        """Return what is made of the routes over leg out i of tubes on their surface number `depth`, `twice` (n,) as
+        for `Leaving`."""
+        rows, way = leaving.over(i), self._exchanged(depth, i)
+        if way < 0:
+            rows = rows[twice[rows]]
+        made = list[T]()
+        for routes in _returned(self.geometry, self.leg, self.outs[i], tubes.only(rows), depth == 1, found):
+            made.append(self.each(routes, depth, i, False))
+            if way > 0:
+                plane = self.geometry.plane[routes.facet[np.arange(len(routes.kind)), routes.scatter]]
+                made.append(self.each(take(routes, ~self.images.planes[plane]), depth, i, True))
+        return made
+
+    def _exchanged(self, depth: int, i: int) -> int:
+        """Tell whether routes over leg out i also stand for those with their ends exchanged, 1, or are brought by
+        those, -1; but for those of mirrors of legs. Else 0."""
+        leg, out, role = self.leg, self.outs[i], self.geometry.facets.role
+        over = leg.mirrors + out.mirrors
+        if depth > 1 or not self.turned or out is leg or any(role[m.body] != MIRROR for m in over):
+            return 0
+        return 1 if i > next(j for j, one in enumerate(self.outs) if one is leg) else -1
 
     def _bounced(self, tubes: Tubes, count: int, depth: int, found: Contributions, landed: list[Tubes]) -> list[T]:
         """Put tubes after their next reflection into `landed`."""
@@ -184,10 +204,11 @@ def _returned(
     if not len(some):
         return
     if first and out == leg:
-        corners, passed = leg_of_arrival(some, len(leg.mirrors), rule.layers)
         if not geometry.convex_alone:
             ph = phases_of(geometry, leg, out, some, rule)
             found.add(ph)
+            some = some.only(found.that_return(ph, geometry.facets.body[some.facet]))
+        corners, passed = leg_of_arrival(some, len(leg.mirrors), rule.layers)
     else:
         which = OBLIQUE if first else FACING
         some, corners, passed = resolve_return_leg(geometry, leg, out, some, found, first, which)
@@ -221,7 +242,11 @@ def resolve_return_leg(
             weak = np.flatnonzero(~facing)
             left = found.that_count(OBLIQUE_SHARE * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
-            tubes, ph, facing = tubes.only(rows), ph.take(rows), facing[rows]
+            tubes, ph, share, facing = tubes.only(rows), ph.take(rows), share[rows], facing[rows]
+        if not (level or geometry.convex_alone):
+            rows = found.that_return(ph, geometry.facets.body[tubes.facet], share)
+            if len(rows) < len(tubes):
+                tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
         least = found.prune_threshold(ph.length) if first else found.deep_threshold(ph.length)
         # Along an edge flat tubes may err alike though the phase runs over each.
         bound = ph.bound

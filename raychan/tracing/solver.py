@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
+from raychan.tracing.launch import seeds_of
 from raychan.tracing.legs import Leg, Stop, legs_over, reachable
 from raychan.tracing.lit_legs import lit_legs
 from raychan.tracing.point_targets import diffracted_routes, point_routes
@@ -23,7 +24,7 @@ from raychan.tracing.shared_work import all_of
 from raychan.tracing.shooting import Wanted, numbered_routes
 from raychan.tracing.sources import EXACT, Sources, depth_of, legs_of, source_of, sources_of
 from raychan.tracing.tubes import Refinement
-from raychan.tracing.ways import Way
+from raychan.tracing.ways import Way, turned_round
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -169,16 +170,18 @@ class Launch:
         way = self._ways[i >= len(self.legs)]
         leg = way.legs[i - way.back * len(self.legs)]
         pieces = reachable(self.geometry, leg)
-        if not pieces.any():
+        if not pieces.any() or not len(seeds_of(self.geometry, leg, pieces)):
             return
 
-        def made(routes: Routes, depth: int, out: int) -> tuple[int, T, Sources]:
+        def made(routes: Routes, depth: int, out: int, turned: bool) -> tuple[int, T, Sources]:
             source = sources_of(routes, i, len(leg.mirrors), out, depth)
+            if turned:
+                return 0, each(turned_round(routes)), source
             return len(routes.kind), each(way.counted(self.geometry, leg, routes, depth)), source
 
         for tubes, *one in numbered_routes(
             self.geometry, leg, way.outs, way.images, pieces, self.rule.bounces, found, made, wanted=wanted,
-            back=way.back,
+            back=way.back, turned=self.rule.rx is None,
         ):  # fmt: skip
             stats.tubes += tubes
             yield one[0], one[1]

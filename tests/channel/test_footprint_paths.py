@@ -26,7 +26,8 @@ def test_footprints_that_stay_one_path_change_no_cell_by_a_tenth_of_the_noise(sp
         join([paths_of(batch, facets, radar, radar.waveform.carrier, noise) for batch in routes.batches])
         for noise in (0.0, routes.noise)
     )
-    assert len(whole.length) < 0.8 * len(split.length)
+    # Of most footprints that the noise hides no route is left.
+    assert len(whole.length) < 0.95 * len(split.length)
     apart = synthesize(split, radar).samples - synthesize(whole, radar).samples
     power = quiet_map(apart, radar, settings)
     assert np.sqrt(power.max() / radar.power) < 0.1 * routes.noise

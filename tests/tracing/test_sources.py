@@ -13,7 +13,7 @@ from raychan.channel.paths import join, paths_of
 from raychan.run.rules import fine_rule
 from raychan.signal.baseband import synthesize
 from raychan.tracing.solver import Launch, Stats
-from raychan.tracing.sources import EXACT, Rings, covered, depth_of, facet_of, launches, source_of
+from raychan.tracing.sources import EXACT, Rings, covered, depth_of, facet_of, launches, legs_of, source_of
 from raychan.world.geometry import geometry_of
 
 
@@ -42,17 +42,22 @@ def surfaces(routes):
 def test_depth_and_facet_are_those_that_the_interactions_tell(whole):
     _, launch, routes, sources = whole
     depths, facets, row = depth_of(sources), facet_of(sources), 0
-    legs = sources >> 49
+    legs, outs = legs_of(sources)
+    turned = 0
     for met, facet in surfaces(routes):
         if sources[row] == EXACT:
             assert (depths[row], facets[row]) == (0, -1)
         else:
-            mirrors = len(launch.legs[int(legs[row])].mirrors)
+            mirrors, others = (len(launch.legs[int(x[row])].mirrors) for x in (legs, outs))
+            # Of routes over one leg and another the same with their ends exchanged have the source, too.
+            mirrors = others if depths[row] == 1 and len(met) != mirrors + 1 else mirrors
+            turned += mirrors != len(launch.legs[int(legs[row])].mirrors)
             assert depths[row] == len(met) - mirrors
             assert facets[row] == facet[met[mirrors]]
         row += 1
     assert row == len(sources)
     assert {1, 2} <= set(depths.tolist())
+    assert turned > 100
 
 
 def test_covered_tells_what_a_slow_search_tells(whole):
