@@ -23,6 +23,9 @@ SHAPE = 0.25  # least quality of new facets, 1 for equilateral ones, unless the 
 # Of the limits, what a vertex that goes may be off its new facet: elsewhere on the facet the surface is off by more. It
 # trades facets that fail their check for facets left: at 0.25 an ellipsoid keeps 1.7 times as many (command not noted).
 _OWN = 0.5
+# Times the deviation allowed: length times turn cubed of an edge. Over the middle of a chord of a circle a Nagata patch
+# is off by length times turn cubed over 128, and `patch_offsets` counts 1.6 times that.
+_ALONG = 128.0 / 1.6
 
 
 class Limits(NamedTuple):
@@ -152,7 +155,8 @@ def form(p, q, r, np_, nq, nr):  # type: ignore[no-untyped-def]
 def edge_allowed(p, q, np_, nq, reach, limits):  # type: ignore[no-untyped-def]
     """Tell whether an edge between two points with these normals may come, by its length, turn and sagitta."""
     d, e = less(q, p), less(nq, np_)
-    if _squared(p, q) > reach**2 or dot(e, e) > limits.turn**2:
+    size, turned = _squared(p, q), dot(e, e)
+    if size > reach**2 or turned > limits.turn**2 or size * turned**3 > (_ALONG * limits.deviation) ** 2:
         return False
     return not abs(dot(d, e)) > 8.0 * limits.sag
 

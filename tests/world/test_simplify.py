@@ -8,6 +8,7 @@ import trimesh
 from support.fine_surfaces import ball, ellipsoid, off_ball, off_torus, on_patches, torus
 
 import raychan as rc
+from raychan.geometry.triangles import edge_curvatures
 from raychan.parallel import run_pair
 from raychan.units import C0
 from raychan.world.geometry import geometry_of
@@ -15,6 +16,7 @@ from raychan.world.mesh import make_mesh
 from raychan.world.near_surfaces import near_surfaces
 from raychan.world.simplified import limits_of, traced_alone, traced_mesh, traced_scene
 from raychan.world.simplify import simplify
+from raychan.world.surface_check import Check
 
 F = 24e9
 K = 2.0 * np.pi * F / C0
@@ -204,3 +206,29 @@ def test_a_moving_body_is_simplified_once():
     assert scene.bodies[0].geometry is not meshes[0]
     assert geometry_of(scene) is geometry_of(scene)
     assert str(geometry_of(scene).merged).startswith("81,920 facets merged into ")
+
+
+@pytest.mark.parametrize("turn", [0.02, 0.1, 0.3])
+def test_a_curved_edge_over_a_chord_of_a_circle_is_off_by_length_times_turn_cubed_over_128(turn):
+    """What edges of a simplified mesh are limited by before any point is checked."""
+    ends = np.array([[np.cos(t), np.sin(t), 0.0] for t in (-0.5 * turn, 0.5 * turn)])
+    v = np.vstack([ends, [1.0, 0.0, turn]])
+    edge = edge_curvatures(v[None], np.vstack([ends, ends.mean(axis=0)])[None])[0][0, 0]
+    middle = ends.mean(axis=0) - 0.25 * edge
+    length, off = np.linalg.norm(ends[1] - ends[0]), abs(np.linalg.norm(middle) - 1.0)
+    assert off == pytest.approx(length * turn**3 / 128.0, rel=0.03)
+
+
+def test_a_balls_rounds_of_removals_need_no_redo(monkeypatch):
+    """Edges that would fail the check do not come."""
+    checks, real = [], Check.__call__
+
+    def counted(check, net, heir, limits):
+        off, most = real(check, net, heir, limits)
+        checks.append(most)
+        return off, most
+
+    monkeypatch.setattr(Check, "__call__", counted)
+    found = simplified(ball(6), 0.15)
+    assert max(checks) <= 1.0
+    assert len(found.mesh.faces) < 0.25 * 81_920
