@@ -1,4 +1,5 @@
-"""Threads: whole frames on two against one, and what of a frame is done outside every loop that threads share."""
+"""Threads: whole frames on two against one, what of a frame is done outside every loop that threads share, and how fast
+two frames at once are that share nothing but the interpreter: no division of one frame among threads is faster."""
 
 from __future__ import annotations
 
@@ -34,11 +35,36 @@ def threads(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
             "threads", f"{name}, {tolerance:g} dB, two threads", [(run(2), run(1)) for _ in range(repeats)], "one"
         )
         yield barred(row, f"<= {_BAR:.2f}", row.ratio <= _BAR)
+        yield _at_once(scene, name, tolerance, repeats)
         with _shared() as spent:
             whole = run(1)
         share = 1.0 - spent[0] / whole
         row = Row("threads", f"{name}: outside shared loops", whole - spent[0], "whole frame", whole, share)
         yield barred(row, f"<= {_SERIAL:g}", share <= _SERIAL)
+
+
+def _at_once(scene: rc.Scene, name: str, tolerance: float, repeats: int) -> Row:
+    """Return the row of two frames at once, each on a thread of its own, against the same one after the other."""
+    scenes = [rc.Scene.load(str(scene.path)) for _ in range(2)]
+
+    def frame(one: rc.Scene) -> None:
+        rc.simulate(one, tolerance_db=tolerance)
+
+    def both() -> None:
+        workers = [threading.Thread(target=frame, args=(one,)) for one in scenes]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+
+    parallel.set_threads(1)
+    try:
+        for one in scenes:
+            frame(one)
+        pairs = [(seconds(both), sum(seconds(lambda one=one: frame(one)) for one in scenes)) for _ in range(repeats)]  # type: ignore[misc]
+    finally:
+        parallel.set_threads(None)
+    return paired("threads", f"{name}: two frames at once, a thread each", pairs, "one after the other")
 
 
 @contextmanager
