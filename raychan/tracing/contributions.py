@@ -218,19 +218,22 @@ class Contributions:
         keep[weak.take(order[running <= SHARE])] = False
         return np.flatnonzero(keep)
 
-    def that_return(self, ph: Phases, body: NDArray[np.int16], share: Floats | None = None) -> NDArray[np.intp]:
+    def leaves_out(self, count: int) -> bool:
+        """Tell whether any of so many tubes may leave no route (see `that_return`)."""
+        return count >= _SOME and _SILENT * self.rule.floor > 0.0
+
+    def that_return(self, each: Complexes, length: Floats, body: NDArray[np.int16]) -> NDArray[np.intp]:
         """Return the tubes (n,) whose routes are kept: on each body (n,) and in each cell without the weakest, as long
         as neither the sum of what these scatter nor its rms sum exceeds a small part of the floor.
 
-        Args: share (n,) by which each scatters less than `ph` tells.
+        Args: each (n,) [1/m] what a tube scatters; length (n,) [m] of the two-way paths.
         """
-        limit = _SILENT * self.rule.floor
-        if len(body) < _SOME or limit == 0.0:
+        if not self.leaves_out(len(body)):
             return np.arange(len(body))
-        each = amplitudes(ph) if share is None else amplitudes(ph) * share
+        limit = _SILENT * self.rule.floor
         size = np.abs(each)
         weak = np.flatnonzero(size <= limit)
-        cell = self._cell(ph.length.take(weak)) * (int(body.max()) + 1) + body.take(weak)
+        cell = self._cell(length.take(weak)) * (int(body.max()) + 1) + body.take(weak)
         order = np.lexsort((size.take(weak), cell))
         weak, first = weak.take(order), np.flatnonzero(np.diff(cell.take(order), prepend=-1))
         return np.delete(np.arange(len(body)), weak[_first_within(each.take(weak), first, limit)])

@@ -14,7 +14,7 @@ from raychan.columns import take
 from raychan.poses import sizes
 from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
-from raychan.tracing.contributions import Contributions
+from raychan.tracing.contributions import Contributions, amplitudes
 from raychan.tracing.images import Images
 from raychan.tracing.launch import OBLIQUE_SHARE, launch
 from raychan.tracing.legs import Leg, View
@@ -206,8 +206,9 @@ def _returned(
     if first and out == leg:
         if not geometry.convex_alone:
             ph = phases_of(geometry, leg, out, some, rule)
-            found.add(ph)
-            some = some.only(found.that_return(ph, geometry.facets.body[some.facet]))
+            each = amplitudes(ph)
+            found.add(ph, each)
+            some = some.only(found.that_return(each, ph.length, geometry.facets.body[some.facet]))
         corners, passed = leg_of_arrival(some, len(leg.mirrors), rule.layers)
     else:
         which = OBLIQUE if first else FACING
@@ -243,16 +244,17 @@ def resolve_return_leg(
             left = found.that_count(OBLIQUE_SHARE * ph.bound[weak] * share[weak], ph.length[weak], 0)
             rows = np.sort(np.concatenate([np.flatnonzero(facing), weak[left]]))
             tubes, ph, share, facing = tubes.only(rows), ph.take(rows), share[rows], facing[rows]
-        if not (level or geometry.convex_alone):
-            rows = found.that_return(ph, geometry.facets.body[tubes.facet], share)
-            if len(rows) < len(tubes):
-                tubes, ph, facing = tubes.take(rows), ph.take(rows), facing[rows]
         least = found.prune_threshold(ph.length) if first else found.deep_threshold(ph.length)
         # Along an edge flat tubes may err alike though the phase runs over each.
-        bound = ph.bound
-        if rule.by_landing:
-            bound = np.where(tubes.flat & ~geometry.curved[tubes.facet], ph.in_phase, bound)
-        matters = (bound > least) & (not found.budget.spent(geometry))
+        flat = rule.by_landing & tubes.flat & ~geometry.curved[tubes.facet]
+        matters = np.where(flat, ph.in_phase, ph.bound) > least
+        if not level and found.leaves_out(len(tubes)):
+            rows = found.that_return(
+                # Of what may be cut the parts are not known yet.
+                np.where(matters, np.inf, amplitudes(ph) * share), ph.length, geometry.facets.body[tubes.facet]
+            )  # fmt: skip
+            tubes, ph, facing, matters = tubes.only(rows), ph.take(rows), facing[rows], matters[rows]
+        matters &= not found.budget.spent(geometry)
         # In a scene currents beyond the horizon are weak: their visibility is tested by their centres alone.
         tested = matters if which == LIT else matters & facing
         view = tube_visibility(geometry, out, tubes, tested, first, rule, level, facing_away=~facing)

@@ -37,9 +37,9 @@ def weak_tubes(n, seed):
 def test_what_leaves_no_route_adds_up_to_less_than_the_limit_in_each_cell_on_each_body(seed):
     ph, body = weak_tubes(3000, seed)
     share = np.random.default_rng(seed + 9).uniform(0.2, 1.0, 3000)
-    kept = Contributions(RULE).that_return(ph, body.astype(np.int16), share)
-    gone = np.setdiff1d(np.arange(3000), kept)
     each = amplitudes(ph) * share
+    kept = Contributions(RULE).that_return(each, ph.length, body.astype(np.int16))
+    gone = np.setdiff1d(np.arange(3000), kept)
     assert len(gone) > 1000
     assert (np.diff(kept) > 0).all()
     cell = (ph.length / RULE.cell).astype(int)
@@ -54,19 +54,18 @@ def test_what_leaves_no_route_adds_up_to_less_than_the_limit_in_each_cell_on_eac
 
 def test_all_routes_are_kept_of_few_tubes_and_where_there_is_no_noise():
     ph, body = weak_tubes(200, 1)
-    assert len(Contributions(RULE).that_return(ph, body.astype(np.int16))) == 200
+    assert len(Contributions(RULE).that_return(amplitudes(ph), ph.length, body.astype(np.int16))) == 200
     ph, body = weak_tubes(3000, 1)
     silent = Refinement(wavenumber=1600.0, floor=0.0, cell=0.5)
-    assert len(Contributions(silent).that_return(ph, body.astype(np.int16))) == 3000
+    assert len(Contributions(silent).that_return(amplitudes(ph), ph.length, body.astype(np.int16))) == 3000
 
 
 def test_tubes_in_phase_are_not_left_out_however_small_they_are():
     """A finely tessellated mirror: each facet is a thousandth of the limit, all together are far above it."""
     ph, body = weak_tubes(100_000, 2)
-    flat = Phases(
-        np.zeros_like(ph.six), ph.bend, *(np.full(len(body), 1e-3 * LIMIT),) * 2, ph.rough, np.full(len(body), 10.1)
-    )
-    kept = Contributions(RULE).that_return(flat, np.zeros(len(body), np.int16))
+    small, far = np.full(len(body), 1e-3 * LIMIT), np.full(len(body), 10.1)
+    flat = Phases(np.zeros_like(ph.six), ph.bend, small, small, ph.rough, far)
+    kept = Contributions(RULE).that_return(amplitudes(flat), far, np.zeros(len(body), np.int16))
     assert 1e-3 * LIMIT * (len(body) - len(kept)) <= LIMIT * (1.0 + 1e-9)
 
 
