@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import take
+from raychan.geometry.triangles import edge_folds
 from raychan.world.creases import Alternatives
 from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved
+from raychan.world.pieces import pieces
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -107,6 +109,17 @@ def _halved(geometry: Geometry, rows: Bools, wavenumber: float) -> Geometry | No
     every = np.tile(np.arange(len(facets.vertices)), 4)
     # Middles of the edges of a saddle lie inside, by less than its facets are off: they hide nothing more.
     return Geometry(take(facets, every).replace(vertices=v, normals=n), finer_of=geometry)
+
+
+def has_edges(geometry: Geometry) -> bool:
+    """Tell whether a surface is not one that bends smoothly all over: where normals are alike, a seam between parts is
+    no edge."""
+    if not geometry.smooth.any():
+        return False
+    pair, f = geometry.scene_topology.half_edges("pair"), geometry.facets
+    soft = edge_folds(pair, f.vertices, f.normals, geometry.normal, geometry.area)[1]
+    a, b = pair[soft].T // 3
+    return bool(pieces(a, b, len(f.body)).any())
 
 
 def creeping(geometry: Geometry, wavenumber: float) -> tuple[float, float]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.error import COVER, stated_error
-from raychan.channel.mesh_error import MeshError, creeping
+from raychan.channel.mesh_error import MeshError, creeping, has_edges
 from raychan.channel.terminator_error import terminator_error
 from raychan.run.rcs_doubt import Doubt
 from raychan.run.scattering import BodyLaunch, BySource
@@ -114,7 +114,7 @@ def _terminator(case: Case) -> float:
     """Return the error [m] due to the terminator of a smooth body, a ring all of which may return in phase; 0 for
     bodies with edges."""
     geometry = case.geometry
-    if not geometry.convex_alone or not geometry.curved.any() or geometry.smooth.any():
+    if not geometry.convex_alone or not geometry.curved.any() or has_edges(geometry):
         return 0.0
     k = 2.0 * np.pi * case.frequency / C0
     area, ends = float(geometry.area.sum()), (case.leg.end, case.out.end)

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 from support.targets import F, amplitudes, ball, bodies, db, sigma, tube, view
+from truth import mie
 
 from raychan.run.rcs import rcs
 from raychan.run.single_body import facets_of
+from raychan.units import C0
 from raychan.world.material import Material
+from raychan.world.mesh import make_mesh
 
 
 @pytest.mark.parametrize("name", bodies())
@@ -71,3 +74,27 @@ def test_exchange_of_transmitter_and_receiver_in_random_scenes():
         if max(both) > 1e-9:  # 1 mm^2/1000: nothing but rounding
             worst = max(worst, abs(db(both[1] / both[0])))
     assert worst < 0.1
+
+
+@pytest.mark.parametrize(
+    ("level", "radius", "frequency", "azimuth", "elevation"),
+    [(5, 0.1041, 24e9, 119.81, 14.39), (6, 0.0784, 77e9, -96.97, 51.94), (5, 0.3773, 10e9, -92.2, 27.86)],
+)
+@pytest.mark.parametrize("known", [False, True], ids=["estimated", "known"])
+def test_parts_of_a_smooth_body_change_neither_its_level_nor_its_error(
+    level, radius, frequency, azimuth, elevation, known
+):
+    """Drawn as four parts a sphere stated a third of the error, which did not cover what it is off Mie's series by."""
+    raw = trimesh.creation.icosphere(subdivisions=level)
+    normals, centre = (raw.vertices[raw.faces] if known else None), raw.vertices[raw.faces].mean(axis=1)
+    part = (centre[:, 2] > 0.3).astype(np.int32) + 2 * (centre[:, 1] > 0.0)
+
+    def found(**parts):
+        mesh = make_mesh(radius * raw.vertices, raw.faces, normals=normals, **parts)
+        return rcs(mesh, frequency, azimuth, elevation, tolerance_db=0.05)
+
+    whole, parts = found(), found(part=part, part_names=("a", "b", "c", "d"))
+    assert parts.error_db == pytest.approx(whole.error_db, rel=0.1)
+    truth = mie.rcs(radius, 2.0 * np.pi * frequency / C0)
+    for one in (whole, parts):
+        assert abs(10.0 * np.log10(one.sigma / truth)) < one.error_db
