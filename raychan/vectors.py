@@ -78,3 +78,12 @@ def plane_distance(n, v, x, along, d):  # type: ignore[no-untyped-def]
     for c in range(3):
         height += n[c] * (v[c] - (x[c] + along * d[c]))
     return height / slope
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def twice_area_across(points, k):  # type: ignore[no-untyped-def]
+    """Return twice the area of corners (3, 3) or more as seen along k (3,), times its length, with its sign [m^2]."""
+    p, q, r = points[0], points[1], points[2]
+    ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]

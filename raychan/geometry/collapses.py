@@ -15,7 +15,7 @@ import numpy as np
 
 from raychan.compile.jit import njit
 from raychan.geometry.half_edges import MOST, before, fan_of
-from raychan.geometry.patch_offsets import beyond, patch_offset
+from raychan.geometry.patch_offsets import BETWEEN, beyond, patch_offset
 from raychan.vectors import cross, dot, less, row
 
 UPRIGHT = 0.9  # least cosine of a facet's plane normal to its corner normals: 26 deg; not measured
@@ -24,8 +24,8 @@ SHAPE = 0.25  # least quality of new facets, 1 for equilateral ones, unless the 
 # trades facets that fail their check for facets left: at 0.25 an ellipsoid keeps 1.7 times as many (command not noted).
 _OWN = 0.5
 # Times the deviation allowed: length times turn cubed of an edge. Over the middle of a chord of a circle a Nagata patch
-# is off by length times turn cubed over 128, and `patch_offsets` counts 1.6 times that.
-_ALONG = 128.0 / 1.6
+# is off by length times turn cubed over 128, of which checks count so many times more.
+_ALONG = 128.0 / BETWEEN
 
 
 class Limits(NamedTuple):

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.vectors import distance, dot, largest, length_to
+from raychan.vectors import distance, dot, largest, length_to, twice_area_across
 
 _STEPS, _CLOSE = 12, 1e-9  # most steps from a plane to its patch, and the m by which the last one moves at most
 _BESIDE = 0.5  # of a facet's barycentric range: so far beside the facet its patch goes on; not measured
@@ -206,13 +206,11 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
 def _in_phase(p, image, far, out_image, out_far, wavenumber):  # type: ignore[no-untyped-def]
     """Return what a patch of corners p (7, 3), the last its centre, may scatter [1/m], all in phase: k A / (2 pi r r')
     of its area across the rays (see `radiation.phases`)."""
-    ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
-    bx, by, bz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
-    across = (ay * bz - az * by) * (image[0] if far else p[6, 0] - image[0])
-    across += (az * bx - ax * bz) * (image[1] if far else p[6, 1] - image[1])
-    across += (ax * by - ay * bx) * (image[2] if far else p[6, 2] - image[2])
-    if not far:
-        across /= length_to(p[6], image, False) ** 2
+    if far:
+        across = twice_area_across(p, (image[0], image[1], image[2]))
+    else:
+        k = p[6, 0] - image[0], p[6, 1] - image[1], p[6, 2] - image[2]
+        across = twice_area_across(p, k) / length_to(p[6], image, False) ** 2
     if not out_far:
         across /= length_to(p[6], out_image, False)
     return wavenumber / (4.0 * math.pi) * abs(across)

@@ -20,7 +20,7 @@ _STEPS = 3  # of the search for a foot point; each leaves a few hundredths of th
 _WALK = 400  # facets passed in search of a point's own; beyond, it is lost
 # Largest deviation anywhere on a facet over that of the points checked: 1.53 at most on spheres and tori of 20,000 to
 # 100,000 facets at 0.05 to 1 dB, against their closed forms (command not noted).
-_BETWEEN = 1.6
+BETWEEN = 1.6
 
 
 @njit(cache=True, forceinline=True)
@@ -130,7 +130,7 @@ def offsets(place, normal, begin, net, most, found, off, excess):  # type: ignor
             else:
                 m = number[f]
                 far, turned = _offset(p, up, _corners(v, m), _corners(n, m), _corners(b, m), s, t)
-                off[i] = _BETWEEN * far
+                off[i] = BETWEEN * far
                 excess[i] = max(off[i] / most[0], turned / most[1])
         farthest, worst = max(farthest, off[i]), max(worst, excess[i])
     return farthest, worst

@@ -22,7 +22,7 @@ from raychan.parallel import parallel_for
 from raychan.tracing.image_paths import weight
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes
-from raychan.vectors import distance, length_to
+from raychan.vectors import distance, length_to, twice_area_across
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -152,15 +152,6 @@ def _length_at_middle(c, points, k, length, normals, bary, v, b, image, far, mid
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
-def _area_across(points, k):  # type: ignore[no-untyped-def]
-    """Return twice the area of a tube's corners (3, 3) or more as seen along k (3,), with its sign [m^2]."""
-    p, q, r = points[0], points[1], points[2]
-    ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
-
-
-@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _reflection(j, materials, normal, k, wavenumber):  # type: ignore[no-untyped-def]
     """Return the larger of |R_s|, |R_p| of material j for a ray along k (3,)."""
     kind, eps, thickness, roughness = materials
@@ -243,7 +234,7 @@ def _each_phase(tubes, facets, image, far, antenna, wavenumber, limits, every, o
         gain = weight(points[3], images, out_far, mirrors, table, look)
         if lossy[f]:
             gain *= _reflection(material[f], materials, normals[i, 3], k[3], wavenumber)
-        share = wavenumber / (4.0 * math.pi) * abs(_area_across(points, k[3])) * strength[i] * spread[i]
+        share = wavenumber / (4.0 * math.pi) * abs(twice_area_across(points, k[3])) * strength[i] * spread[i]
         share /= 1.0 if out_far else back
         in_phase[i] = gain * share
         bound[i] = gain * (share / (1.0 + 0.5 * span))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from raychan.compile.jit import njit
 from raychan.em.fresnel import coefficients
 from raychan.geometry.curved_patches import distance_to_patch, weights_at
-from raychan.vectors import dot, length_to
+from raychan.vectors import dot, length_to, twice_area_across
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -67,14 +67,6 @@ class ReflectingFacets(NamedTuple):
 
 
 @njit(cache=True, forceinline=True, uncounted=True)
-def _twice_area(p, k):  # type: ignore[no-untyped-def]
-    """Return twice the area of a triangle as seen along k."""
-    ax, ay, az = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
-    bx, by, bz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
-    return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
-
-
-@njit(cache=True, forceinline=True, uncounted=True)
 def _strength(j, materials, cosine, wavenumber):  # type: ignore[no-untyped-def]
     """Return the larger of |R_s|, |R_p| of a material."""
     kind, eps, thickness, roughness = materials
@@ -114,7 +106,7 @@ def contribution_bound(i, tubes, image, far, wavenumber, surface):  # type: igno
     for c in range(3):
         there = tubes.length[i, c] + length_to(points[c], image, far)
         low, high, total = min(low, there), max(high, there), total + there
-    share = wavenumber / (4.0 * math.pi) * abs(_twice_area(points, k[3])) * tubes.strength[i] * tubes.spread[i]
+    share = wavenumber / (4.0 * math.pi) * abs(twice_area_across(points, k[3])) * tubes.strength[i] * tubes.spread[i]
     if not far:
         share /= length_to(points[3], image, far)
     if lossy[facet]:
@@ -166,7 +158,7 @@ def growth_at_hit(points, directions, f, reach, p):  # type: ignore[no-untyped-d
     for q in range(3):
         for c in range(3):
             p[q, c] = points[q, c] + reach * directions[q, c]
-    there, before = _twice_area(p, directions[3]), _twice_area(points, directions[3])
+    there, before = twice_area_across(p, directions[3]), twice_area_across(points, directions[3])
     return math.sqrt(max(abs(there / before), 1.0)) if before != 0.0 else 1.0
 
 
@@ -278,8 +270,8 @@ def tubes_at_hits(rows, hit, reach, tubes, facets, far, wavenumber, out):  # typ
             for q in range(4):
                 for c in range(3):
                     out.normals[j, q, c] = -out.normals[j, q, c]
-        before = _twice_area(tubes.points[i], tubes.directions[i, 3])
-        after = _twice_area(out.points[j], tubes.directions[i, 3])
+        before = twice_area_across(tubes.points[i], tubes.directions[i, 3])
+        after = twice_area_across(out.points[j], tubes.directions[i, 3])
         out.flat[j] = tubes.flat[i] and not facets.curved[left]
         if out.flat[j]:
             out.spread[j] = 1.0 if far else 1.0 / out.length[j, 3]
