@@ -12,7 +12,7 @@ import numpy as np
 from raychan.records import RangeDoppler
 from raychan.run.ledger import Entry
 from raychan.run.result import ExplainedDetections, Result
-from raychan.tracing.solver import Stats
+from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry
 
 _NAMED = 5  # detections that a line names by their numbers

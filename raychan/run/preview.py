@@ -23,7 +23,8 @@ from raychan.run.receiver import noise_amplitude, noise_equivalent_amplitude, no
 from raychan.run.rules import rule_of
 from raychan.signal.baseband import synthesize
 from raychan.tracing.settings import PruneRule, refinement
-from raychan.tracing.solver import Batch, Stats
+from raychan.tracing.solver import Batch
+from raychan.tracing.stats import Stats
 from raychan.units import C0
 from raychan.world.geometry import Geometry
 

@@ -26,7 +26,8 @@ from raychan.tracing.mirrors import Mirror
 from raychan.tracing.radiation import FACING, Phases, phases_of, radiating
 from raychan.tracing.routes import routes_of
 from raychan.tracing.settings import PruneRule
-from raychan.tracing.solver import Batch, Launch, Stats
+from raychan.tracing.solver import Batch, Launch
+from raychan.tracing.stats import Stats
 from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, launch_tubes
 from raychan.tracing.visibility import centre_visibility
 from raychan.world.geometry import Geometry

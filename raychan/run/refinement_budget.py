@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from raychan.tracing.solver import Stats
+from raychan.tracing.stats import Stats
 
 STEPS = 8
 """Launches, each half as coarse as the one before. Rays against cells reached: of the detections at 0.5 dB of nine

@@ -24,7 +24,7 @@ from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, needed
 from raychan.tracing.settings import PruneRule
-from raychan.tracing.solver import Stats
+from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.scene import Scene
 from raychan.world.schema import PREVIEW

@@ -9,7 +9,7 @@ or a budget ends.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
-from raychan.columns import take
 from raychan.parallel import parallel_tasks, run_pair
 from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
@@ -40,9 +39,11 @@ from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
 from raychan.run.unreached import Unreached, unreached_notes, unreached_of
 from raychan.signal.baseband import noisy, synthesize
-from raychan.tracing.solver import Batch, Launch, Stats
+from raychan.tracing.routes import counting
+from raychan.tracing.solver import Batch, Launch
 from raychan.tracing.source_rays import SourceRays
 from raychan.tracing.sources import EXACT, Rings, Sources
+from raychan.tracing.stats import Further, Stats
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -145,7 +146,7 @@ class SceneRefinement:
 
     def _paths(
         self,
-        batches: Iterator[tuple[tuple[Batch | None, Facets, Paths], Sources]],
+        batches: Iterable[tuple[tuple[Batch | None, Facets, Paths], Sources]],
         most: float = math.inf,
     ) -> tuple[Paths, Sources] | None:
         """Return the paths of a launch, and the source of each trajectory; None where there are too many."""
@@ -251,15 +252,19 @@ class SceneRefinement:
     ) -> tuple[Paths, Sources]:
         """Trace sources again, each half as coarse as before, and others `alone` with the first of them; return what
         that changes, as `SourcedPaths.replace`."""
-        step, changed = rays.next_step(wanted), list[tuple[Paths, Sources]]()
-        for k in np.unique(step):
-            by = list(rings.with_those_beside(wanted[step == k], alone if k == step.min() else alone[:0]))
-            rule, before = step_rule(self.radar, self.settings, self.model, int(k)), self.stats.rays
-            finer = replace(rule.refinement, least=int(k))
-            new = self._paths(launch.again(finer, by, self.stats, self._carried))
+        step, asked = rays.next_step(wanted), list[Further]()
+        steps = np.unique(step).tolist()
+        for k in steps:
+            by = list(rings.with_those_beside(wanted[step == k], alone if k == steps[0] else alone[:0]))
+            rule = step_rule(self.radar, self.settings, self.model, k).refinement
+            asked.append(Further(replace(rule, least=k), by))
+        changed = list[tuple[Paths, Sources]]()
+        for k, one, brought in zip(steps, asked, launch.again(asked, self._carried), strict=True):
+            new = self._paths(brought)
             assert new is not None
-            rays.learn(int(k), by, new[1], self.stats.rays - before)
-            changed.append(held.replace(*new, by))
+            self.stats.add(one.stats)
+            rays.learn(k, one.wanted, new[1], one.stats.rays)
+            changed.append(held.replace(*new, one.wanted))
         paths, sources = zip(*changed, strict=True)
         return join(list(paths)), np.concatenate(sources)
 
@@ -289,9 +294,3 @@ def _each(sums: Iterator[Complexes], work: Callable[[int, Complexes], None]) -> 
     for part in sums:
         parallel_tasks(len(part), lambda j, first=first, part=part: work(first + j, part[j]))  # type: ignore[misc]
         first += len(part)
-
-
-def counting(batches: list[Batch], keep: Bools) -> list[Batch]:
-    """Return batches of routes with those that `keep` (w,), over all of them, tells."""
-    ends = np.cumsum([0, *(len(b.kind) for b in batches)])
-    return [take(b, keep[i:j]) for b, i, j in zip(batches, ends, ends[1:], strict=False)]

@@ -13,7 +13,8 @@ from raychan.radar.beam_table import beam_of
 from raychan.records import DiffractedRoutes, Facets, Paths, Points, Routes
 from raychan.tracing.point_targets import diffracted_routes
 from raychan.tracing.settings import PruneRule
-from raychan.tracing.solver import Progress, Stats, launch_routes
+from raychan.tracing.solver import Progress, launch_routes
+from raychan.tracing.stats import Stats
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
 from raychan.world.geometry import Geometry

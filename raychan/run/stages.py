@@ -19,7 +19,8 @@ from raychan.run.solver import Batch
 from raychan.run.turning import needed
 from raychan.signal.baseband import synthesize as samples_of
 from raychan.tracing.settings import PruneRule
-from raychan.tracing.solver import Stats, launch_routes
+from raychan.tracing.solver import launch_routes
+from raychan.tracing.stats import Stats
 from raychan.units import C0
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.limits import SEED

@@ -141,6 +141,7 @@ def _rules(step: _Bounce) -> Rules:
         by_landing=rule.by_landing,
         wide=not rule.fan < np.inf,
         thresholds=found.deep_thresholds,
+        spots=found.spot_thresholds,
         cell=float(rule.cell),
         max_cuts=float(found.budget.rule.max_cuts),
         max_rays=float(found.budget.rule.max_rays),

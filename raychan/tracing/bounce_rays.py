@@ -111,25 +111,40 @@ def _is_wide(directions):  # type: ignore[no-untyped-def]
     return most > _WIDE
 
 
+@njit(cache=True, forceinline=True, uncounted=True)
+def _there(levels, length, cell):  # type: ignore[no-untyped-def]
+    """Return the level (c,) of the cell of a length [m]."""
+    return levels[min(int(max(length / cell, 0.0)), len(levels) - 1)]
+
+
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _matters(i, tubes, rays, world, how, room):  # type: ignore[no-untyped-def]
-    """Tell whether tube i is worth subdividing: one that may contribute more than the prune threshold."""
+    """Tell whether tube i is worth subdividing: one that may contribute more than the prune threshold, or reflect more
+    than counts at one spot of a curved surface."""
     surface = world.lossy, world.material, world.materials
     points, directions, length = tubes.points[i], rays.directions[i], tubes.length[i]
     in_phase, _, whole = contribution_bound(i, tubes, how.image, how.far, how.wavenumber, surface)
-    mid, ahead = rays.hit[i, 3], rays.reach[i, 3]
+    mid, ahead, flat = rays.hit[i, 3], rays.reach[i, 3], rays.flat[i]
+    bent = mid >= 0 and (not flat or world.curved[mid])
+    growth = growth_at_hit(points, directions, mid, ahead, room) if how.by_landing or bent else 1.0
     if how.by_landing:
-        in_phase *= growth_at_hit(points, directions, mid, ahead, room)
-    span = 0.0
-    if how.last:
-        # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back.
-        # Where the centre ray meets nothing, or the ground, from which tubes do not return, a body may stand beside it.
-        if mid >= 0 and world.role[world.body[mid]] == MIRROR:
-            mid = -1
+        in_phase *= growth
+    # Where the centre ray meets nothing, or the ground, from which tubes do not return, a body may stand beside it.
+    if mid >= 0 and world.role[world.body[mid]] == MIRROR:
+        mid = -1
+    runs, span, there = 0.0, 0.0, whole
+    if how.last or bent:
         first, normal, out = world.shapes.first, world.shapes.normal, (how.image, how.far)
-        span, whole = phase_at_hit(points, directions, length, mid, ahead, first, normal, out, how.wavenumber, room[0])
-        if how.by_landing and tubes.flat[i] and not world.curved[tubes.facet[i]]:
-            # Beside where the centre ray lands the phase may run slowly, and there tubes along an edge err alike.
-            span = 0.0
-    cell = min(int(max(whole / how.cell, 0.0)), len(how.thresholds) - 1)
-    return in_phase > how.thresholds[cell] * (1.0 + 0.5 * span)
+        span, there = phase_at_hit(points, directions, length, mid, ahead, first, normal, out, how.wavenumber, room[0])
+    if how.last:
+        # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back. But
+        # beside where the centre ray lands it may run slowly, and there tubes along an edge err alike.
+        runs, whole = (0.0 if how.by_landing and flat else span), there
+    if in_phase > _there(how.thresholds, whole, how.cell) * (1.0 + 0.5 * runs):
+        return True
+    if not bent or mid < 0:
+        return False
+    # Over curved surfaces the phase may be stationary somewhere in the tube. Of one that is quadratic in one direction
+    # a share of (pi / (4 S))^(1/2) is left, of a linear one 2 / S, for a span of S.
+    spot = in_phase if how.by_landing else growth * in_phase
+    return spot > _there(how.spots, there, how.cell) * math.sqrt(1.0 + 4.0 / math.pi * span)

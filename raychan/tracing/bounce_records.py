@@ -52,8 +52,8 @@ class Rules(NamedTuple):
     """How tubes are reflected: patches lit over their leg; image (3,), far of the leg by which contributions are
     bounded; wavenumber [rad/m]; first, last whether they stand on their first surface, or land on their last; layers,
     levels, jitter, patch of the `Refinement`; by_landing whether tubes are cut by what they bring, all in phase, where
-    they land; wide whether fans are not narrow; thresholds (c,) [1/m] of contributions for each `cell` [m] of length;
-    max_cuts, max_rays."""
+    they land; wide whether fans are not narrow; thresholds (c,) [1/m] of contributions for each `cell` [m] of length,
+    and those of single `spots` (c,); max_cuts, max_rays."""
 
     patches: Patches
     image: Floats
@@ -68,6 +68,7 @@ class Rules(NamedTuple):
     by_landing: bool
     wide: bool
     thresholds: Floats
+    spots: Floats
     cell: float
     max_cuts: float
     max_rays: float

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.columns import take
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
-from raychan.records import REFLECT, SCATTER, TRANSMIT, Routes
+from raychan.records import REFLECT, SCATTER, TRANSMIT, DiffractedRoutes, Routes
 from raychan.tracing.footprints import footprints
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import Tubes, edge_middles, slices
@@ -19,6 +20,7 @@ from raychan.world.geometry import Geometry
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bytes = NDArray[np.int8]
+AnyRoutes = TypeVar("AnyRoutes", bound=Routes | DiffractedRoutes)
 
 _REFLECT, _TRANSMIT, _SCATTER = int(REFLECT), int(TRANSMIT), int(SCATTER)  # plain numbers for the kernels
 
@@ -155,6 +157,12 @@ def leg_of_arrival(tubes: Tubes, mirrors: int, layers: int) -> tuple[Floats, Int
     passed = np.empty((len(tubes), layers * (mirrors + 1)), np.int32)
     same_leg_out(tubes.last, tubes.slots, tubes.history.rows, mirrors, corners, passed)
     return corners, passed
+
+
+def counting(batches: list[AnyRoutes], keep: NDArray[np.bool_]) -> list[AnyRoutes]:
+    """Return batches of routes with those that `keep` (w,), over all of them, tells."""
+    ends = np.cumsum([0, *(len(b.kind) for b in batches)])
+    return [take(b, keep[i:j]) for b, i, j in zip(batches, ends, ends[1:], strict=False)]
 
 
 @njit(cache=True, nogil=True, uncounted=True)

@@ -188,7 +188,7 @@ class _Wave(Generic[T]):
 
     def _bounced(self, tubes: Tubes, count: int, depth: int, found: Contributions, landed: list[Tubes]) -> list[T]:
         """Put tubes after their next reflection into `landed`."""
-        last = count + 1 >= self.bounces
+        last = count + 1 >= self.bounces or (self.wanted is not None and depth + 1 == self.wanted.depth)
         after = bounce(self.geometry, self.leg, self.outs[0], tubes, depth == 1, last, found)
         if depth == 1 and len(after):
             after = after.take(~self.images.carry(self.geometry, after))

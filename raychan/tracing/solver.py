@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from itertools import compress
+from itertools import chain, compress, islice
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
 from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
@@ -23,6 +24,7 @@ from raychan.tracing.settings import PruneRule
 from raychan.tracing.shared_work import all_of
 from raychan.tracing.shooting import Wanted, numbered_routes
 from raychan.tracing.sources import EXACT, Sources, depth_of, legs_of, source_of, sources_of
+from raychan.tracing.stats import Further, Stats
 from raychan.tracing.tubes import Refinement
 from raychan.tracing.ways import Way, turned_round
 from raychan.world.geometry import Geometry
@@ -32,6 +34,8 @@ Ints = NDArray[np.int64]
 Progress = Callable[[str, float], None]
 Batch = Routes | DiffractedRoutes
 T = TypeVar("T")
+Brought = tuple[T, Sources]
+_Job = tuple[int, Contributions, Wanted | None]
 LegsFrom = Callable[[Geometry, Floats, int, Beam | None], list[Leg]]
 """Gives the legs from an end, the direct one first (see `legs.legs_over`)."""
 
@@ -42,18 +46,8 @@ _SHARES = 16  # parts of what the direct leg leaves of a budget that each other 
 _GROUP = 64  # legs traced at once at most, and their facets in all: bounds the memory; threads wait for each other
 # after each
 _HELD = 1 << 21
+_HELD_ROUTES = 1 << 17  # of the direct leg's first surfaces: beyond, it is done before other legs; not measured
 _PART = 4096  # first facets from which tubes are traced again at once; not measured
-
-
-@dataclass
-class Stats:
-    """What a launch cost and what it left coarser than asked for."""
-
-    rays: int = 0
-    tubes: int = 0
-    legs: int = 0
-    uncut: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """Tubes (bodies,) that were too many to be cut as finely as asked for."""
 
 
 def launch_routes(
@@ -95,50 +89,61 @@ class Launch:
         self._ways = Way.between(geometry, self.legs, self.outs, both)
         self._found: dict[int, Contributions] = {}
 
-    def whole(
-        self, stats: Stats, each: Callable[[Batch], T], progress: Progress | None = None
-    ) -> Iterator[tuple[T, Sources]]:
+    def whole(self, stats: Stats, each: Callable[[Batch], T], progress: Progress | None = None) -> Iterator[Brought[T]]:
         """Yield what `each`, called by any thread, makes of all routes, and their sources (n,), batch by batch."""
         before = self.geometry.rays
         for exact in self.exact():
             yield each(exact), np.full(len(exact.kind), EXACT)
-        # Every leg is pruned against what the direct leg has found, and itself: the order of the others does not
-        # matter.
+        # Every leg is pruned against itself and what the direct leg has found, the first ones against what its first
+        # surfaces return: the order of the others does not matter.
         direct = self._found[0] = Contributions(self._limited(self.rule.refinement))
-        yield from self._over(0, direct, stats, each)
-        count = sum(len(way.legs) for way in self._ways)
+        straight, count = self._over(0, direct, stats, each), sum(len(way.legs) for way in self._ways)
+        yield from islice(straight, 1)
+        if stats.tubes > _HELD_ROUTES:
+            yield from straight
         for group in self._groups(range(1, count)):
             if progress:
                 progress("trace", group[0] / count)
             for i in group:
                 share = 0.5 if i == len(self.legs) else 1.0 / _SHARES  # the direct leg of the other way
                 self._found[i] = direct.forked(self.geometry, share)
-            yield from self._together([(i, self._found[i], None) for i in group], stats, each)
+            jobs: list[_Job] = [(i, self._found[i], None) for i in group]
+            rest, others = self._beside(straight, jobs, [stats] * len(group), each)
+            yield from chain(rest, *others)
             for i in group:
                 direct.budget.take_back(self._found[i].budget)
-        self._finished(stats, before, [direct.budget])
+        yield from straight
+        stats.rays += self.geometry.rays - before
+        stats.legs = len(self.every[0])
+        stats.count_uncut(direct.budget.uncut)
         if progress:
             progress("trace", 1.0)
 
-    def again(
-        self, refinement: Refinement, wanted: list[tuple[int, Wanted]], stats: Stats, each: Callable[[Batch], T]
-    ) -> Iterator[tuple[T, Sources]]:
-        """Yield what `each`, called by any thread, makes of the routes of tubes traced again, and their sources (n,).
+    def again(self, asked: list[Further], each: Callable[[Batch], T]) -> list[list[Brought[T]]]:
+        """Return, for each of several further launches at once, what `each`, called by any thread, makes of batches of
+        routes, and their sources (n,). Their stats are filled.
 
-        Args: refinement by which tubes are cut; wanted numbers of legs in, and what is wanted there (see
-        `tracing.sources`). What is too weak to be cut is judged by what the whole launch found.
+        What is too weak to be cut is judged by what the whole launch found.
         """
-        before, budgets = self.geometry.rays, list[Budget]()
         # Those that take longest first: at the end threads wait for the last one.
-        longest = sorted(wanted, key=lambda one: (-one[1].depth, -np.count_nonzero(one[1].facets)))
-        parts = [(i, part) for i, what in longest for part in what.parts(_PART)]
+        longest = sorted(
+            ((k, *one) for k, further in enumerate(asked) for one in further.wanted),
+            key=lambda x: (-x[2].depth, -np.count_nonzero(x[2].facets) << asked[x[0]].refinement.least),
+        )
+        parts = [(k, i, part) for k, i, what in longest for part in what.parts(_PART)]
+        found: list[list[Brought[T]]] = [[] for _ in asked]
         for group in self._groups(range(len(parts))):
-            jobs: list[tuple[int, Contributions, Wanted | None]] = []
-            for i, what in (parts[j] for j in group):
-                budgets.append(Budget(self._limited(refinement)))
-                jobs.append((i, self._found[i].frozen(budgets[-1]), what))
-            yield from self._together(jobs, stats, each)
-        self._finished(stats, before, budgets)
+            jobs = list[_Job]()
+            own = [parts[j][0] for j in group]
+            for k, i, what in (parts[j] for j in group):
+                budget = Budget(self._limited(asked[k].refinement))
+                jobs.append((i, self._found[i].frozen(budget), what))
+            for k, made in zip(own, self._together(jobs, [asked[k].stats for k in own], each), strict=True):
+                found[k] += made
+            for k, (_, job, _) in zip(own, jobs, strict=True):
+                asked[k].stats.legs = len(self.every[0])
+                asked[k].stats.count_uncut(job.budget.uncut)
+        return found
 
     def turned_round(self, source: Sources, last: NDArray[np.int32]) -> Sources:
         """Return the sources (n,) of the same routes the other way round, which start on facets `last` (n,)."""
@@ -152,20 +157,39 @@ class Launch:
         size = max(1, min(_GROUP, _HELD // max(len(self.geometry.facets.body), 1)))
         return (jobs[i : i + size] for i in range(0, len(jobs), size))
 
-    def _together(
-        self, jobs: list[tuple[int, Contributions, Wanted | None]], stats: Stats, each: Callable[[Batch], T]
-    ) -> Iterator[tuple[T, Sources]]:
+    def _beside(
+        self, straight: Iterator[Brought[T]], jobs: list[_Job], stats: list[Stats], each: Callable[[Batch], T]
+    ) -> tuple[list[Brought[T]], list[list[Brought[T]]]]:
+        """Return what is left of the direct leg, done by this thread, and what each job brings."""
+
+        def others() -> list[list[Brought[T]]]:
+            before = self.geometry.rays
+            made = self._together(jobs, stats, each)
+            # They count in the stats of the jobs.
+            self.geometry.count_rays(before - self.geometry.rays)
+            return made
+
+        return run_pair(lambda: list(straight), others)
+
+    def _together(self, jobs: list[_Job], stats: list[Stats], each: Callable[[Batch], T]) -> list[list[Brought[T]]]:
+        """Return what each job brings; add what it costs to its stats."""
         own = [Stats() for _ in jobs]
-        tasks = [
-            partial(lambda *a: list(self._over(*a)), i, f, s, each, w) for (i, f, w), s in zip(jobs, own, strict=True)
-        ]
-        for made in all_of(self.geometry, tasks):
-            yield from made
-        stats.tubes += sum(s.tubes for s in own)
+
+        def one(i: int, found: Contributions, wanted: Wanted | None, cost: Stats) -> list[Brought[T]]:
+            before = self.geometry.rays
+            made = list(self._over(i, found, cost, each, wanted))
+            cost.rays = self.geometry.rays - before
+            return made
+
+        made = all_of(self.geometry, [partial(one, *job, cost) for job, cost in zip(jobs, own, strict=True)])
+        for cost, whole in zip(own, stats, strict=True):
+            whole.tubes += cost.tubes
+            whole.rays += cost.rays
+        return made
 
     def _over(
         self, i: int, found: Contributions, stats: Stats, each: Callable[[Batch], T], wanted: Wanted | None = None
-    ) -> Iterator[tuple[T, Sources]]:
+    ) -> Iterator[Brought[T]]:
         # Legs of the other way are numbered after those of this one.
         way = self._ways[i >= len(self.legs)]
         leg = way.legs[i - way.back * len(self.legs)]
@@ -215,17 +239,6 @@ class Launch:
             max_tubes=min(refined.max_tubes, _TUBES),
             max_cuts=min(refined.max_cuts, cuts),
         )
-
-    def _finished(self, stats: Stats, before: int, budgets: list[Budget]) -> None:
-        stats.legs = len(self.every[0])
-        stats.rays += self.geometry.rays - before
-        for budget in budgets:
-            stats.uncut = _added(stats.uncut, budget.uncut)
-
-
-def _added(a: Ints, b: Ints) -> Ints:
-    n = max(len(a), len(b))
-    return np.pad(a, (0, n - len(a))) + np.pad(b, (0, n - len(b)))
 
 
 def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Routes | None:

@@ -6,7 +6,7 @@ subdivision of its facets.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -65,41 +65,61 @@ def merge_flat(
         if kept.sum() == before:
             break
     whole = (count > 1) & ~stuck
-    fans, parts = [f[~whole[piece]]], [part[~whole[piece]]]
     first_face = np.full(len(f), -1, np.int64)
     first_face[piece[::-1]] = np.arange(len(f))[::-1]
+    owners, triangles = _filled(v, np.flatnonzero(whole), owner, following, stop, is_corner)
+    left = ~whole[piece]
+    return np.concatenate([f[left], triangles]), np.concatenate([part[left], part[first_face[owners]]])
+
+
+def _filled(
+    v: Floats, rows: Ints, owner: Ints, following: Ints, stop: Ints, is_corner: NDArray[np.bool_]
+) -> tuple[Ints, Ints]:
+    """Return the triangles (t, 3) that fill pieces `rows` (p,), and the piece (t,) of each.
+
+    Args: v (v, 3) [m]; of the edges of all outlines (e,) the piece, the edge that follows, the vertex where it stops,
+    and whether there is a corner.
+    """
     by_owner = np.argsort(owner, kind="stable")
-    begin = np.searchsorted(owner[by_owner], np.arange(len(f) + 1))
-    for p in np.flatnonzero(whole):
-        corners = _loop(by_owner[begin[p] : begin[p + 1]], following, stop, is_corner)
-        begins = _first(v[corners])
-        corners = corners[begins:] + corners[:begins]
-        fans.append(np.array([[corners[0], corners[i], corners[i + 1]] for i in range(1, len(corners) - 1)]))
-        parts.append(np.full(len(corners) - 2, part[first_face[p]]))
-    return np.concatenate(fans), np.concatenate(parts)
+    begin, end = (np.searchsorted(owner[by_owner], rows, side=side) for side in ("left", "right"))
+    made = [(rows[:0], np.zeros((0, 3), np.int64))]
+    for many in np.unique(end - begin):
+        some = end - begin == many
+        made += _fans(v, rows[some], by_owner[begin[some]], many, following, stop, is_corner)
+    owners, triangles = (np.concatenate(x) for x in zip(*made, strict=True))
+    order = np.argsort(owners, kind="stable")
+    return owners[order], triangles[order]
 
 
-def _loop(mine: Ints, following: Ints, stop: Ints, is_corner: NDArray[np.bool_]) -> list[int]:
-    """Return the corners of one outline in order."""
-    corners, edge = [], int(mine[0])
-    for _ in range(len(mine)):
-        if is_corner[edge]:
-            corners.append(int(stop[edge]))
-        edge = int(following[edge])
-    return corners
+def _fans(
+    v: Floats, rows: Ints, edge: Ints, many: int, following: Ints, stop: Ints, is_corner: NDArray[np.bool_]
+) -> Iterator[tuple[Ints, Ints]]:
+    """Give pieces (t,) and triangles (t, 3) of the fans that fill pieces `rows` (p,), whose outlines have so `many`
+    edges, the first ones `edge` (p,)."""
+    outline, turns = np.empty((len(rows), many), np.int64), np.empty((len(rows), many), bool)
+    for j in range(many):
+        outline[:, j], turns[:, j] = stop[edge], is_corner[edge]
+        edge = following[edge]
+    count = turns.sum(axis=1)
+    for n in np.unique(count):
+        some = np.flatnonzero(count == n)
+        corners = outline[some][turns[some]].reshape(len(some), n)
+        first = _first(v[corners])
+        corners = np.take_along_axis(corners, (first[:, None] + np.arange(n)) % n, axis=1)
+        fan = np.stack([np.repeat(corners[:, :1], n - 2, axis=1), corners[:, 1:-1], corners[:, 2:]], axis=2)
+        yield np.repeat(rows[some], n - 2), fan.reshape(-1, 3)
 
 
-def _first(corners: Floats) -> int:
-    """Return the number of the corner, of (c, 3) [m], at which a triangle fan begins, independent of how the outline
-    was subdivided or turned: chosen by the lengths of the edges that follow, of equal ones by position."""
-    length = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-    lengths = [tuple(row) for row in np.round(length / length.max(), 6)[_round(len(length))]]
-    return min(range(len(corners)), key=lambda i: (tuple(-x for x in lengths[i]), tuple(corners[i])))
-
-
-def _round(n: int) -> Ints:
-    """Return the cyclic sequences (n, n) of 0 to n - 1, one starting at each number."""
-    return (np.arange(n)[:, None] + np.arange(n)) % n
+def _first(corners: Floats) -> Ints:
+    """Return the number of the corner (p,), of (p, c, 3) [m], at which a triangle fan begins, independent of how the
+    outline was subdivided or turned: chosen by the lengths of the edges that follow, of equal ones by position."""
+    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    length = np.round(length / length.max(axis=1, keepdims=True), 6)
+    left = np.ones(length.shape, bool)
+    for key in (*(-np.roll(length, -j, axis=1) for j in range(length.shape[1])), *np.moveaxis(corners, 2, 0)):
+        least = np.where(left, key, np.inf).min(axis=1, keepdims=True)
+        left &= key == least
+    return np.asarray(left.argmax(axis=1))
 
 
 def _unit(d: Floats) -> Floats:

@@ -26,7 +26,8 @@ from raychan.run.receiver import aperture_of, channel, detections_in, map_of
 from raychan.run.rules import step_rule
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
-from raychan.tracing.solver import Stats, launch_routes
+from raychan.tracing.solver import launch_routes
+from raychan.tracing.stats import Stats
 from raychan.units import db
 from raychan.world.geometry import geometry_of
 

@@ -17,7 +17,8 @@ from raychan.records import REFLECT, SCATTER, Routes
 from raychan.run.micro_doppler import retraced
 from raychan.run.rules import fine_rule, step_rule
 from raychan.signal.baseband import synthesize
-from raychan.tracing.solver import Stats, launch_routes
+from raychan.tracing.solver import launch_routes
+from raychan.tracing.stats import Stats
 from raychan.units import C0
 from raychan.world.geometry import geometry_of
 

@@ -12,7 +12,8 @@ import raychan as rc
 from raychan.channel.paths import paths_of
 from raychan.records import REFLECT, SCATTER
 from raychan.run.rules import step_rule
-from raychan.tracing.solver import Stats, launch_routes
+from raychan.tracing.solver import launch_routes
+from raychan.tracing.stats import Stats
 from raychan.units import C0
 from raychan.world.geometry import geometry_of
 

@@ -10,7 +10,8 @@ import raychan as rc
 from raychan.channel.paths import paths_of
 from raychan.records import SCATTER
 from raychan.run.rules import step_rule
-from raychan.tracing.solver import Stats, launch_routes
+from raychan.tracing.solver import launch_routes
+from raychan.tracing.stats import Stats
 from raychan.world.geometry import geometry_of
 
 WAVE = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=30e-6, n_chirps=8, n_samples=64)

@@ -8,8 +8,9 @@ import pytest
 import raychan as rc
 from raychan.run.other_ways import OtherWays, last_facets
 from raychan.run.rules import fine_rule
-from raychan.tracing.solver import Launch, Stats
+from raychan.tracing.solver import Launch
 from raychan.tracing.sources import depth_of, facet_of, legs_of
+from raychan.tracing.stats import Stats
 from raychan.world.geometry import geometry_of
 
 WAVE = rc.Waveform(77e9, 500e6, 40e-6, n_chirps=32, n_samples=64)

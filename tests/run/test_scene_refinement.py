@@ -12,8 +12,8 @@ from raychan.run.point_spread import PointSpread
 from raychan.run.rules import step_rule
 from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
-from raychan.tracing.solver import Stats
 from raychan.tracing.sources import depth_of, launches
+from raychan.tracing.stats import Further, Stats
 from raychan.world.geometry import geometry_of
 
 
@@ -55,7 +55,7 @@ def test_what_was_never_cut_is_in_doubt():
     assert np.sort(np.abs(held.doubtful.amplitude)) == pytest.approx(np.sort(np.abs(first.paths.amplitude[deep])))
     by = list(launches(np.unique(first.source[depth_of(first.source) > 1]), len(refinement.geometry.facets.body)))
     rule = step_rule(of.radar, of.processing, of.model, 0)
-    paths, source = refinement._paths(first.launch.again(rule.refinement, by, Stats(), refinement._carried))
+    paths, source = refinement._paths(first.launch.again([Further(rule.refinement, by)], refinement._carried)[0])
     change, _ = held.replace(paths, source, by)
     assert held.doubtful.amplitude.sum() == pytest.approx(change.amplitude.sum())
     assert len(held.now.amplitude) == len(paths.amplitude) + np.count_nonzero(~deep)

@@ -21,7 +21,8 @@ from raychan.run.scene_channel import channel_of
 from raychan.run.simulate import result_of
 from raychan.run.single_body import facets_of
 from raychan.tracing.contributions import Contributions
-from raychan.tracing.solver import Stats, launch_routes
+from raychan.tracing.solver import launch_routes
+from raychan.tracing.stats import Stats
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import Geometry
 

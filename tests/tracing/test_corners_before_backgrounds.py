@@ -11,8 +11,9 @@ from support.boxes_and_balls import WAVEFORM
 import raychan as rc
 from raychan.channel.paths import paths_of
 from raychan.run.rules import step_rule
-from raychan.tracing.solver import Launch, Stats
+from raychan.tracing.solver import Launch
 from raychan.tracing.sources import depth_of
+from raychan.tracing.stats import Stats
 from raychan.world.geometry import geometry_of
 
 _BACKGROUNDS = {

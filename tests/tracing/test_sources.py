@@ -12,8 +12,9 @@ import raychan as rc
 from raychan.channel.paths import join, paths_of
 from raychan.run.rules import fine_rule
 from raychan.signal.baseband import synthesize
-from raychan.tracing.solver import Launch, Stats
+from raychan.tracing.solver import Launch
 from raychan.tracing.sources import EXACT, Rings, covered, depth_of, facet_of, launches, legs_of, source_of
+from raychan.tracing.stats import Further, Stats
 from raychan.world.geometry import geometry_of
 
 
@@ -79,9 +80,9 @@ def test_covered_tells_what_a_slow_search_tells(whole):
 def test_tracing_all_sources_again_by_the_same_rule_gives_the_same_samples(whole):
     scene, launch, routes, sources = whole
     by = list(launches(np.unique(sources), len(launch.geometry.facets.body)))
-    stats = Stats()
-    again = [batch for batch, _ in launch.again(launch.rule.refinement, by, stats, lambda routes: routes)]
-    assert stats.rays > 0
+    further = Further(launch.rule.refinement, by)
+    again = [batch for batch, _ in launch.again([further], lambda routes: routes)[0]]
+    assert further.stats.rays > 0
 
     def samples(batches):
         facets, radar = launch.geometry.facets, scene.radar
@@ -91,6 +92,22 @@ def test_tracing_all_sources_again_by_the_same_rule_gives_the_same_samples(whole
     # What is weak is judged by what the whole launch had found in the end, so some tubes are cut less.
     tolerance = 1.0 - 10.0 ** (-scene.model.tolerance_db / 20.0)
     assert np.linalg.norm(samples(again) - whole_before) < tolerance * np.linalg.norm(whole_before)
+
+
+def test_further_launches_at_once_bring_what_each_brings_alone(whole):
+    _, launch, _, sources = whole
+    own, rule = np.unique(sources[sources != EXACT]), launch.rule.refinement
+    halves = [list(launches(own[i::2], len(launch.geometry.facets.body))) for i in range(2)]
+    asked = [Further(dataclasses.replace(rule, least=i), by) for i, by in enumerate(halves)]
+    both = launch.again(asked, lambda routes: routes)
+    for further, found in zip(asked, both, strict=True):
+        alone = Further(further.refinement, further.wanted)
+        again = launch.again([alone], lambda routes: routes)[0]
+        assert (further.stats.rays, further.stats.tubes) == (alone.stats.rays, alone.stats.tubes)
+        assert sum(len(s) for _, s in found) > 0
+        for (a, s), (b, t) in zip(found, again, strict=True):
+            assert np.array_equal(s, t)
+            assert np.array_equal(a.length, b.length)
 
 
 def test_uncut_deep_tubes_cost_fewer_rays(whole):

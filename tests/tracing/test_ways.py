@@ -15,8 +15,9 @@ from raychan.tracing.contributions import Contributions
 from raychan.tracing.images import Images
 from raychan.tracing.legs import reachable
 from raychan.tracing.shooting import numbered_routes
-from raychan.tracing.solver import Launch, Stats, launch_routes
+from raychan.tracing.solver import Launch, launch_routes
 from raychan.tracing.sources import depth_of, legs_of
+from raychan.tracing.stats import Stats
 from raychan.tracing.ways import turned_round
 from raychan.world.geometry import geometry_of
 

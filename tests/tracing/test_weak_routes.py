@@ -16,7 +16,8 @@ from raychan.tracing.contributions import Contributions, amplitudes
 from raychan.tracing.launch import launch_tubes
 from raychan.tracing.legs import Leg
 from raychan.tracing.radiation import Phases, phases_of
-from raychan.tracing.solver import Launch, Stats
+from raychan.tracing.solver import Launch
+from raychan.tracing.stats import Stats
 from raychan.tracing.tubes import Refinement
 from raychan.world.geometry import geometry_of
 

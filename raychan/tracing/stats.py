@@ -1,0 +1,44 @@
+"""What launches cost and leave coarse, and what further ones are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.tracing.shooting import Wanted
+from raychan.tracing.tubes import Refinement
+
+Ints = NDArray[np.int64]
+
+
+@dataclass
+class Stats:
+    """What a launch cost and what it left coarser than asked for."""
+
+    rays: int = 0
+    tubes: int = 0
+    legs: int = 0
+    uncut: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Tubes (bodies,) that were too many to be cut as finely as asked for."""
+
+    def count_uncut(self, uncut: Ints) -> None:
+        """Count further tubes (bodies,) that were too many."""
+        n = max(len(uncut), len(self.uncut))
+        self.uncut = np.pad(self.uncut, (0, n - len(self.uncut))) + np.pad(uncut, (0, n - len(uncut)))
+
+    def add(self, other: Stats) -> None:
+        """Count what another launch over the same legs cost, too."""
+        self.rays, self.tubes, self.legs = self.rays + other.rays, self.tubes + other.tubes, other.legs
+        self.count_uncut(other.uncut)
+
+
+@dataclass
+class Further:
+    """A further launch: the refinement by which tubes are cut; numbers of legs in, and what is wanted there (see
+    `tracing.sources`); what it costs."""
+
+    refinement: Refinement
+    wanted: list[tuple[int, Wanted]]
+    stats: Stats = field(default_factory=Stats)

@@ -1,0 +1,52 @@
+"""An echo over two spheres is found and has the level of geometrical optics, as many bounces as are modelled."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.optics import field_back, shortest_way, unit
+
+import raychan as rc
+from raychan.units import db
+
+RADAR = {
+    "position": [0, 0, 1],
+    "power_dbm": 25,
+    "waveform": {"bandwidth_mhz": 1000, "chirp_us": 30, "chirps": 32, "samples": 256},
+}
+END = np.array([0.0, 0.0, 1.0])
+
+
+def spheres(seed):
+    """Return two spheres beside each other in front of the radar."""
+    rng = np.random.default_rng(seed)
+    radius, x = rng.uniform(0.3, 1.5, 2), rng.uniform(5.0, 12.0, 2)
+    y = rng.uniform(radius[0] + 0.3, 4.0), -rng.uniform(radius[1] + 0.3, 4.0)
+    return [(np.array(c), float(r)) for *c, r in zip(x, y, rng.uniform(0.5, 1.5, 2), radius, strict=True)]
+
+
+# The first of 25 scenes whose echo is 27 dB or more above the noise.
+@pytest.mark.parametrize("seed", [0, 1, 4, 5, 6, 7])
+@pytest.mark.parametrize("bounces", [2, 3])
+def test_an_echo_over_two_spheres_has_the_level_of_geometrical_optics(seed, bounces):
+    both = spheres(seed)
+    bodies = [
+        rc.Body(name=f"ball{i}", shape="sphere", params={"radius": r}, position=tuple(map(float, c)))
+        for i, (c, r) in enumerate(both)
+    ]
+    scene = rc.Scene(bodies=bodies, radar=RADAR, model={"max_bounces": bounces})
+    result = rc.simulate(scene, tolerance_db=1.0)
+    first, length = shortest_way(END, both)
+    (centre, radius), _ = both
+    near, far = np.linalg.norm(centre - END) - radius, 0.5 * length
+    errors = []
+    for place in (near, far):
+        row = np.argmin(np.abs(result.detections.range - place))
+        assert abs(result.detections.range[row] - place) < 0.12
+        errors.append(result.detections.error_db[row])
+    # One sphere's echo comes one way, that of two both ways, in phase.
+    wanted = 2.0 * field_back(END, unit(first - END), both) / field_back(END, unit(centre - END), both[:1])
+    paths, met = result.paths, result.paths.trajectories
+    count, body = (met.kind != 0).sum(axis=1)[paths.trajectory], met.body[paths.trajectory, 0]
+    one, two = (abs(paths.amplitude[rows].sum()) for rows in ((count == 1) & (body == 0), count == 2))
+    assert abs(db((two / one / wanted) ** 2)) < sum(errors)
