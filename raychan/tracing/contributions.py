@@ -29,9 +29,6 @@ SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in ph
 # noise: with 0.03 of the noise 43 % of urban's first routes at 3 dB go, and no cell of its map changes by more than
 # 0.15 of its noise; with 0.1, 59 % and 0.39; with 0.3, 75 % and 1.3 (command not kept).
 _SILENT = 0.05
-# Of the floor: what a curved surface reflects at one spot may be left uncut. With 1.0 in launches that refine, an urban
-# frame at 3 dB takes 1.3 times the CPU, and of 25 echoes over two spheres as many are found (command not kept).
-_SPOT = 3.0
 _SOME = 256  # tubes from which on leaving out those pays; not measured
 
 
@@ -183,7 +180,7 @@ class Contributions:
     def spot_thresholds(self) -> Floats:
         """The contribution [1/m] in each cell from which on what a curved surface reflects at one spot counts: by
         itself, for there are few."""
-        return self._in_cells(_SPOT * self.rule.floor, self.rule.relative)
+        return self._in_cells(self.rule.spot, self.rule.relative)
 
     def _in_cells(self, least: float, relative: float) -> Floats:
         """Return for each cell a share of what was found there, or the least contribution that counts."""
