@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
-from raychan.records import MIRROR, REFLECT, DiffractedRoutes, Points, Routes
+from raychan.records import DiffractedRoutes, Points, Routes
 from raychan.tracing.contributions import Budget, Contributions
+from raychan.tracing.exact_routes import direct_routes, foot_points
 from raychan.tracing.launch import seeds_of
-from raychan.tracing.legs import Leg, Stop, legs_over, reachable
+from raychan.tracing.legs import Leg, legs_over, reachable
 from raychan.tracing.lit_legs import lit_legs
 from raychan.tracing.point_targets import diffracted_routes, point_routes
-from raychan.tracing.routes import Interactions, ray_routes
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.shared_work import all_of
 from raychan.tracing.shooting import Wanted, numbered_routes
@@ -46,7 +46,9 @@ _SHARES = 16  # parts of what the direct leg leaves of a budget that each other 
 _GROUP = 64  # legs traced at once at most, and their facets in all: bounds the memory; threads wait for each other
 # after each
 _HELD = 1 << 21
-_HELD_ROUTES = 1 << 17  # of the direct leg's first surfaces: beyond, it is done before other legs; not measured
+_HELD_ROUTES = (
+    1 << 17
+)  # of the direct leg at once; with so many of first surfaces it comes before other legs; not measured
 _PART = 4096  # first facets from which tubes are traced again at once; not measured
 
 
@@ -160,7 +162,8 @@ class Launch:
     def _beside(
         self, straight: Iterator[Brought[T]], jobs: list[_Job], stats: list[Stats], each: Callable[[Batch], T]
     ) -> tuple[list[Brought[T]], list[list[Brought[T]]]]:
-        """Return what is left of the direct leg, done by this thread, and what each job brings."""
+        """Return what is left of the direct leg, done by this thread, as many routes of it as may be held, and what
+        each job brings."""
 
         def others() -> list[list[Brought[T]]]:
             before = self.geometry.rays
@@ -169,7 +172,7 @@ class Launch:
             self.geometry.count_rays(before - self.geometry.rays)
             return made
 
-        return run_pair(lambda: list(straight), others)
+        return run_pair(lambda: list(_so_many(straight)), others)
 
     def _together(self, jobs: list[_Job], stats: list[Stats], each: Callable[[Batch], T]) -> list[list[Brought[T]]]:
         """Return what each job brings; add what it costs to its stats."""
@@ -226,9 +229,9 @@ class Launch:
             if found is not None:
                 yield found
         if rule.rx is None:
-            found = _foot_points(geometry, legs, refined)
+            found = foot_points(geometry, legs, refined)
         else:
-            found = _direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
+            found = direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
         if found is not None:
             yield found
 
@@ -241,55 +244,11 @@ class Launch:
         )
 
 
-def _foot_points(geometry: Geometry, legs: list[Leg], rule: Refinement) -> Routes | None:
-    """Return the exact routes to the ground's foot points and back: a plane mirror too large for tubes."""
-    f, direct, rows = geometry.facets, legs[0], list[tuple[float, list[Stop]]]()
-    for leg in legs:
-        if len(leg.mirrors) != 1 or f.role[leg.mirrors[0].body] != MIRROR:
-            continue
-        m = leg.mirrors[0]
-        height = float((leg.end - m.point) @ m.normal)
-        foot = leg.end - height * m.normal
-        view = direct.visible(geometry, foot[None], np.array([m.facet], np.int32), np.full(1, 1e-6), rule.layers)
-        if view.seen[0]:
-            down = direct.stops(geometry, view, 0, foot)
-            rows.append((2.0 * height, [*down, (foot, m.normal, m.facet, int(REFLECT)), *down[::-1]]))
-    return _specular(geometry, direct.end, direct.end, rows, rule.slots)
-
-
-def _direct_routes(geometry: Geometry, legs: list[Leg], rx: Floats, slots: int, layers: int) -> Routes | None:
-    """Return the exact routes to a receiver elsewhere, at rx (3,) [m], over legs whose mirrors only reflect: line of
-    sight, and over the ground; None if there is none.
-
-    Other surfaces reflect by their tubes. Args: slots for interactions; layers that each stretch may pass.
-    """
-    body_role, rows = geometry.facets.role, []
-    for leg in legs:
-        if any(body_role[m.body] != MIRROR for m in leg.mirrors) or not leg.may_reach(rx[None], np.zeros(1))[0]:
-            continue
-        view = leg.visible(geometry, rx[None], np.array([-1], np.int32), np.full(1, 1e-6), layers)
-        if not view.seen[0]:
-            continue
-        rows.append((float(leg.rays(rx[None])[1][0]), leg.stops(geometry, view, 0, rx)))
-    return _specular(geometry, legs[0].end, rx, rows, slots)
-
-
-def _specular(
-    geometry: Geometry, tx: Floats, rx: Floats, rows: list[tuple[float, list[Stop]]], slots: int
-) -> Routes | None:
-    """Return the routes of single rays from tx to rx (3,) [m], of such lengths [m] and stops; None if there is none.
-
-    Args: slots for interactions.
-    """
-    if not rows:
-        return None
-    n = len(rows)
-    vertices, normals = np.broadcast_to(rx, (n, slots, 3)).copy(), np.zeros((n, slots, 3))
-    facet, kind = np.full((n, slots), -1, np.int32), np.zeros((n, slots), np.int8)
-    for i, (_, stops) in enumerate(rows):
-        for j, stop in enumerate(stops):
-            vertices[i, j], normals[i, j], facet[i, j], kind[i, j] = stop
-    body = geometry.facets.body[np.maximum(facet, 0)] if len(geometry.facets.body) else facet
-    length = np.array([r[0] for r in rows])
-    met = Interactions(vertices, normals, facet, np.where(facet >= 0, body, -1).astype(np.int16), kind)
-    return ray_routes(tx, rx, met, length)
+def _so_many(brought: Iterator[Brought[T]]) -> Iterator[Brought[T]]:
+    """Give what is brought until it is as many routes as may be held; the rest stays."""
+    count = 0
+    for one in brought:
+        yield one
+        count += len(one[1])
+        if count > _HELD_ROUTES:
+            return

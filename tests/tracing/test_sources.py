@@ -12,6 +12,7 @@ import raychan as rc
 from raychan.channel.paths import join, paths_of
 from raychan.run.rules import fine_rule
 from raychan.signal.baseband import synthesize
+from raychan.tracing import solver
 from raychan.tracing.solver import Launch
 from raychan.tracing.sources import EXACT, Rings, covered, depth_of, facet_of, launches, legs_of, source_of
 from raychan.tracing.stats import Further, Stats
@@ -108,6 +109,31 @@ def test_further_launches_at_once_bring_what_each_brings_alone(whole):
         for (a, s), (b, t) in zip(found, again, strict=True):
             assert np.array_equal(s, t)
             assert np.array_equal(a.length, b.length)
+
+
+def test_a_launch_holds_no_more_routes_than_it_may(whole, monkeypatch):
+    """Beside the legs of a group one batch of the direct leg is held at a time, however many there are."""
+    _, launch, *_ = whole
+    small = dataclasses.replace(launch.rule.refinement, batch=200)
+    few = Launch(launch.geometry, launch.points, dataclasses.replace(launch.rule, refinement=small))
+    monkeypatch.setattr(solver, "_HELD_ROUTES", 100)
+    made, held, most = [], 0, 0
+
+    def each(routes):
+        made.append(len(routes.kind))
+        return len(routes.kind)
+
+    legs = list[int]()
+    for number, source in few.whole(Stats(), each):
+        held += number
+        straight = (source != EXACT).all() and (legs_of(source)[0] == 0).all()
+        legs.append(0 if straight else 1)
+        if straight:
+            most = max(most, sum(made) - held)
+    assert sum(made) == held
+    assert legs.count(0) > 5
+    # What is made but not yielded yet when a batch of the direct leg is: the other batches of one group at most.
+    assert most < 0.5 * held
 
 
 def test_uncut_deep_tubes_cost_fewer_rays(whole):
