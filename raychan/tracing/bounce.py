@@ -160,7 +160,7 @@ def _narrowed(step: _Bounce, tubes: Tubes) -> Tubes:
         wide = edge >= 0
         if coarse:
             in_phase, _, length = _contribution_bounds(step, tubes)
-            wide &= in_phase > step.found.deep_threshold(length)
+            wide &= in_phase > step.found.spot_threshold(length)
         if not wide.any():
             break
         done.append(tubes.take(~wide))
