@@ -26,7 +26,7 @@ def urban():
 
 
 def check(fine: rc.Result, coarse: rc.Result) -> None:
-    """Assert that direct echoes are where they are in the fine run, all but one within 3 dB, all within what both state."""
+    """Assert that direct echoes are where the fine run has them, all but one within 3 dB, all within what is stated."""
     found = beside(fine, coarse)
     strong = found.snr >= ABOVE_DB
     assert strong.any()
