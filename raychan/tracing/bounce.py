@@ -141,7 +141,7 @@ def _rules(step: _Bounce) -> Rules:
         by_landing=rule.by_landing,
         wide=not rule.fan < np.inf,
         thresholds=found.deep_thresholds,
-        spots=found.spot_thresholds,
+        specular=found.specular_thresholds,
         cell=float(rule.cell),
         max_cuts=float(found.budget.rule.max_cuts),
         max_rays=float(found.budget.rule.max_rays),
@@ -160,7 +160,7 @@ def _narrowed(step: _Bounce, tubes: Tubes) -> Tubes:
         wide = edge >= 0
         if coarse:
             in_phase, _, length = _contribution_bounds(step, tubes)
-            wide &= in_phase > step.found.spot_threshold(length)
+            wide &= in_phase > step.found.specular_threshold(length)
         if not wide.any():
             break
         done.append(tubes.take(~wide))

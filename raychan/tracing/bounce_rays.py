@@ -112,7 +112,7 @@ def _is_wide(directions):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True, uncounted=True)
-def _there(levels, length, cell):  # type: ignore[no-untyped-def]
+def _in_cell(levels, length, cell):  # type: ignore[no-untyped-def]
     """Return the level (c,) of the cell of a length [m]."""
     return levels[min(int(max(length / cell, 0.0)), len(levels) - 1)]
 
@@ -120,7 +120,7 @@ def _there(levels, length, cell):  # type: ignore[no-untyped-def]
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _matters(i, tubes, rays, world, how, room):  # type: ignore[no-untyped-def]
     """Tell whether tube i is worth subdividing: one that may contribute more than the prune threshold, or reflect more
-    than counts at one spot of a curved surface."""
+    than counts at a specular point of a curved surface."""
     surface = world.lossy, world.material, world.materials
     points, directions, length = tubes.points[i], rays.directions[i], tubes.length[i]
     in_phase, _, whole = contribution_bound(i, tubes, how.image, how.far, how.wavenumber, surface)
@@ -140,11 +140,11 @@ def _matters(i, tubes, rays, world, how, room):  # type: ignore[no-untyped-def]
         # What counts is how the phase runs where the tube lands: two mirrors at right angles send it straight back. But
         # beside where the centre ray lands it may run slowly, and there tubes along an edge err alike.
         runs, whole = (0.0 if how.by_landing and flat else span), there
-    if in_phase > _there(how.thresholds, whole, how.cell) * (1.0 + 0.5 * runs):
+    if in_phase > _in_cell(how.thresholds, whole, how.cell) * (1.0 + 0.5 * runs):
         return True
     if not bent or mid < 0:
         return False
-    # Over curved surfaces the phase may be stationary somewhere in the tube. Of one that is quadratic in one direction
-    # a share of (pi / (4 S))^(1/2) is left, of a linear one 2 / S, for a span of S.
-    spot = in_phase if how.by_landing else growth * in_phase
-    return spot > _there(how.spots, there, how.cell) * math.sqrt(1.0 + 4.0 / math.pi * span)
+    # Over curved surfaces the tube may hold a specular point, where the phase is stationary. Of a phase that is
+    # quadratic in one direction a share of (pi / (4 S))^(1/2) is left, of a linear one 2 / S, for a span of S.
+    most = in_phase if how.by_landing else growth * in_phase
+    return most > _in_cell(how.specular, there, how.cell) * math.sqrt(1.0 + 4.0 / math.pi * span)

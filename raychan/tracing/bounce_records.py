@@ -53,7 +53,7 @@ class Rules(NamedTuple):
     bounded; wavenumber [rad/m]; first, last whether they stand on their first surface, or land on their last; layers,
     levels, jitter, patch of the `Refinement`; by_landing whether tubes are cut by what they bring, all in phase, where
     they land; wide whether fans are not narrow; thresholds (c,) [1/m] of contributions for each `cell` [m] of length,
-    and those of single `spots` (c,); max_cuts, max_rays."""
+    and those of `specular` points (c,); max_cuts, max_rays."""
 
     patches: Patches
     image: Floats
@@ -68,7 +68,7 @@ class Rules(NamedTuple):
     by_landing: bool
     wide: bool
     thresholds: Floats
-    spots: Floats
+    specular: Floats
     cell: float
     max_cuts: float
     max_rays: float

@@ -29,8 +29,9 @@ SHARE = 0.3  # of the prune threshold: what all pruned tubes may add up to in ph
 # noise: with 0.03 of the noise 43 % of urban's first routes at 3 dB go, and no cell of its map changes by more than
 # 0.15 of its noise; with 0.1, 59 % and 0.39; with 0.3, 75 % and 1.3 (command not kept).
 _SILENT = 0.05
-# Of what one tube may change: a part of a spot that edges of facets divide. With 1 an echo of 43 dB over a sphere and a
-# box is lost from 1 dB on (tests/run/test_echoes_over_two_spheres.py); it costs 3 % of the CPU of an urban frame.
+# Of what one tube may change: edges of facets divide what is reflected about a specular point. With 1 an echo of 43 dB
+# over a sphere and a box is lost from 1 dB on (tests/run/test_echoes_over_two_spheres.py); it costs 3 % of the CPU of
+# an urban frame.
 _PART = 0.3
 _SOME = 256  # tubes from which on leaving out those pays; not measured
 
@@ -38,6 +39,14 @@ _SOME = 256  # tubes from which on leaving out those pays; not measured
 CUTS, RAYS, BEGUN, BEFORE = 0, 1, 2, 3
 """Of the account of a budget, for kernels: cuts made; rays cast by this thread, when the budget was first asked (-1: it
 was not), and when the account was made."""
+
+
+def added(a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the sum of counts (n,) and (m,), the shorter ones filled up with zeros."""
+    if not len(b):
+        return a
+    n = max(len(a), len(b))
+    return np.pad(a, (0, n - len(a))) + np.pad(b, (0, n - len(b)))
 
 
 class Budget:
@@ -86,9 +95,7 @@ class Budget:
     def take_back(self, part: Budget) -> None:
         """Count what a part was spent for."""
         self._tubes, self._cuts = self._tubes + part._tubes, self._cuts + part._cuts
-        if len(part.uncut):
-            n = max(len(self.uncut), len(part.uncut))
-            self.uncut = np.pad(self.uncut, (0, n - len(self.uncut))) + np.pad(part.uncut, (0, n - len(part.uncut)))
+        self.uncut = added(self.uncut, part.uncut)
 
     def account(self, geometry: Geometry) -> Floats:
         """Return what is spent (4,), for kernels."""
@@ -102,8 +109,7 @@ class Budget:
             self._left_uncut(geometry, uncut)
 
     def _left_uncut(self, geometry: Geometry, count: NDArray[np.int64]) -> None:
-        n = max(len(count), len(self.uncut))
-        self.uncut = np.pad(count, (0, n - len(count))) + np.pad(self.uncut, (0, n - len(self.uncut)))
+        self.uncut = added(self.uncut, count)
         geometry.count_uncut(int(count.sum()))
 
     def _within(self, geometry: Geometry, facet: Ints, wanted: Bools, spent: bool) -> Bools:
@@ -179,15 +185,15 @@ class Contributions:
             return self._in_cells(self.rule.floor, 0.1 * relative)
         return self._in_cells(coarse * self.rule.floor, relative)
 
-    def spot_threshold(self, length: Floats) -> Floats:
-        """Return the `spot_thresholds` (n,) of two-way lengths (n,) [m]."""
-        return self.spot_thresholds[self._cell_held(length)]
+    def specular_threshold(self, length: Floats) -> Floats:
+        """Return the `specular_thresholds` (n,) of two-way lengths (n,) [m]."""
+        return self.specular_thresholds[self._cell_held(length)]
 
     @property
-    def spot_thresholds(self) -> Floats:
-        """The contribution [1/m] in each cell from which on what a curved surface reflects at one spot counts, or a
-        part of it."""
-        return self._in_cells(self.rule.spot, _PART * self.rule.relative)
+    def specular_thresholds(self) -> Floats:
+        """The contribution [1/m] in each cell from which on counts what a curved surface reflects at a specular point,
+        or a part of it."""
+        return self._in_cells(self.rule.specular, _PART * self.rule.relative)
 
     def _in_cells(self, least: float, relative: float) -> Floats:
         """Return for each cell a share of what was found there, or the least contribution that counts."""

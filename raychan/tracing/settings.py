@@ -13,11 +13,11 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 
-# Of the floor, half of the noise: what a curved surface reflects at one spot may be left uncut. With 1 in launches that
-# refine, an urban frame at 3 dB takes 1.3 times the CPU, and no more echoes over two spheres are found; with twice this
-# in the first launch it takes 0.95 times, and one of 22 echoes 20 to 38 dB above the noise is lost (command not
-# kept).
-_SPOT = 3.0
+# Of the floor, half of the noise: what a curved surface reflects at a specular point may be left uncut. With 1 in
+# launches that refine, an urban frame at 3 dB takes 1.3 times the CPU, and no more echoes over two spheres are found;
+# with twice this in the first launch it takes 0.95 times, and one of 22 echoes 20 to 38 dB above the noise is lost
+# (command not kept).
+_SPECULAR = 3.0
 _ALIKE = 1e-9  # of a wavelength, a carrier, a field: what rounding changes
 
 
@@ -81,7 +81,7 @@ def refinement(
         relative=min(0.15, 0.05 * fine),
         max_edge=0.3 * min(1.0, np.sqrt(fine)),
         floor=least,
-        spot=_SPOT * least,
+        specular=_SPECULAR * least,
         cell=cell,
         layers=layers,
         slots=8 + layers,

@@ -135,16 +135,16 @@ class Launch:
         parts = [(k, i, part) for k, i, what in longest for part in what.parts(_PART)]
         found: list[list[Brought[T]]] = [[] for _ in asked]
         for group in self._groups(range(len(parts))):
-            jobs = list[_Job]()
-            own = [parts[j][0] for j in group]
+            own, jobs = [parts[j][0] for j in group], list[_Job]()
             for k, i, what in (parts[j] for j in group):
                 budget = Budget(self._limited(asked[k].refinement))
                 jobs.append((i, self._found[i].frozen(budget), what))
-            for k, made in zip(own, self._together(jobs, [asked[k].stats for k in own], each), strict=True):
+            brought = self._together(jobs, [asked[k].stats for k in own], each)
+            for k, (_, job, _), made in zip(own, jobs, brought, strict=True):
                 found[k] += made
-            for k, (_, job, _) in zip(own, jobs, strict=True):
-                asked[k].stats.legs = len(self.every[0])
                 asked[k].stats.count_uncut(job.budget.uncut)
+        for further in asked:
+            further.stats.legs = len(self.every[0])
         return found
 
     def turned_round(self, source: Sources, last: NDArray[np.int32]) -> Sources:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.tracing.contributions import added
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.tubes import Refinement
 
@@ -25,8 +26,7 @@ class Stats:
 
     def count_uncut(self, uncut: Ints) -> None:
         """Count further tubes (bodies,) that were too many."""
-        n = max(len(uncut), len(self.uncut))
-        self.uncut = np.pad(self.uncut, (0, n - len(self.uncut))) + np.pad(uncut, (0, n - len(uncut)))
+        self.uncut = added(self.uncut, uncut)
 
     def add(self, other: Stats) -> None:
         """Count what another launch over the same legs cost, too."""

@@ -37,10 +37,10 @@ class Refinement:
 
     Fields: `wavenumber` [rad/m]; `phase` [rad] by which a tube may deviate from quadratic where its phase is
     stationary; `turn` [rad] by which its normal may; `floor` [1/m] scattered amplitude (unit field at 1 m) under which
-    a tube is not subdivided, `spot` the same for what a curved surface reflects at one spot; `relative` the same for a
-    hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge` [m] of first
-    tubes, and the `widest` angle [rad] under which an end may see their edges; `levels` of subdivision for visibility
-    and bounces;
+    a tube is not subdivided, `specular` the same for what a curved surface reflects at a specular point; `relative` the
+    same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
+    [m] of first tubes, and the `widest` angle [rad] under which an end may see their edges; `levels` of subdivision for
+    visibility and bounces;
     `slots` of history; `layers` that a stretch may pass; `batch` of tubes launched at once, which bounds the memory
     (few scenes have more on one leg; not measured); budgets of a launch: `max_tubes` that subdivision for phase
     may make, `max_cuts` for visibility, `max_rays` (see `Contributions.affords`); `jitter` (0 to 0.5) moves cuts off
@@ -58,7 +58,7 @@ class Refinement:
     phase: float = 0.05
     turn: float = 0.15
     floor: float = 0.0
-    spot: float = 0.0
+    specular: float = 0.0
     relative: float = 0.01
     cell: float = np.inf
     max_edge: float = 0.3

@@ -25,16 +25,16 @@ def urban():
     return rc.Scene.load(SCENES / "urban.toml").override(["model.mode=preview"])
 
 
-def check(fine: rc.Result, coarse: rc.Result) -> None:
-    """Assert that direct echoes are where the fine run has them, all but one within 3 dB, all within what is stated."""
+def check(fine: rc.Result, coarse: rc.Result, apart: int = 0) -> None:
+    """Assert that direct echoes are where the fine run has them, all but `apart` within 3 dB, and all within what both
+    state."""
     found = beside(fine, coarse)
     strong = found.snr >= ABOVE_DB
     assert strong.any()
     assert (found.cells[strong] <= 1.0).all(), found
     sure = strong & (found.error <= 3.0)  # the fine run itself knows the level
     off = np.abs(found.level[sure])
-    # Beside converged runs the tail of the living street's third car is 4 dB off: echoes over other cars add to it.
-    assert np.count_nonzero(off > 3.0) <= 1, found
+    assert np.count_nonzero(off > 3.0) <= apart, found
     assert (off <= found.stated[sure] + found.error[sure]).all(), found
 
 
@@ -43,11 +43,12 @@ def test_direct_echoes_of_random_scenes_are_within_a_cell_and_3_db_of_a_fine_run
     check(rc.simulate(scene_of(seed, tolerance_db=1.0)), rc.simulate(scene_of(seed, mode="preview")))
 
 
-@pytest.mark.parametrize("name", ["urban", "living_street"])
-def test_direct_echoes_of_streets_are_within_a_cell_and_3_db_of_a_fine_run(name):
+# Beside converged runs the tail of the living street's third car is 4 dB off: echoes over other cars add to it.
+@pytest.mark.parametrize(("name", "apart"), [("urban", 0), ("living_street", 1)])
+def test_direct_echoes_of_streets_are_within_a_cell_and_3_db_of_a_fine_run(name, apart):
     scene = rc.Scene.load(SCENES / f"{name}.toml")
     fine = rc.simulate(scene, tolerance_db=3.0)
-    check(fine, rc.simulate(scene.override(["model.mode=preview"])))
+    check(fine, rc.simulate(scene.override(["model.mode=preview"])), apart)
 
 
 def scene_with(body: rc.Body, **model: object) -> rc.Scene:
