@@ -1,4 +1,4 @@
-"""Effect of smoothing facets on the strongest echo of a body: an entry of the ledger of unmodelled effects."""
+"""What facets are off the smooth surface that they stand for: an entry of the ledger of unmodelled effects."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from raychan.radar.radar import Radar
 from raychan.records import BLOCKER, Paths
 from raychan.run.mechanisms import peak
 from raychan.world.geometry import Geometry
+from raychan.world.halving import cubic_off
 from raychan.world.mesh import Mesh
 
 _OPPOSED = 2.0  # of a field's amplitude: largest change by a phase, at pi
@@ -39,6 +40,23 @@ def strongest_bend(
         if changed > found[2]:
             found = (name, phase, changed)
     return found
+
+
+def coarsest(meshes: Mapping[str, Mesh], radar: Radar) -> tuple[str, float]:
+    """Return, among bodies given by name with their meshes, the one whose curved facets lie farthest from those with
+    cubic edges through the same corners and normals: its name and the two-way phase [rad], rms; '' without any."""
+    off = {name: _beside_cubic(mesh) for name, mesh in meshes.items()}
+    name = max(off, key=lambda body: off[body], default="")
+    return name, 4.0 * np.pi / radar.waveform.wavelength * off.get(name, 0.0)
+
+
+def _beside_cubic(mesh: Mesh) -> float:
+    """Return the rms distance [m] of a body's curved facets from cubic ones, 0 where none is; kept with the mesh."""
+    if "beside_cubic" not in mesh.memo:
+        curvature, curved = edge_curvatures(mesh.corners, mesh.normals)
+        off, area = cubic_off(mesh.corners[curved], mesh.normals[curved], curvature[curved]), mesh.areas[curved]
+        mesh.memo["beside_cubic"] = float(np.sqrt(np.average(off**2, weights=area))) if len(area) else 0.0
+    return float(mesh.memo["beside_cubic"])
 
 
 def _sag(mesh: Mesh) -> float:

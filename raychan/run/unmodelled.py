@@ -16,7 +16,7 @@ from raychan.run.clutter import laws_of, scatters_diffusely
 from raychan.run.ledger import NOTHING, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, peak
 from raychan.run.solver import paths_over_wedges
-from raychan.run.tessellation import strongest_bend
+from raychan.run.tessellation import coarsest, strongest_bend
 from raychan.tracing.diffuse_patches import PatchSize, visible_patches
 from raychan.units import db
 from raychan.world.body import Body
@@ -62,6 +62,7 @@ def ledger(
 # Sectors [rad] and rings of rough ground: finer against 36,000 rays at most, about 0.1 s (not measured by a command).
 _SECTOR, _RINGS = np.radians(5.0), 500
 _NEAR = 80.0  # m: the strongest range cell of rough ground lies nearer, by 1 / r^3 (not measured)
+_CUBIC = 0.01  # rad: facets that lie nearer to cubic ones count as exact
 _FOLDED = 2.0  # unambiguous ranges: what is farther adds at most an eighth, by 1 / r^3
 _NAMES = (
     "further bounces",
@@ -179,15 +180,22 @@ def _diffuse(geometry: Geometry, radar: Radar, model: Any, weakest: float) -> En
 def _tessellation(
     paths: Paths, geometry: Geometry, bodies: Collection[Body], radar: Radar, settings: Any, weakest: float
 ) -> Entry:
-    """Return the entry of smoothed facets: the change of the strongest echo if they are flat."""
-    estimated = {b.name: b.geometry for b in bodies if b.geometry.crease_deg is not None}
-    if not estimated:
-        return Entry(NOTHING, "exact", "no body has estimated normals")
+    """Return the entry of facets: the change of the strongest echo of smoothed ones if they are flat; where all normals
+    are known, unknown if cubic facets differ from them."""
+    known = {b.name: b.geometry for b in bodies if b.geometry.crease_deg is None}
+    estimated = {b.name: b.geometry for b in bodies if b.name not in known}
+    coarse, off = coarsest(known, radar)
+    other = f"facets of {coarse} lie {off:.2g} rad (rms) off a smoother surface of the same corners and normals"
     name, phase, changed = strongest_bend(paths, geometry, estimated, radar, settings)
-    if not name:
-        return Entry(NOTHING, "exact", "no echo comes from smoothed facets")
-    how = f"facets of {name} are taken as smooth: {phase:.2g} rad (rms) from flat ones, of its strongest cell"
-    return Entry(float(db(changed / weakest)), "estimate", how)
+    if name:
+        more = f"; {other}, not estimated" if off > _CUBIC else ""
+        how = f"facets of {name} are taken as smooth: {phase:.2g} rad (rms) from flat ones, of its strongest cell{more}"
+        return Entry(float(db(changed / weakest)), "estimate", how)
+    if off > _CUBIC:
+        return Entry(UNKNOWN, "none", f"{other}: what a finer mesh would change is not estimated")
+    return Entry(
+        NOTHING, "exact", "no echo comes from smoothed facets" if estimated else "no body has estimated normals"
+    )
 
 
 def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:

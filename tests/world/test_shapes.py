@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from raychan.geometry.triangles import edge_curvatures
 from raychan.world.errors import SceneError
+from raychan.world.halving import cubic_off
 from raychan.world.material import names
 from raychan.world.shapes import SHAPES, build
 from raychan.world.shapes.curve import End, arcs, half_outline
@@ -214,3 +216,34 @@ def test_no_two_faces_of_a_shape_lie_in_one_place(name):
         u = c[i, 1] - c[i, 0]
         axes = np.stack([u, np.cross(n[i], u)]) / np.linalg.norm(u)
         assert shared_area(c[i] @ axes.T, c[j] @ axes.T) < 1e-6, (i, j)
+
+
+@pytest.mark.parametrize("name", ["car", "suv", "van"])
+def test_both_sides_of_a_vehicle_are_cut_into_facets_alike(name):
+    """But for cells across the middle, of which each diagonal is the other's image, and rounded edges of foam."""
+    mesh = build(name)
+    middle = np.ptp(np.sign(mesh.corners[:, :, 1].round(9)), axis=1) == 2.0
+    foam = np.isin(mesh.part, [mesh.part_names.index(n) for n in ("seats", "cabin", "plate")])
+    some = mesh.corners[~middle & ~foam].round(9)
+    assert len(some) > 0.7 * len(mesh.faces)
+    facets = [{tuple(sorted(map(tuple, f + 0.0))) for f in v.round(6)} for v in (some, some * [1.0, -1.0, 1.0])]
+    assert facets[0] == facets[1]
+
+
+@pytest.mark.parametrize("name", ["car", "suv", "van"])
+def test_cells_are_cut_so_that_quadratic_facets_lie_nearest_to_cubic_ones(name):
+    """Each pair of facets of a bent cell against the other diagonal."""
+    mesh = build(name)
+    skin = np.isin(mesh.part, [i for i, n in enumerate(mesh.part_names) if "door" in n or "window" in n])
+    i = np.flatnonzero(skin[:-1] & skin[1:] & (mesh.faces[:-1, 0] == mesh.faces[1:, 0]))
+    v, n = mesh.corners, mesh.normals
+
+    def off(corners, normals):
+        return cubic_off(corners, normals, edge_curvatures(corners, normals)[0])
+
+    pair = i[mesh.faces[i, 2] == mesh.faces[i + 1, 1]]  # facets abc and acd
+    assert len(pair) > 50
+    quad, normals = (np.concatenate([x[pair], x[pair + 1][:, 2:]], axis=1) for x in (v, n))
+    own = np.maximum(off(v[pair], n[pair]), off(v[pair + 1], n[pair + 1]))
+    other = np.maximum(*(off(quad[:, c], normals[:, c]) for c in ([0, 1, 3], [1, 2, 3])))
+    assert (own < 1.01 * other + 1e-8).all()

@@ -9,12 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.geometry.triangles import edge_curvatures
+from raychan.world.halving import cubic_off
 from raychan.world.mesh import Floats, Ints, Mesh, make_mesh
 
 SAG = 0.3e-3
 """Default largest distance [m] between a curved part and its facets: facets against accuracy (not measured)."""
 BODY_SAG = 0.6e-3
 """The same for vehicles, whose corner normals carry the curvature: fewer facets are enough (not measured)."""
+
+_OWN, _OTHER = np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 1, 3], [1, 2, 3]])  # corners of a cell's two facets
+_ALIKE = 1e-3  # of a distance: cuts of a cell that differ by less are alike
+_EQUAL = 1e-9  # of a diagonal, and m of a distance: by less they differ by rounding
+_UP, _DIGITS = np.array([0.01, 0.0, 2.0]), 9  # weights of a corner's x, y and z [1/m], and digits of their sum
 
 Bend = Callable[[Floats], tuple[Floats, Floats]]
 """Maps points (n, 3) to new points (n, 3) and the Jacobian there (n, 3, 3)."""
@@ -42,10 +49,33 @@ class Piece:
         return self.moved(np.diag([1.0, -1.0, 1.0]))
 
     def bent(self, bend: Bend) -> Piece:
-        """Return the piece under a smooth map that keeps orientation; normals by its Jacobian's inverse transpose."""
+        """Return the piece under a smooth map that keeps orientation; normals by its Jacobian's inverse transpose.
+
+        Quadrilaterals are cut anew, for the surface that they now span."""
         vertices, jacobian = bend(self.vertices)
         inverse = np.linalg.inv(jacobian)[self.faces]
-        return Piece(vertices, self.faces, _unit(np.einsum("fij,fijk->fik", self.normals, inverse)), self.cell)
+        normals = _unit(np.einsum("fij,fijk->fik", self.normals, inverse))
+        return Piece(vertices, self.faces, normals, self.cell).recut()
+
+    def recut(self) -> Piece:
+        """Return the piece with each quadrilateral cut along the diagonal by which quadratic facets lie nearer to cubic
+        ones, of two alike along the shorter one, of two equal ones along that from the corner highest and farthest from
+        y = 0: a piece that is its own image in this plane has facets that are, too."""
+        faces, normals = self.faces.copy(), self.normals.copy()
+        i = np.flatnonzero(self.cell[1:] == self.cell[:-1])
+        # Faces abc and acd, as `grid` makes them.
+        corners = (i, 0), (i, 1), (i, 2), (i + 1, 2)
+        at, n = (np.stack([x[row, k] for row, k in corners], axis=1) for x in (self.faces, self.normals))
+        p = self.vertices[at]
+        own, other = (_off(p[:, cuts], n[:, cuts]) for cuts in (_OWN, _OTHER))
+        ac, bd = (np.linalg.norm(p[:, k + 2] - p[:, k], axis=1) for k in (0, 1))
+        equal = np.abs(ac - bd) < _EQUAL * ac
+        highest = np.argmax(np.round(p @ _UP + np.abs(p[..., 1]), _DIGITS), axis=1)
+        alike = np.abs(own - other) < _EQUAL + _ALIKE * np.maximum(own, other)
+        rows = np.flatnonzero(np.where(alike, np.where(equal, highest % 2 == 1, bd < ac), other < own))
+        for f, cut in enumerate(_OTHER):
+            faces[i[rows] + f], normals[i[rows] + f] = at[rows][:, cut], n[rows][:, cut]
+        return Piece(self.vertices, faces, normals, self.cell)
 
     def centres(self) -> Floats:
         """Return the centre (f, 3) of the cell that each face belongs to."""
@@ -69,6 +99,13 @@ def _unit(v: Any) -> Floats:
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
+def _off(v: Floats, n: Floats) -> Floats:
+    """Return how far (c,) [m] at most the quadratic facets of cells, v and n (c, 2, 3, 3), lie from cubic ones."""
+    corners, normals = v.reshape(-1, 3, 3), n.reshape(-1, 3, 3)
+    off = cubic_off(corners, normals, edge_curvatures(corners, normals)[0])
+    return np.asarray(off.reshape(-1, 2).max(axis=1))
+
+
 def join(*pieces: Piece) -> Piece:
     """Return several pieces as one."""
     base = np.cumsum([0, *(len(p.vertices) for p in pieces)])
@@ -89,9 +126,9 @@ def grid(points: Floats, normals: Floats) -> Piece:
     m, n = points.shape[:2]
     index = np.arange(m * n).reshape(m, n)
     a, b, c, d = (x.ravel() for x in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
-    faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
     cell = np.repeat(np.arange(len(a)), 2)
     vertices = points.reshape(-1, 3)
+    faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
     p = vertices[faces]
     # Near-zero edges: poles, and creases (the same point twice with two normals).
     shortest = np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2).min(axis=1)
