@@ -161,6 +161,9 @@ def _sized(mesh: Mesh) -> Mesh:
 def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
     if hasattr(source, "faces"):
         return [("body", np.asarray(source.vertices, float), np.asarray(source.faces))]
+    if not hasattr(source, "graph"):
+        kind = type(source).__name__
+        raise SceneError(f"{kind} is no mesh", value=kind, allowed="a file, Mesh, trimesh.Trimesh or trimesh.Scene")
     found: list[tuple[str, Floats, Any]] = []
     for node in source.graph.nodes_geometry:
         transform, key = source.graph[node]

@@ -25,3 +25,9 @@ PLATE = trimesh.creation.box((0.01, 0.3, 0.3))
 def test_what_cannot_be_is_refused(given, said):
     with pytest.raises(ValueError, match=said):
         rc.rcs(PLATE, 77e9, **given)
+
+
+@pytest.mark.parametrize("given", [rc.Body(name="plate", mesh=PLATE), np.zeros((3, 3))])
+def test_what_is_no_mesh_is_refused_by_what_it_is(given):
+    with pytest.raises(rc.SceneError, match=f"{type(given).__name__} is no mesh; allowed: a file, Mesh, trimesh"):
+        rc.rcs(given, 77e9, 0.0)
