@@ -57,7 +57,7 @@ def corner_rays(routes: Routes, facets: Facets, apart: bool) -> CornerRays:
     return CornerRays(first, away, look, cosines[0], cosines[1])
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def outward(tx, rx, far, vertices, i, used):  # type: ignore[no-untyped-def]
     """Return the directions in which the transmitter radiates and to which the receiver looks, route i of so many
     slots."""

@@ -11,13 +11,13 @@ from raychan.records import TRANSMIT
 from raychan.vectors import row
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def vec(a):  # type: ignore[no-untyped-def]
     """Return the vector of an array (3,)."""
     return a[0], a[1], a[2]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True, uncounted=True)
 def heading(a, b):  # type: ignore[no-untyped-def]
     """Return the unit vector from a to b; x where they are one point."""
     x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -27,19 +27,19 @@ def heading(a, b):  # type: ignore[no-untyped-def]
     return x / s, y / s, z / s
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def cosine(k, n):  # type: ignore[no-untyped-def]
     """Return the cosine between a ray along k and the normal n, on whichever side."""
     return abs(k[0] * n[0] + k[1] * n[1] + k[2] * n[2])
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def slot(a, i, j):  # type: ignore[no-untyped-def]
     """Return the vector in slot j of route i of a (n, d, 3): a view of it would count a reference."""
     return a[i, j, 0], a[i, j, 1], a[i, j, 2]
 
 
-@njit(cache=True)
+@njit(cache=True, uncounted=True)
 def over_mirrors(  # type: ignore[no-untyped-def]
     e, ways, ahead, i, first, stop, step, vertices, normals, kind, facet, material, used, end, table, k, cosines, begun
 ):
@@ -66,14 +66,14 @@ def over_mirrors(  # type: ignore[no-untyped-def]
     return ahead
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def mirrored(x, on, n):  # type: ignore[no-untyped-def]
     """Return x mirrored at the plane through `on` of normal n."""
     h = 2.0 * ((x[0] - on[0]) * n[0] + (x[1] - on[1]) * n[1] + (x[2] - on[2]) * n[2])
     return x[0] - h * n[0], x[1] - h * n[1], x[2] - h * n[2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def curved(n, f):  # type: ignore[no-untyped-def]
     """Tell whether the normals at the corners of facet f differ, n (f, 3, 3)."""
     apart = 0.0

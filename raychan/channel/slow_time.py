@@ -114,14 +114,14 @@ def extrapolated(routes: Routes, strength: Complexes, poses: Poses, frequency: f
     return lengths, amplitudes
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _moved(x, b, t, origin, turn, place):  # type: ignore[no-untyped-def]
     """Return where a point that moves with body b is at instant t."""
     x = _turned_by(less(x, row(origin, b)), t, b, turn)
     return x[0] + place[t, b, 0], x[1] + place[t, b, 1], x[2] + place[t, b, 2]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _turned_by(x, t, b, turn):  # type: ignore[no-untyped-def]
     """Return a vector of body b at instant t."""
     return (
@@ -131,7 +131,7 @@ def _turned_by(x, t, b, turn):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _part_lengths(vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, tx, rx, out):  # type: ignore[no-untyped-def]
     """Write the lengths (p + 1,) [m] at instant t of route i, which has `used` slots, through the first p points of its
     footprint in slot `at`, and through its vertex there."""
@@ -163,8 +163,17 @@ def _part_lengths(vertices, normals, kind, body, points, i, at, used, t, origin,
 def _corner_rates(  # type: ignore[no-untyped-def]
     rows, vertices, normals, kind, body, scatter, points, origin, turn, place, tx, rx, out
 ):
+    _each_rate(
+        rows, vertices, normals, kind, body, scatter, points, origin, turn, place, tx, rx, out, np.empty(4), np.empty(4)
+    )
+
+
+@njit(cache=True, uncounted=True)
+def _each_rate(  # type: ignore[no-untyped-def]
+    rows, vertices, normals, kind, body, scatter, points, origin, turn, place, tx, rx, out, now, then
+):
+    """Do what `_corner_rates` does, with room for lengths (4,) now and then."""
     d = kind.shape[1]
-    now, then = np.empty(4), np.empty(4)
     for r in range(len(rows)):
         i = rows[r]
         used = 0

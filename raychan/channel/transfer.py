@@ -93,12 +93,23 @@ def _transfer(  # type: ignore[no-untyped-def]
     ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length, taper,
     area, spread_in, spread_out, caustics, sigma, elements, out,
 ):  # fmt: skip
-    # Taken out of their tuples once: each access counts a reference.
-    (tx, rx, far), (first, away, look, cos_in, cos_out) = ends, rays
-    terms, phases = np.empty(3, np.complex128), np.empty(6)
     # The fields of the centre, or of the three corners one after the other.
     arriving = np.empty((3 * e_tx.shape[1], 3), np.complex128)
     leaving = np.empty((3 * e_rx.shape[1], 3), np.complex128)
+    _each(
+        ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length,
+        taper, area, spread_in, spread_out, caustics, sigma, elements, out, np.empty(3, np.complex128), np.empty(6),
+        arriving, leaving,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy", uncounted=True)
+def _each(  # type: ignore[no-untyped-def]
+    ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length, taper,
+    area, spread_in, spread_out, caustics, sigma, elements, out, terms, phases, arriving, leaving,
+):  # fmt: skip
+    """Do what `_transfer` does, with room for terms (3,), phases (6,) and fields (3 p, 3) and (3 q, 3)."""
+    (tx, rx, far), (first, away, look, cos_in, cos_out) = ends, rays
     for i in range(len(kind)):
         used, wavelength_4pi = used_of(kind, i), 0.5 / k
         at = scatter[i] if scatter[i] >= 0 else used
@@ -143,7 +154,7 @@ def _transfer(  # type: ignore[no-untyped-def]
             _scatter_elements(i, out, terms, wave, arriving, leaving, k_in, k_out, normal, table, m, k, elements)
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _begin(held, fields, directions, centre, first, ways):  # type: ignore[no-untyped-def]
     """Write the fields (p, 3) that an end has of so many ways, rows from the first on, one after the other; those of
     three ways as turned with their rays into that of the centre."""
@@ -159,7 +170,7 @@ def _begin(held, fields, directions, centre, first, ways):  # type: ignore[no-un
                 held[w * count + f, c] = e[c] - along * both[c]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _couple(i, out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
     """Write gains (n, q, p, ...) of route i without a footprint: fields arriving (p, 3) onto receiving (q, 3)."""
     for p in range(out.shape[2]):
@@ -167,7 +178,7 @@ def _couple(i, out, whole, receiving, arriving):  # type: ignore[no-untyped-def]
             out[i, q, p, 0] = whole * dot(row(receiving, q), row(arriving, p))
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _scatter(  # type: ignore[no-untyped-def]
     i, out, terms, ways, arriving, leaving, k_in, k_out, normal, table, m, k, at, cos_in, cos_out, begun
 ):
@@ -195,7 +206,7 @@ def _scatter(  # type: ignore[no-untyped-def]
                     out[i, q, p, c3 if apart else 0] += couple * terms[c3]
 
 
-@njit(cache=True)
+@njit(cache=True, uncounted=True)
 def _scatter_elements(  # type: ignore[no-untyped-def]
     i, out, terms, wave, arriving, leaving, k_in, k_out, normal, table, m, k, elements
 ):

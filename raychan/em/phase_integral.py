@@ -171,7 +171,7 @@ def _by_panels(begin, run, bend, slope, turn, c):  # type: ignore[no-untyped-def
     return complex(share * first_re, share * first_im), complex(share * last_re, share * last_im)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", uncounted=True)
 def _by_stationary_phase(phases, d, out) -> bool:  # type: ignore[no-untyped-def]
     """Write the mean's parts where the phase runs fast along all lines parallel to one edge: only the ends of these
     lines count, which lie on the two other edges. Return False where it runs in no such direction.
@@ -202,7 +202,7 @@ def _by_stationary_phase(phases, d, out) -> bool:  # type: ignore[no-untyped-def
     return True
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, forceinline=True, uncounted=True)
 def _quadratic(phases, d01, d12, d20, v, w):  # type: ignore[no-untyped-def]
     """Return the quadratic phase at barycentric (1 - v - w, v, w)."""
     u = 1.0 - v - w
@@ -254,7 +254,7 @@ def _by_pieces(phases, d01, d12, d20, m, out) -> int:  # type: ignore[no-untyped
     return m * m
 
 
-@njit(cache=True)
+@njit(cache=True, uncounted=True)
 def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untyped-def]
     """Write the mean of exp(-j phi) over a triangle on which phi is quadratic; return how many points or pieces it
     took.
@@ -288,8 +288,13 @@ def triangle_terms(phases, linear: float, out) -> int:  # type: ignore[no-untype
 def quadratic_means(phases, linear):  # type: ignore[no-untyped-def]
     """Return the means (n,) of exp(-j phi) over triangles with phases (n, 6) as for `triangle_terms`."""
     out = np.empty(phases.shape[0], np.complex128)
-    part = np.empty(3, np.complex128)
+    _each_mean(phases, linear, np.empty(3, np.complex128), out)
+    return out
+
+
+@njit(cache=True, nogil=True, uncounted=True)
+def _each_mean(phases, linear, part, out):  # type: ignore[no-untyped-def]
+    """Write the means, with room for the parts (3,) of one."""
     for i in range(phases.shape[0]):
         triangle_terms(phases[i], linear, part)
         out[i] = part[0] + part[1] + part[2]
-    return out

@@ -91,7 +91,7 @@ def _along(first, step, bend, knots, weights):  # type: ignore[no-untyped-def]
     return whole_re, whole_im, late_re, late_im
 
 
-@njit(cache=True)
+@njit(cache=True, uncounted=True)
 def mean_parts(phases, bend01, bend12, bend20, points, out):  # type: ignore[no-untyped-def]
     """Write the parts (3,) of the mean of exp(-j phi) over a triangle that belong to each corner: those weighted by the
     corner's barycentric coordinate.

@@ -104,7 +104,9 @@ def refined(case: Case) -> Value:
     counted = np.flatnonzero(np.abs(by_bounce) > _COUNTS * np.abs(by_bounce).max(initial=0.0))
     most, further = int(counted.max(initial=-1)) + 1, _further(case, rules[0], by_bounce)
     matrix = amplitudes.sum(axis=0)
-    if abs(sums.value) <= _ROUNDING * np.abs(amplitudes).max(initial=0.0):
+    # A flat face that is seen square on returns its area over the wavelength.
+    whole = float(case.geometry.area.sum()) * case.frequency / C0
+    if abs(sums.value) <= _ROUNDING * max(np.abs(amplitudes).max(initial=0.0), whole):
         matrix[case.row, case.col], error_db, numerical_db = 0.0, np.nan, np.nan
     sigma = 4.0 * np.pi * abs(matrix[case.row, case.col]) ** 2
     return Value(sigma, error_db, numerical_db, case.rays - rays, most, further, matrix)

@@ -23,6 +23,7 @@ from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, needed
+from raychan.run.unreached import Remains
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of
@@ -46,6 +47,8 @@ class Channel:
     warnings: tuple[str, ...] = ()
     turned: Retraced | None = None
     """Samples of a frame that was traced more than once."""
+    remains: Remains | None = None
+    """How its refinement ended."""
 
     @property
     def quiet(self) -> Cube:
@@ -88,9 +91,9 @@ def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock
         if first is None:
             return None
         found = refinement.converged(first)
-    cost = _cost(stats, stats.rays, 1, found.model) | {"refinements": found.steps}
-    said = (*uncut(geometry, stats), *found.notes())
-    return Channel(geometry, points, found.launched, found.others, found.model, found.chosen, cost, said)
+    cost = _cost(stats, stats.rays, 1, found.model) | {"refinements": found.remains.steps}
+    launched, others, said = found.launched, found.others, uncut(geometry, stats)
+    return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, remains=found.remains)
 
 
 def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel:

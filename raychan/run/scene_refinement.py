@@ -37,7 +37,7 @@ from raychan.run.source_changes import class_of
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
-from raychan.run.unreached import Unreached, unreached_notes, unreached_of
+from raychan.run.unreached import Remains, Unreached, unreached_of
 from raychan.signal.baseband import noisy, synthesize
 from raychan.tracing.routes import counting
 from raychan.tracing.solver import Batch, Launch
@@ -67,22 +67,7 @@ class Converged:
     others: Launched
     model: Any
     chosen: ModelChoice | None
-    steps: int
-    unreached: tuple[Unreached, ...]
-    ended: str
-    """What ended the refinement before all cells were reached, '' where none was left."""
-    speckled: int = 0
-    """Cells that were refined to their speckle only."""
-
-    def notes(self) -> list[str]:
-        """Return a line on the cells that are speckle, and one on those that were not reached, and why."""
-        said = []
-        if self.speckled:
-            said.append(
-                f"{self.speckled} cells of the map are speckle (model.speckle): displacing bodies by 0.05 deg and 1 mm "
-                f"moves them by more than {self.model.tolerance_db:g} dB, and they are refined to that only"
-            )
-        return said + unreached_notes(self.unreached, self.steps, self.ended, self.model.tolerance_db)
+    remains: Remains
 
 
 @dataclass(frozen=True)
@@ -193,7 +178,8 @@ class SceneRefinement:
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
-        return Converged(launched, others, self.model, first.chosen, steps, unreached, ended, speckled)
+        remains = Remains(unreached, steps, ended, self.model.tolerance_db, speckled)
+        return Converged(launched, others, self.model, first.chosen, remains)
 
     def _cells(self, quiet: Cube, response: PointSpread, paths: Paths) -> MapCells:
         """Return the cells of the map that are detections, or would be a little stronger, also beside stronger ones."""

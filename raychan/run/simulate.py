@@ -98,6 +98,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *warnings,
             *channel.launched.notes(),
             *channel.warnings,
+            *_remaining(channel, known, radar),
             *heard,
             *told(known, tolerance, rdmap, left_out),
         ),
@@ -105,6 +106,13 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         text=scene.text,
         path=str(scene.path.resolve()) if scene.path else "",
     )
+
+
+def _remaining(channel: Channel, found: ExplainedDetections, radar: Radar) -> list[str]:
+    """Return lines on what the refinement did not reach, given what was detected."""
+    wave = radar.channel_waveform
+    size = wave.range_resolution, wave.rate_resolution
+    return channel.remains.notes((found.range, found.rate), size) if channel.remains else []
 
 
 def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.run.map_cells import MapCells
+
+Floats = NDArray[np.float64]
 
 _NAMED = 3  # cells that a line names
 
@@ -27,6 +30,38 @@ class Unreached:
     def text(self) -> str:
         """Where the cell lies, and what changes there."""
         return f"{self.range:.2f} m, {self.rate:+.2f} m/s ({'tubes that bounced' if self.deep else 'first surfaces'})"
+
+
+@dataclass(frozen=True)
+class Remains:
+    """How a refinement ended: the cells `unreached` after so many `steps`, and what `ended` it, '' where none is left;
+    `speckled` cells were refined to their speckle only."""
+
+    unreached: tuple[Unreached, ...]
+    steps: int
+    ended: str
+    tolerance_db: float
+    speckled: int = 0
+
+    def notes(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> list[str]:
+        """Return a line on the cells that are speckle, and what `unreached_notes` says of the others.
+
+        Args: found ranges and rates (n,) of the detections, size of a cell [m], [m/s]: what was weak may be one now.
+        """
+        said = []
+        if self.speckled:
+            said.append(
+                f"{self.speckled} cells of the map are speckle (model.speckle): displacing bodies by 0.05 deg and 1 mm "
+                f"moves them by more than {self.tolerance_db:g} dB, and they are refined to that only"
+            )
+        ranges, rates = found
+        cells = tuple(
+            replace(u, weak=False)
+            if ((np.abs(ranges - u.range) <= size[0]) & (np.abs(rates - u.rate) <= size[1])).any()
+            else u
+            for u in self.unreached
+        )
+        return said + unreached_notes(cells, self.steps, self.ended, self.tolerance_db)
 
 
 def unreached_of(cells: MapCells) -> Iterator[Unreached]:

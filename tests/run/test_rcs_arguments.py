@@ -31,3 +31,10 @@ def test_what_cannot_be_is_refused(given, said):
 def test_what_is_no_mesh_is_refused_by_what_it_is(given):
     with pytest.raises(rc.SceneError, match=f"{type(given).__name__} is no mesh; allowed: a file, Mesh, trimesh"):
         rc.rcs(given, 77e9, 0.0)
+
+
+def test_a_plate_seen_edge_on_returns_nothing_and_not_what_rounding_leaves():
+    plate = rc.Body(name="plate", shape="plate", params={"width": 0.2, "height": 0.1}).geometry
+    found = rc.rcs(plate, 77e9, [89.0, 90.0])
+    assert found.sigma[0] > 0.0 and np.isfinite(found.error_db[0])
+    assert found.sigma[1] == 0.0 and np.isnan(found.error_db[1])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from raychan.run.map_cells import MapCells
-from raychan.run.unreached import Unreached, unreached_notes, unreached_of
+from raychan.run.unreached import Remains, Unreached, unreached_notes, unreached_of
 
 SHALLOW, DEEP = 1 << 31, 2 << 31  # sources of facet 0: bounces 1 and 2
 
@@ -28,3 +28,11 @@ def test_nothing_is_said_where_all_is_reached_and_three_cells_are_named():
     assert unreached_notes((), 1, "8 steps", 1.0) == []
     (line,) = unreached_notes(tuple(Unreached(float(k), 0.0, True) for k in range(5)), 1, "8 steps", 1.0)
     assert line.startswith("refined once, ") and line.endswith("2.00 m, +0.00 m/s (tubes that bounced) and 2 more")
+
+
+def test_a_weak_cell_where_something_is_detected_now_is_one_whose_level_changes():
+    """Within a cell of a detection in range and in rate, not in one of both."""
+    remains = Remains((Unreached(13.64, -3.79, deep=True, weak=True),), 3, "8 steps", 0.25)
+    for found, weak in (([13.66, -3.74], False), ([13.66, -2.9], True), ([14.2, -3.74], True)):
+        (line,) = remains.notes((np.array(found[:1]), np.array(found[1:])), (0.30, 0.76))
+        assert ("where nothing is detected yet" in line) == weak and "13.64 m" in line
