@@ -13,7 +13,8 @@ from raychan.tracing.sources import Sources, without_out
 Floats = NDArray[np.float64]
 
 SLOW = "changes that shrink too slowly for more steps to help"
-_SURE = 3  # steps from which on it counts what all that follow would take (not measured)
+_HOPE = 0.1  # of the rays left: so many cells may take that are not expected to be reached (not measured)
+_SURE = 3  # steps from which on cells are given up for the steps or rays that they would take (not measured)
 _GROWTH = 1.6
 """Rays of a cell's step over those of the one before: ever fewer sources keep it open. At 2.2, as for one source, cells
 are given up before half of the rays that are left is spent: 90 % of the detections of `bench.detections`, seeds 9640 to
@@ -23,8 +24,8 @@ are given up before half of the rays that are left is spent: 90 % of the detecti
 def planned(cells: MapCells, rays: SourceRays, budget: tuple[float, str], steps: int) -> tuple[Sources, float, str]:
     """Return the sources to trace again, how many rays that takes, about, and, where open cells have none, why.
 
-    Cells that take fewest rays come first; after some steps those that are not expected to be reached by the rays that
-    are left wait, and those by the steps that are left come last: they take what the others leave.
+    Cells that take fewest rays come first. After some steps those that are not expected to be reached by the rays that
+    are left wait, and by the steps that are left, unless they take few: what they would take is lost.
 
     Args: budget the rays that are left, and what does not allow more; steps that are left.
     """
@@ -45,14 +46,15 @@ def planned(cells: MapCells, rays: SourceRays, budget: tuple[float, str], steps:
     # How changes shrink is not known before some: until then a step must be paid for, not all that follow.
     known = STEPS - steps >= _SURE
     series = {p: (_GROWTH ** min(n, steps) - 1.0) / (_GROWTH - 1.0) if known else 1.0 for p, n in needed.items()}
+    hope = {p: _HOPE if known and n > steps else 1.0 for p, n in needed.items()}
     taken, spent, again = np.zeros(0, np.int64), 0.0, np.zeros(len(every), bool)
-    for p in sorted(rows, key=lambda p: (known and needed[p] > steps, series[p] * _sum(cost, launch, rows[p]))):
+    for p in sorted(rows, key=lambda p: series[p] * _sum(cost, launch, rows[p])):
         more = series[p] * _sum(cost, launch, rows[p][~np.isin(launch[rows[p]], taken)])
-        if spent + more <= left:
+        if spent + more <= hope[p] * left:
             spent, again[rows[p]] = spent + more, True
             taken = np.union1d(taken, launch[rows[p]])
-    ended = "" if again.any() else which + (FORESEEN if left > 0.0 else "")
-    return every[again], _sum(cost, launch, np.flatnonzero(again)), ended
+    ended = which + (FORESEEN if left > 0.0 else "") if max(hope[p] for p in rows) == 1.0 else SLOW
+    return every[again], _sum(cost, launch, np.flatnonzero(again)), "" if again.any() else ended
 
 
 def _sum(cost: Floats, launch: Sources, rows: NDArray[np.intp]) -> float:

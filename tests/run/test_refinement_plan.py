@@ -47,15 +47,10 @@ def test_where_no_cell_can_be_reached_by_the_rays_left_none_is_traced_again():
     assert planned(cells_of((0.4, -0.1)), rays_of(1000), (100.0, SECONDS), 6)[2] == SECONDS + FORESEEN
 
 
-def test_cells_that_steps_hardly_bring_closer_take_what_the_others_leave():
-    """The first is not expected to be reached by two steps more, and would take fewest rays."""
-    cells, rays = cells_of((0.6, -0.6, 0.6), (0.4, -0.2, 0.1)), rays_of(10, 1000)
-    assert cells.steps[0] > 2 >= cells.steps[1] and cells.open.all()
-    assert planned(cells, rays, (1e6, RAYS), 2)[0].tolist() == [*ONE, *OTHER]
-    found, _, ended = planned(cells, rays_of(1000, 1000), (5000.0, RAYS), 2)  # enough for one of them
-    assert found.tolist() == [*OTHER] and ended == ""
-    found, _, ended = planned(cells_of((0.6, -0.6, 0.6)), rays_of(1000), (1e3, RAYS), 2)
-    assert len(found) == 0 and ended == RAYS + FORESEEN
+@pytest.mark.parametrize(("rays", "count", "why"), [(1000, 0, SLOW), (10, 1, "")])
+def test_a_cell_that_steps_hardly_bring_closer_is_followed_only_for_a_few_rays(rays, count, why):
+    found, _, ended = planned(cells_of((0.6, -0.6, 0.6)), rays_of(rays), (1e4, RAYS), 2)
+    assert len(found) == count and ended == why
 
 
 def test_cells_within_their_tolerance_end_a_refinement_and_so_do_all_steps_taken():
@@ -80,7 +75,7 @@ def test_a_source_of_two_cells_is_paid_for_once():
     assert rays == planned(cells_of((0.05,)), rays_of(100), (1e6, RAYS), 6)[1]
 
 
-@pytest.mark.parametrize(("left", "count", "why"), [(7, 1, ""), (5, 0, RAYS + FORESEEN)])
+@pytest.mark.parametrize(("left", "count", "why"), [(7, 1, ""), (5, 0, SLOW)])
 def test_no_cell_is_given_up_before_three_steps_told_how_its_changes_shrink(left, count, why):
     found, _, ended = planned(cells_of((30.0,)), rays_of(1000), (5e3, RAYS), left)
     assert len(found) == count and ended == why
