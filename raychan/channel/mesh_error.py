@@ -24,7 +24,7 @@ Bools = NDArray[np.bool_]
 _FITS = 2.0  # of the change by the alternative fit of normals: both fits share part of their error
 _FACETS = 0.005  # of the value: error of quadratic patches although their normals are right
 _HALVED = 4.0 / 3.0  # of the change by halving the facets: the limit of a series that converges with second order
-_CUBIC = 0.01  # rad of phase: cubic edges that deviate less from the quadratic ones are not computed
+CUBIC = 0.01  # rad of phase: cubic edges that deviate less from the quadratic ones are not computed
 _EDGES_DB = 1.2  # of the change in dB by taking the uncertain folds as edges
 _PARTLY = 0.5  # of the field's change: only some of the uncertain folds may be edges
 _CREEPING = 2.3  # of x^(4/3) exp(-2.2 x^(1/3)) / k: upper bound of the creeping wave of a sphere of k a = x
@@ -103,7 +103,7 @@ def _halved(geometry: Geometry, rows: Bools, wavenumber: float) -> Geometry | No
     """Return a surface with all facets halved; None where that changes nothing on those of `rows` (f,)."""
     facets = geometry.facets
     off = cubic_off(facets.vertices[rows], facets.normals[rows], geometry.edge_curvature[rows])
-    if 2.0 * wavenumber * off.max(initial=0.0) < _CUBIC:
+    if 2.0 * wavenumber * off.max(initial=0.0) < CUBIC:
         return None
     v, n = halved(facets.vertices, facets.normals)
     every = np.tile(np.arange(len(facets.vertices)), 4)

@@ -96,7 +96,7 @@ def _transfer(  # type: ignore[no-untyped-def]
     # The fields of the centre, or of the three corners one after the other.
     arriving = np.empty((3 * e_tx.shape[1], 3), np.complex128)
     leaving = np.empty((3 * e_rx.shape[1], 3), np.complex128)
-    _each(
+    _each_route(
         ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length,
         taper, area, spread_in, spread_out, caustics, sigma, elements, out, np.empty(3, np.complex128), np.empty(6),
         arriving, leaving,
@@ -104,7 +104,7 @@ def _transfer(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", uncounted=True)
-def _each(  # type: ignore[no-untyped-def]
+def _each_route(  # type: ignore[no-untyped-def]
     ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length, taper,
     area, spread_in, spread_out, caustics, sigma, elements, out, terms, phases, arriving, leaving,
 ):  # fmt: skip

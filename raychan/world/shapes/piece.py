@@ -126,9 +126,9 @@ def grid(points: Floats, normals: Floats) -> Piece:
     m, n = points.shape[:2]
     index = np.arange(m * n).reshape(m, n)
     a, b, c, d = (x.ravel() for x in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
     cell = np.repeat(np.arange(len(a)), 2)
     vertices = points.reshape(-1, 3)
-    faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
     p = vertices[faces]
     # Near-zero edges: poles, and creases (the same point twice with two normals).
     shortest = np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2).min(axis=1)
