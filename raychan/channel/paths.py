@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import accumulate
 from typing import Any, TypeVar
 
 import numpy as np
@@ -185,22 +186,22 @@ def join(parts: Sequence[Paths], keep: Sequence[NDArray[np.bool_]] | None = None
     some = [np.arange(len(p.trajectory)) for p in parts]
     if keep is not None:
         some = [np.flatnonzero(_at(k, p.trajectory)) for p, k in zip(parts, keep, strict=True)]
-    begin, number = np.cumsum([0, *map(len, rows)]), list[NDArray[np.int32]]()
+    begin, number = _begins(rows), list[NDArray[np.int32]]()
     for i, p in enumerate(parts):
         new = p.trajectory
         if keep is not None:
             new = _at(np.cumsum(keep[i], dtype=np.int32) - 1, _at(new, some[i]))
         number.append(new + np.int32(begin[i]))
-    copies = list[Callable[[], None]]()
+    copies, first = list[Callable[[], None]](), _begins(some)
     columns = {
-        name: _column([getattr(p, name) for p in parts], some, copies)
+        name: _column([getattr(p, name) for p in parts], some, first, copies)
         for name in columns_of(parts[0])
         if name != "aside"
     }
     # Paths without it lie where their centres do.
     ends = max(p.aside.shape[1] for p in parts)
-    columns["aside"] = _column([p.aside for p in parts], some, copies, ends, 0.0)
-    way = _joined([p.trajectories for p in parts], rows, parts[0].rx, copies)
+    columns["aside"] = _column([p.aside for p in parts], some, first, copies, ends, 0.0)
+    way = _joined([p.trajectories for p in parts], rows, begin, parts[0].rx, copies)
 
     def done(at: slice) -> None:
         for copy in copies[at]:
@@ -210,6 +211,11 @@ def join(parts: Sequence[Paths], keep: Sequence[NDArray[np.bool_]] | None = None
     return parts[0].rebuilt(
         **columns, trajectory=np.concatenate(number), trajectories=parts[0].trajectories.rebuilt(**way)
     )
+
+
+def _begins(rows: list[NDArray[np.intp]]) -> list[int]:
+    """Return where each of several sets of rows begins, and where the last one ends."""
+    return list(accumulate(map(len, rows), initial=0))
 
 
 def _at(values: NDArray[_Kind], rows: NDArray[np.integer[Any]]) -> NDArray[_Kind]:
@@ -225,15 +231,19 @@ def _at(values: NDArray[_Kind], rows: NDArray[np.integer[Any]]) -> NDArray[_Kind
 
 
 def _joined(
-    parts: list[Trajectories], rows: list[NDArray[np.intp]], rx: Floats, copies: list[Callable[[], None]]
+    parts: list[Trajectories],
+    rows: list[NDArray[np.intp]],
+    begin: list[int],
+    rx: Floats,
+    copies: list[Callable[[], None]],
 ) -> dict[str, NDArray[Any]]:
-    """Return the columns of some rows of several sets of trajectories as one set, to be filled by `copies`, to which
-    are added; unused slots repeat the receiver rx (3,) [m]."""
+    """Return the columns of some rows of several sets of trajectories as one set, as `_column` does; unused slots
+    repeat the receiver rx (3,) [m]."""
     slots = max(p.kind.shape[1] for p in parts)
     empty: dict[str, Any] = {"body": -1, "part": -1, "kind": 0, "vertices": rx}
     return {
         f.name: _column(
-            [getattr(p, f.name) for p in parts], rows, copies, slots if f.name in empty else 0, empty.get(f.name)
+            [getattr(p, f.name) for p in parts], rows, begin, copies, slots if f.name in empty else 0, empty.get(f.name)
         )
         for f in dataclasses.fields(Trajectories)
     }
@@ -242,12 +252,14 @@ def _joined(
 def _column(
     held: list[NDArray[Any]],
     rows: list[NDArray[np.intp]],
+    begin: list[int],
     copies: list[Callable[[], None]],
     slots: int = 0,
     empty: Any = None,
 ) -> NDArray[Any]:
-    """Return a column for some rows of several, of so many slots, to be filled by `copies`, to which are added."""
-    begin, wide = np.cumsum([0, *map(len, rows)]), (slots,) if slots else ()
+    """Return a column for some rows of several, each set from its `begin` on, of so many slots, to be filled by
+    `copies`, to which are added."""
+    wide = (slots,) if slots else ()
     out = np.empty((begin[-1], *wide, *held[0].shape[1 + len(wide) :]), held[0].dtype)
     for i, one in enumerate(held):
         copies.append(partial(_copy, one, rows[i], out[begin[i] : begin[i + 1]], empty))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.error import COVER
 from raychan.run.source_changes import Changes, class_of
-from raychan.tracing.sources import EXACT, Sources
+from raychan.tracing.sources import EXACT, Sources, held_in
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating]
@@ -100,8 +100,8 @@ class MapCells:
         self._weak[i], self._untraced[i] = (source[kept], power[kept]), _UNTRACED * math.sqrt(power[kept].sum())
 
     def traced(self, source: Sources) -> None:
-        """Note which sources (s,) the first step traced again: the other weak ones stay as they are."""
-        left = [power[~np.isin(own, source)].sum() for own, power in self._weak]
+        """Note which sources (s,), in order, the first step traced again: the other weak ones stay as they are."""
+        left = [power[~held_in(source, own)].sum() for own, power in self._weak]
         self._untraced = _UNTRACED * np.sqrt(np.array(left))
 
     @property
@@ -125,14 +125,15 @@ class MapCells:
 
     @property
     def _open_doubt(self) -> Floats:
-        """The sum of what may still change of each level (c,) and of deep tubes never cut, or, where that cancels,
-        their rms sum; and, in squares, what shallow tubes that were not traced again may be wrong by."""
-        found = np.zeros(len(self))
-        for i, changes in enumerate(self._changes):
-            whole, rms = changes.sums
-            sizes = abs(whole.sum() + self.left[i]), float(np.hypot(np.hypot(*rms), abs(self.left[i])))
-            found[i] = ALONG * COVER * math.hypot(max(sizes), self._untraced[i])
-        return found
+        """What may still change of each level (c,)."""
+        return np.array([self._open_doubt_of(i) for i in range(len(self))])
+
+    def _open_doubt_of(self, i: int) -> float:
+        """Return the sum of what may still change of level i and of deep tubes never cut, or, where that cancels, their
+        rms sum; and, in squares, what shallow tubes that were not traced again may be wrong by."""
+        whole, rms = self._changes[i].sums
+        sizes = abs(whole.sum() + self.left[i]), float(np.hypot(np.hypot(*rms), abs(self.left[i])))
+        return ALONG * COVER * math.hypot(max(sizes), self._untraced[i])
 
     @property
     def change(self) -> Floats:
@@ -188,6 +189,7 @@ class MapCells:
         Args: rays (n,) that it takes to trace each source again; launch (n,) one number for all traced together.
         """
         known, allowed = self._changes[i], self.allowed[i] * abs(self.level[i])
+        confirmed = self._held[i] <= 1.0 or self._open_doubt_of(i) > _ROOM * allowed
         _, group = np.unique(launch, return_inverse=True)
         change = known.slowness * known.change
         sums = np.bincount(group, change.real) + 1j * np.bincount(group, change.imag)
@@ -196,7 +198,7 @@ class MapCells:
         limit = max(_REST * allowed, _PART * math.sqrt(power.sum()))
         order = np.argsort(power / cost, kind="stable")
         rest = np.maximum(np.sqrt(np.cumsum(power[order])), np.abs(np.cumsum(sums[order])))
-        first = int(np.flatnonzero(rest <= limit * (not self._to_confirm[i])).max(initial=-1)) + 1
+        first = int(np.flatnonzero(rest <= limit * confirmed).max(initial=-1)) + 1
         return known.source[np.isin(group, order[first:])]
 
 

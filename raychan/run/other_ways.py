@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from raychan.records import DiffractedRoutes, Routes
 from raychan.tracing.solver import Launch
-from raychan.tracing.sources import EXACT, Sources, depth_of
+from raychan.tracing.sources import EXACT, Sources, depth_of, held_in
 
 Facets = NDArray[np.int32]
 
@@ -38,7 +38,7 @@ class OtherWays:
         self._found.append((source, self._launch.turned_round(source, last)))
 
     def missing(self, wanted: Sources) -> Sources:
-        """Return the sources, of no route, of the routes of some sources (s,) the other way round."""
+        """Return the sources, of no route, of the routes of some sources (s,), in order, the other way round."""
         own, turned = (np.concatenate(x) for x in zip(*self._found, strict=True))
-        new = np.unique(turned[np.isin(own, wanted)])
-        return new[~np.isin(new, own)]
+        new = np.unique(turned[held_in(wanted, own)])
+        return new[~held_in(np.unique(own), new)]

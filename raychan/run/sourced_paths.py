@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join, of_trajectories
+from raychan.parallel import parallel_map
 from raychan.radar.dual_paths import columns_of, scaled
 from raychan.records import Paths
 from raychan.run.point_spread import PointSpread
@@ -61,18 +62,21 @@ class SourcedPaths:
     def replace(self, paths: Paths, source: Sources, launches: list[tuple[int, Wanted]]) -> tuple[Paths, Sources]:
         """Replace what some launches traced again; return what this changes: the new paths and the old ones with their
         sign turned, and the source (w,) of each trajectory."""
-        changed, sources = [self._needed(paths)], [source]
-        for part in self._parts:
+
+        def taken(part: _Part) -> list[tuple[Paths, Sources]]:
             hit = covered(part.source, launches)
             old = hit & (part.state == _NOW)
+            part.state[hit] = np.where(old[hit], _BEFORE, _GONE)
+            if not old.any():
+                return []
             shallow = old & ~part.deep
             if part.first and shallow.any():
                 self._moved += _powers(part, shallow, paths, source)
-            changed.append(_negative(of_trajectories(self._needed(part.paths), old)))
-            sources.append(part.source[old])
-            part.state[hit] = np.where(old[hit], _BEFORE, _GONE)
+            return [(_negative(of_trajectories(self._needed(part.paths), old)), part.source[old])]
+
+        changed = [(self._needed(paths), source), *chain(*parallel_map(taken, self._parts))]
         self._parts.append(_Part(paths, source, np.full(len(source), _NOW, np.int8), False))
-        return join(changed), np.concatenate(sources)
+        return join([x for x, _ in changed]), np.concatenate([x for _, x in changed])
 
     def doubt(self, source: Sources, factor: Floats, share: Floats) -> None:
         """Count the last changes of sources (n,) times factors (n,), those of the cell that they matter most to, of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ class Mirror:
         """Return the same plane lit from its other side."""
         return replace(self, normal=-self.normal)
 
-    @property
+    @cached_property
     def corners(self) -> Floats:
         """Corners (4, 3) [m] of the rectangle, one after the other around it."""
         foot, ends = self.point - (self.axes @ self.point) @ self.axes, np.array([self.low, self.high])

@@ -35,13 +35,12 @@ def point_routes(
         return None
     seen_in = [_see(geometry, points, leg, layers) for leg in legs_in]
     seen_out = seen_in if legs_out == legs_in else [_see(geometry, points, leg, layers) for leg in legs_out]
+    mirrors, back = np.array([len(out.mirrors) for out in legs_out]), np.array([s.seen for s in seen_out])
     found = []
-    for i, leg in enumerate(legs_in):
-        for j, out in enumerate(legs_out):
-            if len(leg.mirrors) + len(out.mirrors) + 1 > bounces:
-                continue
-            for p in np.flatnonzero(seen_in[i].seen & seen_out[j].seen):
-                found.append(_route(geometry, points, int(p), leg, out, seen_in[i], seen_out[j], slots))
+    for leg, seen in zip(legs_in, seen_in, strict=True):
+        both = seen.seen & back & (len(leg.mirrors) + mirrors < bounces)[:, None]
+        for j, p in np.argwhere(both).tolist():
+            found.append(_route(geometry, points, p, leg, legs_out[j], seen, seen_out[j], slots))
     if not found:
         return None
     tx, rx = legs_in[0].end, legs_out[0].end

@@ -46,8 +46,9 @@ class SourceRays:
             found[i, wanted.depth] = facets, np.ones(len(facets)) if some is None else np.maximum(some[facets], 1.0)
         each = rays / max(sum(float(brought.sum()) for _, brought in found.values()), 1.0)
         for key, (facets, brought) in found.items():
-            self._step.setdefault(key, np.zeros(self._facets, np.int64))[facets] = step
-            self._rays.setdefault(key, np.zeros(self._facets))[facets] = each * brought
+            if key not in self._step:
+                self._step[key], self._rays[key] = np.zeros(self._facets, np.int64), np.zeros(self._facets)
+            self._step[key][facets], self._rays[key][facets] = step, each * brought
 
     def step_of(self, source: Sources) -> Ints:
         """Return the step (n,) at which each source was traced last; 0 for those of the first launch."""

@@ -77,6 +77,13 @@ def _launch_of(source: Sources) -> Ints:
     return legs_of(source)[0] << _DEPTH | depth_of(source)
 
 
+def held_in(held: Sources, source: Sources) -> Bools:
+    """Tell which sources (n,) are among those held (m,), which are in order."""
+    if not len(held):
+        return np.zeros(len(source), bool)
+    return np.asarray(held[np.minimum(np.searchsorted(held, source), len(held) - 1)] == source)
+
+
 def launches(source: Sources, facets: int) -> Iterator[tuple[int, Wanted]]:
     """Give the launches that trace sources (n,) again: numbers of legs in, and what is wanted there, one depth each.
 
@@ -103,10 +110,9 @@ class Rings:
     def with_those_beside(self, source: Sources, alone: Sources) -> Iterator[tuple[int, Wanted]]:
         """Give the `launches` of sources (n,) that start also from the facets beside theirs that none before did, and
         from those of sources (m,) without any beside."""
-        beside = {
-            (leg, wanted.depth): self._beside(wanted.facets) for leg, wanted in launches(source, len(self._plane))
-        }
-        for leg, wanted in launches(np.union1d(source, alone), len(self._plane)):
+        own = list(launches(source, len(self._plane)))
+        beside = {(leg, wanted.depth): self._beside(wanted.facets) for leg, wanted in own}
+        for leg, wanted in launches(np.union1d(source, alone), len(self._plane)) if len(alone) else own:
             none = np.zeros_like(wanted.facets)
             before = self._traced.get((leg, wanted.depth), none)
             started = wanted.facets | (beside.get((leg, wanted.depth), none) & ~before)
@@ -139,6 +145,8 @@ def _covered(source: Sources, by: list[tuple[int, Wanted]]) -> NDArray[np.bool_]
     found, launch = np.zeros(len(source), bool), _launch_of(source)
     for i, wanted in by:
         rows = np.flatnonzero(launch == (i << _DEPTH | wanted.depth))
-        out = np.isin(legs_of(source[rows])[1], list(wanted.outs))
+        outs = np.zeros(1 << _LEG, bool)
+        outs[list(wanted.outs)] = True
+        out = outs[legs_of(source[rows])[1]]
         found[rows] |= wanted.facets[facet_of(source[rows])] & out
     return found
