@@ -21,7 +21,9 @@ Sums = tuple[Complexes, Floats, NDArray[np.int64]]
 
 _FINE = 64  # points of the tabulated window response per resolution cell (not measured)
 _LEAST = 1e-3  # of a cell's amplitude: largest sum of the paths left out (speed against error; not measured)
-_PART = 1 << 15  # paths summed at once by one thread; not measured
+_PART = 1 << 13  # paths summed at once by one thread, or more, so that there are _PARTS parts at most: with 1 << 15
+# two threads wait for each other, of a frame of the living street 0.05 of 2.1 s
+_PARTS = 32
 _FEW = 1 << 14  # sums, of cells and groups, up to which paths are summed in parts; not measured
 _STEP = 0.25  # range cells that a path may move within one part of the frame (speed against error; not measured)
 
@@ -126,12 +128,13 @@ class PointSpread:
         tables = self._tables(rate)
         beyond = self._bounds(len(tables[3][1]))
         # Few sums are made by parts of the paths; many, which do not fit a processor's cache, by parts of the cells.
-        parts = -(-len(rate) // _PART) if len(cells) * count <= _FEW else 1
+        size = max(_PART, -(-len(rate) // _PARTS))
+        parts = -(-len(rate) // size) if len(cells) * count <= _FEW else 1
         sums = [_Sums.of(len(cells), count) for _ in range(max(parts, 1))]
 
         def by_paths(at: slice) -> None:
             for i in range(len(sums))[at]:
-                part = slice(i * _PART, (i + 1) * _PART)
+                part = slice(i * size, (i + 1) * size)
                 paths = group[part], amplitude[part], delay[part], rate[part]
                 sums_in_cells(*paths, cells, least, beyond, *sums[i].columns, *tables)
 
@@ -144,7 +147,7 @@ class PointSpread:
         else:
             parallel_for(len(cells), by_cells, least=2)
         for i, one in enumerate(sums[1:], 1):
-            sums[0].add(one, i * _PART)
+            sums[0].add(one, i * size)
         return sums[0].total, sums[0].size, sums[0].strongest
 
     def _tables(self, rate: Floats) -> tuple[Any, ...]:

@@ -201,8 +201,8 @@ class Model(Table):
     speckle: bool = False
     """Levels that makers' tolerances of the bodies move by more than tolerance_db are refined to that only."""
     max_rays: Literal["auto"] | Rays = "auto"
-    """Rays that a frame may cast to reach tolerance_db; auto: 1.5 times those of its first launch,
-    or 1,000,000 more where that is more."""
+    """Rays that a frame may cast to reach tolerance_db; auto: those of its first launch and half
+    as many again, or 1,000,000 more where that is more; below 1 dB what comes on top is divided by the tolerance."""
     max_seconds: RunSeconds | None = None
     """Time after which refinement takes no further step."""
     max_memory_mb: MemoryMb | None = None

@@ -133,6 +133,17 @@ def test_a_scene_of_few_rays_may_still_be_refined():
     assert "max_rays" in budget.ended(stats, 10, 20_000.0)
 
 
+def test_finer_tolerances_may_take_more_rays():
+    """At a quarter of a decibel four times as many as at one; coarser ones may take as many as that."""
+    left = {}
+    for tolerance in (3.0, 1.0, 0.5, 0.25):
+        model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}, model={"tolerance_db": tolerance}).model
+        stats = Stats(rays=4_000_000)
+        left[tolerance] = refinement_budget.Budget(model, stats).left(stats)[0]
+    assert left[3.0] == left[1.0] == pytest.approx(2e6)
+    assert left[0.5] == pytest.approx(4e6) and left[0.25] == pytest.approx(8e6)
+
+
 def test_a_step_of_few_rays_fits_into_what_is_left():
     model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}, model={"max_rays": 2_500_000}).model
     ended = []
