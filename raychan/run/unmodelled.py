@@ -45,7 +45,7 @@ def ledger(
     # Those that take longest first: at the end threads wait for the last one.
     entries: dict[str, Callable[[], Entry]] = {
         "further bounces": lambda: _further(paths, radar, settings, model.max_bounces, weakest),
-        "transmission": lambda: _transmission(paths, radar, settings, weakest),
+        "transmission": lambda: _transmission(paths, geometry.facets, radar, settings, model, weakest),
         "diffraction to point targets": lambda: _around(geometry, points, radar, settings, model, weakest),
         "diffuse scattering": lambda: _diffuse(geometry, radar, model, weakest),
         "tessellation": lambda: _tessellation(paths, geometry, bodies, radar, settings, weakest),
@@ -91,12 +91,16 @@ def _further(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: f
     return Entry(float(db(last * ratio / weakest)), "estimate", how)
 
 
-def _transmission(paths: Paths, radar: Radar, settings: Any, weakest: float) -> Entry:
+def _transmission(paths: Paths, facets: Facets, radar: Radar, settings: Any, model: Any, weakest: float) -> Entry:
     """Return the entry of transmissions through further layers, extrapolated by the ratio of the last two orders."""
     passes = layers(paths)
     most = int(passes.max(initial=0))
+    if model.max_transmissions == 0 and (facets.materials.thickness[facets.material] > 0.0).any():
+        return Entry(UNKNOWN, "none", "model.max_transmissions is 0: what stands behind thin layers is not traced")
     if most == 0:
         return Entry(NOTHING, "exact", "no path passes a thin layer")
+    if most < model.max_transmissions:
+        return Entry(NOTHING, "exact", f"no path passes more than {most} of the layers that may be passed")
     last = peak(paths, passes == most, radar, settings)
     loss = peak(paths, passes == max(most - 1, 0), radar, settings)
     ratio = min(last / loss, 1.0) if loss > 0.0 else 1.0
