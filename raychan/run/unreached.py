@@ -46,7 +46,8 @@ class Remains:
     def notes(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> list[str]:
         """Return a line on the cells that are speckle, and what `unreached_notes` says of the others.
 
-        Args: found ranges and rates (n,) of the detections, size of a cell [m], [m/s]: what was weak may be one now.
+        Args: found ranges and rates (n,) of the detections, size of a cell [m], [m/s]: what was weak may be one now,
+        and what was strong none.
         """
         said = []
         if self.speckled:
@@ -56,17 +57,16 @@ class Remains:
             )
         ranges, rates = found
         cells = tuple(
-            replace(u, weak=False)
-            if ((np.abs(ranges - u.range) <= size[0]) & (np.abs(rates - u.rate) <= size[1])).any()
-            else u
+            replace(u, weak=not ((np.abs(ranges - u.range) <= size[0]) & (np.abs(rates - u.rate) <= size[1])).any())
             for u in self.unreached
         )
         return said + unreached_notes(cells, self.steps, self.ended, self.tolerance_db)
 
 
 def unreached_of(cells: MapCells) -> Iterator[Unreached]:
-    """Give the cells that are still to be refined."""
-    change, last = cells.change, np.flatnonzero(cells.open)
+    """Give the cells that are still to be refined and may be wrong by more than is allowed: refinement aims at less."""
+    beyond = cells.doubt > np.abs(cells.level) * cells.allowed
+    change, last = cells.change, np.flatnonzero(cells.open & beyond)
     weak = cells.allowed > cells.tolerance
     for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
         (shallow, deep), place = change[i], cells.cell_of(i)
