@@ -95,7 +95,9 @@ def _transmission(paths: Paths, facets: Facets, radar: Radar, settings: Any, mod
     """Return the entry of transmissions through further layers, extrapolated by the ratio of the last two orders."""
     passes = layers(paths)
     most = int(passes.max(initial=0))
-    if model.max_transmissions == 0 and (facets.materials.thickness[facets.material] > 0.0).any():
+    # What "auto" leaves out stands in the ledger's "model".
+    closed = model.max_transmissions == 0 and model.mode != "auto"
+    if closed and (facets.materials.thickness[facets.material] > 0.0).any():
         return Entry(UNKNOWN, "none", "model.max_transmissions is 0: what stands behind thin layers is not traced")
     if most == 0:
         return Entry(NOTHING, "exact", "no path passes a thin layer")
