@@ -124,18 +124,23 @@ def _terminator(case: Case) -> float:
 
 
 def _launched(case: Case, rules: list[Refinement]) -> tuple[SourceSums, float, float]:
-    """Launch the whole body twice, then trace the sources again that leave the sum open, until it is within the
-    tolerance or rays run out; return the sums, the error to state [dB], and the part of it that launches leave open."""
+    """Launch the whole body twice, once more the sources that bring most, then those that leave the sum open, until it
+    is within the tolerance or rays run out; return the sums, the error to state [dB], and what launches leave of it."""
     launch = BodyLaunch(case.geometry, (case.leg, case.out), case.frequency, case.bounces)
     start, within = case.geometry.rays, 1.0 - 10.0 ** (-case.tolerance_db / 20.0)
     sums, first, known = _whole(case, launch, rules)
     doubt, off = _doubt(case, rules[0], first), np.inf
     while known:
         off = _off(case, sums, rules)
-        left = case.max_rays - (case.geometry.rays - start)
-        if left <= 0 or _agreed(case, sums, doubt, off):
+        left, leave = case.max_rays - (case.geometry.rays - start), _LEFT * within * abs(sums.value)
+        if left <= 0:
             break
-        rows = sums.to_refine(_cover(case), _LEFT * within * abs(sums.value), left, len(rules))
+        # No launch over a convex body misses a hidden part.
+        rows = sums.to_confirm(leave, 0 if case.geometry.convex_alone else left)
+        if not len(rows):
+            if _agreed(case, sums, doubt, off):
+                break
+            rows = sums.to_refine(_cover(case), leave, left, len(rules))
         if not len(rows):
             break
         coarse = case.geometry.uncut

@@ -22,6 +22,8 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 _SHRINKS = COVER / (1.0 + COVER)
 """Of two changes in a row, the later over the earlier: COVER times the last change covers all that a series of changes
 that shrink by this still brings."""
+_GROWN = 3.0  # times the change before: one in ten changes between launches that scatter grows by as much (the ratio of
+# two exponential powers exceeds 9); where launches miss the same part, the first that finds some of it grows by far more
 _WEIGHT = 1.5  # of a launch in a mean over one of the rule before: changes that do not die out shrink by about 0.8 a
 # rule (bodies of primitives, a person and a traffic light, 3 views each; command not noted)
 # Rays of the next rule over those of this: median of rules 1 to 6 of 19 sources, 1.3 to 2.2 in eight of ten (see
@@ -120,13 +122,26 @@ class SourceSums:
         # Those first that are most off for what they cost.
         gain = power / rays
         order = np.argsort(gain, kind="stable")
-        together = np.hypot(np.cumsum(real[order]), np.cumsum(imaginary[order]))
-        rest = np.maximum(together, np.sqrt(np.cumsum(power[order])))
-        first = int(np.flatnonzero(rest <= leave).max(initial=-1)) + 1
+        first = _first(order, (real, imaginary, power), leave)
         # Where no source stands out all are refined.
         best = order[first if first < len(order) else 0 :][::-1]
         best = best[(rays[best] <= most) & (ended[best] == 0.0)]
         best = best[gain[best] >= _WORTH * gain[best[:1]]]
+        return np.flatnonzero(np.isin(pair, best[np.cumsum(rays[best]) <= most]))
+
+    def to_confirm(self, leave: float, most: float) -> Ints:
+        """Return the sources, as row numbers, of which two launches alone tell, but for the weakest: two may miss the
+        same hidden part. Args: as for `to_refine`."""
+        row, col = self.element
+        source, brings = self.sums.source, self.sums.amplitude[:, row, col]
+        _, pair = np.unique(depth_of(source) << 32 | facet_of(source), return_inverse=True)
+        power, rays, real, imaginary, launched = (
+            np.bincount(pair, x)
+            for x in (np.abs(brings) ** 2, self.next_rays, brings.real, brings.imag, self.launches > 2)
+        )
+        order = np.argsort(power, kind="stable")
+        best = order[_first(order, (real, imaginary, power), leave) :][::-1]
+        best = best[launched[best] == 0.0]
         return np.flatnonzero(np.isin(pair, best[np.cumsum(rays[best]) <= most]))
 
     def groups(self, rows: Ints) -> Iterator[tuple[int, int, Sources]]:
@@ -147,7 +162,8 @@ class SourceSums:
         change, before = new[:, row, col] - self.last[rows], self.change[rows]
         slow = np.abs(change) > _SHRINKS * np.abs(before)
         turned = (change * before.conj()).real < 0.0
-        scatters = self.scatters[rows] | (slow & turned)
+        grown = np.abs(change) > _GROWN * np.abs(before)
+        scatters = self.scatters[rows] | (slow & turned & ~grown)
         mean, off = _mean(self, rows, new, rule)
         doubt = np.where(slow & ~turned, change + before, change)
         doubt[scatters] = off[scatters]
@@ -165,6 +181,14 @@ class SourceSums:
             mean=_with(self.mean.T, rows, mean.T).T,
             scatters=_with(self.scatters, rows, scatters),
         )
+
+
+def _first(order: NDArray[np.intp], sums: tuple[Floats, Floats, Floats], leave: float) -> int:
+    """Return how many of some amplitudes, in an order, may be left out: they add up to no more than leave [m], in phase
+    as they are and as if of unrelated phases. Args: sums (p,) real and imaginary parts [m], and powers [m^2]."""
+    real, imaginary, power = (np.cumsum(x[order]) for x in sums)
+    rest = np.maximum(np.hypot(real, imaginary), np.sqrt(power))
+    return int(np.flatnonzero(rest <= leave).max(initial=-1)) + 1
 
 
 def _mean(sums: SourceSums, rows: Ints, new: Complexes, rule: Ints) -> tuple[Floats, Complexes]:

@@ -119,3 +119,34 @@ def test_the_stated_error_of_few_noisy_sources_covers_99_percent():
 def level(n):
     """Return a launch of n sources of amplitude 1."""
     return BySource(np.arange(n, dtype=np.int64) + (2 << 31), np.ones((n, 2, 2), complex), np.ones(n))
+
+
+def _sums(*levels):
+    """Return the sums of sources after launches that gave some levels (s,) each, every source traced again each time."""
+    source = np.arange(len(levels[0]), dtype=np.int64) + (2 << 31)
+    found = [
+        BySource(source, np.asarray(x, complex)[:, None, None] * np.ones((2, 2)), np.ones(len(x))) for x in levels
+    ]
+    sums = SourceSums.of(found[0], found[1], (0, 0), 1)
+    for one in found[2:]:
+        sums = sums.joined(np.arange(len(source)), [one])
+    return sums
+
+
+def test_a_part_that_two_launches_missed_alike_is_a_bias_and_no_scatter():
+    """What finds more of it from launch to launch is not held to a mean with those that missed it."""
+    sums = _sums([1.0], [0.999], [1.1], [1.4])
+    assert not sums.scatters[0]
+    assert sums.value == 1.4
+    # What the last two launches found, more than half of it in the second.
+    assert abs(sums.doubt_of[0]) == pytest.approx(0.401)
+
+
+def test_sources_that_bring_most_are_confirmed_by_a_third_launch():
+    """All but the weakest, which may be left out together; none twice, none beyond the rays left."""
+    sums = _sums([1.0, 0.5j, 0.02, 0.01], [1.0, 0.5j, 0.02, 0.01])
+    assert list(sums.to_confirm(0.03, np.inf)) == [0, 1]
+    assert list(sums.to_confirm(0.029, np.inf)) == [0, 1, 2]
+    assert list(sums.to_confirm(0.03, float(sums.next_rays[0]))) == [0]
+    again = sums.joined(np.array([0]), [BySource(sums.sums.source[:1], np.ones((1, 2, 2), complex), np.ones(1))])
+    assert list(again.to_confirm(0.03, np.inf)) == [1]
