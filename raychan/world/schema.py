@@ -198,6 +198,8 @@ class Model(Table):
     max_bounces: Bounces = 3
     tolerance_db: Tolerance = 0.5
     max_transmissions: Layers = 4
+    """Thin layers that a wave may pass on each stretch from surface to surface: the way out and the way back count
+    apart, so a direct echo may pass twice as many. Of interferers and `specular_paths`: on the whole way."""
     speckle: bool = False
     """Levels that makers' tolerances of the bodies move by more than tolerance_db are refined to that only."""
     max_rays: Literal["auto"] | Rays = "auto"

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 import raychan as rc
-from raychan.records import REFLECT, TRANSMIT
+from raychan.records import POINT, REFLECT, TRANSMIT
 
 WAVE = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps=8, n_samples=256)
 AIR = rc.Material(1.0001, 0.0, thickness=1e-3, name="air")
@@ -85,6 +85,21 @@ def test_layers_on_every_stretch_between_two_mirrors():
     assert total(behind) == pytest.approx(total(free), abs=1e-3)
     way = behind.paths.trajectories
     assert ((way.kind == TRANSMIT).sum(axis=1) >= 4).any()
+
+
+def test_as_many_layers_as_are_allowed_are_passed_on_each_stretch_and_in_all_on_a_specular_path():
+    one, two = [pane(2.0, AIR)], [pane(2.0, AIR), pane(4.0, AIR, name="more")]
+    passed = []
+    for panes in (one, two):
+        way = found([target("point"), *panes], max_transmissions=1).paths.trajectories
+        passed.append((way.kind == TRANSMIT)[(way.kind == POINT).any(axis=1)].sum(axis=1).tolist())
+    assert passed == [[2], []]
+    ends = (0.0, 0.0, 0.8), (6.0, 0.2, 0.9)
+    exact = [
+        rc.specular_paths(rc.Scene(bodies=panes, frequency=77e9, model={"max_transmissions": 1}), *ends, 0)
+        for panes in (one, two)
+    ]
+    assert [len(paths.length) for paths in exact] == [1, 0]
 
 
 @pytest.mark.parametrize("receiver", [(8.0, 0.2, 0.9), (7.0, -0.4, 0.3)])
