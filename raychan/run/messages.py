@@ -19,12 +19,14 @@ _NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: rounds to 1 dB or more
 
 
-def counts(found: ExplainedDetections, tolerance_db: float) -> dict[str, float]:
-    """Return the counts of summary.json; `reached_db` is the worst error that is a figure."""
+def counts(found: ExplainedDetections, tolerance_db: float | None) -> dict[str, float]:
+    """Return the counts of summary.json; `reached_db` is the worst error that is a figure. Without a tolerance, as in a
+    preview, none is over it."""
     known = found.error_db[found.converged]
+    over = {} if tolerance_db is None else {"over_tolerance": int((known > tolerance_db).sum())}
     return {
         "reached_db": float(known.max(initial=0.0)),
-        "over_tolerance": int((known > tolerance_db).sum()),
+        **over,
         "not_converged": int((~found.converged).sum()),
         "folded": int(found.folded.sum()),
     }

@@ -93,7 +93,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         seed=seed,
         timings=clock.timings,
         ledger=left_out if channel.chosen is None else {**left_out, "model": channel.chosen},
-        stats=channel.stats | counts(known, tolerance),
+        stats=channel.stats | counts(known, None if preview else tolerance),
         warnings=(
             *warnings,
             *channel.launched.notes(),
