@@ -46,6 +46,8 @@ def load(
     if not SCALE.allows(scale):
         raise SceneError(f"{scale!r} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
     turn = _turn(*axes_taken(file, up, forward), file)
+    if not file.stat().st_size:
+        raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
     if file.suffix.lower() == ".stl":
         _whole_stl(file)
     try:
@@ -69,7 +71,7 @@ def _whole_stl(file: Path) -> None:
     there = file.stat().st_size
     with file.open("rb") as stream:
         head = stream.read(1 << 10)
-    if there == 0 or (head.lstrip().startswith(b"solid") and b"facet" in head):
+    if head.lstrip().startswith(b"solid") and b"facet" in head:
         return
     count = int.from_bytes(head[80:84], "little") if there >= _STL_HEAD else 0
     expected = _STL_HEAD + _STL_FACET * count

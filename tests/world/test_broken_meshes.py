@@ -23,7 +23,7 @@ from raychan.units import C0
 from raychan.world.errors import SceneError
 from raychan.world.geometry import Geometry
 from raychan.world.mesh import make_mesh, smooth_normals
-from raychan.world.mesh_io import from_trimesh
+from raychan.world.mesh_io import SUFFIXES, from_trimesh, load
 
 F = 77e9
 
@@ -112,6 +112,14 @@ def test_shadows_across_a_body_are_those_of_the_body_without_its_spike():
         found.append(side)
     assert (found[0] != 0.0).any()
     np.testing.assert_allclose(found[1], found[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_file_of_no_bytes_is_told_to_be_empty(suffix, tmp_path):
+    file = tmp_path / f"car{suffix}"
+    file.touch()
+    with pytest.raises(SceneError, match=f"car{suffix}: the file is empty: 0 bytes; allowed: a valid {suffix}"):
+        load(file)
 
 
 def test_the_command_tells_what_was_mended_and_ends_well(tmp_path):
