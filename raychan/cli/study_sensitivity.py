@@ -117,11 +117,11 @@ def _table(done: Sensitivity) -> Table:
 def _each(done: Sensitivity) -> Table:
     """Return the share of each body that moves alone in the sum of variances of a level."""
     rows = [
-        [str(i + 1), *(f"{_known(s, '.2f')} ({_known(100.0 * share, '.0f')} %)" for s, share in m.shares.values())]
+        [str(i + 1), *(_known(s, ".2f") + _known(100.0 * share, ".0f", " ({} %)") for s, share in m.shares.values())]
         for i, m in enumerate(done.moves)
     ]
     return show.table("One body at a time: spread dB (share of variance)", ["#", *done.bodies], rows)
 
 
-def _known(value: float, digits: str) -> str:
-    return "" if math.isnan(value) else f"{value:{digits}}"
+def _known(value: float, digits: str, shown: str = "{}") -> str:
+    return "" if math.isnan(value) else shown.format(f"{value:{digits}}")

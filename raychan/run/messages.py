@@ -73,7 +73,7 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
         worst = f"; the largest error stated is {stated['reached_db']:.1f} dB" if over else ""
         said.append(f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{worst}")
     if above := _listed(ledger, _LEAST_DB, math.inf):
-        said.append(f"left out, above the weakest detection: {above} (see summary.json)")
+        said.append(f"left out, above the weakest detection: {above} (see left_out in summary.json of raychan run)")
     # What adds in phase to the weakest detection moves it by so much.
     moves_db = 20.0 * math.log10(10.0 ** (tolerance_db / 20.0) - 1.0) if tolerance_db < math.inf else math.inf
     if n and (below := _listed(ledger, moves_db, _LEAST_DB)):

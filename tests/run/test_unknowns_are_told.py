@@ -120,7 +120,7 @@ def test_only_what_the_ledger_puts_above_the_weakest_detection_is_listed(half):
     above, below = noted(known, 3.0, ledger)
     assert above == (
         "left out, above the weakest detection: diffuse scattering +38 dB, further bounces +19 dB, "
-        "diffraction at most +2 dB (see summary.json)"
+        "diffraction at most +2 dB (see left_out in summary.json of raychan run)"
     )
     assert below == "left out, below the weakest detection but may move it by over 3 dB: transmission -3 dB"
 

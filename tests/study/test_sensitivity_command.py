@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import csv
+import math
 import subprocess
 import sys
 
 import pytest
 from support.scene_texts import PLATE, but_compiling
 
-from raychan.cli import invoke
+from raychan.cli import invoke, show
+from raychan.cli.study_sensitivity import _each
+from raychan.study.detection_tracks import Sighting, Track
+from raychan.study.sensitivity import Moves, Sensitivity, Tolerances
 
 
 @pytest.fixture
@@ -57,6 +61,15 @@ def test_wrong_words_are_told_in_a_sentence_and_write_nothing(options, words, fi
     said = capsys.readouterr().err
     assert words in said and "Traceback" not in said
     assert [p.name for p in tmp_path.iterdir()] == [file.name]
+
+
+def test_a_level_that_no_body_moves_has_no_share_and_one_that_no_draw_sees_has_no_spread(capsys):
+    track = Track(Sighting(9.0, 0.0, math.nan, -80.0, 0.1, "direct", "a", frozenset("a")))
+    shares = [(0.0, math.nan), (0.0, math.nan)], [(0.3, 1.0), (math.nan, math.nan)]
+    moves = tuple(Moves(track, True, 2, dict(zip("ab", s, strict=True))) for s in shares)
+    show.console().print(_each(Sensitivity("", Tolerances(each=True), ("a", "b"), 0.5, moves, ())))
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert rows[-3:-1] == [["1", "0.00", "0.00"], ["2", "0.30", "(100", "%)"]]
 
 
 _STOPPED = """
