@@ -31,6 +31,7 @@ from raychan.world.quantities import (
     SpotWidth,
     Spread,
     Strength,
+    Switch,
     TurnRate,
     Voyage,
     WaveHeight,
@@ -153,11 +154,11 @@ class ScannerTable(Table):
     roll_deg: Angle = 0.0
     noise_m: Spread = 0.0
     """Standard deviation of a range."""
-    lambert: bool = False
+    lambert: Switch = False
     """Power falls with the cosine of the angle of incidence."""
     spot: SpotTable | None = None
     """None: a beam is a ray of no width."""
-    motion: bool = True
+    motion: Switch = True
     """Each beam leaves at the pose of its own time; false: all at the pose of the scan's start."""
 
 
@@ -171,7 +172,7 @@ class WavesTable(Table):
     gamma: Peak = 1.0
     heading_deg: Heading = 0.0
     """Towards which the waves run."""
-    spread: bool = True
+    spread: Switch = True
     """Directions vary as cos^2 about the heading."""
 
 

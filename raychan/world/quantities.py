@@ -80,6 +80,7 @@ _REAL = Field(strict=True, allow_inf_nan=False)
 _WHOLE = Field(strict=True)
 _THREE = Field(min_length=3, max_length=3)
 
+Switch = Annotated[bool, Field(strict=True)]
 Place = Annotated[list[Annotated[float, _REAL, _within(limits.PLACE)]], _THREE, _three(limits.PLACE)]
 Speed = Annotated[list[Annotated[float, _REAL, _within(limits.SPEED)]], _THREE, _three(limits.SPEED)]
 Spin = Annotated[list[Annotated[float, _REAL, _within(limits.TURN)]], _THREE, _three(limits.TURN)]

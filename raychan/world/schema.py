@@ -36,6 +36,7 @@ from raychan.world.quantities import (
     Spin,
     Stagger,
     Start,
+    Switch,
     Tolerance,
     Tracings,
     Turn,
@@ -71,7 +72,7 @@ class WaveformTable(Table):
     """Times from ramp to ramp in turn, in place of repetition_us."""
     chirps: Chirps = 128
     samples: Samples = 256
-    iq: bool = True
+    iq: Switch = True
 
     @model_validator(mode="after")
     def _fits(self) -> WaveformTable:
@@ -99,7 +100,7 @@ class RadarTable(Table):
     noise_figure_db: Noise = 15.0
     noise_temperature_k: Kelvin = 290.0
     """Of the antenna: the noise power is k (T + 290 K (F - 1)) times the sample rate."""
-    noise: bool = True
+    noise: Switch = True
     antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
     """Of transmitter and receiver; a text names an antenna file, relative to the scene's."""
     tx_antenna: str | AntennaTable | None = None
@@ -159,7 +160,7 @@ class InterfererTable(Table):
     """Its samples do not matter."""
     start_us: Start = 0.0
     """Start of its first ramp after that of the radar."""
-    locked: bool = False
+    locked: Switch = False
     """Ramps keep their phase to the radar's; else each begins at a random phase."""
 
 
@@ -200,7 +201,7 @@ class Model(Table):
     max_transmissions: Layers = 4
     """Thin layers that a wave may pass on each stretch from surface to surface: the way out and the way back count
     apart, so a direct echo may pass twice as many. Of interferers and `specular_paths`: on the whole way."""
-    speckle: bool = False
+    speckle: Switch = False
     """Levels that makers' tolerances of the bodies move by more than tolerance_db are refined to that only."""
     max_rays: Literal["auto"] | Rays = "auto"
     """Rays that a frame may cast to reach tolerance_db; auto: those of its first launch and half
@@ -215,9 +216,9 @@ class Model(Table):
     diffuse: Literal["stated", "rough", "off"] = "stated"
     """Diffuse scattering, as clutter. stated: of materials with a diffuse table; rough: also of those with a roughness,
     by Lambert's law; off: none."""
-    diffraction: bool = False
+    diffraction: Switch = False
     """Single diffraction at wedges on the ways to targets given by their RCS."""
-    simplify: bool = True
+    simplify: Switch = True
     """Trace finely tessellated smooth surfaces by fewer facets, as near to them as tolerance_db asks for."""
 
 

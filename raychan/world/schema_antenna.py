@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import model_validator
 
 from raychan.world.limits import ROW_WAVELENGTHS
-from raychan.world.quantities import Beam, Gain, Level, Loss, Row, Spacing, Window
+from raychan.world.quantities import Beam, Gain, Level, Loss, Row, Spacing, Switch, Window
 from raychan.world.schema_base import Table
 
 
@@ -42,7 +42,7 @@ class AntennaTable(Table):
     taper_z: Window = "rect"
     element: AntennaTable | None = None
     """Default: isotropic ahead."""
-    front: bool = False
+    front: Switch = False
     file: str | None = None
 
     @model_validator(mode="after")

@@ -20,7 +20,6 @@ def checked(kind: type[Any], data: Any, file: Any = None) -> Any:
 _TYPES = {
     "string_type": "a text",
     "bool_type": "true or false",
-    "bool_parsing": "true or false",
     "list_type": "a list",
     "too_short": "a list of at least {min_length}",
     "too_long": "a list of at most {max_length}",

@@ -14,6 +14,7 @@ from raychan.world.quantities import (
     KShape,
     Permittivity,
     Roughness,
+    Switch,
     Texture,
     Thickness,
 )
@@ -51,6 +52,6 @@ class MaterialTable(Table):
     """S/m."""
     thickness_mm: Thickness | None = None
     roughness_mm: Roughness = 0.0
-    pec: bool = False
+    pec: Switch = False
     source: str = ""
     diffuse: DiffuseTable | None = None

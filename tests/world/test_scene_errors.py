@@ -56,6 +56,12 @@ def test_override_changes_keys_and_keeps_the_file():
         ("bodies.suw.yaw_deg=1", "bodies.suw", "suv"),
         ("radar.power_dbm", "radar.power_dbm", "key=value"),
         ("radar.power_dbm=loud", "radar.power_dbm", "number"),
+        *(
+            (f"model.speckle={x}", "model.speckle", "allowed: true or false")
+            for x in ("yes", "1", "on", "True", '"true"')
+        ),
+        ("radar.noise=off", "radar.noise", "allowed: true or false"),
+        ("radar.waveform.iq=0", "radar.waveform.iq", "allowed: true or false"),
         ("scene.title.x=1", "scene.title", "table"),
         ("bodies=3", "bodies", "list"),
     ],

@@ -184,6 +184,11 @@ def test_bad_parameters_are_named(name, params, key):
     assert caught.value.key == key
 
 
+def test_a_switch_is_true_or_false():
+    with pytest.raises(SceneError, match="square: 'yes' is not possible; allowed: true or false"):
+        build("trihedral", {"square": "yes"})
+
+
 def test_nearest_shape_is_suggested():
     with pytest.raises(SceneError, match="did you mean 'car'"):
         build("carr")

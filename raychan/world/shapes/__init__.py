@@ -29,6 +29,7 @@ RIGID: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
 """Shapes in one piece."""
 SHAPES: dict[str, Callable[..., Mesh | Skeleton]] = {**RIGID, **SKELETONS}
 _LIMITS = {"max_sag": SAG, "hoops": HOOPS, "speed": WALK, "phase": PHASE}
+_WANTED: dict[type, str] = {bool: "true or false", str: "a text", list: "a list"}
 
 
 def build(name: str, params: dict[str, Any] | None = None) -> Mesh:
@@ -69,7 +70,7 @@ def _made(name: str, params: dict[str, Any] | None) -> Mesh | Skeleton:
         if isinstance(default, int) and not isinstance(default, bool) and not isinstance(value, int):
             raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a whole number")
         if not number and not isinstance(value, type(default)):
-            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=type(default).__name__)
+            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=_WANTED[type(default)])
     try:
         return make(**given)
     except SceneError:
