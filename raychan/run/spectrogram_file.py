@@ -10,6 +10,8 @@ from raychan.run.netcdf import CONVENTIONS
 from raychan.run.spectrogram import Spectrogram
 from raychan.units import dbm, watt
 
+_UNITS = {"resolution": "m s-1", "ranges": "m", "noise": "W", "error_db": "dB", "tracings": "1"}
+"""Of the attributes of a file; the seed has none."""
 _NO_POWER = -300.0  # dBm: for cells without any power
 
 
@@ -21,9 +23,9 @@ def as_netcdf(found: Spectrogram, text: str = "") -> memoryview:
     made = io.BytesIO()
     with h5py.File(made, "w") as held, h5netcdf.File(held, "w") as file:
         file.attrs.update({"Conventions": CONVENTIONS, "title": "raychan spectrogram", "scene": text})
-        for name in ("resolution", "noise", "error_db", "tracings", "seed"):
-            file.attrs[name] = getattr(found, name)
-        file.attrs["ranges"] = np.array(found.ranges)
+        file.attrs["seed"] = found.seed
+        for name, unit in _UNITS.items():
+            file.attrs.update({name: np.array(getattr(found, name)), f"{name}_units": unit})
         file.dimensions = {"time": len(found.time), "range_rate": len(found.rate)}
         columns = {
             "time": (("time",), found.time, "s", "middle of the stretch"),
