@@ -15,6 +15,19 @@ if TYPE_CHECKING:
     from raychan.run.spectrogram import Spectrogram
     from raychan.world.scene import Scene
 
+_Near = Annotated[
+    float | None,
+    typer.Option(
+        help="Nearest range cell in metres; the first if not given.", metavar="M", callback=within(limits.CELL_RANGE)
+    ),
+]
+_Far = Annotated[
+    float | None,
+    typer.Option(
+        help="Farthest range cell in metres; the last if not given.", metavar="M", callback=within(limits.CELL_RANGE)
+    ),
+]
+
 
 def spectrogram(
     scene: SceneFile,
@@ -35,12 +48,8 @@ def spectrogram(
     tracings: Annotated[
         float, typer.Option(help="Tracings of the scene a second.", metavar="N", callback=within(limits.TRACED))
     ] = 50.0,
-    near: Annotated[
-        float | None, typer.Option(help="Nearest range cell in metres; the first if not given.", metavar="M")
-    ] = None,
-    far: Annotated[
-        float | None, typer.Option(help="Farthest range cell in metres; the last if not given.", metavar="M")
-    ] = None,
+    near: _Near = None,
+    far: _Far = None,
     seed: Seed = 0,
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,
@@ -66,8 +75,10 @@ def spectrogram(
     found = _computed(loaded, seconds, options)
     files = _written(loaded, out, found)
     screen = show.console()
+    got = f"{found.resolution:.3g} m/s"
+    asked = "" if got == f"{resolution:.3g} m/s" else f" ({resolution:g} asked: a stretch has whole chirps)"
     screen.print(
-        f"{len(found.time)} stretches of {found.resolution:.3g} m/s over {seconds:g} s; {found.tracings} tracings, "
+        f"{len(found.time)} stretches of {got}{asked} over {seconds:g} s; {found.tracings} tracings, "
         f"error of carrying on {found.error_db:.1f} dB; seed {found.seed}",
         soft_wrap=True,
     )

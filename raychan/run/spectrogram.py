@@ -26,7 +26,7 @@ from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy
 from raychan.units import C0, db
 from raychan.world.errors import SceneError
-from raychan.world.limits import RATE_STEP, SECONDS, SEED, TRACED
+from raychan.world.limits import CELL_RANGE, RATE_STEP, SECONDS, SEED, TRACED
 from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -37,6 +37,7 @@ _TRACINGS = 50.0
 by -19, -21, -23, -21 dB at 12.5, 25, 50, 100 (the error that `raychan spectrogram --tracings N` prints); from 50 on the
 random part of the launches is what is left."""
 _RESOLUTION = 0.1  # m/s: finer tells slow limbs apart, coarser follows fast ones (not measured)
+_LEAST = 4  # chirps in a stretch: fewer tell hardly any rate from another (not measured)
 _BYTES = 32.0  # of memory, a sample of slow time: the samples, and the transforms of one range cell
 _OVERLAP = 8  # stretches that each instant belongs to: a picture without steps (not measured)
 
@@ -126,10 +127,17 @@ def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]
             key, allowed = f"bodies.{body.name}.swerling", "0: in a spectrogram targets are steady"
             raise SceneError(f"{body.swerling} is not possible", key=key, value=body.swerling, allowed=allowed)
     wave = scene.radar.waveform
-    chirps = max(2, round(duration / wave.repetition))
-    length = max(4, round(0.5 * C0 / wave.middle / (resolution * wave.repetition)))
+    chirps, one = round(duration / wave.repetition), 0.5 * C0 / wave.middle / wave.repetition
+    if chirps < _LEAST:
+        raise ValueError(f"duration = {duration:g} s: a stretch of {_LEAST} chirps, the shortest, takes longer")
+    length = round(one / resolution)
     if length > chirps:
         raise ValueError(f"duration = {duration:g} s: a range rate resolution of {resolution:g} m/s takes longer")
+    if length < _LEAST:
+        ends = (
+            f"{one / chirps:.3g} m/s, a stretch of all {chirps:,} chirps, and {one / _LEAST:.3g} m/s, one of {_LEAST}"
+        )
+        raise ValueError(f"resolution = {resolution:g} m/s: must lie between {ends}")
     return chirps, length
 
 
@@ -145,10 +153,11 @@ def _cells(radar: Radar, ranges: tuple[float, float] | None) -> NDArray[np.int64
     wave = radar.waveform
     cells = np.arange(wave.n_samples if wave.complex_sampling else wave.n_samples // 2)
     if ranges is not None:
+        CELL_RANGE.check("ranges[0]", ranges[0])
         at = cells * wave.range_resolution
         cells = cells[(at >= ranges[0]) & (at <= ranges[1])]
     if not len(cells):
-        raise ValueError(f"ranges = {ranges}: no range cell lies there, of 0 to {wave.unambiguous_range:.4g} m")
+        raise ValueError(f"ranges = {ranges} m: no range cell lies there, of 0 to {wave.unambiguous_range:.4g} m")
     return cells
 
 

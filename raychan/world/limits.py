@@ -118,6 +118,7 @@ FRAMES = Limit(1, 100_000, "", "each is a run and a folder of its own")
 SECONDS = Limit(1e-4, 600.0, "s", "a spectrogram of ten minutes is thousands of tracings")
 TRACED = Limit(1.0, 1e5, "1/s", "tracings a second")
 RATE_STEP = Limit(1e-3, 100.0, "m/s", "resolution of a spectrogram in range rate", above=True)
+CELL_RANGE = Limit(0.0, 1e6, "m", "range cells begin at the radar, and a scene is no wider than its horizon")
 INTERVAL = Limit(1e-9, 1e6, "s", "from frame to frame")
 SEED = Limit(0, (1 << 63) - 1, "", "seeds are whole numbers of 63 bits")
 

@@ -87,13 +87,24 @@ def test_spectrogram_writes_a_picture_and_netcdf(tmp_path, capsys):
     file.write_text(PLATE)
     command = ["spectrogram", str(file), "--out", str(out), "--seconds", "0.01", "--resolution", "0.5"]
     assert invoke([*command, "--near", "5", "--far", "12"]) == 0
-    assert "tracings" in capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
+    assert "tracings" in said and "m/s (0.5 asked: a stretch has whole chirps) over" in said
     with xr.open_dataset(out / "spectrogram.nc", engine="h5netcdf") as data:
         ridge = data.range_rate[data.power_dbm.argmax("range_rate")]
         assert np.allclose(ridge, -5.0, atol=0.2) and data.power_dbm.attrs["units"] == "dBm"
+        numbers = {name for name, value in data.attrs.items() if not isinstance(value, str)} - {"seed"}
+        assert {f"{name}_units" for name in numbers} == {name for name in data.attrs if name.endswith("_units")}
+        assert data.attrs["resolution"] == pytest.approx(0.5, rel=0.05) and data.attrs["resolution_units"] == "m s-1"
     assert (out / "spectrogram.png").read_bytes().startswith(b"\x89PNG")
     assert invoke([*command, "--near", "500", "--far", "600"]) == 2
     assert "no range cell" in capsys.readouterr().err
+    for option, value, words in (
+        ("--near", "-1", "must lie between 0 and 1e+06 m"),
+        ("--far", "nan", "must lie between 0 and 1e+06 m"),
+        ("--resolution", "50", "resolution = 50 m/s: must lie between 0.1"),
+    ):
+        assert invoke([*command, option, value]) == 2
+        assert words in " ".join(capsys.readouterr().err.split())
 
 
 def test_info_tells_of_scenes_and_of_meshes(scene, tmp_path, capsys):

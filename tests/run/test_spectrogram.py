@@ -111,6 +111,12 @@ def test_what_cannot_be_is_told():
         spectrogram(scene, 0.0)
     with pytest.raises(ValueError, match="takes longer"):
         spectrogram(scene, 0.01, resolution=0.05)
+    with pytest.raises(ValueError, match=r"between 0\.0975 m/s, a stretch of all 133 chirps, and 3\.24 m/s, one of 4"):
+        spectrogram(scene, 0.02, resolution=5.0)
+    with pytest.raises(ValueError, match="a stretch of 4 chirps, the shortest, takes longer"):
+        spectrogram(scene, 4e-4, resolution=5.0)
+    with pytest.raises(ValueError, match=r"ranges\[0\] = -1.0: must lie between 0 and"):
+        spectrogram(scene, 0.2, ranges=(-1.0, 20.0))
     with pytest.raises(SceneError, match="targets are steady"):
         spectrogram(Scene.from_text(RADAR + target(12.0, 0.0) + "swerling = 1\n"), 0.2)
     with pytest.raises(ValueError, match="GB of memory"):
