@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,12 @@ _NAMED = 3  # cells that a line names
 
 @dataclass(frozen=True)
 class Unreached:
-    """A cell that a budget left above the tolerance: range [m], rate [m/s], whether it is `deep` tubes, those that
-    bounced, that change most, and whether it is `weak`: no detection (below the detector's threshold, or on the slope
-    of a stronger echo), but may still become one."""
+    """A cell that a budget left above the tolerance: range [m], rate [m/s], and whether it is `deep` tubes, those that
+    bounced, that change most."""
 
     range: float
     rate: float
     deep: bool
-    weak: bool = False
 
     @property
     def text(self) -> str:
@@ -44,45 +42,38 @@ class Remains:
     speckled: int = 0
 
     def notes(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> list[str]:
-        """Return a line on the cells that are speckle, and what `unreached_notes` says of the others.
+        """Return a line on the cells that are speckle, one on the detections whose levels are not within the tolerance,
+        and one on cells that may still become detections, with what ended the refinement.
 
-        Args: found ranges and rates (n,) of the detections, size of a cell [m], [m/s]: what was weak may be one now,
-        and what was strong none.
+        Args: found ranges and rates (n,) of the detections; size of a cell [m], [m/s].
         """
-        said = []
+        said, tolerance = [], f"{self.tolerance_db:g} dB"
         if self.speckled:
             said.append(
                 f"{self.speckled} cells of the map are speckle (model.speckle): displacing bodies by 0.05 deg and 1 mm "
-                f"moves them by more than {self.tolerance_db:g} dB, and they are refined to that only"
+                f"moves them by more than {tolerance}, and they are refined to that only"
             )
         ranges, rates = found
-        cells = tuple(
-            replace(u, weak=not ((np.abs(ranges - u.range) <= size[0]) & (np.abs(rates - u.rate) <= size[1])).any())
+        detected = [
+            bool(((np.abs(ranges - u.range) <= size[0]) & (np.abs(rates - u.rate) <= size[1])).any())
             for u in self.unreached
-        )
-        return said + unreached_notes(cells, self.steps, self.ended, self.tolerance_db)
+        ]
+        how = f"refined {'once' if self.steps == 1 else f'{self.steps} times'}, ended by {self.ended}"
+        for one, what in (
+            (True, f"the level still changes by more than {tolerance} at"),
+            (False, "where nothing is detected yet, what may still change makes a detection at"),
+        ):
+            some = [u.text for u, is_one in zip(self.unreached, detected, strict=True) if is_one == one]
+            if some:
+                more = f" and {len(some) - _NAMED} more" if len(some) > _NAMED else ""
+                said.append(f"{how}: {what} {'; '.join(some[:_NAMED])}{more}")
+        return said
 
 
 def unreached_of(cells: MapCells) -> Iterator[Unreached]:
     """Give the cells that are still to be refined and may be wrong by more than is allowed: refinement aims at less."""
     beyond = cells.doubt > np.abs(cells.level) * cells.allowed
     change, last = cells.change, np.flatnonzero(cells.open & beyond)
-    weak = cells.allowed > cells.tolerance
     for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
         (shallow, deep), place = change[i], cells.cell_of(i)
-        yield Unreached(float(place[0]), float(place[1]), bool(deep > shallow), bool(weak[i]))
-
-
-def unreached_notes(unreached: tuple[Unreached, ...], steps: int, ended: str, tolerance_db: float) -> list[str]:
-    """Return a line on the detections whose levels are not within the tolerance [dB], and one on cells that may still
-    become detections, with what ended the refinement after so many steps."""
-    said, how = [], f"refined {'once' if steps == 1 else f'{steps} times'}, ended by {ended}"
-    for weak, what in (
-        (False, f"the level still changes by more than {tolerance_db:g} dB at"),
-        (True, "where nothing is detected yet, what may still change makes a detection at"),
-    ):
-        some = [u.text for u in unreached if u.weak == weak]
-        if some:
-            more = f" and {len(some) - _NAMED} more" if len(some) > _NAMED else ""
-            said.append(f"{how}: {what} {'; '.join(some[:_NAMED])}{more}")
-    return said
+        yield Unreached(float(place[0]), float(place[1]), bool(deep > shallow))

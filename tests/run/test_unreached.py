@@ -3,9 +3,15 @@
 import numpy as np
 
 from raychan.run.map_cells import MapCells
-from raychan.run.unreached import Remains, Unreached, unreached_notes, unreached_of
+from raychan.run.unreached import Remains, Unreached, unreached_of
 
 SHALLOW, DEEP = 1 << 31, 2 << 31  # sources of facet 0: bounces 1 and 2
+
+
+def said(unreached, steps, ranges, rates):
+    """Return the lines on cells, given the detections and cells of 0.30 m and 0.76 m/s."""
+    remains = Remains(tuple(unreached), steps, "8 steps", 0.5)
+    return remains.notes((np.array(ranges), np.array(rates)), (0.30, 0.76))
 
 
 def test_weak_cells_are_told_apart_from_detections():
@@ -15,8 +21,8 @@ def test_weak_cells_are_told_apart_from_detections():
     cells.changed(0, np.array([SHALLOW]), np.array([0.2 + 0j]))
     cells.changed(1, np.array([DEEP]), np.array([0.01 + 0.4j]))
     found = list(unreached_of(cells))
-    assert found == [Unreached(10.0, 1.0, deep=False), Unreached(20.0, -2.0, deep=True, weak=True)]
-    strong, weak = unreached_notes(tuple(found), 2, "8 steps", 0.5)
+    assert found == [Unreached(10.0, 1.0, deep=False), Unreached(20.0, -2.0, deep=True)]
+    strong, weak = said(found, 2, [10.0], [1.0])
     assert strong == (
         "refined 2 times, ended by 8 steps: the level still changes by more than 0.5 dB at 10.00 m, +1.00 m/s "
         "(first surfaces)"
@@ -25,14 +31,13 @@ def test_weak_cells_are_told_apart_from_detections():
 
 
 def test_nothing_is_said_where_all_is_reached_and_three_cells_are_named():
-    assert unreached_notes((), 1, "8 steps", 1.0) == []
-    (line,) = unreached_notes(tuple(Unreached(float(k), 0.0, True) for k in range(5)), 1, "8 steps", 1.0)
+    assert said([], 1, [], []) == []
+    (line,) = said([Unreached(float(k), 0.0, True) for k in range(5)], 1, [], [])
     assert line.startswith("refined once, ") and line.endswith("2.00 m, +0.00 m/s (tubes that bounced) and 2 more")
 
 
-def test_a_weak_cell_where_something_is_detected_now_is_one_whose_level_changes():
-    """Within a cell of a detection in range and in rate, not in one of both."""
-    remains = Remains((Unreached(13.64, -3.79, deep=True, weak=True),), 3, "8 steps", 0.25)
+def test_a_cell_is_a_detection_within_a_cell_of_one_in_range_and_in_rate_not_in_one_of_both():
+    cell = Unreached(13.64, -3.79, deep=True)
     for found, weak in (([13.66, -3.74], False), ([13.66, -2.9], True), ([14.2, -3.74], True)):
-        (line,) = remains.notes((np.array(found[:1]), np.array(found[1:])), (0.30, 0.76))
+        (line,) = said([cell], 3, found[:1], found[1:])
         assert ("where nothing is detected yet" in line) == weak and "13.64 m" in line
