@@ -16,6 +16,7 @@ from raychan.processing.detection_theory import fluctuation
 from raychan.radar.dual_paths import scaled
 from raychan.records import POINT, Cube, Paths
 from raychan.run.path_stream import Launched
+from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import response
 from raychan.world.errors import SceneError
@@ -32,10 +33,10 @@ def check(scene: Scene, turned: NDArray[np.bool_]) -> None:
             raise SceneError("a frame traced more than once", key=key, value=body.swerling, allowed=allowed)
 
 
-def drawn(scene: Scene, chirps: int, rng: np.random.Generator) -> dict[int, Floats]:
-    """Return the amplitude factors (chirps,) of each fluctuating body by its number."""
+def drawn(scene: Scene, chirps: int, seed: int) -> dict[int, Floats]:
+    """Return the amplitude factors (chirps,) of each fluctuating body by its number, each of the stream of its name."""
     return {
-        b: np.sqrt(fluctuation(body.swerling, chirps, 1, rng)[0])
+        b: np.sqrt(fluctuation(body.swerling, chirps, 1, stream(seed, Stage.FLUCTUATION, body.name))[0])
         for b, body in enumerate(scene.bodies)
         if body.fluctuates
     }

@@ -12,6 +12,7 @@ from raychan.channel.transfer import transfer
 from raychan.radar.interferer import Interferer
 from raychan.records import Paths
 from raychan.run.specular_paths import Chain, exact_routes
+from raychan.run.streams import Stage, stream
 from raychan.signal.interference import burst
 from raychan.tracing.legs import legs_over
 from raychan.world.geometry import Geometry
@@ -20,12 +21,17 @@ from raychan.world.scene import Scene
 _BOUNCES = 1  # mirrors on the way: each further one loses several dB against the direct way; not measured
 
 
-def interference(scene: Scene, geometry: Geometry, rng: np.random.Generator) -> NDArray[np.complex128] | None:
-    """Return what the interferers of a scene add to the samples (a, c, s) [sqrt(W)]; None if there are none."""
+def interference(scene: Scene, geometry: Geometry, seed: int) -> NDArray[np.complex128] | None:
+    """Return what the interferers of a scene add to the samples (a, c, s) [sqrt(W)], each with phases of the stream of
+    its name; None if there are none."""
     if not scene.interferers:
         return None
+    rngs = (stream(seed, Stage.INTERFERENCE, one.name) for one in scene.interferers)
     return np.asarray(
-        sum(burst(scene.radar, one, interferer_paths(scene, geometry, one), rng) for one in scene.interferers)
+        sum(
+            burst(scene.radar, one, interferer_paths(scene, geometry, one), rng)
+            for one, rng in zip(scene.interferers, rngs, strict=True)
+        )
     )
 
 

@@ -28,7 +28,7 @@ def realized(
     clutter; seed of the run.
     """
     radar = scene.radar
-    factors = drawn(scene, radar.waveform.n_chirps, stream(seed, Stage.FLUCTUATION))
+    factors = drawn(scene, radar.waveform.n_chirps, seed)
     quiet, launched = fluctuated(quiet, launched, factors)
     clutter = clutter_of(geometry, radar, model, stream(seed, Stage.CLUTTER))
     count = len(clutter.delay)

@@ -24,7 +24,6 @@ from raychan.run.received import notes, received
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.scene_channel import Channel, channel_of
-from raychan.run.streams import Stage, stream
 from raychan.run.unmodelled import ledger
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
@@ -119,7 +118,7 @@ def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, s
     """Return what the receiver records of noise-free samples, and what a user should know of it."""
     turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
-    others = interference(scene, channel.geometry, stream(seed, Stage.INTERFERENCE))
+    others = interference(scene, channel.geometry, seed)
     # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
     clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
     cube, said = received(quiet, paths, scene.radar, seed, others, clean)

@@ -11,11 +11,11 @@ from raychan.radar.impairments import ChirpError, Converter, Impairments, PhaseN
 from raychan.radar.interferer import Interferer
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
-from raychan.run.interferers import interferer_paths
+from raychan.run.interferers import interference, interferer_paths
 from raychan.run.streams import Stage, stream
 from raychan.units import db
 from raychan.world.errors import SceneError
-from raychan.world.geometry import Geometry
+from raychan.world.geometry import Geometry, geometry_of
 
 REAL = SCENE.replace("samples = 256", "samples = 256\niq = false")
 HIGH = SCENE.replace("[radar.waveform]", "[radar.waveform]\ncarrier_ghz = 300.0")
@@ -24,6 +24,17 @@ HIGH = SCENE.replace("[radar.waveform]", "[radar.waveform]\ncarrier_ghz = 300.0"
 def test_streams_of_stages_are_those_that_a_seed_spawns():
     for stage, child in zip(Stage, np.random.SeedSequence(7).spawn(len(Stage)), strict=True):
         assert stream(7, stage).random() == np.random.default_rng(child).random()
+
+
+def test_streams_of_names_are_their_own_and_an_interferer_more_leaves_the_others_as_they_are():
+    draws = [stream(7, Stage.INTERFERENCE, name).random() for name in (None, "a", "b", "ab", "ba", "ä")]
+    assert len(set(draws)) == len(draws)
+    more = OTHER.replace("truck", "van").replace("40.0, -2.0", "35.0, 3.0")
+    van, truck, both = (
+        interference(scene, geometry_of(scene), 3)
+        for scene in (rc.Scene.from_text(SCENE + text) for text in (more, OTHER, more + OTHER))
+    )
+    np.testing.assert_allclose(both, van + truck, rtol=1e-12)
 
 
 def test_a_rainy_scene_returns_less_by_the_rain_over_both_ways():

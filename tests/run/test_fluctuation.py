@@ -8,7 +8,6 @@ from raychan.run.clock import Clock
 from raychan.run.fluctuation import drawn, fluctuated, of_target
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.simulate import result_of, simulate
-from raychan.run.streams import Stage, stream
 from raychan.run.target_links import target_links
 from raychan.signal.baseband import synthesize
 from raychan.units import db
@@ -39,7 +38,7 @@ def test_only_the_targets_echo_fluctuates_and_has_the_mean_power_of_its_rcs(chan
     ).samples
     chirps, powers, means = scene.radar.waveform.n_chirps, [], []
     for seed in range(600):
-        factors = drawn(scene, chirps, stream(seed, Stage.FLUCTUATION))
+        factors = drawn(scene, chirps, seed)
         cube, launched = fluctuated(channel.launched.quiet, channel.launched, factors)
         share = (cube.samples - (steady - own))[0, :, 3] / own[0, :, 3]
         assert np.allclose(share, factors[body], rtol=2e-3, atol=2e-3)
@@ -62,6 +61,14 @@ def test_noise_and_all_else_are_byte_equal_and_seeds_repeat(channel):
     assert once.cube.samples.tobytes() == twice.cube.samples.tobytes()
     other = result_of(scene_of(1), channel, 6, Clock(None))
     assert not np.array_equal(once.paths.amplitude, other.paths.amplitude)
+
+
+def test_a_target_more_leaves_the_draws_of_the_others_as_they_are():
+    cart = walker(5.0, 0.0).replace("walker", "cart") + "swerling = 2\n"
+    one, more = scene_of(2), Scene.from_text(TEXT + cart + walker(8.0, 2.0) + "swerling = 2\n")
+    (alone,), beside = (list(drawn(s, 8, 3).values()) for s in (one, more))
+    assert alone.tobytes() == beside[1].tobytes() != beside[0].tobytes()
+    assert alone[:3] == pytest.approx([0.51325276, 0.48578192, 1.0595855]), "the same in every process"
 
 
 def test_the_explanation_knows_how_strong_the_target_was_in_this_frame(channel):
