@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ _SHRINKS = COVER / (1.0 + COVER)
 """Of two changes in a row, the later over the earlier: COVER times the last change covers all that a series of changes
 that shrink by this still brings."""
 _GROWN = 3.0  # times the change before: one in ten changes between launches that scatter grows by as much (the ratio of
-# two exponential powers exceeds 9); where launches miss the same part, the first that finds some of it grows by far more
+# two exponential powers exceeds 9); where launches miss the same part, the first that finds some of it grows by more
 _WEIGHT = 1.5  # of a launch in a mean over one of the rule before: changes that do not die out shrink by about 0.8 a
 # rule (bodies of primitives, a person and a traffic light, 3 views each; command not noted)
 # Rays of the next rule over those of this: median of rules 1 to 6 of 19 sources, 1.3 to 2.2 in eight of ten (see
@@ -183,7 +183,7 @@ class SourceSums:
         )
 
 
-def _first(order: NDArray[np.intp], sums: tuple[Floats, Floats, Floats], leave: float) -> int:
+def _first(order: NDArray[np.intp], sums: tuple[NDArray[Any], NDArray[Any], NDArray[Any]], leave: float) -> int:
     """Return how many of some amplitudes, in an order, may be left out: they add up to no more than leave [m], in phase
     as they are and as if of unrelated phases. Args: sums (p,) real and imaginary parts [m], and powers [m^2]."""
     real, imaginary, power = (np.cumsum(x[order]) for x in sums)

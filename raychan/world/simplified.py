@@ -188,13 +188,14 @@ def _apart(mesh: Mesh, limits: Limits, fixed: Bools, sag_alone: float) -> Simpli
     """Return a simplified mesh whose flat facets keep off other surfaces: where one lies nearer to a facet than flat
     facets may lie under their curved ones, its facets stay as they are."""
     for _ in range(_TRIES):
-        found = simplify(mesh, limits, fixed, sag_alone)
-        if found is None:
+        simple = simplify(mesh, limits, fixed, sag_alone)
+        if simple is None:
             return None
+        found, home = simple
         near = near_surfaces(found.mesh, _APART * found.sag) & found.merged
         if not near.any():
             return found
-        fixed = fixed | near[found.home]
+        fixed = fixed | near[home()]
     return None
 
 

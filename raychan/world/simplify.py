@@ -2,18 +2,20 @@
 its tessellation does.
 
 Vertices inside smooth patches go as long as the curved facets (Nagata patches) through the rest stay near the curved
-facets of the whole mesh. Every vertex that goes, and the centre of every facet, is checked against them in place and
-normal, so that nothing is smoothed more than it was.
+facets of the whole mesh. Every vertex that goes is checked against them in place and normal, and the centre of every
+facet where few vertices lie, so that nothing is smoothed more than it was.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.collapses import Limits, remove_vertices
+from raychan.geometry.contractions import contract
 from raychan.geometry.flips import flip_edges
 from raychan.geometry.half_edges import Net, by_first_use, followed, leaving, lock, pair_up
 from raychan.parallel import parallel_for
@@ -27,19 +29,23 @@ Bools = NDArray[np.bool_]
 _LONGEST = 0.3  # m: longest edge, that of the longest tubes (tracing.settings); a longer one saves nothing
 # Measured on a sphere, a torus and an ellipsoid of 160,000 to 330,000 facets at 0.05 to 0.5 dB (command not noted).
 _ROUNDS = 3  # between checks: more miss by more, fewer check more often; 5 leave up to 5 % more or fewer facets
-_MANY_ROUNDS = 5  # the same first, and where all points of the last check were nearer than
-_FAR = 0.05  # of the limits: edges double in five rounds, and deviations grow by up to 16
+_TIGHT = 0.25  # of the deviation, what edges of contracted cells may be off: they are not chosen one by one. At 0.5 and
+# 0.12 as many facets are left at the end (spheres of 82,000 to 1.3e6)
+_CELL = 2  # edges from the middle of a cell that is contracted to its rim, at most; not measured
+_CONTRACTIONS = 3  # tries of them, each with shorter edges where points were off; not measured
+_SOME = 0.02  # of the points, that may be off for another try; not measured
 _REDOS = 16  # of rounds that failed their check: where one fails once more, they are not taken
 _SHRINKS = 10  # of them, that allow shorter edges where a check failed; the others allow no new ones there
 _ENOUGH = 0.9  # of the facets left by the rounds: with more, no others are tried
-_TOO_MANY = 0.75  # of the facets left by rounds that failed: with more, the surface is not known better than that
+_TOO_MANY = 0.9  # of the facets left by rounds that failed: with more, the surface is not known better than that
 _HALF = 0.5  # of the facets left at the end, or by the first rounds: with more it does not pay
 _SLABS = 4  # parts of the mesh that threads work on
 _FLIPS = 2  # passes of edge flips after them; not measured
-# Of the points, 1 in so many is checked while all are nearer than far, and all at the end. It takes 0.8 times the CPU
-# (spheres of 328,000 and 1.3e6 facets at 0.5 dB, one thread, load 6 of others: 0.59 and 0.69 s, 2.3 and 2.9 s); 4 takes
-# 0.67 and 2.2 s, 64 0.51 and 2.2 s.
-_FEW = 16
+# Of the points, 1 in so many is checked where twice as many facets of the whole mesh lie on each, and all at the end.
+_FEW = 8
+# Of the limits, until all are checked: the others were off by up to 5 % more (a sphere of 1.3e6 facets).
+_CLOSER = 0.95
+_MANY = 8  # vertices on a facet, from which on the centres of the facets of the whole mesh that lie there tell no more
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +54,7 @@ class Simplified:
 
     Fields: mesh; corner (f, 3) corners 3 g + k of facets g of the whole mesh that the facets have; merged (f,) which of
     them stand for several; deviation [m] largest distance of the whole mesh's curved surface from that of this one; sag
-    [m] by which its flat facets may lie under its curved ones; home (n,) the facet on which the centre of each facet of
-    the whole mesh lies.
+    [m] by which its flat facets may lie under its curved ones.
     """
 
     mesh: Mesh
@@ -57,11 +62,13 @@ class Simplified:
     merged: Bools
     deviation: float
     sag: float
-    home: Ints
 
 
-def simplify(mesh: Mesh, limits: Limits, fixed: Bools, sag_alone: float = 0.0) -> Simplified | None:
-    """Return a mesh simplified within limits; None where it would have more than half of the facets.
+def simplify(
+    mesh: Mesh, limits: Limits, fixed: Bools, sag_alone: float = 0.0
+) -> tuple[Simplified, Callable[[], Ints]] | None:
+    """Return a mesh simplified within limits, and what gives the facet (n,) on which the centre of each facet of the
+    whole mesh lies; None where it would have more than half of the facets.
 
     Args: fixed (f,) facets that stay as they are; sag_alone [m] in place of the limits' if the mesh is convex, above 0.
     """
@@ -70,7 +77,8 @@ def simplify(mesh: Mesh, limits: Limits, fixed: Bools, sag_alone: float = 0.0) -
     sag = sag_alone if sag_alone > 0.0 and convex else limits.sag
     for few in (_FEW, 1):
         rounds = _Rounds(whole, limits._replace(sag=sag), few)
-        live = len(mesh.faces)
+        rounds.contract()
+        live = len(rounds.net.faces)
         while rounds.checked():
             left = len(rounds.net.faces)
             if left > _ENOUGH * live:
@@ -94,7 +102,7 @@ def simplify(mesh: Mesh, limits: Limits, fixed: Bools, sag_alone: float = 0.0) -
     # What is convex stays so, although facets may meet in grooves of micrometres.
     coarse.__dict__["topology"] = replace(coarse.topology, convex=convex)
     merged = (corner != 3 * rounds.facet[:, None] + np.arange(3)).any(axis=1)
-    return Simplified(coarse, corner, merged, rounds.deviation, sag, rounds.home)
+    return Simplified(coarse, corner, merged, rounds.deviation, sag), rounds.home
 
 
 def _convex(mesh: Mesh, height: float) -> bool:
@@ -139,7 +147,7 @@ class _Rounds:
     """Rounds of removals, numbered on, each on slabs of the mesh across another axis.
 
     Fields: net what is left of the whole mesh, all within the limits; vertex (k,), facet (m,), corner (3 m,) its
-    numbers in the whole mesh; home (n,) the facet on which the centre of each facet of the whole mesh lies; deviation
+    numbers in the whole mesh; heir (n,) the facet in whose place each facet of the whole mesh is looked for; deviation
     [m] of the points checked.
     """
 
@@ -147,11 +155,40 @@ class _Rounds:
         """Begin with a whole mesh; few: the check of every so manieth point serves where all are near."""
         n, self.net, self.deviation = len(whole.faces), whole, 0.0
         self.vertex, self.facet, self.corner = np.arange(len(whole.v)), np.arange(n), np.arange(3 * n, dtype=np.int32)
-        self.home = np.arange(n, dtype=np.int32)
-        self._limits, self._stage, self._turn, self._far = limits, 0, 0, True
+        self.heir = np.arange(n, dtype=np.int32)
+        self._limits, self._stage, self._turn = limits, 0, 0
+        closer = 1.0 if few == 1 else _CLOSER
+        self._closer = limits._replace(deviation=closer * limits.deviation, normal=closer * limits.normal)
         self._whole, self._few, self._checks, self._checked = whole, few, dict[int, Check](), True
+        self._inside = ~whole.locked[whole.faces].all(axis=1) if whole.locked.any() else np.ones(n, bool)
         some = whole.v[:: max(1, len(whole.v) // 10_000)]
         self._ends = np.quantile(some, np.arange(1, _SLABS) / _SLABS, axis=0)
+
+    def contract(self) -> None:
+        """Contract cells as long as most vertices go; the net stays as it was where some cell is no disc, or where it
+        is off the limits after it however often that is done again."""
+        slab, reach = self._slabs(0)[0], self.net.reach.copy()
+        tight = self._limits._replace(deviation=_TIGHT * self._limits.deviation)
+        for _ in range(_CONTRACTIONS):
+            now, left = self.net.copied(), len(self.net.v)
+            while True:
+                self._turn += 1
+                went = contract(now, tight, _CELL, self._turn)
+                left -= went
+                if went < left:
+                    break
+            if went < 0 or left == len(self.net.v):
+                break
+            heir = followed(now.heir)
+            for _ in range(_FLIPS):
+                self._flip(now, np.flatnonzero(now.faces[:, 0] >= 0), slab)
+            check = self._taken(now, heir)
+            if check is None:
+                return
+            if check.failed > _SOME:
+                break
+            check.shorten(self.net, now, self.vertex, True)
+        self.net.reach[:] = reach
 
     def checked(self) -> bool:
         """Do some rounds, and tell whether the net is within the limits after them; else points stay off however often
@@ -161,46 +198,56 @@ class _Rounds:
         for redo in range(_REDOS):
             now = self.net.copied()
             # The same slabs in every redo, so that it differs only where edges were shortened.
-            for i in range(_MANY_ROUNDS if self._far else _ROUNDS):
+            for i in range(_ROUNDS):
                 self._remove(now, slabs[(self._stage + i) % 3])
             live, heir = np.flatnonzero(now.faces[:, 0] >= 0), followed(now.heir)
             for i in range(_FLIPS):
                 self._flip(now, live, slabs[(self._stage + i) % 3][0])
-            for every in (self._few, 1) if self._far else (1,):
-                off, most = self._check(every)(now, heir, self._limits)
-                if most < _FAR or most > 1.0:
-                    break
-            if not most > 1.0:
-                self._far, self.deviation = most < _FAR, off
-                self._take(now, heir, every)
+            check = self._taken(now, heir)
+            if check is None:
                 return True
-            if self._far:
-                self._far = False
-                continue
             if len(live) > _TOO_MANY * len(self.net.faces):
                 return False
-            self._check(1).shorten(self.net, now, self.vertex, redo < _SHRINKS)
+            check.shorten(self.net, now, self.vertex, redo < _SHRINKS)
         return False
 
     def all_checked(self) -> bool:
-        """Tell whether all points are within the limits; find the deviation and the home of each facet."""
-        check = self._check(1)
-        if not self._checked:
-            self.deviation, most = check(self.net, self.net.heir, self._limits)
-            if most > 1.0:
-                return False
-            check.taken(self.net.heir, self.net.heir)
-        self.home[check.rows] = check.home
-        return True
+        """Tell whether all points are within the limits; find the deviation."""
+        if self._checked:
+            return True
+        vertices = Check(self._whole, self.heir, np.flatnonzero(~self._whole.locked), np.zeros(0, np.intp))
+        off, most = vertices(self.net, self.net.heir, self._limits)
+        few = np.bincount(vertices.found, minlength=len(self.net.faces)) < _MANY
+        centres = Check(self._whole, self.heir, np.zeros(0, np.intp), np.flatnonzero(self._inside & few[self.heir]))
+        far, worst = centres(self.net, self.net.heir, self._limits)
+        self.deviation = max(off, far)
+        return max(most, worst) <= 1.0
+
+    def home(self) -> Ints:
+        """Return the facet (n,) on which the centre of each facet of the whole mesh lies."""
+        inside, out = np.flatnonzero(self._inside), self.heir.copy()
+        centres = Check(self._whole, self.heir, np.zeros(0, np.intp), inside)
+        centres(self.net, self.net.heir, self._limits)
+        out[inside] = centres.found
+        return out
 
     def _check(self, every: int) -> Check:
         """Return the check of all points or of every so manieth, made when it is first used."""
         if every not in self._checks:
-            self._checks[every] = Check(self._whole, self.home, every)
+            vertex, rows = np.flatnonzero(~self._whole.locked)[::every], np.flatnonzero(self._inside)[::every]
+            self._checks[every] = Check(self._whole, self.heir, vertex, rows)
         return self._checks[every]
 
-    def _take(self, now: Net, heir: Ints, every: int) -> None:
-        """Go on with a net of which the last heirs (m,) are given, after a check of every so manieth point."""
+    def _taken(self, now: Net, heir: Ints) -> Check | None:
+        """Go on with a net of which the last heirs (m,) are given, if it is within the limits, a little closer ones
+        where not every point is checked; else return the check that it failed."""
+        left = int((now.faces[:, 0] >= 0).sum())
+        every = self._few if len(self._whole.faces) > 2 * self._few * left else 1
+        check = self._check(every)
+        off, most = check(now, heir, self._closer)
+        if most > 1.0:
+            return check
+        self.deviation = off
         self.net, live, stays = now.packed()
         number = np.zeros(len(now.faces), np.int32)
         number[live] = np.arange(len(live))
@@ -208,9 +255,10 @@ class _Rounds:
         for kept, check in self._checks.items():
             check.taken(then, number if kept == every else None)
         self._checked = every == 1
-        self.home = then[self.home]
+        self.heir = then[self.heir]
         self.vertex, self.facet = self.vertex[stays], self.facet[live]
         self.corner = self.corner[now.corner[live].ravel()]
+        return None
 
     def _slabs(self, axis: int) -> tuple[NDArray[np.int8], NDArray[np.intp], NDArray[np.intp]]:
         """Return the slab (k,) across an axis of each vertex, and the vertices that may go by slab, and where each of

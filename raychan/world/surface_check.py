@@ -24,13 +24,10 @@ class Check:
     """Points of the whole mesh's curved surface, vertices that may go and the centres of facets, with its normals
     there; facet (s,) of the simplified mesh on which each lies, vertex (p,) and rows (q,) of the whole mesh."""
 
-    def __init__(self, whole: Net, facet: Ints, every: int = 1) -> None:
-        """Take the points of a whole mesh, or every so manieth; facet (n,) on which the centre of each facet lies."""
-        self.vertex, inside = np.flatnonzero(~whole.locked)[::every], np.arange(0, len(whole.faces), every)
-        if whole.locked.any():
-            a, b, c = whole.faces.T
-            inside = np.flatnonzero(~(whole.locked[a] & whole.locked[b] & whole.locked[c]))[::every]
-        self.rows, begin = inside, len(self.vertex)
+    def __init__(self, whole: Net, facet: Ints, vertex: Ints, rows: Ints) -> None:
+        """Take vertices (p,) and centres of facets, rows (q,), of a whole mesh; facet (n,) where the search for the
+        centre of each of its facets begins."""
+        self.vertex, self.rows, begin = vertex, rows, len(vertex)
         corner = whole.half[self.vertex]
         self._facet, count = facet[np.concatenate([corner // 3, self.rows])], begin + len(self.rows)
         self._place, self._normal = np.empty((count, 3)), np.empty((count, 3))
@@ -78,9 +75,14 @@ class Check:
         self._found[:], self._last = 0, None
 
     @property
-    def home(self) -> Ints:
-        """The facet (q,) of the net taken last on which the centre of each of `rows` lies."""
-        return self._facet[len(self.vertex) :]
+    def found(self) -> Ints:
+        """The facet (s,) of the net checked last on which each point lies."""
+        return self._found
+
+    @property
+    def failed(self) -> float:
+        """The share of points that were off over the limits in the last check."""
+        return float(np.mean(self._excess > 1.0))
 
     def shorten(self, net: Net, failed: Net, vertex: Ints, some: bool) -> None:
         """Shorten the edges that may come on a net where facets of what became of it failed, which was checked last.

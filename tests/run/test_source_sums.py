@@ -122,11 +122,9 @@ def level(n):
 
 
 def _sums(*levels):
-    """Return the sums of sources after launches that gave some levels (s,) each, every source traced again each time."""
+    """Return the sums of sources after launches of all of them that gave some levels (s,) each."""
     source = np.arange(len(levels[0]), dtype=np.int64) + (2 << 31)
-    found = [
-        BySource(source, np.asarray(x, complex)[:, None, None] * np.ones((2, 2)), np.ones(len(x))) for x in levels
-    ]
+    found = [BySource(source, np.asarray(x, complex)[:, None, None] * np.ones((2, 2)), np.ones(len(x))) for x in levels]
     sums = SourceSums.of(found[0], found[1], (0, 0), 1)
     for one in found[2:]:
         sums = sums.joined(np.arange(len(source)), [one])

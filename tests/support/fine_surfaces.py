@@ -67,3 +67,14 @@ def on_patches(mesh, per_facet, rng):
     x, y, z = np.moveaxis(rng.dirichlet(np.ones(3), (len(v), per_facet)), 2, 0)[..., None]
     flat = x * v[:, None, 0] + y * v[:, None, 1] + z * v[:, None, 2]
     return (flat - x * y * bend[:, None, 0] - y * z * bend[:, None, 1] - z * x * bend[:, None, 2]).reshape(-1, 3)
+
+
+def half_ball():
+    """Return the upper half of a sphere with a flat lid below, whose rim is a crease."""
+    whole = ball(6)
+    top = whole.faces[(whole.vertices[whole.faces][:, :, 2] > -1e-9).all(axis=1)]
+    raw = trimesh.Trimesh(whole.vertices, top, process=False)
+    rim = raw.edges[trimesh.grouping.group_rows(raw.edges_sorted, require_count=1)]
+    v = np.append(whole.vertices, [[0.0, 0.0, 0.0]], axis=0)
+    faces = np.concatenate([top, np.stack([rim[:, 1], rim[:, 0], np.full(len(rim), len(v) - 1)], axis=1)])
+    return make_mesh(v, faces)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from support.fine_surfaces import ball, ellipsoid, off_ball, off_torus, on_patches, torus
+from support.fine_surfaces import ball, ellipsoid, half_ball, off_ball, off_torus, on_patches, torus
 
 import raychan as rc
 from raychan.geometry.triangles import edge_curvatures
@@ -25,9 +25,9 @@ K = 2.0 * np.pi * F / C0
 def simplified(mesh, tolerance_db=0.5):
     """Return a mesh simplified as one that hides nothing, by fewer facets than among others."""
     limits = limits_of(K, tolerance_db, float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))))
-    found = simplify(mesh, limits._replace(sag=C0 / F / 8.0), np.zeros(len(mesh.faces), bool))
-    assert found is not None
-    return found
+    simple = simplify(mesh, limits._replace(sag=C0 / F / 8.0), np.zeros(len(mesh.faces), bool))
+    assert simple is not None
+    return simple[0]
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("ball", 0.15), ("ball", 0.5), ("torus", 0.5), ("torus", 1.0)])
@@ -100,17 +100,6 @@ def test_no_edge_of_a_part_or_of_the_body_goes():
             )
 
 
-def half_ball():
-    """Return the upper half of a sphere with a flat lid below, whose rim is a crease."""
-    whole = ball(6)
-    top = whole.faces[(whole.vertices[whole.faces][:, :, 2] > -1e-9).all(axis=1)]
-    raw = trimesh.Trimesh(whole.vertices, top, process=False)
-    rim = raw.edges[trimesh.grouping.group_rows(raw.edges_sorted, require_count=1)]
-    v = np.append(whole.vertices, [[0.0, 0.0, 0.0]], axis=0)
-    faces = np.concatenate([top, np.stack([rim[:, 1], rim[:, 0], np.full(len(rim), len(v) - 1)], axis=1)])
-    return make_mesh(v, faces)
-
-
 def test_open_surfaces_keep_their_boundary():
     whole = ball(6)
     top = whole.faces[(whole.vertices[whole.faces][:, :, 2] > -1e-9).all(axis=1)]
@@ -148,7 +137,7 @@ def test_fixed_facets_stay():
     fixed = mesh.corners[:, :, 0].mean(axis=1) > 0.3
     found = simplify(mesh, limits_of(K, 0.5, 1.0)._replace(sag=C0 / F / 8.0), fixed)
     assert found is not None
-    kept = {tuple(c.ravel()) for c in np.sort(found.mesh.corners, axis=1)}
+    kept = {tuple(c.ravel()) for c in np.sort(found[0].mesh.corners, axis=1)}
     assert {tuple(c.ravel()) for c in np.sort(mesh.corners[fixed], axis=1)} <= kept
 
 
@@ -156,8 +145,8 @@ def test_one_thread_and_two_simplify_alike():
     two = simplify(torus(), limits_of(K, 0.5, 1.3), np.zeros(57_600, bool))
     one, _ = run_pair(lambda: simplify(torus(), limits_of(K, 0.5, 1.3), np.zeros(57_600, bool)), wait)
     assert one is not None and two is not None
-    assert np.array_equal(one.corner, two.corner)
-    assert one.deviation == two.deviation
+    assert np.array_equal(one[0].corner, two[0].corner)
+    assert one[0].deviation == two[0].deviation
 
 
 def wait():

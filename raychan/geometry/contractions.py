@@ -1,0 +1,201 @@
+"""Contractions of a net that is being simplified: cells of vertices go to their middle ones at once, where facets are
+far finer than asked for (numba kernels).
+
+Everywhere: half edge 3 f + k runs from corner k of facet f to the next; cell (k,) is the vertex to which each goes,
+itself for one that stays. Facets whose corners lie in three cells stay. Source: Okabe et al., Spatial Tessellations,
+2000, section 2.2 (the dual of cells that are discs is a triangulation).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from raychan.compile.jit import njit
+from raychan.geometry.collapses import UPRIGHT, Limits, edge_allowed, form
+from raychan.geometry.half_edges import MOST, Net, fan_of
+from raychan.parallel import parallel_for
+from raychan.vectors import dot, less, row
+
+# Edges between middles are about so many times as long as those from a middle to the rim of its cell.
+_ACROSS = 2.0
+_WALK = 1000  # facets along the border of two cells; more than there are where cells are discs
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def grow_cells(net, limits, most, cell):  # type: ignore[no-untyped-def]
+    """Write into cell (k,) to which vertex each goes: one at most so many edges away, by edges that may come.
+
+    Every vertex in no cell yet begins one; a vertex within reach of several goes where it is fewer edges away, or
+    nearer.
+    """
+    v, n, faces, corner, mate, half, _, locked, gone, reach, _, _ = net
+    fan, ring = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
+    away, far, queue = np.zeros(len(v), np.int8), np.zeros(len(v)), np.empty(MOST * MOST, np.int64)
+    for a in range(len(v)):
+        cell[a] = a if locked[a] or gone[a] else -1
+    for a in range(len(v)):
+        if cell[a] >= 0:
+            continue
+        cell[a], away[a], queue[0], begin, end = a, 0, a, 0, 1
+        p, na = row(v, a), row(n, corner[half[a] // 3, half[a] % 3])
+        while begin < end:
+            u = queue[begin]
+            begin += 1
+            step = away[u] + 1
+            for i in range(fan_of(faces, mate, half[u], fan, ring)):
+                w = ring[i]
+                q = row(v, w)
+                size = dot(less(q, p), less(q, p))
+                # Those about the middle stay, since the rim hangs on them.
+                taken = cell[w] >= 0 and (away[w] < step or (away[w] == step and (step < most or far[w] <= size)))
+                if locked[w] or cell[w] == a or taken:
+                    continue
+                nw = row(n, corner[half[w] // 3, half[w] % 3])
+                if not edge_allowed(p, q, na, nw, min(reach[a], reach[w]) / _ACROSS, limits):
+                    continue
+                cell[w], away[w], far[w] = a, step, size
+                if step < most and end < len(queue):
+                    queue[end] = w
+                    end += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def misshapen(net, limits, cell, begin, stop, bad):  # type: ignore[no-untyped-def]
+    """Mark in bad (k,) the cells of facets that turn over or have edges that may not come; return how many facets do.
+
+    Args: begin, stop: of which facets.
+    """
+    v, n, faces, corner, _, half, _, _, _, reach, _, _ = net
+    count = 0
+    for f in range(begin, stop):
+        if faces[f, 0] < 0:
+            continue
+        a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
+        if a == b or b == c or c == a or (a == faces[f, 0] and b == faces[f, 1] and c == faces[f, 2]):
+            continue
+        p, q, r = row(v, a), row(v, b), row(v, c)
+        na = row(n, _corner(faces, corner, half, f, 0, a))
+        nb = row(n, _corner(faces, corner, half, f, 1, b))
+        nc = row(n, _corner(faces, corner, half, f, 2, c))
+        most = min(reach[a], reach[b], reach[c])
+        fits = form(p, q, r, na, nb, nc)[1] >= UPRIGHT and edge_allowed(p, q, na, nb, most, limits)
+        fits = fits and edge_allowed(q, r, nb, nc, most, limits) and edge_allowed(r, p, nc, na, most, limits)
+        if not fits:
+            bad[a], bad[b], bad[c] = True, True, True
+            count += 1
+    return count
+
+
+@njit(cache=True, forceinline=True)
+def _corner(faces, corner, half, f, k, a):  # type: ignore[no-untyped-def]
+    """Return the corner whose normal facet f has at a vertex in place of its corner k."""
+    return corner[f, k] if faces[f, k] == a else corner[half[a] // 3, half[a] % 3]
+
+
+@njit(cache=True, nogil=True)
+def beyond_cells(faces, mate, cell, begin, stop, out):  # type: ignore[no-untyped-def]
+    """Write into out (3 m,) the other side of each half edge of some facets that stay; return whether all are found."""
+    for f in range(begin, stop):
+        if faces[f, 0] < 0:
+            continue
+        a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
+        if a == b or b == c or c == a:
+            continue
+        for k in range(3):
+            one, two = cell[faces[f, k]], cell[faces[f, (k + 1) % 3]]
+            h, found = np.int64(mate[3 * f + k]), False
+            for _ in range(_WALK):
+                # h runs from cell two to cell one.
+                if h < 0:
+                    found = True
+                    break
+                g, i = h // 3, h % 3
+                other = cell[faces[g, (i + 2) % 3]]
+                if other != one and other != two:
+                    found = True
+                    break
+                h = np.int64(mate[3 * g + (i + 2) % 3] if other == one else mate[3 * g + (i + 1) % 3])
+            if not found:
+                return False
+            out[3 * f + k] = h
+    return True
+
+
+@njit(cache=True, nogil=True)
+def merge_cells(net, cell, beyond, turn):  # type: ignore[no-untyped-def]
+    """Move the vertices of each cell to its middle; return how many go, or -1 where some cell is no disc: then the net
+    is spoilt.
+
+    Args: beyond as `beyond_cells` writes it; turn the number of this round.
+    """
+    _, _, faces, corner, mate, half, heir, _, gone, _, touched, _ = net
+    went, left, stays = 0, 0, np.zeros(len(cell), np.bool_)
+    inside = np.zeros(len(faces), np.bool_)
+    own = half.copy()
+    for f in range(len(faces)):
+        if faces[f, 0] < 0:
+            continue
+        a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
+        if a == b or b == c or c == a:
+            inside[f] = True
+            left += 1
+            continue
+        for k in range(3):
+            x = cell[faces[f, k]]
+            own[x], stays[x] = 3 * f + k, True
+    for f in range(len(faces)):
+        if faces[f, 0] < 0:
+            continue
+        if inside[f]:
+            # A vertex of a cell of several, which is of one smooth patch.
+            a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
+            heir[f] = own[a if a in (b, c) else b] // 3
+        for k in range(3):
+            x = cell[faces[f, k]]
+            if not inside[f]:
+                corner[f, k] = _corner(faces, corner, half, f, k, x)
+                mate[3 * f + k] = beyond[3 * f + k]
+    for f in range(len(faces)):
+        if faces[f, 0] < 0:
+            continue
+        for k in range(3):
+            faces[f, k] = -1 if inside[f] else cell[faces[f, k]]
+            if inside[f]:
+                corner[f, k], mate[3 * f + k] = -1, -1
+    for a in range(len(cell)):
+        if gone[a]:
+            continue
+        if cell[a] != a:
+            gone[a] = True
+            went += 1
+        else:
+            half[a] = own[a]
+            touched[a] = turn
+            if not stays[a]:
+                return -1
+    return went if left == 2 * went else -1
+
+
+def contract(net: Net, limits: Limits, most: int, turn: int) -> int:
+    """Contract the cells of a net, in place; return how many vertices go, or -1 where the net is spoilt.
+
+    Args: limits that edges between vertices that stay keep; most edges from the middle of a cell to its rim; turn the
+    number of this round.
+    """
+    n, cell = len(net.faces), np.empty(len(net.v), np.int32)
+    # An edge across two cells is twice as long and turns twice as far.
+    half = limits._replace(
+        deviation=limits.deviation / _ACROSS**4, sag=limits.sag / _ACROSS**2, turn=limits.turn / _ACROSS
+    )
+    grow_cells(net, half, most, cell)
+    while True:
+        bad = np.zeros(len(cell), bool)
+        parallel_for(n, lambda r, bad=bad: misshapen(net, limits, cell, r.start, r.stop, bad))
+        # Vertices of cells that do not fit stay.
+        apart = bad[cell] & (cell != np.arange(len(cell)))
+        if not apart.any():
+            break
+        cell[apart] = np.flatnonzero(apart)
+    beyond, whole = np.full(3 * n, -1, np.int32), list[bool]()
+    parallel_for(n, lambda r: whole.append(beyond_cells(net.faces, net.mate, cell, r.start, r.stop, beyond)))
+    return int(merge_cells(net, cell, beyond, turn)) if all(whole) else -1
