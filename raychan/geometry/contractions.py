@@ -8,7 +8,10 @@ itself for one that stays. Facets whose corners lie in three cells stay. Source:
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.geometry.collapses import UPRIGHT, Limits, edge_allowed, form
@@ -16,24 +19,27 @@ from raychan.geometry.half_edges import MOST, Net, fan_of
 from raychan.parallel import parallel_for
 from raychan.vectors import dot, less, row
 
+Ints = NDArray[np.signedinteger[Any]]
+
 # Edges between middles are about so many times as long as those from a middle to the rim of its cell.
 _ACROSS = 2.0
 _WALK = 1000  # facets along the border of two cells; more than there are where cells are discs
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def grow_cells(net, limits, most, cell):  # type: ignore[no-untyped-def]
+def grow_cells(net, limits, most, rows, slab, cell, away, far):  # type: ignore[no-untyped-def]
     """Write into cell (k,) to which vertex each goes: one at most so many edges away, by edges that may come.
 
     Every vertex in no cell yet begins one; a vertex within reach of several goes where it is fewer edges away, or
     nearer.
+
+    Args: rows (r,) the vertices of a slab, none locked; slab (k,): no cell leaves its own, so that threads never meet;
+    cell (k,) holds -1 for these, themselves for others; away, far (k,) [edges], [m^2] from the middle, are written.
     """
-    v, n, faces, corner, mate, half, _, locked, gone, reach, _, _ = net
+    v, n, faces, corner, mate, half, _, locked, _, reach, _, _ = net
     fan, ring = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
-    away, far, queue = np.zeros(len(v), np.int8), np.zeros(len(v)), np.empty(MOST * MOST, np.int64)
-    for a in range(len(v)):
-        cell[a] = a if locked[a] or gone[a] else -1
-    for a in range(len(v)):
+    queue = np.empty(MOST * MOST, np.int64)
+    for a in rows:
         if cell[a] >= 0:
             continue
         cell[a], away[a], queue[0], begin, end = a, 0, a, 0, 1
@@ -48,7 +54,7 @@ def grow_cells(net, limits, most, cell):  # type: ignore[no-untyped-def]
                 size = dot(less(q, p), less(q, p))
                 # Those about the middle stay, since the rim hangs on them.
                 taken = cell[w] >= 0 and (away[w] < step or (away[w] == step and (step < most or far[w] <= size)))
-                if locked[w] or cell[w] == a or taken:
+                if taken or locked[w] or cell[w] == a or slab[w] != slab[a]:
                     continue
                 nw = row(n, corner[half[w] // 3, half[w] % 3])
                 if not edge_allowed(p, q, na, nw, min(reach[a], reach[w]) / _ACROSS, limits):
@@ -94,7 +100,8 @@ def _corner(faces, corner, half, f, k, a):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def beyond_cells(faces, mate, cell, begin, stop, out):  # type: ignore[no-untyped-def]
-    """Write into out (3 m,) the other side of each half edge of some facets that stay; return whether all are found."""
+    """Write into out (3 m,) the other side of each half edge of some facets that stay, -1 where the smooth patch ends;
+    return whether all are found."""
     for f in range(begin, stop):
         if faces[f, 0] < 0:
             continue
@@ -122,80 +129,95 @@ def beyond_cells(faces, mate, cell, begin, stop, out):  # type: ignore[no-untype
 
 
 @njit(cache=True, nogil=True)
-def merge_cells(net, cell, beyond, turn):  # type: ignore[no-untyped-def]
-    """Move the vertices of each cell to its middle; return how many go, or -1 where some cell is no disc: then the net
-    is spoilt.
-
-    Args: beyond as `beyond_cells` writes it; turn the number of this round.
-    """
-    _, _, faces, corner, mate, half, heir, _, gone, _, touched, _ = net
-    went, left, stays = 0, 0, np.zeros(len(cell), np.bool_)
-    inside = np.zeros(len(faces), np.bool_)
-    own = half.copy()
+def corners_of_cells(faces, cell, own):  # type: ignore[no-untyped-def]
+    """Write a half edge that leaves each vertex that stays into own (k,), -1 where no facet stays; return how many
+    facets go."""
+    went = 0
+    own[:] = -1
     for f in range(len(faces)):
         if faces[f, 0] < 0:
             continue
         a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
         if a == b or b == c or c == a:
-            inside[f] = True
-            left += 1
-            continue
-        for k in range(3):
-            x = cell[faces[f, k]]
-            own[x], stays[x] = 3 * f + k, True
-    for f in range(len(faces)):
+            went += 1
+        else:
+            own[a], own[b], own[c] = 3 * f, 3 * f + 1, 3 * f + 2
+    return went
+
+
+@njit(cache=True, nogil=True)
+def merge_cells(net, cell, own, seen, beyond, begin, stop):  # type: ignore[no-untyped-def]
+    """Move the vertices of some facets to the middles of their cells: facets within two cells go.
+
+    Args: own as `corners_of_cells` writes it; seen (k,) the corner at each vertex before; beyond as `beyond_cells`
+    writes it; begin, stop: which facets.
+    """
+    _, _, faces, corner, mate, _, heir, _, _, _, _, _ = net
+    for f in range(begin, stop):
         if faces[f, 0] < 0:
             continue
-        if inside[f]:
+        a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
+        inside = a == b or b == c or c == a
+        if inside:
             # A vertex of a cell of several, which is of one smooth patch.
-            a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
             heir[f] = own[a if a in (b, c) else b] // 3
         for k in range(3):
             x = cell[faces[f, k]]
-            if not inside[f]:
-                corner[f, k] = _corner(faces, corner, half, f, k, x)
-                mate[3 * f + k] = beyond[3 * f + k]
-    for f in range(len(faces)):
-        if faces[f, 0] < 0:
-            continue
-        for k in range(3):
-            faces[f, k] = -1 if inside[f] else cell[faces[f, k]]
-            if inside[f]:
-                corner[f, k], mate[3 * f + k] = -1, -1
-    for a in range(len(cell)):
-        if gone[a]:
-            continue
-        if cell[a] != a:
-            gone[a] = True
-            went += 1
-        else:
-            half[a] = own[a]
-            touched[a] = turn
-            if not stays[a]:
-                return -1
-    return went if left == 2 * went else -1
+            if inside:
+                faces[f, k], corner[f, k], mate[3 * f + k] = -1, -1, -1
+            else:
+                corner[f, k] = corner[f, k] if faces[f, k] == x else seen[x]
+                faces[f, k], mate[3 * f + k] = x, beyond[3 * f + k]
 
 
-def contract(net: Net, limits: Limits, most: int, turn: int) -> int:
-    """Contract the cells of a net, in place; return how many vertices go, or -1 where the net is spoilt.
+def contract(net: Net, limits: Limits, most: int, turn: int, slabs: tuple[NDArray[np.int8], Ints, Ints]) -> int:
+    """Contract the cells of a net, in place; return how many vertices go, or -1 where some cell is no disc: then the
+    net is spoilt.
 
     Args: limits that edges between vertices that stay keep; most edges from the middle of a cell to its rim; turn the
-    number of this round.
+    number of this round; slabs: the slab (k,) of each vertex, the vertices that may go by slab, and where each begins.
     """
-    n, cell = len(net.faces), np.empty(len(net.v), np.int32)
+    cell = _cells(net, limits, most, slabs)
+    n, number = len(net.faces), np.arange(len(cell))
+    while True:
+        bad, count = np.zeros(len(cell), bool), list[int]()
+
+        def marked(r: slice, bad: NDArray[np.bool_] = bad, count: list[int] = count) -> None:
+            count.append(misshapen(net, limits, cell, r.start, r.stop, bad))
+
+        parallel_for(n, marked)
+        if not any(count):
+            break
+        # Vertices of cells that do not fit stay.
+        apart = np.flatnonzero(bad[cell] & (cell != number))
+        cell[apart] = apart
+    own, went = np.empty(len(cell), np.int32), ~net.gone & (cell != number)
+    beyond, whole = np.empty(3 * n, np.int32), list[bool]()
+    facets, stays = corners_of_cells(net.faces, cell, own), ~net.gone & ~went
+    parallel_for(n, lambda r: whole.append(beyond_cells(net.faces, net.mate, cell, r.start, r.stop, beyond)))
+    # Of cells that are discs two facets go with each vertex (Euler).
+    if not all(whole) or facets != 2 * went.sum() or (own[stays] < 0).any():
+        return -1
+    seen = net.corner.ravel()[net.half]
+    parallel_for(n, lambda r: merge_cells(net, cell, own, seen, beyond, r.start, r.stop))
+    net.half[stays], net.touched[stays] = own[stays], turn
+    net.gone[went] = True
+    return int(went.sum())
+
+
+def _cells(net: Net, limits: Limits, most: int, slabs: tuple[NDArray[np.int8], Ints, Ints]) -> NDArray[np.int32]:
+    """Return the vertex (k,) to which each goes."""
+    slab, rows, first = slabs
+    cell = np.where(net.locked | net.gone, np.arange(len(net.v), dtype=np.int32), np.int32(-1))
+    away, far = np.empty(len(cell), np.int8), np.empty(len(cell))
     # An edge across two cells is twice as long and turns twice as far.
     half = limits._replace(
         deviation=limits.deviation / _ACROSS**4, sag=limits.sag / _ACROSS**2, turn=limits.turn / _ACROSS
     )
-    grow_cells(net, half, most, cell)
-    while True:
-        bad = np.zeros(len(cell), bool)
-        parallel_for(n, lambda r, bad=bad: misshapen(net, limits, cell, r.start, r.stop, bad))
-        # Vertices of cells that do not fit stay.
-        apart = bad[cell] & (cell != np.arange(len(cell)))
-        if not apart.any():
-            break
-        cell[apart] = np.flatnonzero(apart)
-    beyond, whole = np.full(3 * n, -1, np.int32), list[bool]()
-    parallel_for(n, lambda r: whole.append(beyond_cells(net.faces, net.mate, cell, r.start, r.stop, beyond)))
-    return int(merge_cells(net, cell, beyond, turn)) if all(whole) else -1
+
+    def some(r: slice) -> None:
+        for i in range(r.start, r.stop):
+            grow_cells(net, half, most, rows[first[i] : first[i + 1]], slab, cell, away, far)
+
+    parallel_for(len(first) - 1, some, 2)
+    return cell

@@ -29,19 +29,19 @@ Bools = NDArray[np.bool_]
 _LONGEST = 0.3  # m: longest edge, that of the longest tubes (tracing.settings); a longer one saves nothing
 # Measured on a sphere, a torus and an ellipsoid of 160,000 to 330,000 facets at 0.05 to 0.5 dB (command not noted).
 _ROUNDS = 3  # between checks: more miss by more, fewer check more often; 5 leave up to 5 % more or fewer facets
-_TIGHT = 0.25  # of the deviation, what edges of contracted cells may be off: they are not chosen one by one. At 0.5 and
-# 0.12 as many facets are left at the end (spheres of 82,000 to 1.3e6)
+# Of the deviation, what edges of contracted cells may be off, which are not chosen one by one, and its root of the sag.
+# With all of the sag a sphere of 1.3e6 facets in a scene keeps 26,700 in place of 22,800.
+_TIGHT = 0.25
 _CELL = 2  # edges from the middle of a cell that is contracted to its rim, at most; not measured
 _CONTRACTIONS = 3  # tries of them, each with shorter edges where points were off; not measured
 _SOME = 0.02  # of the points, that may be off for another try; not measured
 _REDOS = 16  # of rounds that failed their check: where one fails once more, they are not taken
 _SHRINKS = 10  # of them, that allow shorter edges where a check failed; the others allow no new ones there
-_ENOUGH = 0.9  # of the facets left by the rounds: with more, no others are tried
-_TOO_MANY = 0.9  # of the facets left by rounds that failed: with more, the surface is not known better than that
+_ENOUGH = 0.9  # of the facets: rounds that leave more are not taken, and no others tried
 _HALF = 0.5  # of the facets left at the end, or by the first rounds: with more it does not pay
 _SLABS = 4  # parts of the mesh that threads work on
 _FLIPS = 2  # passes of edge flips after them; not measured
-# Of the points, 1 in so many is checked where twice as many facets of the whole mesh lie on each, and all at the end.
+# Of the points, 1 in so many is checked where as many facets of the whole mesh lie on each facet; all at the end.
 _FEW = 8
 # Of the limits, until all are checked: the others were off by up to 5 % more (a sphere of 1.3e6 facets).
 _CLOSER = 0.95
@@ -78,12 +78,8 @@ def simplify(
     for few in (_FEW, 1):
         rounds = _Rounds(whole, limits._replace(sag=sag), few)
         rounds.contract()
-        live = len(rounds.net.faces)
         while rounds.checked():
-            left = len(rounds.net.faces)
-            if left > _ENOUGH * live:
-                break
-            live = left
+            pass
         if len(rounds.net.faces) > _HALF * len(mesh.faces):
             return None
         if rounds.all_checked():
@@ -156,9 +152,9 @@ class _Rounds:
         n, self.net, self.deviation = len(whole.faces), whole, 0.0
         self.vertex, self.facet, self.corner = np.arange(len(whole.v)), np.arange(n), np.arange(3 * n, dtype=np.int32)
         self.heir = np.arange(n, dtype=np.int32)
-        self._limits, self._stage, self._turn = limits, 0, 0
         closer = 1.0 if few == 1 else _CLOSER
-        self._closer = limits._replace(deviation=closer * limits.deviation, normal=closer * limits.normal)
+        self._limits = limits._replace(deviation=closer * limits.deviation, normal=closer * limits.normal)
+        self._last, self._stage, self._turn = limits, 0, 0
         self._whole, self._few, self._checks, self._checked = whole, few, dict[int, Check](), True
         self._inside = ~whole.locked[whole.faces].all(axis=1) if whole.locked.any() else np.ones(n, bool)
         some = whole.v[:: max(1, len(whole.v) // 10_000)]
@@ -167,21 +163,21 @@ class _Rounds:
     def contract(self) -> None:
         """Contract cells as long as most vertices go; the net stays as it was where some cell is no disc, or where it
         is off the limits after it however often that is done again."""
-        slab, reach = self._slabs(0)[0], self.net.reach.copy()
-        tight = self._limits._replace(deviation=_TIGHT * self._limits.deviation)
+        slabs, reach = self._slabs(0), self.net.reach.copy()
+        tight = self._limits._replace(deviation=_TIGHT * self._limits.deviation, sag=_TIGHT**0.5 * self._limits.sag)
         for _ in range(_CONTRACTIONS):
             now, left = self.net.copied(), len(self.net.v)
             while True:
                 self._turn += 1
-                went = contract(now, tight, _CELL, self._turn)
+                went = contract(now, tight, _CELL, self._turn, slabs)
                 left -= went
                 if went < left:
                     break
-            if went < 0 or left == len(self.net.v):
+            if went < 0 or left > _HALF * len(self.net.v):
                 break
             heir = followed(now.heir)
             for _ in range(_FLIPS):
-                self._flip(now, np.flatnonzero(now.faces[:, 0] >= 0), slab)
+                self._flip(now, np.flatnonzero(now.faces[:, 0] >= 0), slabs[0])
             check = self._taken(now, heir)
             if check is None:
                 return
@@ -201,13 +197,13 @@ class _Rounds:
             for i in range(_ROUNDS):
                 self._remove(now, slabs[(self._stage + i) % 3])
             live, heir = np.flatnonzero(now.faces[:, 0] >= 0), followed(now.heir)
+            if len(live) > _ENOUGH * len(self.net.faces):
+                return False
             for i in range(_FLIPS):
                 self._flip(now, live, slabs[(self._stage + i) % 3][0])
             check = self._taken(now, heir)
             if check is None:
                 return True
-            if len(live) > _TOO_MANY * len(self.net.faces):
-                return False
             check.shorten(self.net, now, self.vertex, redo < _SHRINKS)
         return False
 
@@ -216,10 +212,10 @@ class _Rounds:
         if self._checked:
             return True
         vertices = Check(self._whole, self.heir, np.flatnonzero(~self._whole.locked), np.zeros(0, np.intp))
-        off, most = vertices(self.net, self.net.heir, self._limits)
+        off, most = vertices(self.net, self.net.heir, self._last)
         few = np.bincount(vertices.found, minlength=len(self.net.faces)) < _MANY
         centres = Check(self._whole, self.heir, np.zeros(0, np.intp), np.flatnonzero(self._inside & few[self.heir]))
-        far, worst = centres(self.net, self.net.heir, self._limits)
+        far, worst = centres(self.net, self.net.heir, self._last)
         self.deviation = max(off, far)
         return max(most, worst) <= 1.0
 
@@ -239,12 +235,12 @@ class _Rounds:
         return self._checks[every]
 
     def _taken(self, now: Net, heir: Ints) -> Check | None:
-        """Go on with a net of which the last heirs (m,) are given, if it is within the limits, a little closer ones
-        where not every point is checked; else return the check that it failed."""
-        left = int((now.faces[:, 0] >= 0).sum())
-        every = self._few if len(self._whole.faces) > 2 * self._few * left else 1
+        """Go on with a net of which the last heirs (m,) are given, if it is within limits that are a little closer;
+        else return the check that it failed."""
+        # From step to step fewer facets are left: once some points serve, they serve all along.
+        every = self._few if len(self.heir) > self._few * int((now.faces[:, 0] >= 0).sum()) else 1
         check = self._check(every)
-        off, most = check(now, heir, self._closer)
+        off, most = check(now, heir, self._limits)
         if most > 1.0:
             return check
         self.deviation = off
