@@ -20,7 +20,10 @@ _WIDEST = 1.0  # m off the phase centre: a wider array is a slip of unit, or ano
 
 def numbers(name: str, given: ArrayLike, wanted: str) -> Floats:
     """Return finite numbers of shape (3,) or (n, 3), read-only. Raises: ValueError that names the argument."""
-    value = np.array(given, np.float64)
+    try:
+        value = np.array(given, np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: numbers of shape {wanted} wanted, {given!r} given") from None
     if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
         raise ValueError(f"{name}: numbers of shape {wanted} wanted, {value.tolist()} given")
     if not np.isfinite(value).all():
@@ -73,12 +76,10 @@ def uniform_array(n: int, spacing: float, axis: str = "y") -> Floats:
     return out
 
 
-def check_receiver_elsewhere(position: object, velocity: object, yaw_deg: float | None, transmitters: int) -> None:
+def check_receiver_elsewhere(position: object, velocity: object, yaw_deg: object, transmitters: int) -> None:
     """Raise ValueError where what is said of receivers elsewhere does not fit."""
     if position is None and not (velocity is None and yaw_deg is None):
         raise ValueError("Radar.rx_velocity and rx_yaw_deg: only with rx_position")
-    if yaw_deg is not None and not np.isfinite(yaw_deg):
-        raise ValueError(f"Radar.rx_yaw_deg = {yaw_deg!r}: must be finite")
     if position is not None and transmitters > 1:
         raise ValueError("Radar.tx_elements: one transmitter wanted where the receivers stand elsewhere (rx_position)")
 

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
-from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from raychan.radar.declared import check_declared, finite
 from raychan.units import undb, watt
 
 Floats = NDArray[np.float64]
-
-
-def finite(name: str, value: object) -> float:
-    """Return a number. Raises: ValueError that names the argument, for another type or a number not finite."""
-    if isinstance(value, bool) or not isinstance(value, SupportsFloat) or not math.isfinite(float(value)):
-        raise ValueError(f"{name} = {value!r}: must be finite, a number")
-    return float(value)
 
 
 def _table(name: str, rows: ArrayLike, least: int, pair: str) -> tuple[tuple[float, float], ...]:
@@ -162,14 +154,7 @@ class Impairments:
     dc_offset_dbm: float | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (("chirp_error", ChirpError), ("phase_noise", PhaseNoise), ("converter", Converter)):
-            value = getattr(self, name)
-            if not (value is None or isinstance(value, kind)):
-                raise ValueError(f"Impairments.{name} = {value!r}: a {kind.__name__} is wanted, or None")
-        for name in ("iq_gain_db", "iq_phase_deg"):
-            finite(f"Impairments.{name}", getattr(self, name))
-        if self.dc_offset_dbm is not None:
-            finite("Impairments.dc_offset_dbm", self.dc_offset_dbm)
+        check_declared(Impairments, vars(self))
 
     @property
     def phase_errors(self) -> bool:

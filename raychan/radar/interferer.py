@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from raychan.radar.impairments import finite
+from raychan.radar.declared import check_declared
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform
 
@@ -17,7 +17,7 @@ class Interferer:
 
     Args: radar, whose receiver and samples do not matter; start [s] of its first ramp after the victim's; locked:
     whether its ramps keep their phase to the victim's from ramp to ramp, else each begins at a phase of its own.
-    Raises: ValueError for a start that is not finite, and for several transmitters or a waveform of one's own.
+    Raises: ValueError for another type, a start that is not finite, several transmitters or a waveform of one's own.
     """
 
     radar: Radar
@@ -28,9 +28,7 @@ class Interferer:
     """The table of a scene file that it comes from, if any."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.radar, Radar):
-            raise ValueError(f"Interferer.radar = {self.radar!r}: a Radar is wanted")
-        finite("Interferer.start", self.start)
+        check_declared(Interferer, vars(self))
         if len(self.radar.tx_elements) > 1 or isinstance(self.radar.waveform, OwnWaveform):
             raise ValueError("Interferer.radar: one transmitter of linear ramps wanted")
 

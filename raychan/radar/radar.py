@@ -19,6 +19,7 @@ from raychan.radar.array import (
     offsets,
     virtual_elements,
 )
+from raychan.radar.declared import check_declared
 from raychan.radar.impairments import Impairments
 from raychan.radar.pattern import gain_dbi
 from raychan.radar.processing import Processing
@@ -31,7 +32,6 @@ Complexes = NDArray[np.complex128]
 
 _AHEAD, _POWER, _PROCESSING = IsotropicAntenna(front=True), float(watt(12.0)), Processing()
 _IDEAL = Impairments()
-_NUMBERS = ("yaw_deg", "pitch_deg", "roll_deg", "noise_figure_db", "noise_temperature_k")
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -47,7 +47,7 @@ class Radar:
     the empty slot tells folds); rx_polarization V, H or "both" of the receivers; rx_position (3,) [m] of receivers
     elsewhere, with the radar's clock, their rx_velocity [m/s] and rx_yaw_deg [deg] (default the radar's); processing
     and impairments of the receiver.
-    Raises: ValueError for values that cannot be.
+    Raises: ValueError for values that cannot be, or are of another type.
     """
 
     waveform: Waveform
@@ -106,22 +106,18 @@ class Radar:
         impairments: Impairments = _IDEAL,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
-        if not (power > 0.0 and np.isfinite(power)):
-            raise ValueError(f"Radar.power = {power!r}: must be positive and finite")
-        for name in _NUMBERS:
-            if not np.isfinite(given[name]):
-                raise ValueError(f"Radar.{name} = {given[name]!r}: must be finite")
+        check_declared(Radar, given)
+        if power <= 0.0:
+            raise ValueError(f"Radar.power = {power!r}: must be positive")
         if noise_temperature_k < 0.0:
             raise ValueError(f"Radar.noise_temperature_k = {noise_temperature_k!r}: must be 0 or more")
-        if not isinstance(impairments, Impairments):
-            raise ValueError(f"Radar.impairments = {impairments!r}: an Impairments is wanted")
         if not (impairments.iq_balanced or waveform.complex_sampling):
             raise ValueError("Radar.impairments: I/Q imbalance needs I/Q sampling, and the waveform has real sampling")
         if impairments.chirp_error is not None and isinstance(waveform, OwnWaveform):
             raise ValueError("Radar.impairments: a chirp error needs linear ramps, and the waveform is one of its own")
         check_receiver_elsewhere(rx_position, rx_velocity, rx_yaw_deg, len(np.atleast_2d(tx_elements)))
         for name in ("position", "velocity", "rx_position", "rx_velocity"):
-            if given[name] is not None:
+            if given[name] is not None or not name.startswith("rx_"):
                 given[name] = numbers(f"Radar.{name}", given[name], "(3,)")
         for name in ("elements", "tx_elements"):
             given[name] = offsets(f"Radar.{name}", given[name])

@@ -10,12 +10,13 @@ where a is the path's amplitude at the start of the frame, which already holds e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.radar.declared import check_declared
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ class OwnWaveform(Protocol):
 class Waveform:
     """A frame of `n_chirps` equal linear frequency ramps, `n_samples` samples in each; SI units.
 
-    Raises: ValueError for values that cannot be.
+    Raises: ValueError for values that cannot be, or are of another type.
 
     >>> wave = Waveform(carrier=77e9, bandwidth=1e9, chirp_duration=25e-6)
     >>> round(wave.range_resolution, 3), round(wave.unambiguous_rate, 1)
@@ -55,7 +56,7 @@ class Waveform:
     carrier: float
     """Frequency at the start of the sampled part of the ramp [Hz]."""
     bandwidth: float
-    """Frequency swept while sampling [Hz]."""
+    """Frequency swept while sampling [Hz], below the carrier: from there up, a ramp spans less than an octave."""
     chirp_duration: float
     """Time that is sampled in a ramp [s]."""
     repetition: float = None  # type: ignore[assignment]
@@ -68,19 +69,23 @@ class Waveform:
     """Times [s] from ramp to ramp in turn, in place of `repetition`, which becomes their mean."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stagger", tuple(map(float, self.stagger)))
+        check_declared(Waveform, vars(self))
+        try:
+            object.__setattr__(self, "stagger", tuple(map(float, self.stagger)))
+        except (TypeError, ValueError):
+            raise ValueError(f"Waveform.stagger = {self.stagger!r}: times [s] wanted, as (25e-6, 31e-6)") from None
         if self.stagger:
             self._check_stagger()
             object.__setattr__(self, "repetition", sum(self.stagger) / len(self.stagger))
         if self.repetition is None:
             object.__setattr__(self, "repetition", self.chirp_duration)
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if not (f.name in ("complex_sampling", "stagger") or (math.isfinite(value) and value > 0)):
-                raise ValueError(f"Waveform.{f.name} = {value!r}: must be positive and finite")
-        for name in ("n_chirps", "n_samples"):
-            if int(getattr(self, name)) != getattr(self, name):
-                raise ValueError(f"Waveform.{name} = {getattr(self, name)!r}: must be a whole number")
+        for name in ("carrier", "bandwidth", "chirp_duration", "repetition", "n_chirps", "n_samples"):
+            if getattr(self, name) <= 0:
+                raise ValueError(f"Waveform.{name} = {getattr(self, name)!r}: must be positive")
+        if self.bandwidth >= self.carrier:
+            raise ValueError(
+                f"Waveform.bandwidth = {self.bandwidth:g} Hz: must be below the carrier of {self.carrier:g} Hz"
+            )
         if self.repetition < self.chirp_duration * (1.0 - 1e-9):
             raise ValueError(f"Waveform.repetition = {self.repetition:g} s: shorter than the chirp")
 

@@ -1,5 +1,7 @@
 """Wrong types and empty tables of receivers, interferers and rough surfaces are told in a sentence."""
 
+from dataclasses import replace
+
 import pytest
 
 import raychan as rc
@@ -31,6 +33,20 @@ WAVE = rc.Waveform(77e9, 500e6, 20e-6)
         (lambda: Converter(float("nan"), 0.0), "Converter.bits = nan: a whole number from 1 to 24 wanted"),
         (lambda: Converter(8, "0"), "Converter.full_scale_dbm = '0': must be finite, a number"),
         (lambda: rc.Radar(WAVE, impairments=3), "Radar.impairments = 3: an Impairments is wanted"),
+        (lambda: rc.Radar({"carrier": 77e9}), "Radar.waveform = {'carrier': .*}: a Waveform is wanted"),
+        (lambda: rc.Radar(WAVE, antenna="patch"), "Radar.antenna = 'patch': an Antenna is wanted"),
+        (lambda: rc.Radar(WAVE, power="12"), "Radar.power = '12': must be finite, a number"),
+        (lambda: rc.Radar(WAVE, yaw_deg=None), "Radar.yaw_deg = None: must be finite, a number"),
+        (lambda: rc.Radar(WAVE, noise="no"), "Radar.noise = 'no': must be true or false"),
+        (lambda: rc.Radar(WAVE, position=None), r"Radar.position: numbers of shape \(3,\) wanted, nan given"),
+        (lambda: rc.Radar(WAVE, elements="a"), r"Radar.elements: numbers of shape \(n, 3\) wanted, 'a' given"),
+        (lambda: replace(WAVE, carrier="77"), "Waveform.carrier = '77': must be finite, a number"),
+        (lambda: replace(WAVE, carrier=None), "Waveform.carrier = None: must be finite, a number"),
+        (lambda: replace(WAVE, n_chirps=True), "Waveform.n_chirps = True: must be a whole number"),
+        (lambda: replace(WAVE, n_samples="64"), "Waveform.n_samples = '64': must be a whole number"),
+        (lambda: replace(WAVE, complex_sampling="no"), "Waveform.complex_sampling = 'no': must be true or false"),
+        (lambda: replace(WAVE, stagger=3), r"Waveform.stagger = 3: times \[s\] wanted, as"),
+        (lambda: replace(WAVE, bandwidth=77e9), "bandwidth = 7.7e.10 Hz: must be below the carrier of 7.7e.10 Hz"),
         (lambda: Interferer(None), "Interferer.radar = None: a Radar is wanted"),
         (lambda: Interferer(rc.Radar(WAVE), start=None), "Interferer.start = None: must be finite, a number"),
         (lambda: Diffuse("gamma", "a"), "level_db = 'a': a number is wanted"),
