@@ -183,7 +183,7 @@ class Body:
 
         A table is linear in dB between its azimuths and wraps around; it is resampled every degree.
         """
-        if isinstance(self.rcs_dbsm, (int, float)):
+        if np.ndim(self.rcs_dbsm) == 0:  # type: ignore[arg-type]
             return np.array([-np.pi, np.pi]), np.full(2, float(undb(self.rcs_dbsm)))
         azimuth, dbsm = self.rcs_table.T
         knots = np.radians(np.arange(-180.0, 181.0))
@@ -193,7 +193,7 @@ class Body:
     def rcs_table(self) -> Floats:
         """Azimuths [deg] from -180 on and RCS [dBsm] there (n, 2), none where one figure or none is given; SceneError
         for two values at one azimuth."""
-        if self.rcs_dbsm is None or isinstance(self.rcs_dbsm, (int, float)):
+        if np.ndim(self.rcs_dbsm) == 0:  # type: ignore[arg-type]
             return np.zeros((0, 2))
         pairs = np.array(self.rcs_dbsm, float).reshape(-1, 2)
         pairs[:, 0] = (pairs[:, 0] + 180.0) % 360.0 - 180.0

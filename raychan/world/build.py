@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from difflib import get_close_matches
+from os import PathLike
 from pathlib import Path
 
 from raychan.em.diffuse import Diffuse
 from raychan.world import bundled, overrides
 from raychan.world.body import Body
-from raychan.world.errors import SceneError, nearest
+from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.material import Material
 from raychan.world.schema import BodyTable
 from raychan.world.schema_materials import MaterialTable
@@ -36,6 +37,9 @@ def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
     Args: known names that a message proposes; none: those of all bundled scenes.
     Raises: SceneError where there is none, or where it cannot be read.
     """
+    if not isinstance(path, str | PathLike):
+        allowed = "a scene file, or the name of a bundled scene"
+        raise SceneError(f"{shown(path)} is not possible", key="path", value=path, allowed=allowed)
     file = bundled.found(path)
     overrides.refuse_mesh(file)
     try:

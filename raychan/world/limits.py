@@ -120,6 +120,7 @@ TRACED = Limit(1.0, 1e5, "1/s", "tracings a second")
 RATE_STEP = Limit(1e-3, 100.0, "m/s", "resolution of a spectrogram in range rate", above=True)
 CELL_RANGE = Limit(0.0, 1e6, "m", "range cells begin at the radar, and a scene is no wider than its horizon")
 INTERVAL = Limit(1e-9, 1e6, "s", "from frame to frame")
+LATER = Limit(-1e11, 1e11, "s", "as far as the last of the most frames at the longest interval")
 SEED = Limit(0, (1 << 63) - 1, "", "seeds are whole numbers of 63 bits")
 
 EPS_R = Limit(1.0, 1e4, "", "of passive materials: 1 is vacuum, 80 water")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from raychan.world.errors import SceneError, nearest
+from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.mesh_io import SUFFIXES
 
 LATER = "# later by [s]: "
@@ -28,6 +28,8 @@ def refuse_mesh(file: Path) -> None:
 
 def parsed(text: str, file: Any = None) -> dict[str, Any]:
     """Return the tables of TOML text; SceneError with the line where it is broken."""
+    if not isinstance(text, str):
+        raise SceneError(f"{shown(text)} is not possible", file=file, value=text, allowed="the text of a scene file")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as e:
@@ -38,6 +40,15 @@ def parsed(text: str, file: Any = None) -> dict[str, Any]:
         raise SceneError(f"not valid TOML: {e}", file=file, allowed="TOML 1.0") from None
     except RecursionError:
         raise SceneError("tables or lists nested too deep", file=file, allowed="a few levels") from None
+
+
+def listed(changes: Any) -> list[str]:
+    """Return changes as a list of texts. Raises: SceneError for anything else, one text alone among it."""
+    found = None if isinstance(changes, str) or not isinstance(changes, Iterable) else list(changes)
+    if found is None or not all(isinstance(change, str) for change in found):
+        allowed = "a list of texts, as ['radar.power_dbm=10']"
+        raise SceneError(f"{shown(changes)} is not possible", key="changes", value=changes, allowed=allowed)
+    return found
 
 
 def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from raychan.units import watt
 from raychan.world import bundled, overrides
-from raychan.world.errors import SceneError, nearest
+from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.schema import ProcessingTable, RadarTable
 from raychan.world.schema_antenna import AntennaTable
 from raychan.world.schema_errors import checked
@@ -28,8 +28,12 @@ def mount(radar: Radar | RadarTable | Mapping[str, object] | None, file: Any = N
     """Return the radar table of what a scene is given; SceneError for values that a scene file could not have."""
     if radar is None or isinstance(radar, RadarTable | Mapping):
         return None if radar is None else checked(RadarTable, radar, file)  # type: ignore[no-any-return]
+    from raychan.radar.radar import Radar
     from raychan.world.scene_text import radar_table_of
 
+    if not isinstance(radar, Radar):
+        allowed = "a Radar, its table, or None"
+        raise SceneError(f"{shown(radar)} is not possible", file=file, key="radar", value=radar, allowed=allowed)
     return radar_table_of(radar)
 
 

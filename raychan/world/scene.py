@@ -21,11 +21,13 @@ from raychan.world.build import body_of, material_of, scene_text
 from raychan.world.errors import SceneError, nearest
 from raychan.world.fixed import Fixed
 from raychan.world.idle_keys import idle_keys
+from raychan.world.later import check_later, check_time, table_at
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.posed import index_of, points_of, posed, spheres_inside
 from raychan.world.radar_mount import mount, processing_of, radar_of
+from raychan.world.scene_arguments import bodies_of, materials_of
 from raychan.world.schema import PREVIEW, BodyTable, InterfererTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 from raychan.world.schema_impairments import AtmosphereTable
@@ -73,7 +75,7 @@ class Scene(Fixed, Described):
     ) -> None:
         self.title, self.text, self.path = title, text, path
         self.folder = folder or Path.cwd()
-        self._given = tuple(bodies)
+        self._given = bodies_of(bodies)
         self.bodies = tuple(limb for body in self._given for limb in body.limbs)
         self.radar_table: RadarTable | None = mount(radar, path)
         self.processing: Processing = processing_of(processing, radar, path)
@@ -82,12 +84,12 @@ class Scene(Fixed, Described):
             self.__dict__["radar"] = replace(radar, processing=self.processing)
         self.model: Model = checked(Model, model or Model(), path)
         carrier = self.radar_table.waveform.carrier_ghz * 1e9 if self.radar_table else 77e9
-        self.frequency = carrier if frequency is None else float(frequency)
-        if not FREQUENCY.allows(self.frequency):
+        if frequency is not None and FREQUENCY.problem(frequency):
             raise SceneError(
                 f"{frequency!r} is not possible", key="frequency", value=frequency, allowed=FREQUENCY.allowed
             )
-        self.materials = dict(materials or {})
+        self.frequency = carrier if frequency is None else float(frequency)
+        self.materials = materials_of(materials or {})
         self.atmosphere = atmosphere_of(atmosphere, path)
         self.attenuation = attenuation_of(self.atmosphere, self.frequency, self.radar_table, path)
         self.interferers = interferers_of(interferers, self.folder, path)
@@ -124,7 +126,7 @@ class Scene(Fixed, Described):
     def _of(cls, data: Mapping[str, object], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
         """Return the scene of tables; bodies equal to those of the scene `like` are shared, with their meshes."""
         file = None if path is None else Path(path)
-        if "ship" in data:
+        if isinstance(data, Mapping) and "ship" in data:
             raise SceneError("is a scene of a ship, not of a radar", file=file, key="ship", allowed="raychan ship")
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
@@ -161,8 +163,9 @@ class Scene(Fixed, Described):
     def override(self, changes: Sequence[str]) -> Scene:
         """Return the scene with keys changed: 'radar.power_dbm=10', 'bodies.suv.position=[12, 0, 0]'.
 
-        Raises: SceneError for a change that names no key or body; ValueError for a scene not from a file.
+        Raises: SceneError for one text, not a list, or a change of no key or body; ValueError for a scene of no file.
         """
+        changes = overrides.listed(changes)
         if not changes:
             return self
         if self._data is None:
@@ -205,8 +208,10 @@ class Scene(Fixed, Described):
     def at(self, time: float) -> Scene:
         """Return the scene as it stands at a time [s]: bodies and radar moved on, meshes and materials shared.
 
-        Raises: SceneError where the radar would be inside a body by then.
+        Raises: SceneError for another type, or where by then the radar would be inside a body, or a body or the radar
+        beyond the places that a scene may have.
         """
+        check_time(time)
         if time == 0.0:
             return self
         moved = copy(self)
@@ -215,18 +220,12 @@ class Scene(Fixed, Described):
         moved._derived = self._derived if moved._stands_as(self) else {}
         moved._static = self._static
         if self.radar_table is not None:
-            there = np.asarray(self.radar_table.position) + time * np.asarray(self.radar_table.velocity_mps)
-            then["radar_table"] = self.radar_table.model_copy(update={"position": there.tolist()})
-            then["radar"] = self.radar_at(time)
+            then["radar"] = radar = self.radar_at(time)
+            then["radar_table"] = table_at(self.radar_table, radar)
         then["interferers"] = tuple(x.at(time) for x in self.interferers)
         then.pop("warnings", None)
         then["text"], then["_data"] = f"{self.text}\n{overrides.LATER}{time!r}" if self.text else "", None
-        try:
-            checks.radar_outside(moved.bodies, moved.radar_table)
-            check_places(moved.interferers, moved.bodies, moved.radar_table)
-        except SceneError as e:
-            late = f"{e.problem} {time:g} s on"
-            raise SceneError(late, file=self.path, key=e.key, value=e.value, allowed=e.allowed) from None
+        check_later(moved.bodies, moved.radar_table, moved.interferers, time, self.path)
         return moved
 
     def without_caches(self) -> Scene:

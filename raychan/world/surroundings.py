@@ -46,11 +46,14 @@ def attenuation_of(air: Atmosphere | None, frequency: float, radar: RadarTable |
         raise SceneError(str(e), file=file, key="atmosphere", allowed="no [atmosphere] at this frequency") from None
 
 
-def interferers_of(given: Iterable[Any], folder: Path, file: Path | None) -> tuple[Interferer, ...]:
+def interferers_of(given: Any, folder: Path, file: Path | None) -> tuple[Interferer, ...]:
     """Return the interferers of objects or tables; SceneError for values that cannot be, or two of one name."""
     from raychan.radar.interferer import Interferer
 
     found: list[Interferer] = []
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        allowed = "a list of Interferer or their tables"
+        raise SceneError(f"{shown(given)} is not possible", file=file, key="interferers", value=given, allowed=allowed)
     for one in given:
         if isinstance(one, InterfererTable | Mapping):
             one = _interferer(checked(InterfererTable, one, file), folder, file)

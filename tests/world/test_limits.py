@@ -199,3 +199,33 @@ def test_a_long_run_is_told_and_a_short_one_is_not(scene):
     (said,) = rules.long_run(short, frames=100_000)
     assert "min" in said and "memory" in said
     assert replace(rules.demand(short), seconds=5.0).text.startswith("roughly 5 s")
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        (["bodies.sign.velocity_mps=[3, 0, 0]"], "bodies.sign.position"),
+        (["radar.velocity_mps=[0, -3, 0]"], "radar.position"),
+        (["radar.rx_position=[0, 9, 1]", "radar.rx_velocity_mps=[0, 0, 3]"], "radar.rx_position"),
+    ],
+)
+def test_motion_leads_nothing_beyond_the_limit_of_places(scene, change, key):
+    moving = rc.Scene.load(scene).override(["radar.velocity_mps=[0, 0, 0]", *change])
+    assert moving.at(3e5)
+    said = rf"{key}: motion leads to \[.*\] m 1e\+06 s on; allowed: each between -1e\+06 and 1e\+06 m"
+    for run in (lambda: moving.at(1e6), lambda: rc.frames(moving, 2, 1e6)):
+        with pytest.raises(SceneError, match=said):
+            run()
+
+
+def test_a_walker_that_is_led_too_far_is_named_as_a_whole():
+    with pytest.raises(SceneError, match=r"bodies\.anna\.position: motion leads to"):
+        rc.Scene(bodies=[rc.Body("anna", shape="walker")]).at(1e9)
+
+
+def test_the_command_says_in_a_line_where_motion_leads_too_far(scene, tmp_path, capsys):
+    args = ["run", str(scene), "--out", str(tmp_path / "out"), "--frames", "2", "--frame-interval", "1e6"]
+    assert invoke([*args, "--set", "radar.velocity_mps=[3,0,0]"]) == 2
+    said = capsys.readouterr().err
+    assert "radar.position: motion leads to [3e+06, 0, 1] m 1e+06 s on" in said and "Traceback" not in said
+    assert not (tmp_path / "out").exists()

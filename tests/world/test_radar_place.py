@@ -149,3 +149,12 @@ def test_the_array_that_counts_is_the_virtual_one():
         else:
             with pytest.raises(SceneError, match="no uniform line"):
                 rc.Scene.from_dict(data)
+
+
+def test_a_receiver_elsewhere_moves_in_the_radars_table_too_and_may_not_run_into_a_body():
+    body = rc.Body("box", shape="box", position=(4.0, 0.0, 0.0))
+    radar = rc.Radar(rc.Waveform(F, 1e9, 30e-6), (0, 0, 0.5), rx_position=(0, 1, 0.5), rx_velocity=(4, -1, 0))
+    scene = rc.Scene(bodies=[body], radar=radar)
+    assert scene.at(0.5).radar_table.rx_position == scene.at(0.5).radar.rx_position.tolist() == [2.0, 0.5, 0.5]
+    with pytest.raises(SceneError, match=r"radar\.rx_position: receiver is inside 'box' 1 s on"):
+        scene.at(1.0)

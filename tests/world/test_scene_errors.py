@@ -170,3 +170,28 @@ def test_diffraction_to_a_receiver_elsewhere_is_refused_before_anything_is_trace
         Scene.from_text(text + "\n[model]\ndiffraction = true\n")
     assert caught.value.key == "model.diffraction"
     assert "rx_position" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Scene(bodies=None), "bodies: None is not possible; allowed: a list of Body"),
+        (lambda: Scene(bodies="car"), "bodies: 'car' is not possible; allowed: a list of Body"),
+        (lambda: Scene(bodies=["a"]), "bodies.0: 'a' is not possible; allowed: a Body"),
+        (lambda: Scene(materials={"tin": 3}), "materials.tin: 3 is not possible; allowed: a Material"),
+        (lambda: Scene(materials=3), "materials: 3 is not possible; allowed: a dict of Material by name"),
+        (lambda: Scene(radar=3), "radar: 3 is not possible; allowed: a Radar, its table, or None"),
+        (lambda: Scene(frequency="a"), "frequency: 'a' is not possible; allowed: between 1e.08"),
+        (lambda: Scene(interferers=None), "interferers: None is not possible; allowed: a list of Interferer"),
+        (lambda: Scene.load(None), "path: None is not possible; allowed: a scene file, or the name of a bundled"),
+        (lambda: Scene.from_text(None), "None is not possible; allowed: the text of a scene file"),
+        (lambda: Scene.from_dict(None), "None is not possible; allowed: a table"),
+        (lambda: Scene().at("x"), "time: 'x' is not possible; allowed: a number between"),
+        (lambda: Scene().at(float("nan")), "time: nan is not possible; allowed: a number between"),
+        (lambda: Scene.from_text(BALL).override("a=b"), "changes: 'a=b' is not possible; allowed: a list of texts"),
+        (lambda: Scene.from_text(BALL).override([3]), r"changes: \[3\] is not possible; allowed: a list of texts"),
+    ],
+)
+def test_what_is_given_in_python_is_told_with_what_is_allowed(make, said):
+    with pytest.raises(SceneError, match=said):
+        make()
