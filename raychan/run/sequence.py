@@ -18,6 +18,7 @@ from raychan.run.storage import CONTENTS, columns_of, rows, save_result
 from raychan.world.geometry import geometry_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
+from raychan.world.scene_given import check_scene
 
 HEAD = ("frame", "time_s")
 
@@ -49,14 +50,16 @@ def frames(
 
     Args: count of frames; interval [s] from frame to frame (default the waveform's frame, without a pause); the rest
     as for `simulate`. A scene in which nothing moves relative to the radar is traced once.
-    Raises: ValueError on a count, an interval or an override out of range; SceneError where the radar runs into a body.
+    Raises: ValueError on a count, an interval or an override out of range; SceneError for no Scene, and where the radar
+    runs into a body, or motion leads beyond the places that a scene may have.
     """
+    check_scene(scene)
     FRAMES.check("count", count, whole=True)
     SEED.check("seed", seed, whole=True)
     step = scene.radar.waveform.frame_duration if interval is None else interval
     INTERVAL.check("interval", step)
     for k in range(count):
-        scene.at(k * step)  # a radar that would enter a body is an error before the first frame is computed
+        scene.at(k * step)  # a radar in a body, or one too far off, is an error before the first frame is computed
     return _frames(scene, count, step, seed, tolerance_db, max_bounces, progress)
 
 

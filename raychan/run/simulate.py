@@ -29,6 +29,7 @@ from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
+from raychan.world.scene_given import check_scene
 from raychan.world.schema import PREVIEW
 
 Detected = tuple[RangeDoppler, Detections, MapError]
@@ -47,8 +48,9 @@ def simulate(
 
     Args: seed of all that is random, one stream a stage, so that equal seeds give equal bytes; tolerance_db [dB] and
     max_bounces override the scene's; progress is told how far each stage is.
-    Returns: Result. Raises: ValueError on a tolerance or a number of bounces out of range.
+    Returns: Result. Raises: ValueError on a tolerance or a number of bounces out of range, SceneError for no Scene.
     """
+    check_scene(scene)
     SEED.check("seed", seed, whole=True)
     clock = Clock(progress)
     channel = channel_of(scene, tolerance_db, max_bounces, clock)

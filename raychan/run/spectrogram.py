@@ -28,6 +28,7 @@ from raychan.units import C0, db
 from raychan.world.errors import SceneError
 from raychan.world.limits import CELL_RANGE, RATE_STEP, SECONDS, SEED, TRACED
 from raychan.world.scene import Scene
+from raychan.world.scene_given import check_scene
 
 Floats = NDArray[np.float64]
 Samples = NDArray[np.complex64]
@@ -79,8 +80,10 @@ def spectrogram(
     Args: ranges (from, to) [m] of the cells to sum, all if None; resolution [m/s] of the range rate, which sets the
     length of a stretch; tracings_per_second of the scene; seed of the noise; tolerance_db [dB] and max_bounces override
     the scene's; progress is told how far it is. Rates fold at the unambiguous range rate of the waveform.
-    Raises: ValueError on arguments out of range; SceneError for a radar that runs into a body.
+    Raises: ValueError on arguments out of range; SceneError for no Scene, a radar that runs into a body, or motion
+    beyond the places that a scene may have.
     """
+    check_scene(scene)
     TRACED.check("tracings_per_second", tracings_per_second)
     SEED.check("seed", seed, whole=True)
     if len(scene.radar.tx_elements) > 1:

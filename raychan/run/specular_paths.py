@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,13 +12,16 @@ from raychan.channel.corner_rays import departures
 from raychan.channel.rates import rates
 from raychan.channel.transfer import transfer
 from raychan.poses import theta_phi
+from raychan.radar.array import numbers
 from raychan.records import NONE, REFLECT, TRANSMIT, ExactTrajectories, Facets, Routes, SpecularPaths
 from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import Mirror
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.world.geometry import Geometry
+from raychan.world.limits import BOUNCES
 from raychan.world.point_in_body import Place, place_of
 from raychan.world.scene import Scene
+from raychan.world.scene_given import check_scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -225,17 +229,19 @@ def specular_paths(
 ) -> SpecularPaths:
     """Return the exact specular paths between two points of a scene, line of sight included, isotropic ends.
 
+    Of one point, tx = rx, they are those that return to it, as to a radar: then there is no line of sight.
+
     Args: scene; tx, rx (3,) [m]; max_bounces the most reflections; tx_velocity, rx_velocity (3,) [m/s] of the ends.
     Returns: SpecularPaths, shortest first: length [m] and length_rate [m/s] of the whole way, gain (n, 2, 2) with
     lambda / 4 pi L and the carrier phase exp(-jkL), rows the receiver's V, H, columns the transmitter's (theta-hat and
     phi-hat of the direction of travel), bodies and kind (n, d), vertices (n, d + 2, 3) [m]. Gain 0 is left out.
-    Raises: ValueError for points that are not three finite numbers. Source: image method, McKown, Hamilton 1991.
+    Raises: ValueError for points that are not three finite numbers, SceneError for no Scene.
+    Source: image method, McKown, Hamilton 1991.
     """
-    ends = [np.asarray(x, float) for x in (tx, rx, tx_velocity, rx_velocity)]
-    if any(x.shape != (3,) or not np.isfinite(x).all() for x in ends):
-        raise ValueError("tx, rx and their velocities must be three finite numbers each")
-    if max_bounces < 0:
-        raise ValueError(f"max_bounces = {max_bounces}: must be 0 or more")
+    check_scene(scene)
+    given = {"tx": tx, "rx": rx, "tx_velocity": tx_velocity, "rx_velocity": rx_velocity}
+    ends = [numbers(name, value, "(3,)") for name, value in given.items()]
+    replace(BOUNCES, low=0).check("max_bounces", max_bounces, whole=True)
     facets = scene.facets(0.0)
     routes = specular_routes(Geometry(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)
     gain = jones(routes, facets, scene.frequency)

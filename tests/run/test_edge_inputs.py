@@ -64,3 +64,41 @@ def test_staggered_ramps_that_cannot_tell_folds_prefer_slow_rates_and_say_so():
         result = rc.simulate(scene, seed=seed)
         assert any("staggered ramps tell folded rates apart" in w for w in result.warnings)
         assert np.abs(result.detections.rate[:1] - 12.0).max(initial=0.0) < 0.5
+
+
+@pytest.mark.parametrize("given", ["urban", None])
+@pytest.mark.parametrize(
+    "run",
+    [
+        rc.simulate,
+        lambda scene: rc.frames(scene, 2),
+        lambda scene: rc.spectrogram(scene, 0.1),
+        lambda scene: rc.specular_paths(scene, (0, 0, 1), (2, 0, 1)),
+    ],
+)
+def test_the_name_of_a_scene_is_no_scene(run, given):
+    said = r"scene: .* is not possible; allowed: a Scene, as Scene.load\(" + ("'urban'" if given else "")
+    with pytest.raises(rc.SceneError, match=said):
+        run(given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"tx": "a"}, r"tx: numbers of shape \(3,\) wanted, 'a' given"),
+        ({"rx_velocity": (1, 2)}, r"rx_velocity: numbers of shape \(3,\) wanted"),
+        ({"max_bounces": "a"}, "max_bounces = 'a': a whole number is wanted"),
+        ({"max_bounces": -1}, "max_bounces = -1: must lie between 0 and 12"),
+    ],
+)
+def test_specular_paths_name_the_argument_that_cannot_be(given, said):
+    with pytest.raises(ValueError, match=said):
+        rc.specular_paths(target(), **({"tx": (0, 0, 1), "rx": (2, 0, 1)} | given))
+
+
+def test_specular_paths_of_one_point_are_those_that_return_to_it():
+    box = rc.Body("b", shape="box", position=(10.0, 0.0, 0.0), params={"length": 1.0, "width": 4.0, "height": 4.0})
+    scene = rc.Scene(bodies=[box, rc.Body("road", shape="ground")])
+    found = rc.specular_paths(scene, (0, 0, 1), (0, 0, 1), max_bounces=1, tx_velocity=(1, 0, 0), rx_velocity=(1, 0, 0))
+    assert found.length == pytest.approx([2.0, 19.0]) and found.length_rate == pytest.approx([0.0, -2.0])
+    assert len(rc.specular_paths(scene, (0, 0, 1), (0, 0, 1), max_bounces=0).length) == 0
