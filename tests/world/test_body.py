@@ -37,8 +37,8 @@ def test_a_body_is_copied_pickled_and_compared_with_its_parameters():
     ("given", "said"),
     [
         ({"name": 3}, "bodies.0.name: 3 is not possible; allowed: a text"),
-        ({"name": ""}, "bodies.0.name: '' is not possible; allowed: a text of at least 1 character"),
-        ({"name": "a.b"}, "bodies.0.name: 'a.b' is not possible; allowed: a text without dots, spaces"),
+        ({"name": ""}, "bodies.0.name: '' is not possible; allowed: a text of 1 to 100 characters"),
+        ({"name": "a.b"}, "bodies.0.name: 'a.b' is not possible; allowed: a text of 1 to 100 characters without a dot"),
         ({"params": [1]}, r"bodies.b.params: \[1\] is not possible; allowed: a table"),
         ({"material": 3}, "bodies.b.material: 3 is not possible; allowed: a name or a Material"),
         ({"materials": [3]}, r"bodies.b.materials: \[3\] is not possible; allowed: a table"),

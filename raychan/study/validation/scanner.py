@@ -69,7 +69,7 @@ def scanner_front(bench: Bench) -> Seen:
     """Return the name of the body that the middle beam meets, of two boxes in line, the rear one given first."""
     names = "rear box", "front box"
     bodies = [
-        Body(name=n.replace(" ", "_"), shape="box", params={"height": 9.0}, position=(x, 0.0, 0.0))
+        Body(name=n, shape="box", params={"height": 9.0}, position=(x, 0.0, 0.0))
         for n, x in zip(names, (20, 10), strict=True)
     ]
     deck = _deck(0.0, standing(bodies, 1.0, 0.0))
