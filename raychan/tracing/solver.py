@@ -229,7 +229,9 @@ class Launch:
             if found is not None:
                 yield found
         if rule.rx is None:
-            found = foot_points(geometry, legs, refined)
+            # A bounce at the ground is one, although no leg over it leads on to another.
+            down = legs if rule.bounces > 1 else legs_over(geometry, legs[0].end, 1)
+            found = foot_points(geometry, down, refined)
         else:
             found = direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
         if found is not None:

@@ -143,3 +143,21 @@ def test_the_ground_below_returns_through_a_layer():
     assert len(free.length) == 1
     assert np.abs(behind.amplitude[below]).sum() == pytest.approx(np.abs(free.amplitude).sum(), rel=1e-4)
     assert (behind.trajectories.kind[behind.trajectory[below]] == TRANSMIT).sum() == 2
+
+
+@pytest.mark.parametrize("covered", [False, True])
+def test_the_ground_right_below_returns_by_one_bounce_already(covered):
+    """No leg over it leads on then; through a layer, as without."""
+    bodies = [floor(None)]
+    if covered:
+        corners = np.array([[-1, -1, 0.3], [1, -1, 0.3], [1, 1, 0.3], [-1, 1, 0.3]])
+        cover = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+        bodies.append(rc.Body(name="cover", mesh=cover, material=GLASS))
+    sent = []
+    for bounces in (1, 2):
+        paths = found(bodies, bounces).paths
+        down = (paths.kind == REFLECT).sum(axis=1) == 1
+        down &= np.abs(paths.length - 1.6) < 1e-9
+        assert down.sum() == 1
+        sent.append(complex(paths.amplitude[down].item()))
+    assert sent[0] == sent[1] != 0.0
