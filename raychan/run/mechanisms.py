@@ -34,6 +34,16 @@ def layers(paths: Paths) -> NDArray[np.int64]:
     return np.asarray((paths.trajectories.kind == TRANSMIT).sum(axis=1))[paths.trajectory]
 
 
+def layers_at_once(paths: Paths) -> int:
+    """Return the most thin layers that a path passes on one stretch, from surface to surface."""
+    found = paths.trajectories.kind
+    run, most = np.zeros(len(found), np.int64), 0
+    for kind in found.T:
+        run = np.where(kind == TRANSMIT, run + 1, 0)
+        most = max(most, int(run.max(initial=0)))
+    return most
+
+
 def needed(paths: Paths, chosen: ModelChoice) -> NDArray[np.bool_]:
     """Return which trajectories (w,) of paths the chosen mechanisms make."""
     kind = paths.trajectories.kind

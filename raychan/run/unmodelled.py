@@ -15,7 +15,7 @@ from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
 from raychan.run.clutter import laws_of, scatters_diffusely
 from raychan.run.ledger import NOTHING, UNKNOWN, Entry
-from raychan.run.mechanisms import interactions, layers, peak
+from raychan.run.mechanisms import interactions, layers, layers_at_once, peak
 from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import coarsest, strongest_bend
 from raychan.tracing.diffuse_patches import PatchSize, visible_patches
@@ -101,8 +101,10 @@ def _transmission(paths: Paths, facets: Facets, radar: Radar, settings: Any, mod
         return Entry(UNKNOWN, "none", "model.max_transmissions is 0: what stands behind thin layers is not traced")
     if most == 0:
         return Entry(NOTHING, "exact", "no path passes a thin layer")
-    if most < model.max_transmissions:
-        return Entry(NOTHING, "exact", f"no path passes more than {most} of the layers that may be passed")
+    at_once = layers_at_once(paths)
+    if at_once < model.max_transmissions:
+        how = f"no stretch of a path passes more than {at_once} of the {model.max_transmissions} layers that it may"
+        return Entry(NOTHING, "exact", how)
     last = peak(paths, passes == most, radar, settings)
     loss = peak(paths, passes == max(most - 1, 0), radar, settings)
     ratio = min(last / loss, 1.0) if loss > 0.0 else 1.0

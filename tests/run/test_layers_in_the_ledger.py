@@ -34,4 +34,12 @@ def test_where_no_layer_may_be_passed_what_stands_behind_one_is_unknown():
 
 def test_layers_that_may_be_passed_and_are_not_leave_nothing_out():
     _, entry = _entry(max_transmissions=4)
-    assert entry.level_db == "none" and "2 of the layers" in entry.how
+    assert entry.level_db == "none" and "more than 1 of the 4" in entry.how
+
+
+def test_layers_count_by_stretch_as_the_limit_does():
+    """One pane is passed out and back: one on each stretch."""
+    _, entry = _entry(max_transmissions=2)
+    assert entry.level_db == "none"
+    _, entry = _entry(max_transmissions=1)
+    assert entry.level_db not in ("none", "unknown")
