@@ -16,7 +16,7 @@ from bench.measure import Row, barred
 from raychan.run.sequence import frames
 
 _INTERVAL = 0.05  # s between frames
-_CELL, _LEVEL_DB = 1.0, 3.0  # of a detection beside the fine run's
+_CELL, _LEVEL_DB = 1.0, 3.0  # of a detection beside the fine run's, if that knows its own level as well
 
 
 def preview(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
@@ -41,11 +41,16 @@ def preview(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
 def _levels(name: str, pairs: list[tuple[rc.Scene, rc.Scene]]) -> Row:
     """Return the row of levels of previews beside fine runs, of direct echoes that one body scattered once."""
     seen = [(beside(rc.simulate(fine), rc.simulate(coarse))) for fine, coarse in pairs]
-    cells, level, stated = (np.concatenate([getattr(b, x) for b in seen]) for x in ("cells", "level", "stated"))
+    cells, level, stated, error = (
+        np.concatenate([getattr(b, x) for b in seen]) for x in ("cells", "level", "stated", "error")
+    )
+    known = error <= _LEVEL_DB
+    cells, level, stated = cells[known], level[known], stated[known]
     near = cells <= _CELL
     off = np.abs(level[near])
     more = {
         "detections": len(cells),
+        "unknown to the fine run": int((~known).sum()),
         "within a cell": float(near.mean()),
         "within 3 dB": float((off <= _LEVEL_DB).mean()),
         "rms dB": float(np.sqrt(np.mean(off**2))),
