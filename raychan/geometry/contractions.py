@@ -171,8 +171,7 @@ def merge_cells(net, cell, own, seen, beyond, begin, stop):  # type: ignore[no-u
 
 
 def contract(net: Net, limits: Limits, most: int, turn: int, slabs: tuple[NDArray[np.int8], Ints, Ints]) -> int:
-    """Contract the cells of a net, in place; return how many vertices go, or -1 where some cell is no disc: then the
-    net is spoilt.
+    """Contract the cells of a net, in place; return how many vertices go, none where some cell is no disc.
 
     Args: limits that edges between vertices that stay keep; most edges from the middle of a cell to its rim; turn the
     number of this round; slabs: the slab (k,) of each vertex, the vertices that may go by slab, and where each begins.
@@ -197,7 +196,7 @@ def contract(net: Net, limits: Limits, most: int, turn: int, slabs: tuple[NDArra
     parallel_for(n, lambda r: whole.append(beyond_cells(net.faces, net.mate, cell, r.start, r.stop, beyond)))
     # Of cells that are discs two facets go with each vertex (Euler).
     if not all(whole) or facets != 2 * went.sum() or (own[stays] < 0).any():
-        return -1
+        return 0
     seen = net.corner.ravel()[net.half]
     parallel_for(n, lambda r: merge_cells(net, cell, own, seen, beyond, r.start, r.stop))
     net.half[stays], net.touched[stays] = own[stays], turn

@@ -161,8 +161,8 @@ class _Rounds:
         self._ends = np.quantile(some, np.arange(1, _SLABS) / _SLABS, axis=0)
 
     def contract(self) -> None:
-        """Contract cells as long as most vertices go; the net stays as it was where some cell is no disc, or where it
-        is off the limits after it however often that is done again."""
+        """Contract cells as long as most vertices go; the net stays as it was where few do, or where it is off the
+        limits after it however often that is done again."""
         slabs, reach = self._slabs(0), self.net.reach.copy()
         tight = self._limits._replace(deviation=_TIGHT * self._limits.deviation, sag=_TIGHT**0.5 * self._limits.sag)
         for _ in range(_CONTRACTIONS):
@@ -173,7 +173,7 @@ class _Rounds:
                 left -= went
                 if went < left:
                     break
-            if went < 0 or left > _HALF * len(self.net.v):
+            if left > _HALF * len(self.net.v):
                 break
             heir = followed(now.heir)
             for _ in range(_FLIPS):
