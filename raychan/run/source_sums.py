@@ -22,8 +22,9 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 _SHRINKS = COVER / (1.0 + COVER)
 """Of two changes in a row, the later over the earlier: COVER times the last change covers all that a series of changes
 that shrink by this still brings."""
-_GROWN = 3.0  # times the change before: one in ten changes between launches that scatter grows by as much (the ratio of
-# two exponential powers exceeds 9); where launches miss the same part, the first that finds some of it grows by more
+# Times the change before. Of changes that scatter, taken as unrelated, one in ten grows by as much (the ratio of two
+# exponential powers exceeds 9); where launches miss the same part, the first that finds some of it grows by more.
+_GROWN = 3.0
 _WEIGHT = 1.5  # of a launch in a mean over one of the rule before: changes that do not die out shrink by about 0.8 a
 # rule (bodies of primitives, a person and a traffic light, 3 views each; command not noted)
 # Rays of the next rule over those of this: median of rules 1 to 6 of 19 sources, 1.3 to 2.2 in eight of ten (see
@@ -105,15 +106,20 @@ class SourceSums:
         """How many rays (s,) that takes, about."""
         return np.asarray(np.maximum(self.sums.rays, _LEAST) * np.where(self.next_rule > self.rule, _GROWTH, 1.0))
 
+    @property
+    def _pair(self) -> Ints:
+        """The number (s,) of each source's facet and bounces: both directions are refined together, so that an exchange
+        of both ends changes nothing."""
+        source = self.sums.source
+        return np.asarray(np.unique(depth_of(source) << 32 | facet_of(source), return_inverse=True)[1])
+
     def to_refine(self, cover: float, leave: float, most: float, rules: int) -> Ints:
         """Return the sources, as row numbers, that are most off for the rays that they take, of those that count.
 
         Args: cover as for `off`; leave [m] by which all others may be off, in phase as they are and as if of unrelated
         phases; most rays that the next launch may take; rules that there are: none goes on beyond the last.
         """
-        # Both directions of a facet are refined together, so that an exchange of both ends changes nothing.
-        source = self.sums.source
-        _, pair = np.unique(depth_of(source) << 32 | facet_of(source), return_inverse=True)
+        pair = self._pair
         off = self.doubt_of * np.where(self.scatters, _SIGMAS, cover)
         power, rays, real, imaginary, ended = (
             np.bincount(pair, x)
@@ -133,8 +139,7 @@ class SourceSums:
         """Return the sources, as row numbers, of which two launches alone tell, but for the weakest: two may miss the
         same hidden part. Args: as for `to_refine`."""
         row, col = self.element
-        source, brings = self.sums.source, self.sums.amplitude[:, row, col]
-        _, pair = np.unique(depth_of(source) << 32 | facet_of(source), return_inverse=True)
+        pair, brings = self._pair, self.sums.amplitude[:, row, col]
         power, rays, real, imaginary, launched = (
             np.bincount(pair, x)
             for x in (np.abs(brings) ** 2, self.next_rays, brings.real, brings.imag, self.launches > 2)

@@ -228,12 +228,12 @@ class Launch:
             found = diffracted_routes(geometry, points, legs[0].end, refined.wavenumber, refined.slots)
             if found is not None:
                 yield found
+        # A bounce at the ground is one, although no leg over it leads on to another.
+        over = legs if rule.bounces > 1 else legs_over(geometry, legs[0].end, 1)
         if rule.rx is None:
-            # A bounce at the ground is one, although no leg over it leads on to another.
-            down = legs if rule.bounces > 1 else legs_over(geometry, legs[0].end, 1)
-            found = foot_points(geometry, down, refined)
+            found = foot_points(geometry, over, refined)
         else:
-            found = direct_routes(geometry, legs, outs[0].end, refined.slots, refined.layers)
+            found = direct_routes(geometry, over, outs[0].end, refined.slots, refined.layers)
         if found is not None:
             yield found
 

@@ -41,11 +41,13 @@ _ENOUGH = 0.9  # of the facets: rounds that leave more are not taken, and no oth
 _HALF = 0.5  # of the facets left at the end, or by the first rounds: with more it does not pay
 _SLABS = 4  # parts of the mesh that threads work on
 _FLIPS = 2  # passes of edge flips after them; not measured
-# Of the points, 1 in so many is checked where as many facets of the whole mesh lie on each facet; all at the end.
+# Of the points, 1 in so many is checked where as many facets of the whole mesh lie on each facet, and
+# all at the end; not measured.
 _FEW = 8
 # Of the limits, until all are checked: the others were off by up to 5 % more (a sphere of 1.3e6 facets).
 _CLOSER = 0.95
-_MANY = 8  # vertices on a facet, from which on the centres of the facets of the whole mesh that lie there tell no more
+# Vertices on a facet, from which on the centres of facets of the whole mesh that lie there are not checked; not measured.
+_MANY = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,8 +215,8 @@ class _Rounds:
             return True
         vertices = Check(self._whole, self.heir, np.flatnonzero(~self._whole.locked), np.zeros(0, np.intp))
         off, most = vertices(self.net, self.net.heir, self._last)
-        few = np.bincount(vertices.found, minlength=len(self.net.faces)) < _MANY
-        centres = Check(self._whole, self.heir, np.zeros(0, np.intp), np.flatnonzero(self._inside & few[self.heir]))
+        sparse = np.bincount(vertices.found, minlength=len(self.net.faces)) < _MANY
+        centres = Check(self._whole, self.heir, np.zeros(0, np.intp), np.flatnonzero(self._inside & sparse[self.heir]))
         far, worst = centres(self.net, self.net.heir, self._last)
         self.deviation = max(off, far)
         return max(most, worst) <= 1.0

@@ -161,3 +161,10 @@ def test_the_ground_right_below_returns_by_one_bounce_already(covered):
         assert down.sum() == 1
         sent.append(complex(paths.amplitude[down].item()))
     assert sent[0] == sent[1] != 0.0
+
+
+def test_the_ground_on_the_way_to_a_receiver_elsewhere_is_one_bounce():
+    """Line of sight, and over the ground."""
+    lengths = [np.sort(found([floor(None)], bounces, rx=(5.0, 0.0, 0.8)).paths.length) for bounces in (1, 2)]
+    assert lengths[0] == pytest.approx([5.0, np.hypot(5.0, 1.6)])
+    assert np.array_equal(*lengths)
