@@ -46,7 +46,7 @@ _FLIPS = 2  # passes of edge flips after them; not measured
 _FEW = 8
 # Of the limits, until all are checked: the others were off by up to 5 % more (a sphere of 1.3e6 facets).
 _CLOSER = 0.95
-# Vertices on a facet, from which on the centres of facets of the whole mesh that lie there are not checked; not measured.
+# Vertices on a facet, from which on the centres of facets of the whole mesh there are not checked; not measured.
 _MANY = 8
 
 
