@@ -1,5 +1,6 @@
-"""Threads: whole frames on two against one, what of a frame is done outside every loop that threads share, and how fast
-two frames at once are that share nothing but the interpreter: no division of one frame among threads is faster."""
+"""Threads: whole frames on two against one, what of a frame is done outside every loop that threads share, for what the
+second thread waits, and how fast two frames at once are that share nothing but the interpreter: no division of one
+frame among threads is faster."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import raychan as rc
@@ -41,6 +42,42 @@ def threads(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
         share = 1.0 - spent[0] / whole
         row = Row("threads", f"{name}: outside shared loops", whole - spent[0], "whole frame", whole, share)
         yield barred(row, f"<= {_SERIAL:g}", share <= _SERIAL)
+        yield from _waits(name, lambda run=run: run(2))  # type: ignore[misc]
+
+
+def _waits(name: str, run: Callable[[], float]) -> Iterator[Row]:
+    """Give rows of a frame on two threads: what both wait for, of twice its time."""
+    with _waited() as waited:
+        start = process_time()
+        took = 2.0 * run()
+        idle = took - (process_time() - start)
+    rest = idle - sum(waited.values())
+    for what, spent in (
+        ("no loop to help with", waited["_serve"]),
+        ("the others at the end of a loop", waited["finish"]),
+        ("the interpreter and the rest", rest),
+    ):
+        yield Row("threads", f"{name}: waits for {what}", spent, "both threads", took, spent / took)
+
+
+@contextmanager
+def _waited() -> Iterator[dict[str, float]]:
+    """Give the seconds that threads wait, by the function of the crew that does."""
+    changed, spent = parallel._crew._changed, {"_serve": 0.0, "finish": 0.0}
+    real = changed.wait
+
+    def timed(*args: Any) -> bool:
+        name, start = sys._getframe(1).f_code.co_name, perf_counter()
+        try:
+            return real(*args)
+        finally:
+            spent[name] += perf_counter() - start
+
+    changed.wait = timed  # type: ignore[method-assign]
+    try:
+        yield spent
+    finally:
+        changed.wait = real  # type: ignore[method-assign]
 
 
 def _at_once(scene: rc.Scene, name: str, tolerance: float, repeats: int) -> Row:
