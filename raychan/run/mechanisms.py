@@ -34,21 +34,21 @@ def layers(paths: Paths) -> NDArray[np.int64]:
     return np.asarray((paths.trajectories.kind == TRANSMIT).sum(axis=1))[paths.trajectory]
 
 
-def layers_at_once(paths: Paths) -> int:
-    """Return the most thin layers that a path passes on one stretch, from surface to surface."""
+def layers_at_once(paths: Paths) -> NDArray[np.int64]:
+    """Return the most thin layers that each trajectory (w,) passes on one stretch, from surface to surface."""
     found = paths.trajectories.kind
-    run, most = np.zeros(len(found), np.int64), 0
+    run = most = np.zeros(len(found), np.int64)
     for kind in found.T:
         run = np.where(kind == TRANSMIT, run + 1, 0)
-        most = max(most, int(run.max(initial=0)))
+        most = np.maximum(most, run)
     return most
 
 
 def needed(paths: Paths, chosen: ModelChoice) -> NDArray[np.bool_]:
     """Return which trajectories (w,) of paths the chosen mechanisms make."""
     kind = paths.trajectories.kind
-    bounces, passed = ((kind > 0) & (kind != TRANSMIT)).sum(axis=1), (kind == TRANSMIT).sum(axis=1)
-    few = (bounces <= chosen.bounces) & (passed <= chosen.transmissions)
+    bounces = ((kind > 0) & (kind != TRANSMIT)).sum(axis=1)
+    few = (bounces <= chosen.bounces) & (layers_at_once(paths) <= chosen.transmissions)
     return np.asarray(few & (chosen.diffraction | ~(kind == DIFFRACT).any(axis=1)))
 
 
@@ -84,7 +84,8 @@ def choose(paths: Paths, radar: Radar, settings: Any, tolerance_db: float) -> Mo
     if chances.least == 0.0:
         return _choice(1, 0, False, ["nothing returns and there is no noise: no mechanism is needed"], tolerance_db)
     kept: list[int] = []
-    for name, count, fewest in (("interactions", interactions(paths), 1), ("thin layers passed", layers(paths), 0)):
+    passed = layers_at_once(paths)[paths.trajectory]
+    for name, count, fewest in (("interactions", interactions(paths), 1), ("thin layers on a stretch", passed, 0)):
         most = int(count.max(initial=fewest))
         while most > fewest and not chances.needed(count >= most, f"{most} {name} or more"):
             most -= 1

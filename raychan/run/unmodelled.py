@@ -101,7 +101,7 @@ def _transmission(paths: Paths, facets: Facets, radar: Radar, settings: Any, mod
         return Entry(UNKNOWN, "none", "model.max_transmissions is 0: what stands behind thin layers is not traced")
     if most == 0:
         return Entry(NOTHING, "exact", "no path passes a thin layer")
-    at_once = layers_at_once(paths)
+    at_once = int(layers_at_once(paths).max())
     if at_once < model.max_transmissions:
         how = f"no stretch of a path passes more than {at_once} of the {model.max_transmissions} layers that it may"
         return Entry(NOTHING, "exact", how)

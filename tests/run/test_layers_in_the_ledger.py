@@ -43,3 +43,9 @@ def test_layers_count_by_stretch_as_the_limit_does():
     assert entry.level_db == "none"
     _, entry = _entry(max_transmissions=1)
     assert entry.level_db not in ("none", "unknown")
+
+
+def test_mode_auto_counts_layers_by_stretch_as_the_limit_does():
+    result, _ = _entry(mode="auto", max_transmissions=2)
+    assert result.ledger["model"].transmissions == 1
+    assert any("thin layers on a stretch" in line for line in result.ledger["model"].why)
