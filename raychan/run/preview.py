@@ -62,7 +62,7 @@ def preview_of(geometry: Geometry, points: Points, radar: Radar, settings: Any, 
     def carried(batch: Batch) -> Paths:
         return paths_of(batch, geometry.facets, radar, carrier, noise)
 
-    every = preview_routes(geometry, points, preview_rule(radar, settings, model), stats, carried)
+    every = preview_routes(geometry, points, radar, preview_rule(radar, settings, model), stats, carried)
     paths = join([nothing(geometry.facets, radar), *every])
     launched = Launched(paths, len(paths.length), replace(radar, noise=False), settings.range_window)
     quiet, profile = run_pair(

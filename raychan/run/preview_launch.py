@@ -7,7 +7,7 @@ nothing bounces from body to body. What that leaves out is said in `run.preview`
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from raychan.geometry.curved_patches import edge_to_cut, halved
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
+from raychan.radar.radar import Radar
 from raychan.records import MIRROR, SCATTERER, Points, Routes
 from raychan.run.preview_bounds import facet_bounds
+from raychan.run.preview_rates import RateClasses
 from raychan.tracing.contributions import SHARE, Contributions, amplitudes
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.launch import write_leg
@@ -52,17 +54,18 @@ _CUTS = 12  # times a facet is halved at most: 64 parts a side, of a wall of 40 
 
 
 def preview_routes(
-    geometry: Geometry, points: Points, rule: PruneRule, stats: Stats, each: Callable[[Batch], T]
+    geometry: Geometry, points: Points, radar: Radar, rule: PruneRule, stats: Stats, each: Callable[[Batch], T]
 ) -> list[T]:
     """Return what `each`, called by any thread, makes of the routes of a preview, batch by batch; stats is filled.
 
-    Args: geometry; points the targets given by their RCS; rule what may be left out.
+    Args: geometry; points the targets given by their RCS; radar, which tells rates apart; rule what may be left out.
     """
     launch, refined = Launch(geometry, points, rule, legs_over_ground), rule.refinement.for_depth(rule.bounces)
+    apart = RateClasses.of(geometry, radar, refined.cell)
 
     def over(legs: list[Leg]) -> list[_Tubes]:
         outs = ([out for out in launch.outs if len(leg.mirrors) + 1 + len(out.mirrors) <= rule.bounces] for leg in legs)
-        return [_Tubes.over(geometry, leg, some, refined) for leg, some in zip(legs, outs, strict=True)]
+        return [_Tubes.over(geometry, leg, some, refined, apart) for leg, some in zip(legs, outs, strict=True)]
 
     def first() -> tuple[list[_Tubes], list[T]]:
         direct = over(launch.legs[:1])
@@ -123,7 +126,7 @@ class _Straight:
 @dataclass(frozen=True)
 class _Tubes:
     """Tubes on their first surface that may count, how the end of their leg in sees their centres, and what goes
-    straight back, None where that leg is none of the legs out."""
+    straight back, None where that leg is none of the legs out; apart, classes of rate that do not hide each other."""
 
     geometry: Geometry
     leg: Leg
@@ -131,9 +134,10 @@ class _Tubes:
     tubes: Tubes
     view: View
     straight: _Straight | None
+    apart: RateClasses
 
     @staticmethod
-    def over(geometry: Geometry, leg: Leg, outs: list[Leg], rule: Refinement) -> _Tubes:
+    def over(geometry: Geometry, leg: Leg, outs: list[Leg], rule: Refinement, apart: RateClasses) -> _Tubes:
         """Return the tubes over a leg that may count over one of `outs`, cut where facets are large."""
         nothing = Contributions(rule)
         allowed = reachable(geometry, leg) & (geometry.piece_role == SCATTERER)
@@ -151,9 +155,9 @@ class _Tubes:
         write_leg(geometry, tubes, leg, view.corners, view.passed, rule)
         straight = None
         if leg in outs:
-            rows, ph = _radiated(geometry, leg, leg, tubes, nothing)
+            rows, ph = _radiated(geometry, leg, leg, tubes, nothing, apart)
             straight = _Straight(rows, ph, amplitudes(ph))
-        return _Tubes(geometry, leg, outs, tubes, view, straight)
+        return _Tubes(geometry, leg, outs, tubes, view, straight, apart)
 
     def add_to(self, found: Contributions) -> None:
         """Add what goes straight back to what a launch has found."""
@@ -168,7 +172,7 @@ class _Tubes:
             if out is leg and self.straight:
                 rows, ph, each = self.straight.rows, self.straight.phases, self.straight.each
             else:
-                rows, ph = _radiated(geometry, leg, out, self.tubes, found)
+                rows, ph = _radiated(geometry, leg, out, self.tubes, found, self.apart)
                 each = amplitudes(ph)
             kept = np.flatnonzero(that_count(found, each, ph.length, _SURE))
             rows = rows[kept]
@@ -182,11 +186,15 @@ class _Tubes:
                 yield routes_of(geometry, leg, out, tubes, True, view.corners, view.passed)
 
 
-def _radiated(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions) -> tuple[Rows, Phases]:
-    """Return the numbers of the tubes that face the end of a leg out and may count there, and their phases."""
+def _radiated(
+    geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found: Contributions, apart: RateClasses
+) -> tuple[Rows, Phases]:
+    """Return the numbers of the tubes that face the end of a leg out and may count there, and their phases, with
+    lengths that tell rates apart."""
     ph = phases_of(geometry, leg, out, tubes, found.rule)
     _, facing = radiating(out, tubes, FACING)
     each = _turned(np.where(facing, ph.bound, 0.0), ph.length, found.rule)
+    ph = replace(ph, length=ph.length + apart.lengths(tubes))
     rows = np.flatnonzero(facing & that_count(found, each, ph.length, _SEEN))
     return rows, ph.take(rows)
 
@@ -198,7 +206,7 @@ def that_count(found: Contributions, each: Complexes, length: Floats, weight: fl
     Args: each (n,) [1/m] what a tube scatters; length (n,) [m] of its two-way path.
     """
     share = each / found.prune_threshold(length)
-    cell = np.asarray(length / found.rule.cell, np.int64)
+    _, cell = np.unique(np.asarray(length / found.rule.cell, np.int64), return_inverse=True)
     octave = _CLASSES + _A_CLASS * np.log2(np.maximum(np.abs(share), 1e-9))
     octave = np.clip(octave, 0, _CLASSES - 1).astype(np.int64)
     at, classes = cell * _CLASSES + octave, (int(cell.max(initial=0)) + 1) * _CLASSES

@@ -69,7 +69,7 @@ def trace(
     if model.mode == PREVIEW and not check:
         rule = preview_rule(radar, settings, model)
         stats = Stats()
-        batches = tuple(preview_routes(geometry, points, rule, stats, lambda batch: batch))
+        batches = tuple(preview_routes(geometry, points, radar, rule, stats, lambda batch: batch))
         return SceneRoutes(geometry, rule, batches, stats, preview_noise(radar, settings))
     rule = (check_rule if check else fine_rule)(radar, settings, model)
     if not (check or needed(scene, model.retrace, rule.refinement.max_edge)):

@@ -50,6 +50,20 @@ def test_direct_echoes_of_streets_are_within_a_cell_and_3_db_of_a_fine_run(name,
     check(fine, rc.simulate(scene.override(["model.mode=preview"])), apart)
 
 
+@pytest.mark.parametrize("off", [-0.1, 0.0, 0.12])
+def test_a_stronger_echo_of_another_rate_hides_none_in_its_range_cell(off):
+    """A ball beside a plate as far away, some 20 dB stronger and as fast the other way."""
+    plate = rc.Body(
+        "plate", shape="plate", params={"width": 0.5, "height": 0.5},
+        position=(12.0, 3.0, 0.6), yaw_deg=180.0 + np.degrees(np.arctan2(3.0, 12.0)), velocity=(6.0, 0.0, 0.0),
+    )  # fmt: skip
+    place = (float(np.hypot(12.0, 3.0)) + 0.4 + off, -1.0, 0.6)
+    ball = rc.Body("ball", shape="sphere", params={"radius": 0.4}, position=place, velocity=(-4.0, 0.0, 0.0))
+    radar = {"waveform": WAVEFORM, "position": (0, 0, 0.6), "power_dbm": 20.0}
+    scenes = (rc.Scene(bodies=[plate, ball], radar=radar, model={"mode": m}) for m in ("physical", "preview"))
+    check(*map(rc.simulate, scenes))
+
+
 def scene_with(body: rc.Body, **model: object) -> rc.Scene:
     radar = {"waveform": WAVEFORM, "position": (0, 0, 1.0), "power_dbm": 20.0, "noise": False}
     return rc.Scene(bodies=[body], radar=radar, model={"mode": "preview", **model})

@@ -1,0 +1,64 @@
+"""Tubes whose echoes the radar tells apart by range rate: none of them hides another's in a preview."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.radar.radar import Radar
+from raychan.tracing.tubes import CENTRE, Tubes
+from raychan.world.geometry import Geometry
+
+Floats = NDArray[np.float64]
+
+_CELLS = 4.0  # of rate: within so many a window smears a strong echo over a weak one
+_MOST = 16  # classes of rate: with as many as there are cells hardly anything is pruned (not measured)
+
+
+@dataclass(frozen=True)
+class RateClasses:
+    """Classes of range rate of a scene as a radar sees it: those `width` [m/s] wide from `least` [m/s] on; ends, their
+    places [m] and velocities [m/s]; `longest` [m], more than any two-way path of the scene."""
+
+    geometry: Geometry
+    ends: list[tuple[Floats, Floats]]
+    width: float
+    least: float
+    longest: float
+
+    @staticmethod
+    def of(geometry: Geometry, radar: Radar, cell: float) -> RateClasses:
+        """Return the classes of a scene's bodies, for range cells [m]."""
+        ends = [(np.asarray(radar.position, float), np.asarray(radar.velocity, float))]
+        if radar.rx_position is not None:
+            moves = radar.velocity if radar.rx_velocity is None else radar.rx_velocity
+            ends.append((np.asarray(radar.rx_position, float), np.asarray(moves, float)))
+        f, (middle, radius, _) = geometry.facets, geometry.body_spheres
+        arm = np.linalg.norm(middle - f.origin, axis=1) + radius
+        turning = np.linalg.norm(f.spin, axis=1) * arm
+        fastest, far = 0.0, 0.0
+        for place, velocity in ends:
+            moving = np.linalg.norm(f.velocity - velocity, axis=1) + turning
+            fastest = max(fastest, float(moving.max(initial=0.0)))
+            far = max(far, float((np.linalg.norm(middle - place, axis=1) + radius).max(initial=0.0)))
+        width = max(_CELLS * radar.channel_waveform.rate_resolution, 2.0 * fastest / _MOST, 1e-9)
+        # Over the ground a path is at most three times as long as across the scene.
+        longest = cell * (np.ceil(2.0 * 3.0 * far / cell) + 4.0)
+        # Bodies at rest, and a little faster or slower, are of one class.
+        least = -(np.floor(fastest / width) + 0.5) * width
+        return RateClasses(geometry, ends, width, least, longest)
+
+    def lengths(self, tubes: Tubes) -> Floats:
+        """Return lengths (n,) [m] to add to the two-way paths of tubes, so that those of two classes never share a
+        range cell: multiples of `longest`."""
+        f, at = self.geometry.facets, tubes.points[:, CENTRE]
+        body = f.body[tubes.facet]
+        moved = f.velocity[body] + np.cross(f.spin[body], at - f.origin[body])
+        rate = np.zeros(len(at))
+        for place, velocity in self.ends:
+            way = at - place
+            length = np.sqrt((way**2).sum(axis=1))
+            rate += ((moved - velocity) * way).sum(axis=1) / np.maximum(length, 1e-9) / len(self.ends)
+        return np.asarray(self.longest * np.maximum(np.floor((rate - self.least) / self.width), 0.0))
