@@ -96,7 +96,7 @@ def rcs(
     RAYS.check("max_rays", max_rays, whole=True)
     angles = _angles(azimuth_deg, elevation_deg, rx_az, rx_el)
     k = 2.0 * np.pi * frequency / C0
-    body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None)
+    body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None, crease_deg is not None)
     topology = [body.mesh.topology] if body.merged else []
     geometry = Geometry(facets_of(body.mesh, material, frequency), topology, merged=body.merged)
     other = mesh_error(geometry, body.alternatives, k)

@@ -50,8 +50,9 @@ class Alternatives:
     """Facets (f,) whose curved surface was checked against that of a finer mesh; None where there is no finer one."""
 
 
-def alternatives(mesh: Mesh) -> Alternatives:
-    """Return the other surfaces that a mesh may stand for.
+def alternatives(mesh: Mesh, told: bool = False) -> Alternatives:
+    """Return the other surfaces that a mesh may stand for; told: its crease angle is the caller's word on which folds
+    are edges, so that a smooth surface is near its facets, however irregular they are.
 
     Smooth folds may be edges on patches that turn by more than half the crease angle from facet to facet (an eighth on
     singly curved ones: a prism of 36 sides is as plausible as a cylinder), and where the facets are no regular
@@ -59,13 +60,14 @@ def alternatives(mesh: Mesh) -> Alternatives:
     hull of points are not. Folds above the crease angle may be smooth where they look like a tessellation (see
     world.tessellation).
     """
-    if "alternatives" not in mesh.memo:
-        mesh.memo["alternatives"] = _alternatives(mesh)
-    found: Alternatives = mesh.memo["alternatives"]
+    name = f"alternatives {told}"
+    if name not in mesh.memo:
+        mesh.memo[name] = _alternatives(mesh, told)
+    found: Alternatives = mesh.memo[name]
     return found
 
 
-def _alternatives(mesh: Mesh) -> Alternatives:
+def _alternatives(mesh: Mesh, told: bool) -> Alternatives:
     if mesh.crease_deg is None:
         return Alternatives()
     pair, _, uncertain = _folds(mesh)
@@ -74,14 +76,15 @@ def _alternatives(mesh: Mesh) -> Alternatives:
     if not len(pair):
         return Alternatives(rounded=round_)
     fitted = smoothed(mesh.vertices, mesh.faces, pair, _EVEN)
-    # At uncertain folds `creased` is the alternative.
-    fitted[pair[uncertain] // 3] = mesh.normals[pair[uncertain] // 3]
+    if not told:
+        # At uncertain folds `creased` is the alternative.
+        fitted[pair[uncertain] // 3] = mesh.normals[pair[uncertain] // 3]
     creased = smoothed(mesh.vertices, mesh.faces, pair[~uncertain]) if uncertain.any() else None
     return Alternatives(
         fitted=fitted if np.abs(fitted - mesh.normals).max() > _BEND else None,
         creased=creased,
         rounded=round_,
-        regular=_regular(mesh),
+        regular=np.ones(len(mesh.faces), bool) if told else _regular(mesh),
     )
 
 

@@ -113,11 +113,11 @@ def traced_mesh(mesh: Mesh, wavenumber: float, tolerance_db: float) -> Simplifie
     return _kept(mesh, wavenumber, tolerance_db, None)
 
 
-def traced_alone(mesh: Mesh, wavenumber: float, tolerance_db: float | None) -> Traced:
+def traced_alone(mesh: Mesh, wavenumber: float, tolerance_db: float | None, told: bool = False) -> Traced:
     """Return the mesh that is traced in place of that of a body by itself, and its alternatives; args as for
-    `traced_mesh`, but for a tolerance of None, where no mesh is simplified."""
-    found = alternatives(mesh)
-    coarse = None if tolerance_db is None else _kept(mesh, wavenumber, tolerance_db, found)
+    `traced_mesh`, but for a tolerance of None, where no mesh is simplified; told as for `alternatives`."""
+    found = alternatives(mesh, told)
+    coarse = None if tolerance_db is None else _kept(mesh, wavenumber, tolerance_db, found, told)
     if coarse is None:
         return Traced(mesh, found)
 
@@ -162,13 +162,15 @@ def traced_scene(scene: T, tolerance_db: float | None) -> tuple[T, Merged | None
     return traced, merged
 
 
-def _kept(mesh: Mesh, wavenumber: float, tolerance_db: float, found: Alternatives | None) -> Simplified | None:
-    """Return the simplified mesh, kept with the mesh; found the other surfaces of a body by itself: facets that another
-    fit of its normals moves by more than the deviation allowed stay."""
+def _kept(
+    mesh: Mesh, wavenumber: float, tolerance_db: float, found: Alternatives | None, told: bool = False
+) -> Simplified | None:
+    """Return the simplified mesh, kept with the mesh; found the other surfaces of a body by itself, `told` or not:
+    facets that another fit of its normals moves by more than the deviation allowed stay."""
     if len(mesh.faces) < MANY:
         return None
     limits, alone = limits_of(wavenumber, tolerance_db, _size(mesh)), found is not None
-    name = f"simplified {limits} {alone}"
+    name = f"simplified {limits} {alone} {told}"
     if name not in mesh.memo:
         fixed = uncertain_facets(mesh)
         if found is not None and found.fitted is not None:

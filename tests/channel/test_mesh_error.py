@@ -48,7 +48,7 @@ def test_an_ellipsoid_of_many_facets_is_its_closed_form():
 
 def test_the_stated_error_covers_smooth_and_flat_bodies_not_looked_at_before():
     """Seed 31; factors were chosen on seed 1. An error that is not known covers nothing and is left out."""
-    kind, e, s = shapes.judged(31, 24)
+    kind, e, s = shapes.judged(31, 48)  # the median of 24 scatters by a third from seed to seed
     known = np.isfinite(s)
     assert known.mean() > 0.8
     assert np.mean(e[known] <= s[known]) >= 0.95
@@ -85,6 +85,47 @@ def test_folds_are_in_no_doubt_where_the_caller_tells_edges():
     prism = shapes.flat(mesh, shapes.po.direction(np.radians(11.0), 0.0))
     assert abs(db(flat.sigma / prism)) <= flat.error_db < 0.1
     assert abs(db(told.sigma / prism)) > 0.5 and guessed.error_db > abs(db(told.sigma / prism))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_of_irregular_facets_told_to_be_smooth_the_error_is_stated(seed):
+    """Convex hulls of points on a sphere, folds of up to 35 degrees: pi r^2, but for what a wave creeps around."""
+    rng, r = np.random.default_rng(seed), 0.08
+    for count in (150, 500):
+        p = rng.normal(size=(count, 3))
+        hull = trimesh.convex.convex_hull(r * p / np.linalg.norm(p, axis=1, keepdims=True))
+        crease = np.degrees(hull.face_adjacency_angles).max() + 1.0
+        got = rcs(hull, 77e9, np.arange(0.0, 360.0, 60.0), 20.0, crease_deg=crease)
+        known = got.converged
+        assert (np.abs(db(got.sigma / (np.pi * r**2))) <= got.error_db)[known].all() and known.any()
+
+
+def _saddle(count):
+    """Return a sheet x = 2.5 (y^2 - z^2), 0.2 m wide, of a regular grid, and the same with its own normals."""
+    y, z = np.meshgrid(*[np.linspace(-0.1, 0.1, count + 1)] * 2, indexing="ij")
+    v = np.stack([2.5 * (y**2 - z**2), y, z], axis=-1).reshape(-1, 3)
+    a = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
+    f = np.concatenate([np.stack([a, a + count + 1, a + 1], 1), np.stack([a + count + 1, a + count + 2, a + 1], 1)])
+    n = np.stack([np.ones(len(v)), -5.0 * v[:, 1], 5.0 * v[:, 2]], axis=1)
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    return trimesh.Trimesh(v, f, process=False), make_mesh(v, f, normals=n[f])
+
+
+def test_normals_along_the_border_of_an_open_sheet_are_its_gradient():
+    """Facets turn by 1.4 to 2 degrees; at the sheet's four corners, where neighbours are few, normals are off more."""
+    mesh = from_trimesh(_saddle(40)[0])
+    y, z = mesh.corners[..., 1], mesh.corners[..., 2]
+    true = np.stack([np.ones_like(y), -5.0 * y, 5.0 * z], axis=-1)
+    true /= np.linalg.norm(true, axis=2, keepdims=True)
+    off = np.degrees(np.arccos(np.minimum(np.abs((mesh.normals * true).sum(axis=2)), 1.0)))
+    corner = (np.abs(y) > 0.094) & (np.abs(z) > 0.094)
+    assert off[~corner].max() < 0.02
+
+
+def test_a_double_bounce_of_an_open_sheet_by_its_facets_is_that_by_its_normals():
+    guessed, known = (rcs(mesh, 10e9, 45.0, 5.0) for mesh in _saddle(40))
+    assert abs(db(guessed.sigma / known.sigma)) <= guessed.error_db + known.error_db < 0.5
+    assert known.bounces == 2
 
 
 def test_a_mesh_that_knows_its_normals_is_in_no_doubt():
