@@ -1,4 +1,4 @@
-"""The types that the fields of waveforms, radars and impairments declare, checked in one place."""
+"""The types of arguments, and of the fields of waveforms, radars and impairments, checked in one place."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from types import UnionType
 from typing import Any, SupportsFloat, get_args, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 def finite(name: str, value: object) -> float:
@@ -18,6 +19,32 @@ def finite(name: str, value: object) -> float:
     return float(value)  # type: ignore[arg-type]
 
 
+def reals(name: str, given: object) -> NDArray[np.float64]:
+    """Return numbers as an array. Raises: ValueError that names the argument, where one is a text, true or None."""
+    try:
+        held = np.array(given, object)
+        if all(map(_is_number, held.flat)):
+            return held.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} = {given!r}: numbers are wanted")
+
+
+def check_type(name: str, value: object, *wanted: type[Any], or_none: bool = False) -> None:
+    """Raise ValueError that names the argument unless a value is of a type: float a finite number, int a whole one."""
+    if value is None and or_none:
+        return
+    if wanted == (float,):
+        finite(name, value)
+    elif wanted[0] in _ALLOWED:
+        says, allows = _ALLOWED[wanted[0]]
+        if not allows(value):
+            raise ValueError(f"{name} = {value!r}: {says}")
+    elif not isinstance(value, wanted):
+        kinds = " or ".join(f"{'an' if x.__name__[0] in 'AEIOU' else 'a'} {x.__name__}" for x in wanted)
+        raise ValueError(f"{name} = {value!r}: {kinds} is wanted{', or None' if or_none else ''}")
+
+
 def check_declared(kind: Any, given: Mapping[str, object]) -> None:
     """Check values by the types that fields of a class declare: numbers finite, whole numbers, true or false, objects.
 
@@ -25,23 +52,11 @@ def check_declared(kind: Any, given: Mapping[str, object]) -> None:
     Raises: ValueError that names the field.
     """
     for name, (wanted, may_be_none) in _declared(kind).items():
-        value, where = given[name], f"{kind.__name__}.{name}"
-        if value is None and may_be_none:
-            continue
-        if wanted is float:
-            finite(where, value)
-        elif wanted in _ALLOWED:
-            says, allows = _ALLOWED[wanted]
-            if not allows(value):
-                raise ValueError(f"{where} = {value!r}: {says}")
-        elif not isinstance(value, wanted):
-            article = "an" if wanted.__name__[0] in "AEIOU" else "a"
-            also = ", or None" if may_be_none else ""
-            raise ValueError(f"{where} = {value!r}: {article} {wanted.__name__} is wanted{also}")
+        check_type(f"{kind.__name__}.{name}", given[name], wanted, or_none=may_be_none)
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, SupportsFloat) and not isinstance(value, bool) and np.ndim(value) == 0  # type: ignore[arg-type]
+    return isinstance(value, SupportsFloat) and not isinstance(value, bool | np.bool_) and np.ndim(value) == 0  # type: ignore[arg-type]
 
 
 def _is_whole(value: object) -> bool:
@@ -50,6 +65,7 @@ def _is_whole(value: object) -> bool:
 
 _ALLOWED: dict[type[Any], tuple[str, Callable[[object], bool]]] = {
     int: ("must be a whole number", _is_whole),
+    str: ("must be a text", lambda value: isinstance(value, str)),
     bool: ("must be true or false", lambda value: isinstance(value, bool | np.bool_)),
 }
 

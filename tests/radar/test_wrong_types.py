@@ -38,7 +38,7 @@ WAVE = rc.Waveform(77e9, 500e6, 20e-6)
         (lambda: rc.Radar(WAVE, power="12"), "Radar.power = '12': must be finite, a number"),
         (lambda: rc.Radar(WAVE, yaw_deg=None), "Radar.yaw_deg = None: must be finite, a number"),
         (lambda: rc.Radar(WAVE, noise="no"), "Radar.noise = 'no': must be true or false"),
-        (lambda: rc.Radar(WAVE, position=None), r"Radar.position: numbers of shape \(3,\) wanted, nan given"),
+        (lambda: rc.Radar(WAVE, position=None), r"Radar.position: numbers of shape \(3,\) wanted, None given"),
         (lambda: rc.Radar(WAVE, elements="a"), r"Radar.elements: numbers of shape \(n, 3\) wanted, 'a' given"),
         (lambda: replace(WAVE, carrier="77"), "Waveform.carrier = '77': must be finite, a number"),
         (lambda: replace(WAVE, carrier=None), "Waveform.carrier = None: must be finite, a number"),
