@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import cache
+from os import PathLike
 from types import UnionType
 from typing import Any, SupportsFloat, get_args, get_type_hints
 
@@ -36,13 +37,16 @@ def check_type(name: str, value: object, *wanted: type[Any], or_none: bool = Fal
         return
     if wanted == (float,):
         finite(name, value)
-    elif wanted[0] in _ALLOWED:
+    elif len(wanted) == 1 and wanted[0] in _ALLOWED:
         says, allows = _ALLOWED[wanted[0]]
         if not allows(value):
             raise ValueError(f"{name} = {value!r}: {says}")
     elif not isinstance(value, wanted):
-        kinds = " or ".join(f"{'an' if x.__name__[0] in 'AEIOU' else 'a'} {x.__name__}" for x in wanted)
-        raise ValueError(f"{name} = {value!r}: {kinds} is wanted{', or None' if or_none else ''}")
+        names = [_CALLED.get(x, x.__name__) for x in wanted]
+        kinds = " or ".join(f"{'an' if x[0] in 'AEIOU' else 'a'} {x}" for x in names)
+        text = " ".join(repr(value).split())
+        text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+        raise ValueError(f"{name} = {text}: {kinds} is wanted{', or None' if or_none else ''}")
 
 
 def check_declared(kind: Any, given: Mapping[str, object]) -> None:
@@ -63,6 +67,8 @@ def _is_whole(value: object) -> bool:
     return _is_number(value) and float(value).is_integer()  # type: ignore[arg-type]
 
 
+_LONGEST = 80  # characters of an object as messages show it
+_CALLED: dict[Any, str] = {str: "text", PathLike: "path", Callable: "function"}
 _ALLOWED: dict[type[Any], tuple[str, Callable[[object], bool]]] = {
     int: ("must be a whole number", _is_whole),
     str: ("must be a text", lambda value: isinstance(value, str)),

@@ -267,6 +267,8 @@ def test_explain_and_load_result(result: rc.Result, tmp_path: Path) -> None:
     assert back.paths.length.tobytes() == result.paths.length.tobytes()
     why = assert_type(rc.explain(back, detection=1), CellExplanation)
     assert "wall" in why.bodies
+    with pytest.raises(rc.StoreError, match="no such file"):
+        rc.load_result(tmp_path / "nosuch")
 
 
 def test_directions_of_waves_at_an_array() -> None:
