@@ -22,6 +22,8 @@ def finite(name: str, value: object) -> float:
 
 def reals(name: str, given: object) -> NDArray[np.float64]:
     """Return numbers as an array. Raises: ValueError that names the argument, where one is a text, true or None."""
+    if isinstance(given, np.ndarray) and given.dtype.kind in "iuf":
+        return given.astype(np.float64)
     try:
         held = np.array(given, object)
         if all(map(_is_number, held.flat)):
@@ -63,14 +65,15 @@ def _is_number(value: object) -> bool:
     return isinstance(value, SupportsFloat) and not isinstance(value, bool | np.bool_) and np.ndim(value) == 0  # type: ignore[arg-type]
 
 
-def _is_whole(value: object) -> bool:
+def is_whole(value: object) -> bool:
+    """Return whether a value is a whole number, which a float may be."""
     return _is_number(value) and float(value).is_integer()  # type: ignore[arg-type]
 
 
 _LONGEST = 80  # characters of an object as messages show it
 _CALLED: dict[Any, str] = {str: "text", PathLike: "path", Callable: "function"}
 _ALLOWED: dict[type[Any], tuple[str, Callable[[object], bool]]] = {
-    int: ("must be a whole number", _is_whole),
+    int: ("must be a whole number", is_whole),
     str: ("must be a text", lambda value: isinstance(value, str)),
     bool: ("must be true or false", lambda value: isinstance(value, bool | np.bool_)),
 }

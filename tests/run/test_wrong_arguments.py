@@ -58,7 +58,7 @@ def test_stages_name_the_argument_that_is_of_another_type(call, said, given):
         ),
         (
             lambda: rc.spectrogram(SCENE, 0.01, resolution=1, ranges=3),
-            r"ranges = 3: two numbers are wanted, from and to \[m\]",
+            "ranges = 3: two numbers are wanted",
         ),
         (lambda: rc.spectrogram(SCENE, 0.01, resolution=1, ranges="ab"), "ranges = 'ab': numbers are wanted"),
         (lambda: rc.detection_probability("x"), "snr_db = 'x': numbers are wanted"),
@@ -83,6 +83,11 @@ def test_stages_name_the_argument_that_is_of_another_type(call, said, given):
 def test_functions_name_the_argument_that_cannot_be(call, said):
     with pytest.raises(ValueError, match=said):
         call()
+
+
+def test_a_result_that_is_not_there_is_told_by_a_public_error():
+    with pytest.raises(rc.StoreError, match="nosuch: no such file"):
+        rc.load_result("nosuch")
 
 
 def test_whole_floats_and_scalars_of_numpy_are_numbers():
