@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainc, gammaincc, gammainccinv, gammaln
 
 from raychan.processing.cfar import METHODS, factor, quantiles_of
-from raychan.radar.declared import check_type, reals
+from raychan.radar.declared import check_type, is_number, reals
 from raychan.units import db, undb
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,8 @@ class Detector:
         check_type("Detector.pfa", self.pfa, float)
         check_type("Detector.looks", self.looks, int)
         for name in ("cells", "min_snr_db"):
-            reals(f"Detector.{name}", getattr(self, name))
+            if not is_number(getattr(self, name)):
+                raise ValueError(f"Detector.{name} = {getattr(self, name)!r}: a number is wanted")
         if not 0.0 < self.pfa < 1.0:
             raise ValueError(f"Detector.pfa = {self.pfa!r}: must lie between 0 and 1")
         if self.looks < 1:

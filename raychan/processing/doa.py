@@ -57,10 +57,10 @@ def doa(
     check_type("sources", sources, int, or_none=True)
     check_type("smoothing", smoothing, float, or_none=True)
     aperture = Aperture(reals("elements", elements), float(wavelength))
-    try:
-        data = np.atleast_2d(np.asarray(snapshots, np.complex128))
-    except (TypeError, ValueError):
-        raise ValueError(f"snapshots = {snapshots!r}: numbers are wanted") from None
+    given = np.asarray(snapshots)
+    if given.dtype.kind not in "iufc":
+        raise ValueError(f"snapshots = {snapshots!r}: numbers are wanted")
+    data = np.atleast_2d(given).astype(np.complex128)
     if data.ndim != 2 or data.shape[1] != len(aperture.elements) or not len(data) or not np.isfinite(data).all():
         raise ValueError(f"snapshots: finite numbers (n, {len(aperture.elements)}) wanted, {data.shape} given")
     if method not in METHODS:

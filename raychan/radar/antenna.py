@@ -24,6 +24,7 @@ from raychan.units import undb
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+_LONGEST = 1024  # elements of a row, whose pattern is integrated over the sphere
 POLARIZATIONS = ("V", "H")
 
 
@@ -150,6 +151,8 @@ class ArrayAntenna:
     def __post_init__(self) -> None:
         check("V", self.loss_db, ny=self.ny, nz=self.nz, spacing_y=self.spacing_y, spacing_z=self.spacing_z)
         check_declared(ArrayAntenna, vars(self))
+        if max(self.ny, self.nz) > _LONGEST:
+            raise ValueError(f"ny, nz = {self.ny!r}, {self.nz!r}: at most {_LONGEST} elements a row")
         check_window("taper_y", self.taper_y)
         check_window("taper_z", self.taper_z)
 

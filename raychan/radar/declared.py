@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 def finite(name: str, value: object) -> float:
     """Return a number. Raises: ValueError that names the argument, for another type or a number not finite."""
-    if not (_is_number(value) and math.isfinite(float(value))):  # type: ignore[arg-type]
+    if not (is_number(value) and math.isfinite(float(value))):  # type: ignore[arg-type]
         raise ValueError(f"{name} = {value!r}: must be finite, a number")
     return float(value)  # type: ignore[arg-type]
 
@@ -26,7 +26,7 @@ def reals(name: str, given: object) -> NDArray[np.float64]:
         return given.astype(np.float64)
     try:
         held = np.array(given, object)
-        if all(map(_is_number, held.flat)):
+        if all(map(is_number, held.flat)):
             return held.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
         pass
@@ -61,15 +61,19 @@ def check_declared(kind: Any, given: Mapping[str, object]) -> None:
         check_type(f"{kind.__name__}.{name}", given[name], wanted, or_none=may_be_none)
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Return whether a value is a single real number, which a text, true or false, and None are not."""
+    if isinstance(value, int) and value.bit_length() > _LARGEST:
+        return False
     return isinstance(value, SupportsFloat) and not isinstance(value, bool | np.bool_) and np.ndim(value) == 0  # type: ignore[arg-type]
 
 
 def is_whole(value: object) -> bool:
     """Return whether a value is a whole number, which a float may be."""
-    return _is_number(value) and float(value).is_integer()  # type: ignore[arg-type]
+    return is_number(value) and float(value).is_integer()  # type: ignore[arg-type]
 
 
+_LARGEST = 1000  # bits of a whole number: larger ones are no floats
 _LONGEST = 80  # characters of an object as messages show it
 _CALLED: dict[Any, str] = {str: "text", PathLike: "path", Callable: "function"}
 _ALLOWED: dict[type[Any], tuple[str, Callable[[object], bool]]] = {

@@ -22,6 +22,7 @@ from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
+from raychan.reprs import counted
 from raychan.units import C0, undb
 
 Floats = NDArray[np.float64]
@@ -56,8 +57,7 @@ def check_cube(cube: Cube, radar: Radar) -> None:
     wave = radar.waveform
     own = radar.receivers, wave.n_chirps, wave.n_samples
     if cube.samples.shape != own:
-        found, wanted = ("{} receivers by {} chirps by {} samples".format(*x) for x in (cube.samples.shape, own))
-        raise ValueError(f"cube of {found}; the radar has {wanted}")
+        raise ValueError(f"cube of shape {cube.samples.shape} (receiver, chirp, sample); the radar has {own}")
 
 
 def check_map(rdmap: RangeDoppler, radar: Radar) -> None:
@@ -68,7 +68,7 @@ def check_map(rdmap: RangeDoppler, radar: Radar) -> None:
     own = len(receivers(radar)), wave.range_resolution, 0.5 * C0 / wave.middle / wave.frame_duration
     given = len(rdmap.spectrum), rdmap.range_resolution, rdmap.rate_resolution
     if not np.allclose(given, own, rtol=1e-6, atol=0.0):
-        found, wanted = ("{} antennas and cells of {:.4g} m by {:.4g} m/s".format(*x) for x in (given, own))
+        found, wanted = (f"{counted(n, 'antenna')} and cells of {r:.4g} m by {v:.4g} m/s" for n, r, v in (given, own))
         raise ValueError(f"rdmap of {found}; the radar has {wanted}")
 
 

@@ -160,7 +160,7 @@ class Body:
     @property
     def fluctuates(self) -> bool:
         """Whether its RCS does; SceneError for an unknown Swerling case, or where no RCS is given."""
-        known = not isinstance(self.swerling, bool) and self.swerling in range(5)
+        known = not isinstance(self.swerling, bool | np.bool_) and self.swerling in range(5)
         if not known or (self.swerling and self.rcs_dbsm is None):
             key, allowed = f"{self.name}.swerling", "0, 1, 2, 3 or 4, above 0 only with rcs_dbsm"
             raise SceneError(f"{shown(self.swerling)} is not possible", key=key, value=self.swerling, allowed=allowed)

@@ -68,8 +68,10 @@ def test_stages_name_the_argument_that_is_of_another_type(call, said, given):
         (lambda: rc.Detector(looks=np.inf), "Detector.looks = inf: must be a whole number"),
         (lambda: rc.Detector(looks=0), "Detector.looks = 0: must be a whole number from 1 on"),
         (lambda: rc.Detector(pfa="x"), "Detector.pfa = 'x': must be finite, a number"),
-        (lambda: rc.Detector(min_snr_db="x"), "Detector.min_snr_db = 'x': numbers are wanted"),
-        (lambda: rc.Detector(cells="3"), "Detector.cells = '3': numbers are wanted"),
+        (lambda: rc.Detector(min_snr_db="x"), "Detector.min_snr_db = 'x': a number is wanted"),
+        (lambda: rc.Detector(cells="3"), "Detector.cells = '3': a number is wanted"),
+        (lambda: rc.Detector(cells=[1, 2]), r"Detector.cells = \[1, 2\]: a number is wanted"),
+        (lambda: rc.doa(["1"] * 8, LINE, 4e-3), "snapshots = .*: numbers are wanted"),
         (lambda: rc.uniform_array(10**12, 0.1), "n = 1000000000000: must lie between 1 and 4096"),
         (lambda: rc.uniform_array(True, 0.1), "n = True: must be a whole number"),
         (lambda: rc.uniform_array(4, "0.1"), "spacing = '0.1': must be finite, a number"),
@@ -117,5 +119,5 @@ def test_a_map_of_another_radar_is_refused(change, said):
 )
 def test_samples_of_another_radar_are_refused(change):
     for run in (rc.range_doppler, rc.range_azimuth):
-        with pytest.raises(ValueError, match="cube of 4 receivers by 16 chirps by 32 samples; the radar has"):
+        with pytest.raises(ValueError, match=r"cube of shape \(4, 16, 32\) \(receiver, chirp, sample\); the radar"):
             run(CUBE, replace(RADAR, **change))
