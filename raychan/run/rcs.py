@@ -170,5 +170,5 @@ def _check(
 
 
 def _check_distance(name: str, distance: float) -> None:
-    if not (isinstance(distance, float) and distance == np.inf):
+    if distance != np.inf:
         LENGTH.check(name, distance)

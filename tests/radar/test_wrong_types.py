@@ -83,7 +83,7 @@ def measured(**change):
         (lambda: rc.ArrayAntenna("3", 2, 0.5, 0.5), "ny = '3': must be finite, a number"),
         (lambda: rc.ArrayAntenna(4, 2.5, 0.5, 0.5), "ArrayAntenna.nz = 2.5: must be a whole number"),
         (lambda: rc.ArrayAntenna(True, 2, 0.5, 0.5), "ny = True: must be finite, a number"),
-        (lambda: rc.ArrayAntenna(10**12, 2, 0.5, 0.5), "ny, nz = 1000000000000, 2: at most 1024 elements a row"),
+        (lambda: rc.ArrayAntenna(10**12, 2, 0.5, 0.5), "ny, nz = 1000000000000, 2: at most 1000 elements a row"),
         (lambda: rc.Radar(WAVE, power=10**400), "Radar.power = 1000.*: must be finite, a number"),
         (lambda: rc.ArrayAntenna(4, 2, "3", 0.5), "spacing_y = '3': must be finite, a number"),
         (lambda: rc.ArrayAntenna(4, 2, 0.5, 0.5, taper_y=3), "taper_y = 3: must be one of rect, hann"),

@@ -39,6 +39,11 @@ def test_what_cannot_be_is_refused(given, said):
         rc.rcs(PLATE, 77e9, **given)
 
 
+def test_infinity_of_numpy_is_far():
+    far = rc.rcs(PLATE, 10e9, 0, distance=np.float32(np.inf), rx_distance=np.inf, tolerance_db=3, max_bounces=1)
+    assert far.sigma.shape == () and far.sigma > 0.0
+
+
 @pytest.mark.parametrize("given", [rc.Body(name="plate", mesh=PLATE), np.zeros((3, 3))])
 def test_what_is_no_mesh_is_refused_by_what_it_is(given):
     with pytest.raises(rc.SceneError, match=f"{type(given).__name__} is no mesh; allowed: a file, Mesh, trimesh"):
