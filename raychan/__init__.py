@@ -62,6 +62,7 @@ _HOME = {
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
     "load_result": "raychan.run.storage",
+    "StoreError": "raychan.run.output_files",
     "spectrogram": "raychan.run.spectrogram",
     "Spectrogram": "raychan.run.spectrogram",
     "rcs": "raychan.run.rcs",
@@ -97,6 +98,7 @@ if TYPE_CHECKING:
     from raychan.records import SpecularPaths as SpecularPaths
     from raychan.run.directions import range_azimuth as range_azimuth
     from raychan.run.explain import explain as explain
+    from raychan.run.output_files import StoreError as StoreError
     from raychan.run.rcs import rcs as rcs
     from raychan.run.result import Result as Result
     from raychan.run.sequence import frames as frames

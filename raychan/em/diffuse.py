@@ -46,8 +46,8 @@ class Diffuse:
             value = getattr(self, name)
             if isinstance(value, bool) or not ((value is None and name in _MAY_MISS) or isinstance(value, Real)):
                 raise ValueError(f"{name} = {value!r}: a number is wanted")
-        if not math.isfinite(self.level_db):
-            raise ValueError(f"level_db = {self.level_db!r}: must be finite")
+            if name in ("level_db", "cross_db") and value is not None and not math.isfinite(value):
+                raise ValueError(f"{name} = {value!r}: must be finite")
         if self.law in ("lambert", "lobe") and self.level_db > 0.0:
             raise ValueError(f"level_db = {self.level_db:g} dB: a surface cannot scatter more than it receives (0 dB)")
         if not (1 <= self.exponent <= 50 and int(self.exponent) == self.exponent):

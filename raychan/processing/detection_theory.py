@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainc, gammaincc, gammainccinv, gammaln
 
 from raychan.processing.cfar import METHODS, factor, quantiles_of
+from raychan.radar.declared import check_type, is_number, reals
 from raychan.units import db, undb
 
 Floats = NDArray[np.float64]
@@ -43,9 +44,14 @@ class Detector:
     """Least power over the known noise that is reported [dB]."""
 
     def __post_init__(self) -> None:
+        check_type("Detector.pfa", self.pfa, float)
+        check_type("Detector.looks", self.looks, int)
+        for name in ("cells", "min_snr_db"):
+            if not is_number(getattr(self, name)):
+                raise ValueError(f"Detector.{name} = {getattr(self, name)!r}: a number is wanted")
         if not 0.0 < self.pfa < 1.0:
             raise ValueError(f"Detector.pfa = {self.pfa!r}: must lie between 0 and 1")
-        if self.looks < 1 or int(self.looks) != self.looks:
+        if self.looks < 1:
             raise ValueError(f"Detector.looks = {self.looks!r}: must be a whole number from 1 on")
         if self.cfar not in (None, *METHODS):
             raise ValueError(f"Detector.cfar = {self.cfar!r}: must be None or one of {', '.join(METHODS)}")
@@ -60,9 +66,10 @@ def shape_of(swerling: int, looks: int = 1) -> float:
 
     Raises: ValueError on an unknown case. Source: Shnidman 2003 (IEEE Trans. AES 39): 1, N, 2, 2N.
     """
+    check_type("swerling", swerling, int)
     if swerling not in SWERLING:
         raise ValueError(f"swerling = {swerling!r}: must be one of 0, 1, 2, 3, 4")
-    return (np.inf, 1.0, float(looks), 2.0, 2.0 * looks)[swerling]
+    return (np.inf, 1.0, float(looks), 2.0, 2.0 * looks)[int(swerling)]
 
 
 def over_threshold(snr: ArrayLike, threshold: ArrayLike, looks: int = 1, swerling: int = 0) -> Floats:
@@ -96,10 +103,11 @@ def detection_probability(snr_db: ArrayLike, detector: Detector = Detector(), sw
     """Return the probability of detection of a target of a mean SNR per look [dB], any shape.
 
     A CFAR's threshold follows its training statistic, over whose distribution the probability is averaged.
-    Raises: ValueError on an unknown Swerling case. Source: Rohling 1983; Gandhi & Kassam 1988 for one look of case 1;
-    any other case by the same average.
+    Raises: ValueError on another type or an unknown Swerling case. Source: Rohling 1983; Gandhi & Kassam 1988 for one
+    look of case 1; any other case by the same average.
     """
-    if np.isnan(snr_db).any():
+    check_type("detector", detector, Detector)
+    if np.isnan(reals("snr_db", snr_db)).any():
         raise ValueError("snr_db: holds NaN")
     # Beyond 250 dB nothing but the RCS itself decides, and squares overflow.
     snr, looks = np.asarray(undb(np.minimum(np.asarray(snr_db, float), 250.0))), int(detector.looks)

@@ -15,6 +15,7 @@ from raychan.processing.monopulse import monopulse
 from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, capon, climb, music, peaks
 from raychan.radar.aperture import Aperture
+from raychan.radar.declared import check_type, reals
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
@@ -52,8 +53,14 @@ def doa(
     of one snapshot they tell too many in about a third of cases; smoothing: see `covariance`.
     Raises: ValueError on bad arguments, or an array that measures no angle or is unfit for the method.
     """
-    aperture = Aperture(np.asarray(elements, np.float64), float(wavelength))
-    data = np.atleast_2d(np.asarray(snapshots, np.complex128))
+    check_type("wavelength", wavelength, float)
+    check_type("sources", sources, int, or_none=True)
+    check_type("smoothing", smoothing, float, or_none=True)
+    aperture = Aperture(reals("elements", elements), float(wavelength))
+    given = np.asarray(snapshots)
+    if given.dtype.kind not in "iufc":
+        raise ValueError(f"snapshots = {snapshots!r}: numbers are wanted")
+    data = np.atleast_2d(given).astype(np.complex128)
     if data.ndim != 2 or data.shape[1] != len(aperture.elements) or not len(data) or not np.isfinite(data).all():
         raise ValueError(f"snapshots: finite numbers (n, {len(aperture.elements)}) wanted, {data.shape} given")
     if method not in METHODS:
@@ -61,14 +68,14 @@ def doa(
     if not any(aperture.scans):
         raise ValueError("elements: no spread along y or z, or along a slanted line; such an array measures no angle")
     most = len(aperture.elements) - 1
-    if sources is not None and not (0 <= sources <= most and int(sources) == sources):
+    if sources is not None and not 0 <= sources <= most:
         raise ValueError(f"sources = {sources}: {len(aperture.elements)} elements tell 0 to {most} apart")
     size = float(np.abs(data).max())
     if size == 0.0:  # silence has no direction
         sources = 0
     data = data / (size or 1.0)
     made = covariance(data, aperture, smoothing)
-    count = _counted(data, aperture, criterion, smoothing) if sources is None else sources
+    count = _counted(data, aperture, criterion, smoothing) if sources is None else int(sources)
     found = estimate(data, aperture, method, count, made) if count else np.zeros((0, 2))
     power = (size * np.abs(amplitudes(data, aperture, found))) ** 2
     power = power.mean(axis=0)

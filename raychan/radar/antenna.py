@@ -16,13 +16,15 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
+from raychan.radar.declared import check_declared, check_type, finite
 from raychan.radar.spherical_vectors import cosine_power
-from raychan.radar.windows import window
+from raychan.radar.windows import check_window, window
 from raychan.units import undb
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+_LONGEST = 1000  # elements of a row, whose pattern is integrated over the sphere
 POLARIZATIONS = ("V", "H")
 
 
@@ -46,10 +48,9 @@ def check(polarization: str, loss_db: float = 0.0, **positive: float) -> None:
     """Raise ValueError on a polarisation other than V or H, a loss not finite, or another figure not positive."""
     if polarization not in POLARIZATIONS:
         raise ValueError(f"polarization = {polarization!r}: must be V or H")
-    if not math.isfinite(loss_db):
-        raise ValueError(f"loss_db = {loss_db!r}: must be finite")
+    finite("loss_db", loss_db)
     for name, value in positive.items():
-        if not (math.isfinite(value) and value > 0.0):
+        if finite(name, value) <= 0.0:
             raise ValueError(f"{name} = {value!r}: must be positive and finite")
 
 
@@ -66,6 +67,7 @@ class IsotropicAntenna:
 
     def __post_init__(self) -> None:
         check(self.polarization, self.loss_db)
+        check_type("front", self.front, bool)
 
     def field(self, direction: Floats) -> Complexes:
         """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
@@ -148,8 +150,11 @@ class ArrayAntenna:
 
     def __post_init__(self) -> None:
         check("V", self.loss_db, ny=self.ny, nz=self.nz, spacing_y=self.spacing_y, spacing_z=self.spacing_z)
-        window(self.taper_y, self.ny)
-        window(self.taper_z, self.nz)
+        check_declared(ArrayAntenna, vars(self))
+        if max(self.ny, self.nz) > _LONGEST:
+            raise ValueError(f"ny, nz = {self.ny!r}, {self.nz!r}: at most {_LONGEST} elements a row")
+        check_window("taper_y", self.taper_y)
+        check_window("taper_z", self.taper_z)
 
     @cached_property
     def _series(self) -> tuple[Floats, Floats]:

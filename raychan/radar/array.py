@@ -9,20 +9,23 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from raychan.radar.declared import check_type, reals
+
 Floats = NDArray[np.float64]
 
 MULTIPLEXING = ("none", "tdm", "ddm")
 """How transmitters are told apart: there is one; by time division; by Doppler division."""
 
 
+_MOST = 4096  # elements of a line: as many as a scene file takes
 _WIDEST = 1.0  # m off the phase centre: a wider array is a slip of unit, or another receiver
 
 
 def numbers(name: str, given: ArrayLike, wanted: str) -> Floats:
     """Return finite numbers of shape (3,) or (n, 3), read-only. Raises: ValueError that names the argument."""
     try:
-        value = np.array(given, np.float64)
-    except (TypeError, ValueError):
+        value = reals(name, given)
+    except ValueError:
         raise ValueError(f"{name}: numbers of shape {wanted} wanted, {given!r} given") from None
     if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
         raise ValueError(f"{name}: numbers of shape {wanted} wanted, {value.tolist()} given")
@@ -65,9 +68,11 @@ def uniform_array(n: int, spacing: float, axis: str = "y") -> Floats:
     >>> uniform_array(3, 0.002)[:, 1].tolist()
     [-0.002, 0.0, 0.002]
     """
-    if int(n) != n or n < 1:
-        raise ValueError(f"n = {n!r}: a whole number of at least 1 is wanted")
-    if not (np.isfinite(spacing) and spacing > 0.0):
+    check_type("n", n, int)
+    if not 1 <= n <= _MOST:
+        raise ValueError(f"n = {n!r}: must lie between 1 and {_MOST}")
+    check_type("spacing", spacing, float)
+    if spacing <= 0.0:
         raise ValueError(f"spacing = {spacing!r}: must be positive and finite [m]")
     if axis not in ("y", "z"):
         raise ValueError(f"axis = {axis!r}: must be y or z")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from raychan.radar.declared import check_declared
+from raychan.radar.declared import check_declared, check_type
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform
 
@@ -29,6 +29,7 @@ class Interferer:
 
     def __post_init__(self) -> None:
         check_declared(Interferer, vars(self))
+        check_type("Interferer.name", self.name, str)
         if len(self.radar.tx_elements) > 1 or isinstance(self.radar.waveform, OwnWaveform):
             raise ValueError("Interferer.radar: one transmitter of linear ramps wanted")
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from raychan.poses import angles, direction
 from raychan.radar.antenna import Antenna, check, polarized
+from raychan.radar.declared import reals
 from raychan.units import undb
 
 Floats = NDArray[np.float64]
@@ -30,7 +31,7 @@ class PatternError(ValueError):
 class MeasuredAntenna:
     """A pattern on a grid of azimuth and elevation, linear in dB between its points and constant beyond its edges.
 
-    `MeasuredAntenna.load` reads one from a CSV file.
+    `MeasuredAntenna.load` reads one from a CSV file. Raises: ValueError for values that cannot be.
     """
 
     azimuth: Floats
@@ -45,6 +46,19 @@ class MeasuredAntenna:
 
     def __post_init__(self) -> None:
         check(self.polarization)
+        for name in ("azimuth", "elevation", "gain_db", "phase"):
+            value = reals(f"MeasuredAntenna.{name}", getattr(self, name))
+            if not np.isfinite(value).all():
+                raise ValueError(f"MeasuredAntenna.{name}: finite numbers are wanted")
+            object.__setattr__(self, name, value)
+        for name in ("azimuth", "elevation"):
+            knots = getattr(self, name)
+            if knots.ndim != 1 or len(knots) < 2 or (np.diff(knots) <= 0.0).any():
+                raise ValueError(f"MeasuredAntenna.{name}: 2 or more angles [rad] are wanted, increasing")
+        wanted = len(self.azimuth), len(self.elevation)
+        for name in ("gain_db", "phase"):
+            if getattr(self, name).shape != wanted:
+                raise ValueError(f"MeasuredAntenna.{name} of shape {getattr(self, name).shape}: {wanted} is wanted")
 
     @classmethod
     def load(cls, path: str | Path, polarization: str = "V") -> MeasuredAntenna:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+
+from raychan.radar.declared import check_declared, is_whole
 
 
 @dataclass(frozen=True)
@@ -42,20 +46,22 @@ class Processing:
         for name in ("range_window", "rate_window", "beam_window"):
             value = getattr(self, name)
             if value not in ("rect", "hann"):  # others need scipy to be checked
-                from raychan.radar.windows import window
+                from raychan.radar.windows import check_window
 
-                window(value, 2)
+                check_window(f"Processing.{name}", value)
         if self.cfar not in ("ca", "os"):
             raise ValueError(f"Processing.cfar = {self.cfar!r}: must be 'ca' or 'os'")
         if self.beams not in ("coherent", "mean"):
             raise ValueError(f"Processing.beams = {self.beams!r}: must be 'coherent' or 'mean'")
         if self.doa not in ("bartlett", "capon", "music", "esprit"):
             raise ValueError(f"Processing.doa = {self.doa!r}: must be 'bartlett', 'capon', 'music' or 'esprit'")
+        check_declared(Processing, vars(self))
         if not 0.0 < self.pfa < 1.0:
             raise ValueError(f"Processing.pfa = {self.pfa!r}: must lie between 0 and 1")
-        if not math.isfinite(self.min_snr_db):
-            raise ValueError(f"Processing.min_snr_db = {self.min_snr_db!r}: must be finite")
         for name, least in (("pad", 1), ("guard", 0), ("train", 0)):
             pair = getattr(self, name)
-            if pair is not None and (len(pair) != 2 or any(int(n) != n or n < least for n in pair)):
+            if pair is None and name != "pad":
+                continue
+            two = isinstance(pair, Sequence | np.ndarray) and len(pair) == 2
+            if not (two and all(is_whole(n) and n >= least for n in pair)):
                 raise ValueError(f"Processing.{name} = {pair!r}: must be two whole numbers of at least {least}")

@@ -16,7 +16,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.radar.declared import check_declared
+from raychan.radar.declared import check_declared, reals
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ class Waveform:
     def __post_init__(self) -> None:
         check_declared(Waveform, vars(self))
         try:
-            object.__setattr__(self, "stagger", tuple(map(float, self.stagger)))
+            object.__setattr__(self, "stagger", tuple(map(float, reals("Waveform.stagger", self.stagger))))
         except (TypeError, ValueError):
             raise ValueError(f"Waveform.stagger = {self.stagger!r}: times [s] wanted, as (25e-6, 31e-6)") from None
         if self.stagger:

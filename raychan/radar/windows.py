@@ -22,7 +22,7 @@ def window(name: str, n: int) -> Floats:
     Args: name one of NAMES; taylor and chebyshev take a side-lobe level in dB: "taylor(40)".
     Raises: ValueError on an unknown name. Source: Harris 1978.
     """
-    match = re.fullmatch(r"([a-z]+)(?:\((\d+(?:\.\d*)?)\))?", name)
+    match = re.fullmatch(r"([a-z]+)(?:\((\d+(?:\.\d*)?)\))?", name) if isinstance(name, str) else None
     kind = match[1] if match else ""
     level = float(match[2]) if match and match[2] else _SIDE_LOBE.get(kind, 0.0)
     if kind not in NAMES or (match and match[2] and not (kind in _SIDE_LOBE and 10.0 <= level <= 200.0)):
@@ -45,6 +45,14 @@ def window(name: str, n: int) -> Floats:
         # Below 45 dB scipy warns about spectra; over the elements of an array such levels are common.
         warnings.simplefilter("ignore", UserWarning)
         return np.asarray(windows.chebwin(n, level), np.float64)
+
+
+def check_window(where: str, name: str) -> None:
+    """Raise ValueError that names the field unless it names a window."""
+    try:
+        window(name, 2)
+    except ValueError as e:
+        raise ValueError(f"{where} = {name!r}: {str(e).partition(': ')[2]}") from None
 
 
 def processing_gain(taper: Floats) -> float:

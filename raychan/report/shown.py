@@ -21,7 +21,10 @@ def draw(thing: Any, axes: Any = None) -> Any:
     """Draw a Result, a RangeDoppler, a RangeAzimuth, a Profile or a Spectrogram and return the axes.
 
     Args: axes to draw into; of a Result two, for map and profile; None makes a figure of pyplot.
+    Raises: ValueError for other axes.
     """
+    if axes is not None:
+        _check(axes, 2 if isinstance(thing, Result) else 1)
     with style():
         if isinstance(thing, Result):
             if axes is None:
@@ -43,6 +46,14 @@ def draw(thing: Any, axes: Any = None) -> Any:
         else:
             raise TypeError(f"there is no picture of a {type(thing).__name__}")
     return axes
+
+
+def _check(axes: Any, count: int) -> None:
+    """Raise ValueError unless axes are those of matplotlib, one or a sequence of two."""
+    given = [axes] if count == 1 else list(np.ravel(axes))
+    if len(given) != count or not all(hasattr(x, "pcolormesh") for x in given):
+        wanted = "an Axes of matplotlib is" if count == 1 else "two Axes of matplotlib are"
+        raise ValueError(f"axes = {axes!r}: {wanted} wanted, or None")
 
 
 def _two() -> tuple[Any, Any]:

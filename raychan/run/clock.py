@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from raychan.radar.declared import check_type
+
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, 0 to 1."""
 
@@ -16,6 +18,7 @@ class Clock:
     """Seconds by stage; tells the progress of each."""
 
     def __init__(self, progress: Progress | None = None) -> None:
+        check_type("progress", progress, Callable, or_none=True)  # type: ignore[arg-type]
         self.tell = progress or (lambda stage, share: None)
         self.timings: dict[str, float] = {}
 

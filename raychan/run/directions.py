@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.processing.range_azimuth import range_azimuth as from_map
 from raychan.radar.aperture import cosines
+from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
-from raychan.run.receiver import aperture_of, map_of, receivers
+from raychan.run.receiver import aperture_of, check_cube, check_map, map_of, receivers
 from raychan.run.result import Result
 from raychan.units import C0
 
@@ -24,8 +25,13 @@ def range_azimuth(data: Cube | RangeDoppler, radar: Radar) -> RangeAzimuth:
     """Return the range-azimuth map of samples or of a range-Doppler map, of all range rates the strongest.
 
     Args: data, a Cube or a RangeDoppler with all receivers; radar that recorded it, with its `processing`.
-    Raises: ValueError where the radar's receivers measure no azimuth.
+    Raises: ValueError where the radar's receivers measure no azimuth, or the data are not of this radar.
     """
+    check_type("data", data, Cube, RangeDoppler)
+    if isinstance(data, Cube):
+        check_cube(data, radar)
+    else:
+        check_map(data, radar)
     rdmap = map_of(data, radar, radar.processing) if isinstance(data, Cube) else data
     return from_map(rdmap, receivers(radar), C0 / radar.waveform.middle, radar.processing.beam_window)
 

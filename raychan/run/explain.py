@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from raychan.columns import Record, column
 from raychan.poses import angles
+from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
 from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result
@@ -64,12 +66,17 @@ def explain(
     the detections print it: the nearest detection within a resolution cell of them is taken, of equally near ones the
     strongest; detection its number instead, from 1; cell the very map cell at range and speed (without speed the
     strongest there), which is also taken where no detection is near.
-    Raises: ValueError outside the map, on a number that no detection has, or if nothing or both are asked for.
+    Raises: ValueError for another type, outside the map, on a number that no detection has, or if nothing or both are
+    asked for.
     """
     if (range is None) == (detection is None):
         raise ValueError("either a range or the number of a detection is wanted")
     if detection is not None and (speed is not None or cell):
         raise ValueError("the number of a detection stands alone, without a speed or the cell")
+    check_type("result", result, Result, str, PathLike)
+    check_type("range", range, float, or_none=True)
+    check_type("speed", speed, float, or_none=True)
+    check_type("cell", cell, bool)
     if not isinstance(result, Result):
         from raychan.run.storage import load_result
 
@@ -139,11 +146,12 @@ def _met(paths: Paths, known: Chains) -> tuple[tuple[str, ...], ...]:
 
 
 def _checked(result: Result, number: int) -> int:
+    check_type("detection", number, int)
     count = len(result.detections.range)
     if not 1 <= number <= count:
         allowed = f"they are numbered from 1 to {count}" if count else "there is none"
         raise ValueError(f"no detection has the number {number}: {allowed}")
-    return number - 1
+    return int(number) - 1
 
 
 def _nearest(result: Result, range: float, speed: float | None) -> list[int]:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from raychan.channel.mesh_error import mesh_error
 from raychan.poses import direction
+from raychan.radar.declared import check_type, reals
 from raychan.run.rcs_refinement import Case, Value, refined
 from raychan.run.single_body import facets_of, mesh_of
 from raychan.tracing.legs import Leg
@@ -88,13 +89,17 @@ def rcs(
     Source: Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5.
     """
     _check(frequency, polarization, distance, tolerance_db, max_bounces, crease_deg)
+    check_type("material", material, str, Material)
+    check_type("simplify", simplify, bool)
     bistatic = rx_azimuth_deg is not None or rx_elevation_deg is not None or rx_distance is not None
-    if rx_distance is not None and not (rx_distance > 0.0 and np.isinf(rx_distance) == np.isinf(distance)):
-        raise ValueError(f"rx_distance = {rx_distance!r} m: must be above 0, and inf where distance is")
+    if rx_distance is not None:
+        _check_distance("rx_distance", rx_distance)
+        if np.isinf(rx_distance) != np.isinf(distance):
+            raise ValueError(f"rx_distance = {rx_distance!r} m: must be inf where distance is, and only there")
     rx_az = azimuth_deg if rx_azimuth_deg is None else rx_azimuth_deg
     rx_el = elevation_deg if rx_elevation_deg is None else rx_elevation_deg
     RAYS.check("max_rays", max_rays, whole=True)
-    angles = _angles(azimuth_deg, elevation_deg, rx_az, rx_el)
+    angles = _angles(azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, rx_azimuth_deg=rx_az, rx_elevation_deg=rx_el)
     k = 2.0 * np.pi * frequency / C0
     body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None, crease_deg is not None)
     topology = [body.mesh.topology] if body.merged else []
@@ -115,11 +120,12 @@ def rcs(
     return _collected(found, angles[0].shape, str(body.merged or ""))
 
 
-def _angles(*given: ArrayLike) -> list[Floats]:
+def _angles(**given: ArrayLike) -> list[Floats]:
     """Return angles [rad] of the same shape. Raises: ValueError where there are none, or their shapes do not fit."""
-    each = [np.radians(np.asarray(a, float)) for a in given]
-    if not all(a.size and np.isfinite(a).all() for a in each):
-        raise ValueError("angles must be finite numbers of degrees, one at least")
+    each = [np.radians(reals(name, a)) for name, a in given.items()]
+    for name, a in zip(given, each, strict=True):
+        if not (a.size and np.isfinite(a).all()):
+            raise ValueError(f"{name} = {given[name]!r}: finite numbers of degrees are wanted, one at least")
     try:
         return list(np.broadcast_arrays(*each))
     except ValueError:
@@ -154,11 +160,15 @@ def _check(
     frequency: float, polarization: str, distance: float, tolerance_db: float, bounces: int, crease_deg: float | None
 ) -> None:
     FREQUENCY.check("frequency", frequency)
-    if polarization.upper() not in _POLARIZATIONS:
+    if str(polarization).upper() not in _POLARIZATIONS:
         raise ValueError(f"polarization = {polarization!r}: must be one of {', '.join(_POLARIZATIONS)}")
-    if distance != np.inf:
-        LENGTH.check("distance", distance)
+    _check_distance("distance", distance)
     TOLERANCE_DB.check("tolerance_db", tolerance_db)
     BOUNCES.check("max_bounces", bounces, whole=True)
     if crease_deg is not None:
         CREASE.check("crease_deg", crease_deg)
+
+
+def _check_distance(name: str, distance: float) -> None:
+    if distance != np.inf:
+        LENGTH.check(name, distance)

@@ -18,9 +18,11 @@ from raychan.processing.mimo import virtual_range_doppler
 from raychan.processing.peaks import SideLobes, strongest
 from raychan.processing.staggered import hypotheses, unfolded
 from raychan.radar.aperture import Aperture
+from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.radar.windows import processing_gain, window
 from raychan.records import Cube, Detections, MapError, RangeDoppler
+from raychan.reprs import counted
 from raychan.units import C0, undb
 
 Floats = NDArray[np.float64]
@@ -46,6 +48,28 @@ def channel(cube: Cube, radar: Radar, cross: bool = False) -> Cube:
         return cube
     many = len(radar.elements)
     return cube.replace(samples=cube.samples[many:] if cross else cube.samples[:many])
+
+
+def check_cube(cube: Cube, radar: Radar) -> None:
+    """Raise ValueError unless samples are a cube, and as many as a radar records."""
+    check_type("cube", cube, Cube)
+    check_type("radar", radar, Radar)
+    wave = radar.waveform
+    own = radar.receivers, wave.n_chirps, wave.n_samples
+    if cube.samples.shape != own:
+        raise ValueError(f"cube of shape {cube.samples.shape} (receiver, chirp, sample); the radar has {own}")
+
+
+def check_map(rdmap: RangeDoppler, radar: Radar) -> None:
+    """Raise ValueError unless a map is one, and has a radar's antennas and cells."""
+    check_type("rdmap", rdmap, RangeDoppler)
+    check_type("radar", radar, Radar)
+    wave = radar.waveform
+    own = len(receivers(radar)), wave.range_resolution, 0.5 * C0 / wave.middle / wave.frame_duration
+    given = len(rdmap.spectrum), rdmap.range_resolution, rdmap.rate_resolution
+    if not np.allclose(given, own, rtol=1e-6, atol=0.0):
+        found, wanted = (f"{counted(n, 'antenna')} and cells of {r:.4g} m by {v:.4g} m/s" for n, r, v in (given, own))
+        raise ValueError(f"rdmap of {found}; the radar has {wanted}")
 
 
 def seen_in_map(rdmap: RangeDoppler, radar: Radar, settings: Any) -> DetectorMap:

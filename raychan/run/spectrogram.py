@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from scipy.signal import ShortTimeFFT
 
 from raychan.columns import Record, column
+from raychan.radar.declared import reals
 from raychan.radar.radar import Radar
 from raychan.radar.windows import window
 from raychan.records import Cube
 from raychan.reprs import Plotted
-from raychan.run.clock import Progress
+from raychan.run.clock import Clock, Progress
 from raychan.run.micro_doppler import stretches
 from raychan.run.rules import allowed_memory, asked, check_demand, fine_rule
 from raychan.run.streams import Stage, stream
@@ -98,7 +99,7 @@ def spectrogram(
     cells = _cells(radar, ranges)
     if (need := _BYTES * chirps * len(cells) * len(radar.elements)) > allowed_memory():
         raise ValueError(f"duration = {duration:g} s takes {need / 1e9:.0f} GB of memory: fewer ranges take less")
-    tell = progress or (lambda stage, share: None)
+    tell = Clock(progress).tell
     rng, slow, signal, error = stream(seed, Stage.NOISE), [], 0.0, 0.0
     rule = fine_rule(scene.radar, scene.processing, model)
     for quiet, off in stretches(long, rule, model, count, lambda share: tell("trace", share)):
@@ -156,6 +157,9 @@ def _cells(radar: Radar, ranges: tuple[float, float] | None) -> NDArray[np.int64
     wave = radar.waveform
     cells = np.arange(wave.n_samples if wave.complex_sampling else wave.n_samples // 2)
     if ranges is not None:
+        ends = reals("ranges", ranges)
+        if ends.shape != (2,):
+            raise ValueError(f"ranges = {ranges!r}: two numbers are wanted, from and to [m]")
         CELL_RANGE.check("ranges[0]", ranges[0])
         at = cells * wave.range_resolution
         cells = cells[(at >= ranges[0]) & (at <= ranges[1])]

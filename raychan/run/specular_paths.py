@@ -18,7 +18,7 @@ from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import Mirror
 from raychan.tracing.routes import Interactions, ray_routes
 from raychan.world.geometry import Geometry
-from raychan.world.limits import BOUNCES
+from raychan.world.limits import BOUNCES, PLACE, SPEED
 from raychan.world.point_in_body import Place, place_of
 from raychan.world.scene import Scene
 from raychan.world.scene_given import check_scene
@@ -97,6 +97,8 @@ def _found_chains(geometry: Geometry, tx: Floats, rx: Floats, bounces: int, seed
         for _ in range(bounces):
             hit, t = geometry.cast(p, d, skip)
             ok = hit >= 0
+            if not ok.any():
+                break
             p, d, hit, met = p[ok] + t[ok, None] * d[ok], d[ok], hit[ok], met[ok]
             n = geometry.normal[hit]
             slope = np.einsum("ij,ij->i", d, n)
@@ -235,12 +237,15 @@ def specular_paths(
     Returns: SpecularPaths, shortest first: length [m] and length_rate [m/s] of the whole way, gain (n, 2, 2) with
     lambda / 4 pi L and the carrier phase exp(-jkL), rows the receiver's V, H, columns the transmitter's (theta-hat and
     phi-hat of the direction of travel), bodies and kind (n, d), vertices (n, d + 2, 3) [m]. Gain 0 is left out.
-    Raises: ValueError for points that are not three finite numbers, SceneError for no Scene.
+    Raises: ValueError for points or velocities that cannot be, SceneError for no Scene.
     Source: image method, McKown, Hamilton 1991.
     """
     check_scene(scene)
     given = {"tx": tx, "rx": rx, "tx_velocity": tx_velocity, "rx_velocity": rx_velocity}
     ends = [numbers(name, value, "(3,)") for name, value in given.items()]
+    for name, end in zip(given, ends, strict=True):
+        for x in end:
+            (SPEED if name.endswith("velocity") else PLACE).check(name, float(x))
     replace(BOUNCES, low=0).check("max_bounces", max_bounces, whole=True)
     facets = scene.facets(0.0)
     routes = specular_routes(Geometry(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)

@@ -7,12 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from raychan.channel.paths import join, nothing, paths_of
+from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
 from raychan.run.preview import preview_noise, preview_rule
 from raychan.run.preview_launch import preview_routes
 from raychan.run.received import received
-from raychan.run.receiver import detections_in, map_of, noise_amplitude, noise_equivalent_amplitude
+from raychan.run.receiver import (
+    check_cube,
+    check_map,
+    detections_in,
+    map_of,
+    noise_amplitude,
+    noise_equivalent_amplitude,
+)
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.solver import Batch
@@ -25,6 +33,7 @@ from raychan.units import C0
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
+from raychan.world.scene_given import check_scene
 from raychan.world.schema import PREVIEW
 
 
@@ -57,8 +66,10 @@ def trace(
 
     Args: tolerance_db [dB] and max_bounces override the scene's; check: those of one launch, coarser and on another
     lattice. Where bodies turn within a frame, `simulate` traces several instants; these are the routes of its start.
-    Raises: ValueError on a tolerance or a number of bounces out of range.
+    Raises: ValueError on a tolerance or a number of bounces out of range, SceneError for no Scene.
     """
+    check_scene(scene)
+    check_type("check", check, bool)
     model = asked(scene.model, tolerance_db, max_bounces)
     radar, settings, geometry, points = (
         scene.radar,
@@ -90,6 +101,8 @@ def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
     Raises: ValueError for a radar that the routes were not traced for: elsewhere, of another carrier, of less noise, of
     more bandwidth, or with antennas that reach farther. Its polarisation, power and motion are free.
     """
+    check_type("routes", routes, SceneRoutes)
+    check_type("radar", radar, Radar)
     carrier = radar.waveform.carrier
     own = replace(routes.rule.refinement, wavenumber=2.0 * np.pi * carrier / C0, cell=C0 / radar.waveform.bandwidth)
     noise = noise_equivalent_amplitude(radar, radar.processing)
@@ -107,6 +120,8 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     Args: seed of the noise: equal seeds give equal bytes. A radar with `noise=False` gives none.
     Targets are steady here: only `simulate`, which knows their bodies, draws those that fluctuate.
     """
+    check_type("paths", paths, Paths)
+    check_type("radar", radar, Radar)
     SEED.check("seed", seed, whole=True)
     clean = samples_of(paths, radar)
     return received(clean, paths, radar, seed, clean=clean)[0]
@@ -116,10 +131,17 @@ def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler
     """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`.
 
     Args: cross: of the cross-polarised receivers of a radar with `rx_polarization="both"`, else of the co-polarised.
+    Raises: ValueError for samples that are not of this radar.
     """
+    check_cube(cube, radar)
+    check_type("cross", cross, bool)
     return map_of(cube, radar, radar.processing, cross)
 
 
 def detect(rdmap: RangeDoppler, radar: Radar) -> Detections:
-    """Return what the radar's detector finds in a map, by the CFAR of `radar.processing`."""
+    """Return what the radar's detector finds in a map, by the CFAR of `radar.processing`.
+
+    Raises: ValueError for a map that is not of this radar.
+    """
+    check_map(rdmap, radar)
     return detections_in(rdmap, radar, radar.processing)

@@ -7,11 +7,13 @@ import json
 import math
 import platform
 from importlib.metadata import PackageNotFoundError, version
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from raychan.radar.declared import check_type
 from raychan.radar.waveform import Waveform
 from raychan.run.ledger import entry_of
 from raychan.run.netcdf import GROUPS, as_netcdf, read_record
@@ -66,10 +68,11 @@ def save_result(result: Result, directory: str | Path) -> None:
 def load_result(path: str | Path) -> Result:
     """Return the Result stored in a directory or a result.nc; its scene is read again from the text if that can be.
 
-    Raises: StoreError if there is no such file or it is not one of ours.
+    Raises: StoreError if there is no such file or it is not one of ours, ValueError for no path.
     """
     import xarray as xr
 
+    check_type("path", path, str, PathLike)
     path = Path(path)
     file = path / "result.nc" if path.is_dir() else path
     if not file.is_file():

@@ -10,6 +10,7 @@ import numpy as np
 
 from raychan.columns import take
 from raychan.processing.range_doppler import range_doppler
+from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points
 from raychan.run.labels import Chains, chains, label_of
@@ -59,8 +60,9 @@ def visibility(result: Result, target: str) -> Visibility:
     Args: result of a run with its scene; target a body's name. A path counts as direct or multipath by the
     rule for the labels of detections; as diffracted where it met an edge, by the scene's model or, where that leaves
     diffraction out, by single wedges (UTD).
-    Raises: ValueError for an unknown body, the ground, or the radar's own vehicle.
+    Raises: ValueError for no Result, an unknown body, the ground, or the radar's own vehicle.
     """
+    check_type("result", result, Result)
     scene = check_target(result.scene, target)
     facets, points, radar = scene.facets(0.0), scene.points(0.0), scene.radar
     hidden = occlusion(facets, points, radar.position, target, scene.model.max_transmissions)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 
 import numpy as np
 
+from raychan.radar.declared import reals
 from raychan.records import Role
 from raychan.units import undb
 from raychan.world import limits, shapes
@@ -103,13 +104,14 @@ class Body:
         """Return a field as `count` numbers. Raises: SceneError where they are no numbers or beyond their limit."""
         value = getattr(self, name)
         try:
-            found = [float(x) for x in np.atleast_1d(np.asarray(value, float)).ravel()]
-        except (TypeError, ValueError):
-            found = []
-        if len(found) != count or not all(map(limit.allows, found)):
+            given = reals(name, value)
+        except ValueError:
+            given = np.zeros(0)
+        found = given.ravel().tolist()
+        if given.shape != (() if count == 1 else (count,)) or not all(map(limit.allows, found)):
             allowed = limit.allowed if count == 1 else f"{count} numbers, each {limit.allowed}"
             raise SceneError(f"{shown(value)} is not possible", key=f"{self.name}.{name}", value=value, allowed=allowed)
-        return found
+        return list(found)
 
     @cached_property
     def limbs(self) -> tuple[Body, ...]:
@@ -158,7 +160,8 @@ class Body:
     @property
     def fluctuates(self) -> bool:
         """Whether its RCS does; SceneError for an unknown Swerling case, or where no RCS is given."""
-        if self.swerling not in range(5) or (self.swerling and self.rcs_dbsm is None):
+        known = not isinstance(self.swerling, bool | np.bool_) and self.swerling in range(5)
+        if not known or (self.swerling and self.rcs_dbsm is None):
             key, allowed = f"{self.name}.swerling", "0, 1, 2, 3 or 4, above 0 only with rcs_dbsm"
             raise SceneError(f"{shown(self.swerling)} is not possible", key=key, value=self.swerling, allowed=allowed)
         return self.swerling > 0

@@ -15,10 +15,17 @@ import numpy as np
 from raychan.em.diffuse import Diffuse
 from raychan.records import LAYER, MaterialKind, Materials
 from raychan.units import EPS0
-from raychan.world.errors import SceneError, nearest
+from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import EPS_R, ROUGHNESS_MM, SIGMA, THICKNESS_MM
 
 _ROUGHNESS, _THICKNESS = ROUGHNESS_MM.times(1e-3, "m"), THICKNESS_MM.times(1e-3, "m")
+
+_TYPES = {
+    "pec": (bool | np.bool_, "true or false"),
+    "name": (str, "a text"),
+    "source": (str, "a text"),
+    "diffuse": (Diffuse | None, "a Diffuse, or None"),
+}
 
 
 @dataclass(frozen=True)
@@ -42,13 +49,12 @@ class Material:
     def __post_init__(self) -> None:
         for key, limit in (("eps_r", EPS_R), ("sigma", SIGMA), ("roughness", _ROUGHNESS), ("thickness", _THICKNESS)):
             value = getattr(self, key)
-            if not (limit.allows(value) if value is not None else key == "thickness"):
-                raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=limit.allowed)
-
-        if not (self.diffuse is None or isinstance(self.diffuse, Diffuse)):
-            raise SceneError(
-                f"{self.diffuse!r} is not possible", key="diffuse", value=self.diffuse, allowed="a Diffuse, or None"
-            )
+            if limit.problem(value) if value is not None else key != "thickness":
+                raise SceneError(f"{shown(value)} is not possible", key=key, value=value, allowed=limit.allowed)
+        for key, (kind, allowed) in _TYPES.items():
+            value = getattr(self, key)
+            if not isinstance(value, kind):
+                raise SceneError(f"{shown(value)} is not possible", key=key, value=value, allowed=allowed)
 
     @property
     def kind(self) -> MaterialKind:

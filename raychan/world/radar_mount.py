@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def mount(radar: Radar | RadarTable | Mapping[str, object] | None, file: Any = None) -> RadarTable | None:
     """Return the radar table of what a scene is given; SceneError for values that a scene file could not have."""
     if radar is None or isinstance(radar, RadarTable | Mapping):
-        return None if radar is None else checked(RadarTable, radar, file)  # type: ignore[no-any-return]
+        return None if radar is None else checked(RadarTable, radar, file, "radar")  # type: ignore[no-any-return]
     from raychan.radar.radar import Radar
     from raychan.world.scene_text import radar_table_of
 
@@ -42,8 +42,8 @@ def processing_of(given: Processing | Mapping[str, object] | None, radar: object
     from raychan.radar.processing import Processing
 
     own = getattr(radar, "processing", None) if given is None else given
-    table = asdict(own) if isinstance(own, Processing) else own or {}
-    return Processing(**checked(ProcessingTable, table, file).model_dump())
+    table = asdict(own) if isinstance(own, Processing) else {} if own is None else own
+    return Processing(**checked(ProcessingTable, table, file, "processing").model_dump())
 
 
 def radar_of(table: RadarTable, processing: Processing, folder: Path, file: Any = None) -> Radar:

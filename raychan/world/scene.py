@@ -27,7 +27,7 @@ from raychan.world.material import Material, material, names, validity
 from raychan.world.mesh import Floats
 from raychan.world.posed import index_of, points_of, posed, spheres_inside
 from raychan.world.radar_mount import mount, processing_of, radar_of
-from raychan.world.scene_arguments import bodies_of, materials_of
+from raychan.world.scene_arguments import bodies_of, check_texts, materials_of
 from raychan.world.schema import PREVIEW, BodyTable, InterfererTable, Model, RadarTable, SceneFile
 from raychan.world.schema_errors import checked
 from raychan.world.schema_impairments import AtmosphereTable
@@ -73,6 +73,7 @@ class Scene(Fixed, Described):
         atmosphere: Atmosphere | AtmosphereTable | Mapping[str, object] | None = None,
         interferers: Iterable[Interferer | InterfererTable | Mapping[str, object]] = (),
     ) -> None:
+        check_texts(title=title, text=text, path=path, folder=folder)
         self.title, self.text, self.path = title, text, path
         self.folder = folder or Path.cwd()
         self._given = bodies_of(bodies)
@@ -82,14 +83,14 @@ class Scene(Fixed, Described):
         self.is_radar_object = not isinstance(radar, RadarTable | Mapping | None)
         if not isinstance(radar, RadarTable | Mapping | None):
             self.__dict__["radar"] = replace(radar, processing=self.processing)
-        self.model: Model = checked(Model, model or Model(), path)
+        self.model: Model = checked(Model, Model() if model is None else model, path, "model")
         carrier = self.radar_table.waveform.carrier_ghz * 1e9 if self.radar_table else 77e9
         if frequency is not None and FREQUENCY.problem(frequency):
             raise SceneError(
                 f"{frequency!r} is not possible", key="frequency", value=frequency, allowed=FREQUENCY.allowed
             )
         self.frequency = carrier if frequency is None else float(frequency)
-        self.materials = materials_of(materials or {})
+        self.materials = materials_of({} if materials is None else materials)
         self.atmosphere = atmosphere_of(atmosphere, path)
         self.attenuation = attenuation_of(self.atmosphere, self.frequency, self.radar_table, path)
         self.interferers = interferers_of(interferers, self.folder, path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,14 @@ def materials_of(given: Any) -> dict[str, Material]:
     return dict(given)
 
 
+def check_texts(**given: Any) -> None:
+    """Raise SceneError unless title and text of a scene are texts, and its path and folder paths or None."""
+    for name, value in given.items():
+        kind, allowed = (str, "a text") if name in ("title", "text") else (Path | None, "a Path, or None")
+        if not isinstance(value, kind):
+            raise _refused(value, name, allowed)
+
+
 def _check(body: Body, number: int) -> None:
     """Raise SceneError where a field of a body could not stand in its table."""
     if not (isinstance(body.name, str) and 0 < len(body.name) <= _LONGEST and "." not in body.name):
@@ -57,7 +66,7 @@ def _check(body: Body, number: int) -> None:
         raise e.at(key=f"bodies.{body.name}") from None
     for name, (kind, allowed) in _NAMES.items():
         value = getattr(body, name)
-        if not (value is None or isinstance(value, kind)):
+        if not (value is None or (isinstance(value, kind) and value)):
             raise _refused(value, f"bodies.{body.name}.{name}", allowed)
 
 

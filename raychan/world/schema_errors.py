@@ -9,12 +9,12 @@ from pydantic import BaseModel, ValidationError
 from raychan.world.errors import SceneError, nearest, shown
 
 
-def checked(kind: type[Any], data: Any, file: Any = None) -> Any:
-    """Return `data` checked as a table of `kind`. Raises: SceneError for the first error."""
+def checked(kind: type[Any], data: Any, file: Any = None, key: str = "") -> Any:
+    """Return `data` checked as a table of `kind`, which stands under a key. Raises: SceneError for the first error."""
     try:
         return kind.model_validate(data)
     except ValidationError as e:
-        raise _explained(kind, data, e, file) from None
+        raise _explained(kind, data, e, file).at(key=key) from None
 
 
 _TYPES = {

@@ -30,7 +30,7 @@ def atmosphere_of(given: Any, file: Path | None) -> Atmosphere | None:
     if given is None:
         return None
     table = asdict(given) if isinstance(given, Atmosphere) else given
-    return Atmosphere(**checked(AtmosphereTable, table, file).model_dump())
+    return Atmosphere(**checked(AtmosphereTable, table, file, "atmosphere").model_dump())
 
 
 def attenuation_of(air: Atmosphere | None, frequency: float, radar: RadarTable | None, file: Path | None) -> float:
@@ -56,7 +56,7 @@ def interferers_of(given: Any, folder: Path, file: Path | None) -> tuple[Interfe
         raise SceneError(f"{shown(given)} is not possible", file=file, key="interferers", value=given, allowed=allowed)
     for one in given:
         if isinstance(one, InterfererTable | Mapping):
-            one = _interferer(checked(InterfererTable, one, file), folder, file)
+            one = _interferer(checked(InterfererTable, one, file, "interferers"), folder, file)
         if not isinstance(one, Interferer):
             wanted = "an Interferer or its table"
             raise SceneError(f"{shown(one)} is not possible", file=file, key="interferers", value=one, allowed=wanted)

@@ -26,8 +26,8 @@ from raychan.run.sequence import Frame
 from raychan.run.storage import save_result
 from raychan.study.visibility import Visibility
 
-ELSEWHERE = {"trace", "transfer", "synthesize", "range_doppler", "detect", "SceneRoutes"}
-"""Public names whose examples stand in test_stages.py."""
+ELSEWHERE = {"trace", "transfer", "synthesize", "range_doppler", "detect", "SceneRoutes", "StoreError"}
+"""Public names whose examples stand in tests/run."""
 ROOT = Path(__file__).resolve().parents[2]
 FLAGS = (
     "--strict", "--follow-imports=silent", "--ignore-missing-imports", "--no-error-summary", "--config-file=",

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import raychan as rc
@@ -11,6 +12,13 @@ from raychan.radar.interferer import Interferer
 from raychan.world.errors import SceneError
 
 WAVE = rc.Waveform(77e9, 500e6, 20e-6)
+
+NAN = float("nan")
+
+
+def measured(**change):
+    given = {"azimuth": [-1.0, 0.0, 1.0], "elevation": [-1.0, 1.0], "gain_db": np.zeros((3, 2))}
+    return rc.MeasuredAntenna(**({**given, "phase": np.zeros((3, 2))} | change))
 
 
 @pytest.mark.parametrize(
@@ -38,7 +46,7 @@ WAVE = rc.Waveform(77e9, 500e6, 20e-6)
         (lambda: rc.Radar(WAVE, power="12"), "Radar.power = '12': must be finite, a number"),
         (lambda: rc.Radar(WAVE, yaw_deg=None), "Radar.yaw_deg = None: must be finite, a number"),
         (lambda: rc.Radar(WAVE, noise="no"), "Radar.noise = 'no': must be true or false"),
-        (lambda: rc.Radar(WAVE, position=None), r"Radar.position: numbers of shape \(3,\) wanted, nan given"),
+        (lambda: rc.Radar(WAVE, position=None), r"Radar.position: numbers of shape \(3,\) wanted, None given"),
         (lambda: rc.Radar(WAVE, elements="a"), r"Radar.elements: numbers of shape \(n, 3\) wanted, 'a' given"),
         (lambda: replace(WAVE, carrier="77"), "Waveform.carrier = '77': must be finite, a number"),
         (lambda: replace(WAVE, carrier=None), "Waveform.carrier = None: must be finite, a number"),
@@ -49,6 +57,45 @@ WAVE = rc.Waveform(77e9, 500e6, 20e-6)
         (lambda: replace(WAVE, bandwidth=77e9), "bandwidth = 7.7e.10 Hz: must be below the carrier of 7.7e.10 Hz"),
         (lambda: Interferer(None), "Interferer.radar = None: a Radar is wanted"),
         (lambda: Interferer(rc.Radar(WAVE), start=None), "Interferer.start = None: must be finite, a number"),
+        (lambda: rc.Radar(WAVE, position=("1", "2", "3")), r"Radar.position: numbers of shape \(3,\) wanted, \('1'"),
+        (lambda: rc.Radar(WAVE, position=(True, 0, 0)), r"Radar.position: numbers of shape \(3,\) wanted, \(True"),
+        (lambda: replace(WAVE, stagger=(True, 5e-5)), r"Waveform.stagger = \(True, 5e-05\): times \[s\] wanted"),
+        (lambda: replace(WAVE, stagger=[[3e-5], [5e-5]]), r"Waveform.stagger = .*: times \[s\] wanted"),
+        (lambda: Interferer(rc.Radar(WAVE), name=[1]), r"Interferer.name = \[1\]: must be a text"),
+        (lambda: Interferer(rc.Radar(WAVE), name=NAN), "Interferer.name = nan: must be a text"),
+        *(
+            (lambda name=name, x=x: rc.Processing(**{name: x}), f"Processing.{name} = .*: must be two whole numbers of")
+            for name in ("pad", "guard", "train")
+            for x in (3, "ab", (NAN, 1), (1,), ("1", "2"), (True, 2), [2.5, 1])
+        ),
+        (lambda: rc.Processing(pad=None), "Processing.pad = None: must be two whole numbers of at least 1"),
+        (lambda: rc.Processing(pfa="3"), "Processing.pfa = '3': must be finite, a number"),
+        (lambda: rc.Processing(min_snr_db=None), "Processing.min_snr_db = None: must be finite, a number"),
+        *(
+            (lambda name=name, x=x: rc.Processing(**{name: x}), f"Processing.{name} = {x!r}: must be one of rect, hann")
+            for name in ("range_window", "rate_window", "beam_window")
+            for x in (None, 3, "foo")
+        ),
+        (lambda: rc.IsotropicAntenna(loss_db=None), "loss_db = None: must be finite, a number"),
+        (lambda: rc.IsotropicAntenna(front="no"), "front = 'no': must be true or false"),
+        (lambda: rc.CosineAntenna("3", 20.0), "hpbw_h_deg = '3': must be finite, a number"),
+        (lambda: rc.CosineAntenna(0.0, 20.0), "hpbw_h_deg = 0.0: must be positive"),
+        (lambda: rc.ArrayAntenna("3", 2, 0.5, 0.5), "ny = '3': must be finite, a number"),
+        (lambda: rc.ArrayAntenna(4, 2.5, 0.5, 0.5), "ArrayAntenna.nz = 2.5: must be a whole number"),
+        (lambda: rc.ArrayAntenna(True, 2, 0.5, 0.5), "ny = True: must be finite, a number"),
+        (lambda: rc.ArrayAntenna(10**12, 2, 0.5, 0.5), "ny, nz = 1000000000000, 2: at most 1000 elements a row"),
+        (lambda: rc.Radar(WAVE, power=10**400), "Radar.power = 1000.*: must be finite, a number"),
+        (lambda: rc.ArrayAntenna(4, 2, "3", 0.5), "spacing_y = '3': must be finite, a number"),
+        (lambda: rc.ArrayAntenna(4, 2, 0.5, 0.5, taper_y=3), "taper_y = 3: must be one of rect, hann"),
+        (lambda: rc.ArrayAntenna(4, 2, 0.5, 0.5, element="patch"), "element = 'patch': an Antenna is wanted"),
+        (lambda: rc.ArrayAntenna(4, 2, 0.5, 0.5, element=3), "element = 3: an Antenna is wanted"),
+        (lambda: measured(azimuth=None), "MeasuredAntenna.azimuth = None: numbers are wanted"),
+        (lambda: measured(elevation=["0", "1"]), "MeasuredAntenna.elevation = .*: numbers are wanted"),
+        (lambda: measured(azimuth=[0.0]), "MeasuredAntenna.azimuth: 2 or more angles .* increasing"),
+        (lambda: measured(azimuth=[1.0, 0.0, 2.0]), "MeasuredAntenna.azimuth: 2 or more angles .* increasing"),
+        (lambda: measured(gain_db=np.full((3, 2), NAN)), "MeasuredAntenna.gain_db: finite numbers are wanted"),
+        (lambda: measured(gain_db=np.zeros((2, 3))), r"gain_db of shape \(2, 3\): \(3, 2\) is wanted"),
+        (lambda: Diffuse("gamma", -3.0, cross_db=NAN), "cross_db = nan: must be finite"),
         (lambda: Diffuse("gamma", "a"), "level_db = 'a': a number is wanted"),
         (lambda: Diffuse("gamma", -3.0, exponent="4"), "exponent = '4': a number is wanted"),
         (lambda: Diffuse("gamma", -3.0, k_shape=True), "k_shape = True: a number is wanted"),
@@ -58,6 +105,14 @@ WAVE = rc.Waveform(77e9, 500e6, 20e-6)
 def test_a_wrong_type_or_an_empty_table_is_told_with_what_is_wanted(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+def test_lists_scalars_of_numpy_and_whole_numbers_stay_allowed():
+    assert measured().field(np.eye(3)).shape == (3, 2)
+    assert rc.Processing(pad=[2, np.int64(4)], guard=np.array([1, 1]), min_snr_db=12).pad[1] == 4
+    assert rc.ArrayAntenna(np.int32(4), 2, 1, np.float32(0.5)).field(np.eye(3)).shape == (3, 2)
+    assert rc.Radar(WAVE, position=[np.float32(1.0), 2, np.int8(3)], power=1).position.tolist() == [1.0, 2.0, 3.0]
+    assert replace(WAVE, repetition=None, stagger=np.array([25e-6, 31e-6])).stagger == (25e-6, 31e-6)
 
 
 def test_scenes_tell_of_interferers_and_materials_of_the_wrong_type():

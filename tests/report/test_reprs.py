@@ -112,3 +112,7 @@ def test_a_result_its_map_and_its_profile_draw_themselves_in_given_axes_or_new_o
     assert plt.get_fignums() == [1, 2, 3], "figures of pyplot, which a notebook shows"
     with pytest.raises(AttributeError):
         made.paths.plot()
+    with pytest.raises(ValueError, match="axes = 3: an Axes of matplotlib is wanted, or None"):
+        made.rdmap.plot(3)
+    with pytest.raises(ValueError, match=r"axes = .*: two Axes of matplotlib are wanted, or None"):
+        made.plot(mine)

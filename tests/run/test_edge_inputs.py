@@ -87,6 +87,9 @@ def test_the_name_of_a_scene_is_no_scene(run, given):
     [
         ({"tx": "a"}, r"tx: numbers of shape \(3,\) wanted, 'a' given"),
         ({"rx_velocity": (1, 2)}, r"rx_velocity: numbers of shape \(3,\) wanted"),
+        ({"rx": ("1", "2", "3")}, r"rx: numbers of shape \(3,\) wanted"),
+        ({"rx": (1e30, 0, 0)}, r"rx = 1e\+30: must lie between -1e\+06 and 1e\+06 m"),
+        ({"rx_velocity": (1e30, 0, 0)}, r"rx_velocity = 1e\+30: must lie between -100000 and 100000 m/s"),
         ({"max_bounces": "a"}, "max_bounces = 'a': a whole number is wanted"),
         ({"max_bounces": -1}, "max_bounces = -1: must lie between 0 and 12"),
     ],
@@ -94,6 +97,11 @@ def test_the_name_of_a_scene_is_no_scene(run, given):
 def test_specular_paths_name_the_argument_that_cannot_be(given, said):
     with pytest.raises(ValueError, match=said):
         rc.specular_paths(target(), **({"tx": (0, 0, 1), "rx": (2, 0, 1)} | given))
+
+
+def test_no_specular_path_leads_below_the_ground():
+    scene = rc.Scene(bodies=[rc.Body("road", shape="ground"), rc.Body("ball", shape="sphere", position=(5, 0, 1))])
+    assert len(rc.specular_paths(scene, (0, 0, 0.5), (10, 0, -1), max_bounces=2).length) == 0
 
 
 def test_specular_paths_of_one_point_are_those_that_return_to_it():
