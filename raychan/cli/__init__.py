@@ -14,7 +14,7 @@ import typer
 from raychan.cli.explain import explain
 from raychan.cli.hil import hil
 from raychan.cli.info import info
-from raychan.cli.options import help_of
+from raychan.cli.options import help_of, unread
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
 from raychan.cli.ship import ship
@@ -143,7 +143,7 @@ def invoke(argv: list[str]) -> int:
         return _fail("out of memory; ask for a coarser --tolerance or fewer --max-bounces")
     except Exception as error:
         if hasattr(error, "format_message"):  # typer's own, of options and arguments
-            text = error.format_message()
+            text = unread(error) or error.format_message()
             return _fail(text) if text else 2
         from raychan.parallel import was_interrupted
         from raychan.world.errors import SceneError

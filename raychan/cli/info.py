@@ -23,6 +23,7 @@ _WORDS = {
     "coherent_gain": "gain of chirps x samples",
     "sensitivity": "noise in a cell of the map (rectangular windows)",
 }
+_TOLD = ("vertices", "faces", "size", "watertight")  # of a mesh's report, in other words
 _FIGURES = {
     "gain_dbi": "gain [dBi]",
     "hpbw_h_deg": "half-power width, azimuth [deg]",
@@ -106,7 +107,7 @@ def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
         ("size, x forward by y left by z up", f"{size} m"),
         ("vertices, facets", f"{len(mesh.vertices)}, {len(mesh.faces)}"),
         ("watertight", "yes" if r.watertight else "no"),
-        *((name.replace("_", " "), str(value)) for name, value in vars(r).items() if name != "watertight"),
+        *((name.replace("_", " "), str(value)) for name, value in vars(r).items() if name not in _TOLD),
     ]
     screen = show.console()
     screen.print(show.table(str(source), ("mesh", ""), facts, left=(0, 1)))

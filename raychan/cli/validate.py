@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import within
+from raychan.cli.options import directory, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 def validate(
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for report and figures; made if missing.", metavar="DIR")
+        Path,
+        typer.Option(
+            "--out", "-o", help="Directory for report and figures; made if missing.", metavar="DIR", parser=directory
+        ),
     ] = Path("out/validation"),
     only: Annotated[
         list[str] | None,
