@@ -60,6 +60,11 @@ def unread(error: Any) -> str:
     return str(error.format_message())
 
 
+Directory = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=directory),
+]
+
 # typer takes [m] for markup and drops it: in help texts units are words.
 _SCENE = "Scene file (TOML), or the name of a bundled one, such as urban."
 SceneFile = Annotated[Path, typer.Argument(help=_SCENE, metavar="SCENE", show_default=False)]

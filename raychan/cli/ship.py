@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import ShipChanges, directory, within
+from raychan.cli.options import Directory, ShipChanges, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -27,12 +27,7 @@ def ship(
             show_default=False,
         ),
     ] = Path("ship_turn"),
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=directory
-        ),
-    ] = None,
+    out: Directory = None,
     seed: Annotated[
         int | None,
         typer.Option(

@@ -14,14 +14,16 @@ from raychan.world import limits
 if TYPE_CHECKING:
     from raychan.study.validation.validate import Validation
 
+_Out = Annotated[
+    Path,
+    typer.Option(
+        "--out", "-o", help="Directory for report and figures; made if missing.", metavar="DIR", parser=directory
+    ),
+]
+
 
 def validate(
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", help="Directory for report and figures; made if missing.", metavar="DIR", parser=directory
-        ),
-    ] = Path("out/validation"),
+    out: _Out = Path("out/validation"),
     only: Annotated[
         list[str] | None,
         typer.Option(
