@@ -14,7 +14,7 @@ import typer
 from raychan.cli.explain import explain
 from raychan.cli.hil import hil
 from raychan.cli.info import info
-from raychan.cli.options import help_of
+from raychan.cli.options import help_of, unread
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
 from raychan.cli.ship import ship
@@ -46,7 +46,7 @@ Exit code 0: done
   130: interrupted, 143: ended by SIGTERM; the message says what was written"""
 
 _STOPPED = "interrupted; nothing was written"
-_ended: list[int] = []  # signals other than Ctrl-C that asked this process to end
+_ended: list[int] = []  # signals that asked this process to end, the first counts
 
 app = typer.Typer(
     help=_HELP,
@@ -88,18 +88,24 @@ def main(argv: list[str] | None = None) -> None:
     sys.unraisablehook = _interrupt_again
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _end)
-    sys.exit(invoke(sys.argv[1:] if argv is None else argv))
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a job in the background ignores Ctrl-C
+            signal.signal(signal.SIGINT, _end)
+    code = invoke(sys.argv[1:] if argv is None else argv)
+    # A KeyboardInterrupt in code that is a text, as dataclasses make it, has Python end by SIGINT in place of this
+    # code, though it was caught; the next such code takes that back.
+    exec("")
+    sys.exit(code)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    """End as Ctrl-C does, with another exit code: unfinished files are removed."""
+    """End by an exception, so that unfinished files are removed."""
     _ended.append(number)
     raise KeyboardInterrupt
 
 
 def _stopped(text: str) -> int:
     """Print that the command was interrupted; return the exit code, 128 plus the signal's number."""
-    return _fail(text, 128 + (_ended[-1] if _ended else signal.SIGINT))
+    return _fail(text, 128 + (_ended[0] if _ended else signal.SIGINT))
 
 
 def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
@@ -137,12 +143,13 @@ def invoke(argv: list[str]) -> int:
         return _fail("out of memory; ask for a coarser --tolerance or fewer --max-bounces")
     except Exception as error:
         if hasattr(error, "format_message"):  # typer's own, of options and arguments
-            text = error.format_message()
+            text = unread(error) or error.format_message()
             return _fail(text) if text else 2
         from raychan.parallel import was_interrupted
         from raychan.world.errors import SceneError
 
-        if was_interrupted(error):
+        # Compiled modules turn an interruption while they are imported into errors of their own.
+        if _ended or was_interrupted(error):
             return _stopped(_STOPPED)
 
         _unprinted()

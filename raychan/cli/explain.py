@@ -109,6 +109,10 @@ def _chains(why: CellExplanation) -> list[str]:
             wave = why.paths.wave[why.paths.chain == why.paths.chains.index(part.chain)].sum()
             brings = f", {dbm(abs(wave) ** 2):.1f} dBm at {np.degrees(np.angle(wave)):+.0f} deg"
         lines.append(f"  {part.text()}{brings}")
+    if why.beam:
+        levels = "and levels " if why.paths is not None and why.paths.beam else ""
+        rest = "" if levels else "; levels are those at the middle of the array, for want of the scene"
+        lines.append(f"shares {levels}are those in the array's beam towards the detection{rest}")
     return lines
 
 

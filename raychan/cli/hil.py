@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import ShipChanges, ShipSceneFile, within
+from raychan.cli.options import ShipChanges, ShipSceneFile, directory, within
 from raychan.world.limits import Limit
 
 if TYPE_CHECKING:
@@ -90,7 +90,8 @@ def hil(
     ] = True,
     ports: Annotated[bool, typer.Option("--ports", help="Print the names of the ports as JSON, then run.")] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Directory for summary.json and track.csv.", metavar="DIR")
+        Path | None,
+        typer.Option("--out", "-o", help="Directory for summary.json and track.csv.", metavar="DIR", parser=directory),
     ] = None,
     set_: ShipChanges = None,
 ) -> None:

@@ -23,6 +23,7 @@ _WORDS = {
     "coherent_gain": "gain of chirps x samples",
     "sensitivity": "noise in a cell of the map (rectangular windows)",
 }
+_TOLD = ("vertices", "faces", "size", "watertight")  # of a mesh's report, in other words
 _FIGURES = {
     "gain_dbi": "gain [dBi]",
     "hpbw_h_deg": "half-power width, azimuth [deg]",
@@ -106,7 +107,7 @@ def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
         ("size, x forward by y left by z up", f"{size} m"),
         ("vertices, facets", f"{len(mesh.vertices)}, {len(mesh.faces)}"),
         ("watertight", "yes" if r.watertight else "no"),
-        *((name.replace("_", " "), str(value)) for name, value in vars(r).items() if name != "watertight"),
+        *((name.replace("_", " "), str(value)) for name, value in vars(r).items() if name not in _TOLD),
     ]
     screen = show.console()
     screen.print(show.table(str(source), ("mesh", ""), facts, left=(0, 1)))
@@ -224,15 +225,21 @@ def _drawn(scene: Any, plot: Path) -> None:
 def _chirp(w: Any) -> list[tuple[str, str]]:
     # A map measures range rates at the frequency of the ramp's middle.
     of_middle = w.carrier / w.middle
+    times = f"{w.repetition * 1e6:g} us"
+    if w.stagger:
+        times = f"{', '.join(f'{t * 1e6:g}' for t in w.stagger)} us in turn"
     return [
         ("carrier, bandwidth", f"{w.carrier / 1e9:g} GHz, {w.bandwidth / 1e6:g} MHz"),
-        ("chirp sampled, repeated", f"{w.chirp_duration * 1e6:g} us, {w.repetition * 1e6:g} us"),
+        ("chirp sampled, repeated", f"{w.chirp_duration * 1e6:g} us, {times}"),
         ("chirps x samples", f"{w.n_chirps} x {w.n_samples} {'I/Q' if w.complex_sampling else 'real'}"),
         ("sample rate", f"{w.sample_rate / 1e6:.4g} MS/s"),
         ("range resolution (rectangular window)", f"{w.range_resolution:.4g} m"),
         ("range rate resolution (rectangular window)", f"{w.rate_resolution * of_middle:.4g} m/s"),
         ("unambiguous range", f"{w.unambiguous_range:.4g} m"),
-        ("unambiguous range rate", f"+-{w.unambiguous_rate * of_middle:.4g} m/s"),
+        (
+            "unambiguous range rate" + (", by the staggered times" if w.stagger else ""),
+            f"+-{w.resolved_rate * of_middle:.4g} m/s",
+        ),
     ]
 
 

@@ -31,6 +31,40 @@ def meant(limit: Limit, option: str, value: Any, whole: bool = False) -> None:
         raise typer.BadParameter(str(error)) from None
 
 
+def directory(text: str) -> Path:
+    """Return the path of a directory for results. Raises: typer.BadParameter for an empty name, as of an unset
+    variable, and for a file."""
+    if not str(text).strip():
+        raise typer.BadParameter("the name is empty: name a directory for the results")
+    path = Path(text)
+    for there in (path, *path.parents):
+        if there.is_file():
+            inside = "" if there == path else f"{path} cannot be made in it; "
+            raise typer.BadParameter(f"{there}: is a file; {inside}name a directory")
+    return path
+
+
+def unread(error: Any) -> str:
+    """Return what is wrong with an option whose text is no number, with what is allowed; '' for other errors."""
+    reading, option = error.__cause__, getattr(error, "param", None)
+    if option is None or not hasattr(reading, "errors"):
+        return ""
+    given = reading.errors()[0]["input"]
+    wanted = "whole number" if reading.errors()[0]["type"].startswith("int") else "number"
+    error.message = f"{given!r}: a {wanted} is wanted"
+    try:
+        if option.callback is not None:
+            option.callback(error.ctx, option, given)
+    except typer.BadParameter as told:
+        error.message = told.message
+    return str(error.format_message())
+
+
+Directory = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=directory),
+]
+
 # typer takes [m] for markup and drops it: in help texts units are words.
 _SCENE = "Scene file (TOML), or the name of a bundled one, such as urban."
 SceneFile = Annotated[Path, typer.Argument(help=_SCENE, metavar="SCENE", show_default=False)]
@@ -58,9 +92,11 @@ MaxBounces = Annotated[
 
 def _use_threads(number: int | None) -> int | None:
     """Set how many threads work, where the option is given."""
-    from raychan.parallel import set_threads
+    from raychan.parallel import MOST, set_threads
 
     if number is not None:
+        if not isinstance(number, int):  # a text that is no number, see `unread`
+            raise typer.BadParameter(f"{number!r}: a whole number is wanted, 1 to {MOST}")
         try:
             set_threads(number)
         except ValueError as error:

@@ -20,6 +20,7 @@ from raychan.cli.options import (
     Seed,
     Threads,
     Tolerance,
+    directory,
 )
 
 if TYPE_CHECKING:
@@ -27,19 +28,12 @@ if TYPE_CHECKING:
     from raychan.world.scene import Scene
 
 
-def _directory(text: str) -> Path:
-    """Return a directory's path. Raises: typer.BadParameter for an empty name, as of an unset variable."""
-    if not str(text).strip():
-        raise typer.BadParameter("the name is empty: name a directory for the results")
-    return Path(text)
-
-
 def run(
     scene: SceneFile = None,  # type: ignore[assignment]
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=_directory
+            "--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=directory
         ),
     ] = None,
     seed: Seed = 0,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import ShipChanges, within
+from raychan.cli.options import Directory, ShipChanges, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -27,9 +27,7 @@ def ship(
             show_default=False,
         ),
     ] = Path("ship_turn"),
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR")
-    ] = None,
+    out: Directory = None,
     seed: Annotated[
         int | None,
         typer.Option(
@@ -53,7 +51,7 @@ def ship(
     from raychan.run.ship_files import CONTENTS, PICTURES, sail_into
     from raychan.run.ship_scene import read_ship_scene
 
-    if out is None or not str(out).strip():
+    if out is None:
         raise typer.BadParameter("missing: name a directory for the results", param_hint="--out")
     if (
         view

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, within
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, directory, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -32,7 +32,10 @@ _Far = Annotated[
 def spectrogram(
     scene: SceneFile,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for the results; made if missing.", metavar="DIR")
+        Path,
+        typer.Option(
+            "--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=directory
+        ),
     ],
     seconds: Annotated[
         float, typer.Option(help="How long the radar listens.", metavar="S", callback=within(limits.SECONDS))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import help_of
+from raychan.cli.options import directory, help_of
 from raychan.cli.study_laser import laser
 from raychan.cli.study_sensitivity import sensitivity
 from raychan.cli.study_stability import stability
@@ -31,7 +31,10 @@ def _top() -> None:
 
 def tradeoff(
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for figures and CSV; made if missing.", metavar="DIR")
+        Path,
+        typer.Option(
+            "--out", "-o", help="Directory for figures and CSV; made if missing.", metavar="DIR", parser=directory
+        ),
     ],
     case: Annotated[
         list[str] | None,

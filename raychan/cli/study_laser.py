@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import within
+from raychan.cli.options import directory, within
 from raychan.world import limits
 from raychan.world.limits import Limit
 
@@ -18,7 +18,10 @@ _SCANS = Limit(1, 10_000_000, "", "a share needs one, and more take hours")
 
 def laser(
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for tables and figures; made if missing.", metavar="DIR")
+        Path,
+        typer.Option(
+            "--out", "-o", help="Directory for tables and figures; made if missing.", metavar="DIR", parser=directory
+        ),
     ],
     draws: Annotated[
         int, typer.Option(help="Draws of each sensor error.", metavar="N", callback=within(_DRAWS, True))

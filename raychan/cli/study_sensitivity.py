@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, directory
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -33,7 +33,12 @@ def sensitivity(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", help="Directory for tables and figure; made if missing.", metavar="DIR", show_default=False
+            "--out",
+            "-o",
+            help="Directory for tables and figure; made if missing.",
+            metavar="DIR",
+            parser=directory,
+            show_default=False,
         ),
     ] = None,
     set_: Changes = None,

@@ -8,11 +8,15 @@ from typing import Annotated
 import typer
 
 from raychan.cli import show
+from raychan.cli.options import directory
 
 
 def stability(
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for table and figures; made if missing.", metavar="DIR")
+        Path,
+        typer.Option(
+            "--out", "-o", help="Directory for table and figures; made if missing.", metavar="DIR", parser=directory
+        ),
     ],
     quick: Annotated[
         bool, typer.Option("--quick", help="Leave out the largest cases: 1e5 rays at edges, not 1e7; no 1e7 paths.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, directory
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -22,7 +22,10 @@ def sweep(
     scene: SceneFile,
     target: Annotated[str, typer.Option(help="The body to follow.", metavar="BODY", show_default=False)],
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for table and figure; made if missing.", metavar="DIR")
+        Path,
+        typer.Option(
+            "--out", "-o", help="Directory for table and figure; made if missing.", metavar="DIR", parser=directory
+        ),
     ],
     vary: Annotated[
         list[str] | None,

@@ -8,17 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import within
+from raychan.cli.options import directory, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
     from raychan.study.validation.validate import Validation
 
+_Out = Annotated[
+    Path,
+    typer.Option(
+        "--out", "-o", help="Directory for report and figures; made if missing.", metavar="DIR", parser=directory
+    ),
+]
+
 
 def validate(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Directory for report and figures; made if missing.", metavar="DIR")
-    ] = Path("out/validation"),
+    out: _Out = Path("out/validation"),
     only: Annotated[
         list[str] | None,
         typer.Option(

@@ -49,10 +49,11 @@ def view(
     --detection only the rays of one detection are shown (of the map cell at --range if no detection is near), and
     bodies that they do not meet are transparent. Rays of a detection that is not converged are dashed.
     """
+    for option, file, ending in (("--screenshot", screenshot, ".png"), ("--html", html, ".html")):
+        if file is not None and file.suffix.lower() != ending:
+            raise typer.BadParameter(f"{option} {file}: the name must end in {ending}")
     drawing = _drawing(source, range, speed, detection)
     if screenshot is not None:
-        if screenshot.suffix.lower() != ".png":
-            raise typer.BadParameter(f"--screenshot {screenshot}: the name must end in .png")
         from raychan.view.scene import scene_picture
 
         show.warn(scene_picture(drawing, screenshot))

@@ -176,6 +176,12 @@ class Waveform:
         return self.wavelength / (4.0 * self.repetition)
 
     @property
+    def resolved_rate(self) -> float:
+        """Range rates between plus and minus this are told apart [m/s], nominal: by staggered times those up to the
+        rate of their greatest common divisor, else `unambiguous_rate`."""
+        return self.unambiguous_rate * self.fold_count / max(len(self.stagger), 1)
+
+    @property
     def frame_duration(self) -> float:
         """Time from the first ramp's start to the end of the last repetition [s]."""
         return self.n_chirps * self.repetition

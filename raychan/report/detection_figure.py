@@ -32,11 +32,14 @@ def detection_picture(detector: Detector, links: Sequence[TargetLink], title: st
             axes.plot(snr, detection_probability(snr, detector, case), color=colour, label=f"Swerling {name}")
             dots = snr[::10]
             axes.plot(dots, [simulated(x, detector, case, _DRAWS, rng) for x in dots], ".", color=colour)
+        axes.plot([], [], ".", color="#444444", label=f"{_DRAWS:,} draws of noise")
         for k, link in enumerate(links):
             at, shift = (link.snr, link.probability), (5, 4 - 9 * (k % 4))
             axes.plot(*at, "o", color="black", fillstyle="none")
             axes.annotate(link.name, at, xytext=shift, textcoords="offset points")
+        if links:
+            axes.plot([], [], "o", color="black", fillstyle="none", label="targets of the scene")
         axes.set(xlabel="mean SNR of one look [dB]", ylabel="probability of detection", ylim=(-0.02, 1.05), title=title)
         axes.grid(alpha=0.3)
-        axes.legend(loc="upper left")
+        made.legend(loc="outside right upper")
         return drawn_as(made, suffix)

@@ -35,7 +35,7 @@ def direction_pictures(result: Result, folder: Path) -> list[Path]:
 def range_azimuth_picture(angles: RangeAzimuth, path: str | Path, result: Result | None = None) -> Path:
     """Draw a range-azimuth map [dBm] as seen from above, with the detections of a result."""
     with style():
-        made = figure(7.2, 5.4)
+        made = figure(7.2, 4.2)
         axes = made.add_subplot()
         draw_range_azimuth(angles, axes, result)
         return save(made, path)
@@ -53,19 +53,19 @@ def draw_range_azimuth(angles: RangeAzimuth, axes: Any, result: Result | None = 
     r, az = angles.range[keep], angles.azimuth
     x, y = r[None, :] * np.cos(az)[:, None], r[None, :] * np.sin(az)[:, None]
     image = axes.pcolormesh(
-        -y, x, power, vmin=low, vmax=max(top, low + 15.0), cmap="viridis", shading="gouraud", rasterized=True
+        y, x, power, vmin=low, vmax=max(top, low + 15.0), cmap="viridis", shading="gouraud", rasterized=True
     )
-    axes.set(xlabel="left  ←  y [m]  →  right", ylabel="x ahead [m]", title="Range-azimuth map", aspect="equal")
-    ticks = axes.get_xticks()
-    axes.set_xticks(ticks, [f"{abs(t):g}" for t in ticks])
-    axes.set_xlim(float((-y).min()), float((-y).max()))
-    axes.figure.colorbar(image, ax=axes, label="received power, strongest range rate [dBm]", pad=0.01, aspect=30)
+    axes.set(xlabel="y to the left [m]", ylabel="x ahead [m]", title="Range-azimuth map", aspect="equal")
+    axes.set_xlim(float(y.max()), float(y.min()))
+    # Of the height of the map, which equal scales make lower than its place in the figure.
+    beside = axes.inset_axes((1.02, 0.0, 0.03, 1.0))
+    axes.figure.colorbar(image, cax=beside, label="received power, strongest range rate [dBm]")
     if result is not None:
         d = result.detections
         seen = np.isfinite(d.azimuth)
         x, y = (d.range * np.cos(d.azimuth))[seen], (d.range * np.sin(d.azimuth))[seen]
         axes.plot(
-            -y, x, "o", ms=7, mfc="none", mec="white", mew=1.2, ls="none", path_effects=outlined(2.4),
+            y, x, "o", ms=7, mfc="none", mec="white", mew=1.2, ls="none", path_effects=outlined(2.4),
             label=f"detections ({int(seen.sum())})",
         )  # fmt: skip
         if seen.any():
@@ -93,14 +93,15 @@ def beams_picture(result: Result, path: str | Path) -> Path:
             u, _, power = beams_of(result.rdmap, cell, aperture)
             level = dbm(np.maximum(power[:, 0], watt(-300.0)))
             peak = max(peak, float(level.max()))
-            place = f"{result.rdmap.range[cell[1]]:.1f} m, {result.rdmap.rate[cell[0]]:+.1f} m/s"
-            axes.plot(np.degrees(np.arcsin(np.clip(u, -1.0, 1.0))), level, color=colour, lw=1.2, label=place)
             mine = (d.cell == cell).all(axis=1)
+            # By the detections' rates, which the receiver may have unfolded.
+            place = f"{d.range[mine][0]:.1f} m, {round(d.rate[mine][0], 1) + 0.0:+.1f} m/s"
+            axes.plot(np.degrees(np.arcsin(np.clip(u, -1.0, 1.0))), level, color=colour, lw=1.2, label=place)
             axes.plot(np.degrees(d.azimuth[mine]), dbm(d.power[mine]), "o", color=colour, ms=6, mec="black", mew=0.6)
         axes.set(xlabel="azimuth [deg]", ylabel="received power [dBm]", title="Beams over cells")
         axes.set_ylim(peak - _BEAM_DB, peak + 6.0)
         axes.grid(alpha=0.25, lw=0.5)
-        axes.legend(loc="lower right", title="cell; dots are detections")
+        axes.figure.legend(loc="outside right upper", title="cell; dots are detections")
         return save(made, path)
 
 

@@ -35,10 +35,12 @@ def rdmap_picture(result: Result, path: str | Path | None = None, axes: Any = No
     with style():
         made, axes = on(axes, 8.2, 4.6)
         r, v = m.range[keep], m.rate
+        if len(v) == 1:  # one chirp: its row fills the map
+            v, power = v + 0.5 * _half_row(m) * np.array([-1.0, 1.0]), np.repeat(power, 2, axis=0)
         image = axes.pcolormesh(r, v, power, vmin=low, vmax=top, cmap="viridis", shading="nearest", rasterized=True)
         axes.set(xlabel="range [m]", ylabel="range rate [m/s]   (receding is positive)", title="Range-Doppler map")
         axes.set_xlim(r[0], r[-1])
-        axes.set_ylim(*_rates(result))
+        axes.set_ylim(*_rates(result, _in_map(result)[1]))
         made.colorbar(image, ax=axes, label="received power [dBm]", pad=0.01, aspect=30)
         _mark_detections(result, axes)
         if len(d.range):
@@ -102,57 +104,73 @@ def _reach(result: Result) -> float:
     return min(end, max(10.0, 1.2 * float(found.max()))) if len(found) else end
 
 
-def _rates(result: Result) -> tuple[float, float]:
+def _in_map(result: Result) -> tuple[Floats, Floats]:
+    """Return the ranges [m] and range rates [m/s] at which the map shows detections: those whose rate the receiver
+    unfolded stand at their cells."""
+    m, d = result.rdmap, result.detections
+    rows, columns = d.cell.T
+    away = np.abs(d.rate - m.rate[rows]) > m.unambiguous_rate
+    return np.where(away, m.range[columns], d.range), np.where(away, m.rate[rows], d.rate)
+
+
+def _rates(result: Result, rates: Floats) -> tuple[float, float]:
     """Return the range rates [m/s] to draw: all detections and standing bodies, with a margin, within the map."""
     m = result.rdmap
-    seen = np.concatenate([result.detections.rate, [0.0, -result.receiver.ego_speed]])
+    seen = np.concatenate([rates, [0.0, -result.receiver.ego_speed]])
     room = max(3.0, 0.35 * float(np.ptp(seen)), 10.0 * m.rate_resolution)
-    return max(float(m.rate[0]), float(seen.min()) - room), min(float(m.rate[-1]), float(seen.max()) + room)
+    low, high = float(m.rate[0]) - _half_row(m), float(m.rate[-1]) + _half_row(m)
+    return max(low, float(seen.min()) - room), min(high, float(seen.max()) + room)
+
+
+def _half_row(m: RangeDoppler) -> float:
+    """Return half the height [m/s] of a map's row."""
+    return 0.5 * float(m.rate[1] - m.rate[0]) if len(m.rate) > 1 else m.unambiguous_rate
 
 
 def _mark_detections(result: Result, axes: Any) -> None:
     """Mark detections by their labels: filled, hollow where not converged, with a square around folded ones."""
-    d = result.detections
+    d, (ranges, rates) = result.detections, _in_map(result)
     for label, (mark, colour) in MARKS.items():
         mine = np.array([why.label == label for why in result.provenance], bool)
         for rows, inside, words in ((mine & d.converged, colour, ""), (mine & ~d.converged, "none", ", not converged")):
             if rows.any():
                 edge = "black" if inside == colour else colour
                 axes.plot(
-                    d.range[rows], d.rate[rows], mark, ms=7, mfc=inside, mec=edge, mew=0.8 if edge == "black" else 1.4,
+                    ranges[rows], rates[rows], mark, ms=7, mfc=inside, mec=edge, mew=0.8 if edge == "black" else 1.4,
                     ls="none", label=f"{label}{words} ({int(rows.sum())})",
                     path_effects=None if edge == "black" else outlined(2.6),
                 )  # fmt: skip
     if d.folded.any():
         axes.plot(
-            d.range[d.folded], d.rate[d.folded], "s", ms=13, mfc="none", mec="white", mew=1.2, ls="none",
+            ranges[d.folded], rates[d.folded], "s", ms=13, mfc="none", mec="white", mew=1.2, ls="none",
             label=f"folded, true place elsewhere ({int(d.folded.sum())})", path_effects=outlined(2.4),
         )  # fmt: skip
 
 
 def _name_detections(result: Result, axes: Any) -> None:
-    d = result.detections
+    d, (ranges, rates) = result.detections, _in_map(result)
     placer = Placer(axes)
     placer.prepare()
-    placer.avoid(d.range, d.rate, 9.0)
-    placer.avoid(d.range[d.folded], d.rate[d.folded], 15.0)
+    placer.avoid(ranges, rates, 9.0)
+    placer.avoid(ranges[d.folded], rates[d.folded], 15.0)
     if (legend := axes.get_legend()) is not None:
         placer.spare(legend)
     named: list[tuple[str, float, float]] = []
     for i, why in enumerate(result.provenance):
         name = _short(why)
-        near = any(n == name and abs(r - d.range[i]) < 3.0 and abs(v - d.rate[i]) < 1.0 for n, r, v in named)
+        near = any(n == name and abs(r - ranges[i]) < 3.0 and abs(v - rates[i]) < 1.0 for n, r, v in named)
         if near or len(named) >= _LABELS:
             continue
-        named.append((name, float(d.range[i]), float(d.rate[i])))
-        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB{_true_place(why)}"
+        named.append((name, float(ranges[i]), float(rates[i])))
+        unfolded = "" if rates[i] == d.rate[i] else f"\nunfolded to {d.rate[i]:+.1f} m/s"
+        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB{unfolded}{_true_place(why)}"
         look: dict[str, Any] = {
             "color": MARKS[why.label][1],
             "fontsize": 7,
             "path_effects": outlined(1.8),
             "linespacing": 1.1,
         }
-        placer.label(float(d.range[i]), float(d.rate[i]), text, **look)
+        placer.label(float(ranges[i]), float(rates[i]), text, **look)
 
 
 def _name_peaks(result: Result, axes: Any, power: Floats, far: float) -> None:

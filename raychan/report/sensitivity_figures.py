@@ -48,7 +48,11 @@ def sensitivity_picture(done: Sensitivity, path: Path) -> Path:
         line = f"tolerance, {done.tolerance_db:g} dB"
         axes.axvline(done.tolerance_db, color="#aa3333", lw=0.9, ls="--", label=line)
         axes.set_yticks(y, [_name(i, m) for i, m in enumerate(shown)], fontsize=7)
-        axes.set(xlabel="level [dB]", xlim=(0.0, 1.25 * longest), ylim=(max(len(shown), 1) - 0.5, -0.5))
+        axes.set(
+            xlabel="spread and stated error of the level [dB]",
+            xlim=(0.0, 1.25 * longest),
+            ylim=(max(len(shown), 1) - 0.5, -0.5),
+        )
         axes.grid(axis="x", alpha=0.3, lw=0.5)
         rest = f"; the strongest {_MOST} of {len(done.moves)}" if len(done.moves) > _MOST else ""
         g = done.given

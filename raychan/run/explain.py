@@ -14,7 +14,8 @@ from raychan.columns import Record, column
 from raychan.poses import angles
 from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
-from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
+from raychan.run.directions import beam_to
+from raychan.run.labels import Chains, by_beam, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result
 
 _VERBS = ("", "reflect", "pass", "scatter", "point", "diffract")  # by InteractionType
@@ -28,7 +29,9 @@ class CellPaths(Record):
     row: Ints = column("n", np.int32, doc="row of the result's `paths`")
     power: Floats = column("n", unit="W", doc="received power of the path alone")
     phase: Floats = column("n", unit="rad", doc="argument of the path's amplitude, at the frame's start")
-    wave: Complexes = column("n", np.complex128, unit="sqrt(W)", doc="what it brings to the cell; they add up")
+    wave: Complexes = column(
+        "n", np.complex128, unit="sqrt(W)", doc="what it brings to the cell, or to the beam if `beam`; they add up"
+    )
     range: Floats = column("n", unit="m", doc="true range, mid frame")
     rate: Floats = column("n", unit="m/s", doc="true range rate, positive = receding")
     departure: Floats = column("n 2", unit="rad", doc="azimuth and elevation of departure, world axes")
@@ -39,6 +42,8 @@ class CellPaths(Record):
     """Names 'body.part' met by each chain, as Contribution.chain has them."""
     met: tuple[tuple[str, ...], ...]
     """What happened to each chain, as 'reflect truck.tail'."""
+    beam: bool = False
+    """Whether waves are those in the beam of an array towards the detection; else those at the middle of the array."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,8 @@ class CellExplanation(Explanation):
     """Number of the detection, from 1 as tables and detections.csv list them; 0 for a cell of the map itself."""
     others: tuple[int, ...] = ()
     """Numbers of other detections as near to the place asked for as a resolution cell."""
+    beam: bool = False
+    """Whether shares are those in the beam of an array towards the detection (see `by_beam`)."""
 
 
 def explain(
@@ -94,7 +101,16 @@ def _of_detection(result: Result, near: list[int]) -> CellExplanation:
     row, column = map(int, result.detections.cell[near[0]])
     held = _held(result.provenance[near[0]])
     paths = _paths_in(result, row, column)
-    return CellExplanation(**held, paths=paths, detection=near[0] + 1, others=tuple(i + 1 for i in near[1:]))
+    at = near[0]
+    several = len(result.rdmap.spectrum) > 1
+    power, wave = float(result.rdmap.power[row, column]), paths.wave.sum() / np.sqrt(result.receiver.power)
+    beam = several and by_beam(result.detections.cell, at, power, wave, result.receiver)
+    # A result whose scene cannot be read again does not know where its receivers stand.
+    towards = beam_to(result.scene.radar, result.detections, result.paths) if beam and result.scene else None
+    if towards is not None:
+        paths = _paths_in(result, row, column, passed=towards(at))
+    others = tuple(i + 1 for i in near[1:])
+    return CellExplanation(**held, paths=paths, detection=at + 1, others=others, beam=beam)
 
 
 def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
@@ -111,11 +127,15 @@ def _held(why: Explanation) -> dict[str, Any]:
     return {f.name: getattr(why, f.name) for f in fields(Explanation)}
 
 
-def _paths_in(result: Result, row: int, column: int, known: Chains | None = None) -> CellPaths:
+def _paths_in(
+    result: Result, row: int, column: int, known: Chains | None = None, passed: NDArray[Any] | None = None
+) -> CellPaths:
+    """Return the paths of a cell; passed (n,) is what a beam passes of each, else they are those at the middle."""
     paths, receiver = result.paths, result.receiver
     known = known or chains(paths, receiver.background)
     place = float(result.rdmap.range[column]), float(result.rdmap.rate[row])
     wave, at = waves_in(paths, response_of(receiver), *place)
+    wave = wave if passed is None else wave * passed
     order = np.argsort(-np.abs(wave), kind="stable")
     amplitude, trajectory = paths.amplitude[order], paths.trajectory[order]
     kind = paths.trajectories.kind
@@ -132,6 +152,7 @@ def _paths_in(result: Result, row: int, column: int, known: Chains | None = None
         chain=known.part[order],
         chains=known.names,
         met=_met(paths, known),
+        beam=passed is not None,
     )
 
 

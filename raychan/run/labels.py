@@ -163,16 +163,14 @@ def provenance(
 ) -> tuple[Explanation, ...]:
     """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate.
 
-    Args: beam, what the beam towards a detection (row) passes of each path (n,) as a factor of its wave: of detections
-    that an array tells apart in one cell, each is explained by the paths in its own beam; known the paths' chains, if
-    they are known already.
+    Args: beam, what the beam towards a detection (row) passes of each path (n,) as a factor of its wave, for those that
+    are `by_beam`; known the paths' chains, if they are known already.
     """
     known, response = known or chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
     at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
     sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.range_rate, at)
-    _, which, sharing = np.unique(detections.cell, axis=0, return_inverse=True, return_counts=True)
     found = []
     for i in range(len(at)):
         # What the receiver took off the range of a folded rate is put back: cells stand where the beat does.
@@ -180,13 +178,23 @@ def provenance(
         stands = detections.range[i] + folds * response.periods[1] * response.drift
         shown = Shown(*map(float, (at[i, 0], at[i, 1], stands, detections.rate[i])))
         cell, own = _Cell(shown, float(powers[i]), float(errors[i])), tuple(x[i] for x in sums)
-        if beam is not None and sharing[which.ravel()[i]] > 1:
+        if beam is not None and by_beam(detections.cell, i, float(powers[i]), own[0].sum(), receiver):
             wave = paths.amplitude * beam(i)
             one = response.in_cells(known.part, len(known.names), wave, paths.delay, paths.range_rate, at[i : i + 1])
             cell, own = replace(cell, power=float(detections.power[i])), tuple(x[0] for x in one)
         why = _explained(paths, known, response, own, cell, receiver)
         found.append(replace(why, speed=float(detections.speed[i]), power=float(detections.power[i])))
     return tuple(found)
+
+
+def by_beam(cells: NDArray[np.integer[Any]], row: int, power: float, wave: complex, receiver: Receiver) -> bool:
+    """Return whether an array's detection is explained by the paths in its beam: where another is in its cell, or where
+    echoes of several directions cancel at the middle of the array.
+
+    Args: cells (n, 2) of all detections; row of the detection; power [W] of its cell; wave, the sum of its paths there.
+    """
+    shared = int((cells == cells[row]).all(axis=1).sum()) > 1
+    return shared or abs(wave) ** 2 * receiver.power < _UNEXPLAINED * power
 
 
 def response_of(receiver: Receiver) -> PointSpread:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,6 +87,8 @@ def read_ship_scene(name_or_path: str | Path, changes: Sequence[str] = ()) -> Sh
 
 def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipScene:
     """Return the ship's scene of tables as they stand in its file. Raises: SceneError."""
+    if isinstance(data, Mapping) and "radar" in data:
+        raise SceneError("is a scene of a radar, not of a ship", file=path, key="radar", allowed="raychan run")
     tables: ShipFile = checked(ShipFile, data, path)
     folder = Path.cwd() if path is None else path.parent
     try:

@@ -14,9 +14,9 @@ from raychan.view.drawing import Drawing
 
 _SIZE = (2000, 1125)  # pixels
 _MAP = "plasma"
-_POWER = "received power [dBm]"
+_POWER = "received power in dBm"  # VTK draws square brackets round
 _DASH = 8.0  # length of a dash, and of the gap after it, in radii of a ray
-_LEAST_SPAN_DB = 4.0  # of the colour scale, so that its labels in whole dB differ
+_LABELS = 5  # of the colour scale
 
 
 def screenshot(drawing: Drawing, path: str | Path) -> None:
@@ -106,7 +106,9 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
     if not drawing.rays:
         return
     powers = [ray.power for ray in drawing.rays]
-    limits = [min(powers), max(max(powers), min(powers) + _LEAST_SPAN_DB)]
+    low, steps = float(np.floor(min(powers))), _LABELS - 1
+    # A whole number of dB from label to label, as labels have no decimals.
+    limits = [low, low + steps * max(1.0, np.ceil((max(powers) - low) / steps))]
     for ray in drawing.rays:
         tube = pv.merge([pv.lines_from_points(line).tube(radius=radius) for line in ray.strokes(_DASH * radius)])
         tube.field_data["what"] = [ray.text]
@@ -116,7 +118,7 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
         )  # fmt: skip
     bar = plotter.add_scalar_bar(
         _POWER, vertical=False, position_x=0.03, position_y=0.86, width=0.28, height=0.1, color="#1a1a1a",
-        title_font_size=24, label_font_size=22, fmt="%.0f", n_labels=5,
+        title_font_size=24, label_font_size=22, fmt="%.0f", n_labels=_LABELS,
     )  # fmt: skip
     if drawing.note:
         plotter.add_text(drawing.note, position=(0.03, 0.82), viewport=True, font_size=12, color="#1a1a1a")

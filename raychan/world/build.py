@@ -24,8 +24,9 @@ _LARGEST = 16 << 20  # bytes of a scene file; 10,000 bodies take 2 MB
 def _near(file: Path, known: Sequence[str]) -> str:
     """Return a text that names the scenes beside a missing file, or those known, whose names are close to its own; all
     that are known where none is."""
-    beside = [f.name for f in file.parent.glob("*.toml")] if file.parent.is_dir() else []
-    close = [*get_close_matches(file.name, beside, n=2), *get_close_matches(file.stem, known, n=1)]
+    beside = [f.stem for f in file.parent.glob("*.toml")] if file.parent.is_dir() else []
+    close = [f"{name}.toml" for name in get_close_matches(file.stem, beside, n=2)]
+    close += get_close_matches(file.stem, known, n=1)
     if close:
         return "did you mean " + " or ".join(f"'{name}'" for name in close) + "?"
     return "a scene file that exists" + (f", or {nearest(file.stem, known)}" if known else "")
@@ -40,6 +41,9 @@ def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
     if not isinstance(path, str | PathLike):
         allowed = "a scene file, or the name of a bundled scene"
         raise SceneError(f"{shown(path)} is not possible", key="path", value=path, allowed=allowed)
+    known = known or bundled.names() + bundled.ship_names()
+    if not str(path).strip() or str(path) == ".":  # Path("") is the current directory
+        raise SceneError("no scene file is named", value=str(path), allowed=_near(Path("?"), known))
     file = bundled.found(path)
     overrides.refuse_mesh(file)
     try:
@@ -50,7 +54,6 @@ def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
         # Some editors begin a text with a byte order mark.
         return file.read_text(encoding="utf-8-sig"), file
     except FileNotFoundError:
-        known = known or bundled.names() + bundled.ship_names()
         raise SceneError("file not found: there is none of that name", file=file, allowed=_near(file, known)) from None
     except (OSError, UnicodeDecodeError) as e:
         reason = getattr(e, "strerror", None) or e

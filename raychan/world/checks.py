@@ -105,7 +105,7 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
     """Return a warning for each body beyond the unambiguous range or range rate, with the value at which it appears."""
     said = []
     at, own = np.array(radar.position), np.array(radar.velocity_mps)
-    limit, top = waveform.unambiguous_range, waveform.unambiguous_rate * waveform.carrier / waveform.middle
+    limit, top = waveform.unambiguous_range, waveform.resolved_rate * waveform.carrier / waveform.middle
     for body in bodies:
         if body.resolved_role == MIRROR or _near_and_slow(body, at, own, limit, top):
             continue

@@ -50,6 +50,8 @@ def load(
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
     if file.suffix.lower() == ".stl":
         _whole_stl(file)
+    elif file.suffix.lower() == ".ply":
+        _whole_ply(file)
     try:
         import trimesh
 
@@ -79,6 +81,47 @@ def _whole_stl(file: Path) -> None:
         least = "" if there >= _STL_HEAD else "at least "
         problem = f"is cut short: {there} bytes there, {least}{expected} expected ({count} triangles)"
         raise SceneError(problem, file=file, value=there, allowed="a whole STL")
+
+
+def _whole_ply(file: Path) -> None:
+    """Raise SceneError for a PLY of text that is cut short: as many lines as its header says are expected. A binary one
+    is refused by its reader."""
+    counts: dict[str, int] = {}
+    lists: list[bool] = []  # whether each property of the last element is a list
+    text, there, last = False, 0, b""
+    with file.open("rb") as stream:
+        for line in stream:
+            word, *rest = line.decode("latin-1").split() or [""]
+            if word == "format":
+                text = rest[:1] == ["ascii"]
+            elif word == "element" and len(rest) == 2 and rest[1].isdigit():
+                counts[rest[0]], lists = int(rest[1]), []
+            elif word == "property":
+                lists.append(rest[:1] == ["list"])
+            elif word == "end_header":
+                break
+        if not text:
+            return
+        for line in stream:
+            if line.strip():
+                there, last = there + 1, line
+    expected, problem = sum(counts.values()), ""
+    if there < expected:
+        elements = ", ".join(f"{name} {n}" for name, n in counts.items())
+        problem = f"is cut short: {there} lines after the header, {expected} expected ({elements})"
+    elif there == expected and (missing := _missing(last.split(), lists)):
+        problem = f"is cut short: its last line lacks {missing} of its numbers"
+    if problem:
+        raise SceneError(problem, file=file, value=there, allowed="a whole PLY")
+
+
+def _missing(words: list[bytes], lists: list[bool]) -> int:
+    """Return how many numbers a line of a PLY lacks of its properties, lists or not."""
+    needed = 0
+    for listed in lists:
+        count = words[needed] if listed and needed < len(words) else b"0"
+        needed += 1 + (int(count) if count.isdigit() else 0)
+    return max(needed - len(words), 0)
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:

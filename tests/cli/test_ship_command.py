@@ -103,7 +103,7 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
     [
         (["ship"], "--out"),
         (["ship", "nowhere", "--out", "OUT"], "file not found"),
-        (["ship", "urban", "--out", "OUT"], "unknown key 'radar'"),
+        (["ship", "urban", "--out", "OUT"], "is a scene of a radar, not of a ship; allowed: raychan run"),
         (["run", "ship_turn", "--out", "OUT"], "is a scene of a ship"),
         (["ship", "--seed", "-1", "--out", "OUT"], "seeds are whole numbers"),
         (["ship", "--set", "ship.model=raft", "--out", "OUT"], "ship.model: 'raft' is not possible"),

@@ -7,6 +7,7 @@ import pytest
 from support.echoes import echoes, make_radar
 
 import raychan as rc
+from raychan.cli import invoke
 from raychan.processing.staggered import ResolvedMap
 from raychan.radar.processing import Processing
 from raychan.radar.waveform import Waveform
@@ -92,3 +93,18 @@ def test_staggers_that_cannot_be_are_refused(changes, said):
         Waveform(77e9, 500e6, 15e-6, n_chirps=192, n_samples=128, **changes)
     with pytest.raises(ValueError, match="one transmitter"):
         make_radar(WAVE, tx_elements=np.zeros((2, 3)), multiplexing="tdm")
+
+
+def test_rates_that_staggered_times_tell_apart_are_not_warned_of(tmp_path, capsys):
+    text = (
+        "[radar.waveform]\nbandwidth_mhz = 500.0\nchirp_us = 20.0\nstagger_us = [40, 50, 60]\nchirps = 48\n"
+        'samples = 64\n[[bodies]]\nname = "fast"\nshape = "box"\nposition = [9.0, 0.0, 0.5]\n'
+        "velocity_mps = [%g, 0, 0]\n"
+    )
+    for speed, words in ((-30.0, None), (-130.0, "beyond the unambiguous range rate 97.03 m/s: it appears near")):
+        scene = tmp_path / "s.toml"
+        scene.write_text(text % speed)
+        assert invoke(["info", str(scene)]) == 0
+        told = capsys.readouterr()
+        assert "+-97.03 m/s" in told.out and "40, 50, 60 us in turn" in told.out
+        assert words in " ".join(told.err.split()) if words else "unambiguous" not in told.err

@@ -35,3 +35,27 @@ def test_the_pair_is_in_phase_at_the_first_receiver(result):
     first = here + scene.radar.elements_world[0]
     ways = np.linalg.norm(at - here, axis=1) + np.linalg.norm(at - first, axis=1)
     assert abs(np.diff(ways)[0]) < 0.01 * scene.radar.waveform.wavelength
+
+
+def test_shares_and_levels_of_a_detection_are_those_in_its_beam(result):
+    """In the middle of the array both echoes of the cell have the same level."""
+    for number, body in ((2, "t2"), (3, "t3")):
+        why = rc.explain(result, detection=number)
+        assert why.beam and why.paths.beam
+        level = np.abs(why.paths.wave) ** 2
+        first = why.contributions[0]
+        assert first.chain == (body,) == why.paths.chains[why.paths.chain[0]]
+        assert level[0] / level.sum() == pytest.approx(first.share, abs=1e-3)
+        assert why.predicted == pytest.approx(abs(why.paths.wave.sum()) ** 2, rel=2e-2)
+    alone = rc.explain(result, detection=1)
+    assert not alone.beam and not alone.paths.beam
+
+
+def test_a_pair_that_cancels_at_the_middle_of_the_array_is_named(result):
+    """Bartlett's beams show one detection between the two, whose echoes add up to little at the middle."""
+    scene = result.require_scene().override(["processing.doa=bartlett"])
+    merged = rc.simulate(scene, seed=0)
+    pair = [why for why in merged.provenance if why.range > 30.0]
+    assert len(pair) == 1
+    assert (pair[0].label, pair[0].bodies) == ("direct", "t2")
+    assert pair[0].predicted == pytest.approx(pair[0].power, rel=0.1)

@@ -150,3 +150,41 @@ def test_a_launch_that_its_budget_cut_short_says_so():
     assert geometry.uncut == 0
     scattering(geometry, leg, leg, F, 1, replace(fine, max_tubes=1000))
     assert geometry.uncut > 0
+
+
+PLY = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 4
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+3 0 2 1
+3 0 1 3
+3 1 2 3
+3 0 3 2
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (PLY[:-20], "is cut short: 6 lines after the header, 8 expected (vertex 4, face 4)"),
+        (PLY[:-3], "is cut short: its last line lacks 1 of its numbers"),
+        (PLY[:166], "is cut short: 2 lines after the header, 8 expected (vertex 4, face 4)"),
+    ],
+)
+def test_a_ply_that_is_cut_short_is_refused(text, words, tmp_path):
+    file = tmp_path / "cut.ply"
+    file.write_text(PLY)
+    assert len(load(file).faces) == 4
+    file.write_text(text)
+    with pytest.raises(SceneError) as told:
+        load(file)
+    assert words in str(told.value)

@@ -1,0 +1,67 @@
+"""Ctrl-C ends a command with exit code 130 wherever it comes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from support.scene_texts import PLATE, but_compiling
+
+
+@pytest.fixture
+def scene(tmp_path):
+    file = tmp_path / "plate.toml"
+    file.write_text(PLATE)
+    return file
+
+
+_STOPPED_IN_TEXT = """
+import os, signal, sys
+import raychan.run.simulate, raychan.cli
+signal.signal(signal.SIGINT, signal.default_int_handler)
+raychan.run.simulate.result_of = lambda *a: exec("os.kill(os.getpid(), signal.SIGINT); 0", globals())
+raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
+"""
+_STOPPED_IN_IMPORT = """
+import os, signal, sys
+import raychan.run.simulate, raychan.cli
+signal.signal(signal.SIGINT, signal.default_int_handler)
+def result_of(*a):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        signal.sigtimedwait([], 1.0)
+    except KeyboardInterrupt:
+        pass
+    raise ImportError("initialization failed")
+raychan.run.simulate.result_of = result_of
+raychan.cli.main(["run", {scene!r}, "--out", {out!r}])
+"""
+
+
+@pytest.mark.parametrize("program", [_STOPPED_IN_TEXT, _STOPPED_IN_IMPORT], ids=["code of a text", "compiled import"])
+def test_ctrl_c_ends_with_130_wherever_it_comes(program, scene, tmp_path):
+    (tmp_path / "program.py").write_text(program.format(scene=str(scene), out=str(tmp_path / "out")))
+    command = [sys.executable, "-m", "program"]  # Python ends a module, but no file, by the signal that was caught
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, but_compiling(done.stderr)) == (130, "raychan: interrupted; nothing was written\n")
+
+
+_STOPPED_EARLY = """
+import os, runpy, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Finder:
+    def find_spec(name, path, target=None):
+        if name == "typer":
+            os.kill(os.getpid(), signal.SIGINT)
+            pass
+sys.meta_path.insert(0, Finder)
+sys.argv = ["raychan", "--version"]
+runpy.run_module("raychan", run_name="__main__", alter_sys=True)
+"""
+
+
+def test_ctrl_c_while_the_command_line_is_imported_ends_with_130():
+    command = [sys.executable, "-c", _STOPPED_EARLY]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "raychan: interrupted; nothing was written\n")

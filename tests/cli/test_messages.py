@@ -1,0 +1,65 @@
+"""What the commands say of options and names that cannot be, before anything is computed."""
+
+from __future__ import annotations
+
+import pytest
+import trimesh
+from support.scene_texts import PLATE
+
+from raychan.cli import invoke
+
+
+def told(argv, capsys):
+    """Return what a command that fails prints to standard error, in one line."""
+    assert invoke(argv) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    return " ".join(said.err.split())
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run", "three_reflectors"], ["spectrogram", "walker_and_cyclist"], ["hil", "--duration", "1"], ["ship"],
+        ["validate"], ["study", "tradeoff"], ["study", "stability"], ["study", "sensitivity", "urban"],
+    ],
+    ids=lambda words: words[-1],
+)  # fmt: skip
+def test_a_file_in_the_place_of_a_directory_is_told_before_the_start(command, tmp_path, capsys):
+    (tmp_path / "a").write_text("mine")
+    assert "a: is a file; name a directory" in told([*command, "--out", str(tmp_path / "a")], capsys)
+    said = told([*command, "--out", str(tmp_path / "a" / "sub")], capsys)
+    assert "a: is a file;" in said and "sub cannot be made in it; name a directory" in said
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["run", "urban", "--seed", "1e3"], "'--seed': '1e3': a whole number is wanted; must lie between 0 and 9,2"),
+        (["run", "urban", "--max-bounces", "2.5"], "'2.5': a whole number is wanted; must lie between 1 and 12"),
+        (["run", "urban", "--tolerance", "abc"], "'abc': a number is wanted; must lie between 0.001 and 40 dB"),
+        (["run", "urban", "--threads", "q"], "'q': a whole number is wanted, 1 to "),
+        (["explain", "x", "--detection", "1.5"], "'--detection': '1.5': a whole number is wanted"),
+        (["ship", "urban", "--out", "o"], "radar: is a scene of a radar, not of a ship; allowed: raychan run"),
+        (["hil", "urban"], "radar: is a scene of a radar, not of a ship; allowed: raychan run"),
+        (["run", "", "--out", "o"], "no scene file is named; allowed: a scene file that exists, or one of clutter"),
+        (["view", "urban", "--html", "s.png"], "--html s.png: the name must end in .html"),
+        (["view", "urban", "--screenshot", "s.html"], "--screenshot s.html: the name must end in .png"),
+    ],
+)
+def test_what_is_wrong_and_what_is_allowed_is_told(argv, words, capsys):
+    assert words in told(argv, capsys)
+
+
+def test_only_names_that_are_near_are_proposed(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bin.toml").write_text(PLATE)
+    assert "bin" not in told(["run", "nosuch.toml", "--out", "o"], capsys)
+    assert "did you mean 'bin.toml'?" in told(["run", "bim.toml", "--out", "o"], capsys)
+
+
+def test_a_mesh_is_told_once(tmp_path, capsys):
+    trimesh.creation.box().export(tmp_path / "box.stl")
+    assert invoke(["info", str(tmp_path / "box.stl")]) == 0
+    said = capsys.readouterr().out
+    assert said.count("vertices") == 1 and "faces" not in said and "(1.0" not in said
