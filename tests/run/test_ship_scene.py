@@ -53,7 +53,7 @@ def test_what_is_wrong_is_told_with_its_file_and_what_is_allowed(text, tmp_path)
 def test_a_scene_that_is_nowhere_and_one_of_a_radar_are_told():
     with pytest.raises(rc.SceneError, match="did you mean 'ship_turn'"):
         read_ship_scene("ship_turm")
-    with pytest.raises(rc.SceneError, match="unknown key 'radar'"):
+    with pytest.raises(rc.SceneError, match="a scene of a radar, not of a ship; allowed: raychan run"):
         read_ship_scene("urban")
     with pytest.raises(rc.SceneError, match="is a scene of a ship, not of a radar; allowed: raychan ship"):
         rc.Scene.load("ship_turn")
