@@ -12,6 +12,7 @@ import typer
 from raychan.cli import show
 from raychan.cli.options import (
     Changes,
+    Directory,
     FrameInterval,
     Frames,
     MaxBounces,
@@ -20,7 +21,6 @@ from raychan.cli.options import (
     Seed,
     Threads,
     Tolerance,
-    directory,
 )
 
 if TYPE_CHECKING:
@@ -30,12 +30,7 @@ if TYPE_CHECKING:
 
 def run(
     scene: SceneFile = None,  # type: ignore[assignment]
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", help="Directory for the results; made if missing.", metavar="DIR", parser=directory
-        ),
-    ] = None,
+    out: Directory = None,
     seed: Seed = 0,
     tolerance: Tolerance = None,
     max_bounces: MaxBounces = None,

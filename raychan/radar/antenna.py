@@ -24,7 +24,7 @@ from raychan.units import undb
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-_LONGEST = 1000  # elements of a row, whose pattern is integrated over the sphere
+_LONGEST = 1000  # elements of a row, whose pattern is integrated over the sphere; not measured
 POLARIZATIONS = ("V", "H")
 
 

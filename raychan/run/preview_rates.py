@@ -13,7 +13,7 @@ from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 
-_CELLS = 4.0  # of rate: within so many a window smears a strong echo over a weak one
+_CELLS = 4.0  # of rate: within so many a window smears a strong echo over a weak one; not measured
 _MOST = 16  # classes of rate: with as many as there are cells hardly anything is pruned (not measured)
 
 
