@@ -89,12 +89,13 @@ def explain(
 
         result = load_result(result)
     near: list[int] = []
+    place = None
     if detection is not None:
         near = [_checked(result, detection)]
     elif range is not None:
-        place = _place(result, range, speed)
         near = [] if cell else _nearest(result, range, speed)
-    return _of_detection(result, near) if near else _of_cell(result, place)
+        place = None if near else _place(result, range, speed)
+    return _of_detection(result, near) if place is None else _of_cell(result, place)
 
 
 def _of_detection(result: Result, near: list[int]) -> CellExplanation:
@@ -179,12 +180,14 @@ def _nearest(result: Result, range: float, speed: float | None) -> list[int]:
     """Return the detections within a resolution cell of a place: nearest first, of equally near ones the strongest."""
     d, m = result.detections, result.rdmap
     away = np.abs(d.range - range) / m.range_resolution
-    if speed is not None:
-        period = 2.0 * m.unambiguous_rate
-        off = np.abs(d.speed - speed)
-        away = np.maximum(away, np.minimum(off, np.abs(period - off)) / m.rate_resolution)
-    order = np.lexsort((-d.power, np.floor(away / _SAME)))
-    return [int(i) for i in order if away[i] <= 1.0]
+    off = np.zeros(len(away)) if speed is None else np.abs(d.speed - speed)
+    # Speeds as they are printed, first: those that a receiver unfolded may lie a period of the map apart.
+    for by in (off, np.abs(2.0 * m.unambiguous_rate - off)):
+        far = np.maximum(away, by / m.rate_resolution)
+        order = np.lexsort((-d.power, np.floor(far / _SAME)))
+        if near := [int(i) for i in order if far[i] <= 1.0]:
+            return near
+    return []
 
 
 def _place(result: Result, range: float, speed: float | None) -> tuple[int, int]:

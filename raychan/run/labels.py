@@ -183,7 +183,8 @@ def provenance(
             one = response.in_cells(known.part, len(known.names), wave, paths.delay, paths.range_rate, at[i : i + 1])
             cell, own = replace(cell, power=float(detections.power[i])), tuple(x[0] for x in one)
         why = _explained(paths, known, response, own, cell, receiver)
-        found.append(replace(why, speed=float(detections.speed[i]), power=float(detections.power[i])))
+        place = {name: float(getattr(detections, name)[i]) for name in ("range", "rate", "speed", "power")}
+        found.append(replace(why, **place))
     return tuple(found)
 
 

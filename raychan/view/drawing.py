@@ -15,6 +15,7 @@ from raychan.report.canvas import PALETTE
 from raychan.units import dbm, undb
 
 if TYPE_CHECKING:  # what draws in a process of its own reads a drawing and needs no run
+    from raychan.run.explain import CellExplanation
     from raychan.run.result import Explanation, Result
 
 Floats = NDArray[np.float64]
@@ -131,7 +132,7 @@ def draw(
     radar: Floats,
     boresight: Floats,
     result: Result | None,
-    cell: Explanation | None = None,
+    cell: CellExplanation | None = None,
 ) -> Drawing:
     """Return the drawing of a scene at one instant; with a result, also the rays of its detections.
 
@@ -203,17 +204,15 @@ def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
     return tuple(rays)
 
 
-def rays_in(result: Result, cell: Explanation) -> tuple[Ray, ...]:
-    """Return the strongest path of each chain in a map cell, weakest first."""
-    from raychan.run.labels import chains, response_of, waves_in
-
-    paths, known = result.paths, chains(result.paths, result.receiver.background)
-    size = np.abs(waves_in(paths, response_of(result.receiver), cell.range, cell.rate)[0])
-    index = {chain: i for i, chain in enumerate(known.names)}
+def rays_in(result: Result, cell: CellExplanation) -> tuple[Ray, ...]:
+    """Return the path of each chain that brings most to a map cell, or to the beam of a detection; weakest first."""
+    told = cell.paths
+    if told is None:
+        raise ValueError("cell: its paths are wanted, as `explain` returns them")
     rays = []
     for part in sorted(cell.contributions, key=lambda part: part.share):
-        row = int(np.argmax(np.where(known.part == index[part.chain], size, -1.0)))
-        rays.append(_ray(paths, row, part.chain, part.share * cell.predicted, cell))
+        strongest = np.argmax(told.chain == told.chains.index(part.chain))  # rows come strongest first
+        rays.append(_ray(result.paths, int(told.row[strongest]), part.chain, part.share * cell.predicted, cell))
     return tuple(rays)
 
 

@@ -9,8 +9,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from raychan.run.explain import CellExplanation
 from raychan.run.output_files import write_whole
-from raychan.run.result import Explanation, Result
+from raychan.run.result import Result
 from raychan.view import plain
 from raychan.view.drawing import Drawing, draw
 
@@ -18,7 +19,7 @@ _PATIENCE_S = 180.0  # for one picture; a driver that hangs is given up then (no
 _PNG_END = b"IEND\xaeB`\x82"  # missing where the disk was full
 
 
-def drawing_of(scene: Any, result: Result | None = None, cell: Explanation | None = None) -> Drawing:
+def drawing_of(scene: Any, result: Result | None = None, cell: CellExplanation | None = None) -> Drawing:
     """Return the drawing of a scene, with the rays of its result if given, or with those of one cell of its map."""
     radar, title = scene.radar, scene.title
     if cell is not None:

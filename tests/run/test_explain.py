@@ -12,6 +12,7 @@ from raychan.cli import invoke
 from raychan.records import REFLECT, SCATTER
 from raychan.run.explain import explain
 from raychan.run.storage import load_result
+from raychan.view.drawing import rays_in
 
 TAIL, GHOST = [(1, SCATTER)], [(2, REFLECT), (3, SCATTER)]
 CELL = 0.149896  # of records.WAVE
@@ -97,6 +98,51 @@ def test_the_detection_asked_for_or_the_nearest_within_a_cell_is_taken(place, ta
         d = several.detections
         assert (why.range, why.rate, why.power) == (d.range[taken - 1], d.rate[taken - 1], d.power[taken - 1])
         assert why.label == several.provenance[taken - 1].label
+
+
+def test_of_detections_a_period_of_the_map_apart_the_one_of_that_speed_is_taken():
+    period = 2.0 * 24.3
+    where = [(9.0, 0.0, 1e-10), (9.0, period, 4e-10)]
+    r = result(paths([9.0, 9.0], [0.0, period], [1e-5, 2e-5], [TAIL, TAIL]), where)
+    for number, speed in ((1, 7.0), (2, 7.0 + period)):
+        why = explain(r, 9.0, speed)
+        assert (why.detection, why.others) == (number, ())
+
+
+@pytest.fixture(scope="module")
+def unfolded(tmp_path_factory):
+    """Return a stored run of staggered ramps, which unfold the rate of a walker at 61 m/s."""
+    folder = tmp_path_factory.mktemp("staggered")
+    wave = "bandwidth_mhz = 300.0\nchirp_us = 30.0\nchirps = 48\nsamples = 64\nstagger_us = [37.0, 49.0, 55.0]\n"
+    radar = f'[radar]\npower_dbm = 30.0\nantenna = {{ kind = "isotropic" }}\n[radar.waveform]\n{wave}'
+    (folder / "s.toml").write_text(radar + walker(17.0, 0.0) + "velocity_mps = [61.0, 0.0, 0.0]\n")
+    assert invoke(["run", str(folder / "s.toml"), "--out", str(folder / "out"), "--no-pictures"]) == 0
+    return load_result(folder / "out"), folder / "out"
+
+
+def test_an_unfolded_detection_is_found_by_the_range_and_speed_that_it_prints(unfolded, tmp_path, capsys):
+    r, out = unfolded
+    d = r.detections
+    assert d.speed[0] > 2.0 * r.rdmap.unambiguous_rate
+    assert rc.explain(r, range=float(d.range[0]), speed=float(d.speed[0])).detection == 1
+    place = ["--range", f"{d.range[0]:.2f}", "--speed", f"{d.speed[0]:.2f}"]
+    capsys.readouterr()
+    assert invoke(["explain", str(out), *place]) == 0
+    assert capsys.readouterr().out.startswith(f"detection 1: {d.range[0]:.2f} m, range rate {d.rate[0]:+.2f} m/s")
+    assert invoke(["view", str(out), *place, "--html", str(tmp_path / "v.html")]) == 0
+    assert f"{d.range[0]:.2f} m, {d.speed[0]:+.2f} m/s" in (tmp_path / "v.html").read_text()
+
+
+def test_an_explanation_has_the_place_of_its_detection(unfolded):
+    r, _ = unfolded
+    d = r.detections
+    assert abs(d.range[0] - r.rdmap.range[d.cell[0, 1]]) > 0.2  # its cell stands where its Doppler shift moves it
+    for i, why in enumerate(r.provenance):
+        assert (why.range, why.rate, why.speed) == (d.range[i], d.rate[i], d.speed[i])
+    told = explain(r, detection=1)
+    assert told.range == d.range[0]
+    assert abs(told.paths.wave.sum()) ** 2 == pytest.approx(told.predicted, rel=1e-2)
+    assert [ray.name for ray in rays_in(r, told)] == ["walker"]
 
 
 def test_the_very_cell_is_taken_where_told(several):
