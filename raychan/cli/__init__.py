@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import atexit
 import os
 import signal
 import sys
@@ -87,6 +88,7 @@ def main(argv: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     sys.unraisablehook = _interrupt_again
     if threading.current_thread() is threading.main_thread():
+        atexit.register(_ignore)  # before modules that commands import, so that it is called last
         signal.signal(signal.SIGTERM, _end)
         if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a job in the background ignores Ctrl-C
             signal.signal(signal.SIGINT, _end)
@@ -94,6 +96,7 @@ def main(argv: list[str] | None = None) -> None:
     # A KeyboardInterrupt in code that is a text, as dataclasses make it, has Python end by SIGINT in place of this
     # code, though it was caught; the next such code takes that back.
     exec("")
+    _settle(code)
     sys.exit(code)
 
 
@@ -101,6 +104,23 @@ def _end(number: int, frame: FrameType | None) -> None:
     """End by an exception, so that unfinished files are removed."""
     _ended.append(number)
     raise KeyboardInterrupt
+
+
+def _settle(code: int) -> None:
+    """Have signals end the process with this exit code from now on: its command is done."""
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        os._exit(code)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is _end:
+            signal.signal(number, leave)
+
+
+def _ignore() -> None:
+    """Ignore signals while Python takes itself down: it does without its handlers then, and would end by the signal."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _stopped(text: str) -> int:

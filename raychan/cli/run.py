@@ -86,10 +86,9 @@ def _list() -> None:
 
 
 def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:
-    from raychan.run.messages import notes as result_notes
     from raychan.run.output_files import staging
     from raychan.run.simulate import simulate
-    from raychan.run.storage import ARRAY_PICTURES, CONTENTS, PICTURES, save_result
+    from raychan.run.storage import CONTENTS, save_result
 
     with staging(out, CONTENTS) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
@@ -98,6 +97,17 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
             warnings += _pictures(result, stage, tell, lambda: save_result(result, stage))
         else:
             save_result(result, stage)
+    try:
+        _report(result, out, warnings, pictures)
+    except KeyboardInterrupt:
+        raise show.Interrupted(f"interrupted; the results are in {out}") from None
+
+
+def _report(result: Result, out: Path, warnings: list[str], pictures: bool) -> None:
+    """Print what a run found and which files it wrote."""
+    from raychan.run.messages import notes as result_notes
+    from raychan.run.storage import ARRAY_PICTURES, PICTURES
+
     notes = result_notes(result)
     show.warn(w for w in warnings if w not in notes)
     screen = show.console()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 
@@ -65,3 +66,47 @@ def test_ctrl_c_while_the_command_line_is_imported_ends_with_130():
     command = [sys.executable, "-c", _STOPPED_EARLY]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "raychan: interrupted; nothing was written\n")
+
+
+_STOPPED_LATE = """
+import atexit, os, signal, sys
+import raychan.cli, raychan.world.bundled
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Last:
+    def __del__(self, kill=os.kill, process=os.getpid()):
+        kill(process, {number})
+def names():
+    {late}
+    return []
+raychan.world.bundled.names = names
+raychan.cli.main(["run"])
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+@pytest.mark.parametrize(
+    "late", ["atexit.register(Last().__del__)", "sys.last = Last()"], ids=["at exit", "as modules are taken down"]
+)
+def test_a_signal_after_the_command_is_done_leaves_its_exit_code(late, number):
+    command = [sys.executable, "-c", _STOPPED_LATE.format(late=late, number=int(number))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "raychan run NAME --out DIR" in done.stdout
+
+
+_STOPPED_AS_IT_REPORTS = """
+import os, signal
+import raychan.run.messages, raychan.cli
+signal.signal(signal.SIGINT, signal.default_int_handler)
+raychan.run.messages.notes = lambda result: os.kill(os.getpid(), signal.SIGINT)
+raychan.cli.main(["run", {scene!r}, "--out", {out!r}, "--no-pictures"])
+"""
+
+
+def test_ctrl_c_after_the_results_are_written_says_where_they_are(scene, tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", _STOPPED_AS_IT_REPORTS.format(scene=str(scene), out=str(out))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 130
+    assert f"raychan: interrupted; the results are in {out}\n" in done.stderr
+    assert (out / "result.nc").exists()
