@@ -171,6 +171,7 @@ def provenance(
     powers, errors = rdmap.power[rows, columns], error[rows, columns]
     at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
     sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.range_rate, at)
+    places = detections.range, detections.rate, detections.speed, detections.power
     found = []
     for i in range(len(at)):
         # What the receiver took off the range of a folded rate is put back: cells stand where the beat does.
@@ -183,8 +184,8 @@ def provenance(
             one = response.in_cells(known.part, len(known.names), wave, paths.delay, paths.range_rate, at[i : i + 1])
             cell, own = replace(cell, power=float(detections.power[i])), tuple(x[0] for x in one)
         why = _explained(paths, known, response, own, cell, receiver)
-        place = {name: float(getattr(detections, name)[i]) for name in ("range", "rate", "speed", "power")}
-        found.append(replace(why, **place))
+        at_range, at_rate, speed, level = (float(x[i]) for x in places)
+        found.append(replace(why, range=at_range, rate=at_rate, speed=speed, power=level))
     return tuple(found)
 
 
