@@ -45,6 +45,7 @@ class MeshReport:
     zero_area: int = 0
     duplicates: int = 0
     flipped: int = 0
+    unread_normals: int = 0
 
     def warnings(self) -> list[str]:
         """Return one sentence for each thing a user should know."""
@@ -57,6 +58,8 @@ class MeshReport:
             said.append("closed, but without thickness: a sheet whose two sides lie on each other")
         if self.flipped:
             said.append(f"{self.flipped} faces turned to face outward")
+        if self.unread_normals:
+            said.append(f"{self.unread_normals} of the file's normals are no three numbers and were left out")
         if not self.watertight:
             said.append(f"not watertight: {self.open_edges} open and {self.non_manifold_edges} non-manifold edges")
         return said

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +12,14 @@ import numpy as np
 from raychan.world.errors import SceneError, nearest
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
+from raychan.world.whole_files import checked
 
 _SIZES = 0.01, 150.0  # m: sizes outside are warned of
 _USUAL = 3.0  # m: typical size, for guessing the unit
 _FARTHEST = 1e12  # in the unit of the file: coordinates beyond are errors of the file or of its reader
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "ft": 0.3048}
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
-_STL_HEAD, _STL_FACET = 84, 50  # bytes
+_SILENT = logging.NullHandler()
 _AXES = {s + a: (1.0 if s == "+" else -1.0) * np.eye(3)[i] for s in "+-" for i, a in enumerate("xyz")}
 
 
@@ -48,17 +51,15 @@ def load(
     turn = _turn(*axes_taken(file, up, forward), file)
     if not file.stat().st_size:
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
-    if file.suffix.lower() == ".stl":
-        _whole_stl(file)
-    elif file.suffix.lower() == ".ply":
-        _whole_ply(file)
+    unread = checked(file)
     try:
         import trimesh
 
+        logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
         # Infinite coordinates are reported below, not as warnings of the reader.
         with np.errstate(all="ignore"):
             scene = trimesh.load_scene(str(file), process=False)
-        return from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
+        mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
     except SceneError as e:
         raise e.at(file=file) from None
     except IndexError as e:
@@ -66,62 +67,7 @@ def load(
         raise SceneError(f"{problem} ({e})", file=file, allowed="a valid " + file.suffix) from e
     except Exception as e:  # trimesh's readers raise whatever their parsers do
         raise SceneError(f"cannot be read as a mesh ({e})", file=file, allowed="a valid " + file.suffix) from e
-
-
-def _whole_stl(file: Path) -> None:
-    """Raise SceneError for a binary STL that is cut short: 84 bytes, then 50 a triangle, are expected."""
-    there = file.stat().st_size
-    with file.open("rb") as stream:
-        head = stream.read(1 << 10)
-    if head.lstrip().startswith(b"solid") and b"facet" in head:
-        return
-    count = int.from_bytes(head[80:84], "little") if there >= _STL_HEAD else 0
-    expected = _STL_HEAD + _STL_FACET * count
-    if there < expected:
-        least = "" if there >= _STL_HEAD else "at least "
-        problem = f"is cut short: {there} bytes there, {least}{expected} expected ({count} triangles)"
-        raise SceneError(problem, file=file, value=there, allowed="a whole STL")
-
-
-def _whole_ply(file: Path) -> None:
-    """Raise SceneError for a PLY of text that is cut short: as many lines as its header says are expected. A binary one
-    is refused by its reader."""
-    counts: dict[str, int] = {}
-    lists: list[bool] = []  # whether each property of the last element is a list
-    text, there, last = False, 0, b""
-    with file.open("rb") as stream:
-        for line in stream:
-            word, *rest = line.decode("latin-1").split() or [""]
-            if word == "format":
-                text = rest[:1] == ["ascii"]
-            elif word == "element" and len(rest) == 2 and rest[1].isdigit():
-                counts[rest[0]], lists = int(rest[1]), []
-            elif word == "property":
-                lists.append(rest[:1] == ["list"])
-            elif word == "end_header":
-                break
-        if not text:
-            return
-        for line in stream:
-            if line.strip():
-                there, last = there + 1, line
-    expected, problem = sum(counts.values()), ""
-    if there < expected:
-        elements = ", ".join(f"{name} {n}" for name, n in counts.items())
-        problem = f"is cut short: {there} lines after the header, {expected} expected ({elements})"
-    elif there == expected and (missing := _missing(last.split(), lists)):
-        problem = f"is cut short: its last line lacks {missing} of its numbers"
-    if problem:
-        raise SceneError(problem, file=file, value=there, allowed="a whole PLY")
-
-
-def _missing(words: list[bytes], lists: list[bool]) -> int:
-    """Return how many numbers a line of a PLY lacks of its properties, lists or not."""
-    needed = 0
-    for listed in lists:
-        count = words[needed] if listed and needed < len(words) else b"0"
-        needed += 1 + (int(count) if count.isdigit() else 0)
-    return max(needed - len(words), 0)
+    return replace(mesh, report=replace(mesh.report, unread_normals=unread)) if unread else mesh
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:
