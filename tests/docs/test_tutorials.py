@@ -11,7 +11,6 @@ import shlex
 from pathlib import Path
 
 import pytest
-import trimesh
 
 import raychan as rc
 from raychan.cli import invoke
@@ -70,7 +69,6 @@ def test_the_readme_s_first_scene_runs(tmp_path, monkeypatch):
     (scene,) = (text for kind, text in found if kind == "toml")
     Path("first.toml").write_text(scene)
     assert rc.Scene.load("first.toml").bodies
-    trimesh.creation.box((4.0, 2.0, 1.5)).export("car.ply")
     names = {}
     for kind, text in found:
         if kind == "python":
