@@ -50,7 +50,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating]
 Bools = NDArray[np.bool_]
 
-_MARGIN_DB = 6.0  # below the least SNR of a detection: what refinement may bring above it
+_MARGIN_DB = 9.0  # below the least SNR of a detection: what refinement may bring above it (see `rules._FAN`)
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
 # Steps that trace routes the other way round, too: of the first launch, and of facets beside its own. All steps take
 # 30 % more rays of an urban frame at 3 dB; with the first alone a corner of the living street is 1.3 dB off of 0.5.

@@ -20,6 +20,7 @@ from bench.auto import auto
 from bench.before import before
 from bench.cold import cold
 from bench.cross_section import cross_section
+from bench.cylinders import cylinders
 from bench.detections import detections
 from bench.fine import fine
 from bench.frame import frame
@@ -55,6 +56,7 @@ _GROUPS = (
     preview,
     cross_section,
     detections,
+    cylinders,
     auto,
 )
 ALL: dict[str, Benchmark] = {f.__name__: f for f in _GROUPS}
