@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
+
+from raychan.scalars import is_number, is_one_of, plain, shown
 
 Floats = NDArray[np.float64]
 
@@ -40,18 +41,20 @@ class Diffuse:
     texture_m: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.law not in LAWS:
+        if not is_one_of(self.law, LAWS):
             raise ValueError(f"law = {self.law!r}: must be one of {', '.join(LAWS)}")
         for name in ("level_db", "exponent", "cross_db", "k_shape", "texture_m"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not ((value is None and name in _MAY_MISS) or isinstance(value, Real)):
-                raise ValueError(f"{name} = {value!r}: a number is wanted")
+            value = plain(getattr(self, name))
+            if not ((value is None and name in _MAY_MISS) or is_number(value)):
+                raise ValueError(f"{name} = {shown(value)}: a number is wanted")
+            object.__setattr__(self, name, value)
             if name in ("level_db", "cross_db") and value is not None and not math.isfinite(value):
                 raise ValueError(f"{name} = {value!r}: must be finite")
         if self.law in ("lambert", "lobe") and self.level_db > 0.0:
             raise ValueError(f"level_db = {self.level_db:g} dB: a surface cannot scatter more than it receives (0 dB)")
         if not (1 <= self.exponent <= 50 and int(self.exponent) == self.exponent):
             raise ValueError(f"exponent = {self.exponent!r}: must be a whole number from 1 to 50")
+        object.__setattr__(self, "exponent", int(self.exponent))
         for name in ("k_shape", "texture_m"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):

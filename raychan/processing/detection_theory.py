@@ -13,13 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainc, gammaincc, gammainccinv, gammaln
 
 from raychan.processing.cfar import METHODS, factor, quantiles_of
-from raychan.radar.declared import check_type, is_number, reals
+from raychan.radar.declared import check_type, reals
+from raychan.scalars import is_number, is_one_of, plain, shown
 from raychan.units import db, undb
 
 Floats = NDArray[np.float64]
 
 SWERLING = (0, 1, 2, 3, 4)
 _TINY = 1e-300
+_MOST_CELLS = 1e18  # training cells: their mean is that of the noise to 1e-9, and `cfar` None says the same
+_MOST_LOOKS = 1_000_000
+_MOST_DB = 300.0  # dB: as the most that a scene file takes
 _SURE = 1e4  # times the threshold: the normal deviate of a miss is then below -100
 _NEGLIGIBLE = 12.0  # standard deviations of a gamma variable beyond which its tail is under 1e-15 of a probability
 
@@ -44,21 +48,25 @@ class Detector:
     """Least power over the known noise that is reported [dB]."""
 
     def __post_init__(self) -> None:
-        check_type("Detector.pfa", self.pfa, float)
-        check_type("Detector.looks", self.looks, int)
+        for name, kind in (("pfa", float), ("looks", int)):
+            check_type(f"Detector.{name}", getattr(self, name), kind)
+            object.__setattr__(self, name, kind(plain(getattr(self, name))))
         for name in ("cells", "min_snr_db"):
             if not is_number(getattr(self, name)):
-                raise ValueError(f"Detector.{name} = {getattr(self, name)!r}: a number is wanted")
+                raise ValueError(f"Detector.{name} = {shown(getattr(self, name))}: a number is wanted")
+            object.__setattr__(self, name, float(plain(getattr(self, name))))
         if not 0.0 < self.pfa < 1.0:
             raise ValueError(f"Detector.pfa = {self.pfa!r}: must lie between 0 and 1")
-        if self.looks < 1:
-            raise ValueError(f"Detector.looks = {self.looks!r}: must be a whole number from 1 on")
-        if self.cfar not in (None, *METHODS):
-            raise ValueError(f"Detector.cfar = {self.cfar!r}: must be None or one of {', '.join(METHODS)}")
-        if np.isnan(self.min_snr_db):
-            raise ValueError(f"Detector.min_snr_db = {self.min_snr_db!r}: must be a number")
-        if self.cfar is not None and not (np.isfinite(self.cells) and self.cells > 0.0):
-            raise ValueError(f"Detector.cells = {self.cells!r}: a CFAR needs a positive number of training cells")
+        if not 1 <= self.looks <= _MOST_LOOKS:
+            raise ValueError(f"Detector.looks = {self.looks!r}: must be a whole number from 1 on, to {_MOST_LOOKS:,}")
+        if not (self.cfar is None or is_one_of(self.cfar, METHODS)):
+            raise ValueError(f"Detector.cfar = {shown(self.cfar)}: must be None or one of {', '.join(METHODS)}")
+        if not self.min_snr_db <= _MOST_DB:
+            raise ValueError(f"Detector.min_snr_db = {self.min_snr_db!r}: must be a number, at most {_MOST_DB:g} dB")
+        if self.cfar is not None and not 1.0 <= self.cells <= _MOST_CELLS:
+            raise ValueError(f"Detector.cells = {self.cells!r}: a CFAR needs 1 to {_MOST_CELLS:g} training cells")
+        if not self.cells >= 1.0:
+            raise ValueError(f"Detector.cells = {self.cells!r}: must be 1 or more")
 
 
 def shape_of(swerling: int, looks: int = 1) -> float:

@@ -16,6 +16,7 @@ from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, capon, climb, music, peaks
 from raychan.radar.aperture import Aperture
 from raychan.radar.declared import check_type, reals
+from raychan.scalars import is_one_of, shown
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
@@ -23,6 +24,8 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 METHODS = ("bartlett", "capon", "music", "esprit", "monopulse")
 _ROUNDS = 20  # of refining several echoes by turns: those a beam width apart need 3 to 10 (not measured)
 _STILL = 1e-5  # beam widths: an echo that moves less has arrived
+_ROUNDING = 16.0  # times the rounding of a value: amplitudes below, relative to the strongest, are none (not measured)
+_LARGEST = 1e150  # sqrt(W): its square is a power that a float holds
 _COUNTING = 0.5  # rows of a sub-array over the array's for counting echoes in few snapshots: MDL needs more of them
 
 
@@ -50,7 +53,8 @@ def doa(
     Args: snapshots (n, a) or (a,), complex [sqrt(W)]; elements (a, 3) [m] in the antenna's frame; wavelength [m];
     method: bartlett (each echo is subtracted before the next is sought), capon, music, esprit (uniform lines) or
     monopulse (one echo, uniform lines); sources, how many, or None: by criterion mdl or aic, which are asymptotic:
-    of one snapshot they tell too many in about a third of cases; smoothing: see `covariance`.
+    of one snapshot they tell too many in about a third of cases; smoothing: see `covariance`. A direction whose power
+    is below the rounding of the snapshots is left out.
     Raises: ValueError on bad arguments, or an array that measures no angle or is unfit for the method.
     """
     check_type("wavelength", wavelength, float)
@@ -63,13 +67,15 @@ def doa(
     data = np.atleast_2d(given).astype(np.complex128)
     if data.ndim != 2 or data.shape[1] != len(aperture.elements) or not len(data) or not np.isfinite(data).all():
         raise ValueError(f"snapshots: finite numbers (n, {len(aperture.elements)}) wanted, {data.shape} given")
-    if method not in METHODS:
-        raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
+    if not is_one_of(method, METHODS):
+        raise ValueError(f"method {shown(method)}: must be one of {', '.join(METHODS)}")
     if not any(aperture.scans):
         raise ValueError("elements: no spread along y or z, or along a slanted line; such an array measures no angle")
     most = len(aperture.elements) - 1
     if sources is not None and not 0 <= sources <= most:
         raise ValueError(f"sources = {sources}: {len(aperture.elements)} elements tell 0 to {most} apart")
+    if (largest := float(max(np.abs(data.real).max(), np.abs(data.imag).max()))) > _LARGEST:
+        raise ValueError(f"snapshots: a value of {largest:.3g} sqrt(W); at most {_LARGEST:g}")
     size = float(np.abs(data).max())
     if size == 0.0:  # silence has no direction
         sources = 0
@@ -77,9 +83,12 @@ def doa(
     made = covariance(data, aperture, smoothing)
     count = _counted(data, aperture, criterion, smoothing) if sources is None else int(sources)
     found = estimate(data, aperture, method, count, made) if count else np.zeros((0, 2))
-    power = (size * np.abs(amplitudes(data, aperture, found))) ** 2
-    power = power.mean(axis=0)
-    order = np.argsort(-power, kind="stable")
+    waves = np.abs(amplitudes(data, aperture, found))
+    share, power = (waves**2).mean(axis=0), ((size * waves) ** 2).mean(axis=0)
+    order = np.argsort(-share, kind="stable")
+    # What is weaker than the rounding of the snapshots is no wave.
+    eps = float(np.finfo(given.dtype if given.dtype.kind in "fc" else np.float64).eps)
+    order = order[share[order] > (_ROUNDING * eps) ** 2 * share.max(initial=0.0)]
     azimuth, elevation = aperture.angles(found[order])
     return Directions(azimuth, elevation, power[order], aperture.ambiguous(found[order]))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from raychan.processing.covariance import Covariance
+from raychan.scalars import is_one_of, shown
 
 CRITERIA = ("mdl", "aic")
 _LEAST = 1e-13  # of the greatest eigenvalue: rounding of double precision stands for noise where there is none
@@ -17,8 +18,8 @@ def source_number(found: Covariance, criterion: str = "mdl") -> int:
     Raises: ValueError on another criterion. Source: Wax and Kailath 1985, eqs. 16 and 17; averaged forwards and
     backwards, half as many parameters are free (Xu, Roy and Kailath 1994).
     """
-    if criterion not in CRITERIA:
-        raise ValueError(f"criterion {criterion!r}: must be one of {', '.join(CRITERIA)}")
+    if not is_one_of(criterion, CRITERIA):
+        raise ValueError(f"criterion {shown(criterion)}: must be one of {', '.join(CRITERIA)}")
     values = np.maximum(found.eigen[0], _LEAST * max(float(found.eigen[0][0]), 1e-300))
     p, n = len(values), found.snapshots
     costs = []

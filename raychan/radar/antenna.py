@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from raychan.radar.declared import check_declared, check_type, finite
 from raychan.radar.spherical_vectors import cosine_power
 from raychan.radar.windows import check_window, window
+from raychan.scalars import is_one_of, shown
 from raychan.units import undb
 
 Floats = NDArray[np.float64]
@@ -46,8 +47,8 @@ def polarized(size: NDArray[np.generic], polarization: str) -> Complexes:
 
 def check(polarization: str, loss_db: float = 0.0, **positive: float) -> None:
     """Raise ValueError on a polarisation other than V or H, a loss not finite, or another figure not positive."""
-    if polarization not in POLARIZATIONS:
-        raise ValueError(f"polarization = {polarization!r}: must be V or H")
+    if not is_one_of(polarization, POLARIZATIONS):
+        raise ValueError(f"polarization = {shown(polarization)}: must be V or H")
     finite("loss_db", loss_db)
     for name, value in positive.items():
         if finite(name, value) <= 0.0:
@@ -68,6 +69,7 @@ class IsotropicAntenna:
     def __post_init__(self) -> None:
         check(self.polarization, self.loss_db)
         check_type("front", self.front, bool)
+        check_declared(IsotropicAntenna, vars(self))
 
     def field(self, direction: Floats) -> Complexes:
         """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
@@ -109,8 +111,11 @@ class CosineAntenna:
 
     def __post_init__(self) -> None:
         check(self.polarization, self.loss_db, hpbw_h_deg=self.hpbw_h_deg, hpbw_v_deg=self.hpbw_v_deg)
-        if max(self.hpbw_h_deg, self.hpbw_v_deg) >= 180.0:
-            raise ValueError("a half-power beam width of a cosine pattern must be below 180 deg")
+        check_declared(CosineAntenna, vars(self))
+        for name in ("hpbw_h_deg", "hpbw_v_deg"):
+            if getattr(self, name) >= 180.0:
+                wide = f"{name} = {getattr(self, name):g} deg"
+                raise ValueError(f"a half-power beam width of a cosine pattern must be below 180 deg: {wide}")
 
     def shape(self, direction: Floats) -> Floats:
         """Return the power pattern (n,), 1 at its peak."""

@@ -3,13 +3,15 @@ elements than between the phase centres."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from raychan.radar.declared import check_type, reals
+from raychan.radar.declared import check_type, finite, reals
+from raychan.scalars import is_one_of, plain, shown
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +28,7 @@ def numbers(name: str, given: ArrayLike, wanted: str) -> Floats:
     try:
         value = reals(name, given)
     except ValueError:
-        raise ValueError(f"{name}: numbers of shape {wanted} wanted, {given!r} given") from None
+        raise ValueError(f"{name}: numbers of shape {wanted} wanted, {shown(given)} given") from None
     if value.ndim != (1 if wanted == "(3,)" else 2) or value.shape[-1] != 3 or not value.size:
         raise ValueError(f"{name}: numbers of shape {wanted} wanted, {value.tolist()} given")
     if not np.isfinite(value).all():
@@ -38,7 +40,7 @@ def numbers(name: str, given: ArrayLike, wanted: str) -> Floats:
 def offsets(name: str, given: ArrayLike) -> Floats:
     """Return elements (n, 3) [m] of an array. Raises: ValueError on none, or on one too far off to belong to it."""
     value = numbers(name, given, "(n, 3)")
-    far = float(np.linalg.norm(value, axis=1).max())
+    far = max(math.hypot(*place) for place in value.tolist())
     if far > _WIDEST:
         raise ValueError(
             f"{name}: an element is {far:g} m off the phase centre; at most {_WIDEST:g} m (positions are in metres)"
@@ -48,8 +50,8 @@ def offsets(name: str, given: ArrayLike) -> Floats:
 
 def check_multiplexing(multiplexing: str, transmitters: int, slots: int | None) -> None:
     """Raise ValueError on an unknown way to tell transmitters apart, or one that does not fit their number."""
-    if multiplexing not in MULTIPLEXING:
-        raise ValueError(f"Radar.multiplexing = {multiplexing!r}: must be one of {', '.join(MULTIPLEXING)}")
+    if not is_one_of(multiplexing, MULTIPLEXING):
+        raise ValueError(f"Radar.multiplexing = {shown(multiplexing)}: must be one of {', '.join(MULTIPLEXING)}")
     if multiplexing == "none" and transmitters > 1:
         raise ValueError(f"Radar.multiplexing = 'none': {transmitters} transmitters need 'tdm' or 'ddm'")
     if slots is None:
@@ -68,17 +70,28 @@ def uniform_array(n: int, spacing: float, axis: str = "y") -> Floats:
     >>> uniform_array(3, 0.002)[:, 1].tolist()
     [-0.002, 0.0, 0.002]
     """
-    check_type("n", n, int)
-    if not 1 <= n <= _MOST:
-        raise ValueError(f"n = {n!r}: must lie between 1 and {_MOST}")
-    check_type("spacing", spacing, float)
-    if spacing <= 0.0:
-        raise ValueError(f"spacing = {spacing!r}: must be positive and finite [m]")
-    if axis not in ("y", "z"):
-        raise ValueError(f"axis = {axis!r}: must be y or z")
-    out = np.zeros((int(n), 3))
-    out[:, "xyz".index(axis)] = spacing * (np.arange(n) - 0.5 * (n - 1))
+    count, step = _count("n", n), _spacing(spacing)
+    if not is_one_of(axis, ("y", "z")):
+        raise ValueError(f"axis = {shown(axis)}: must be y or z")
+    out = np.zeros((count, 3))
+    out[:, "xyz".index(axis)] = step * (np.arange(count) - 0.5 * (count - 1))
     return out
+
+
+def _count(name: str, given: object) -> int:
+    """Return a number of elements. Raises: ValueError that names the argument, where it cannot be."""
+    check_type(name, given, int)
+    if not 1 <= plain(given) <= _MOST:
+        raise ValueError(f"{name} = {given!r}: must lie between 1 and {_MOST}")
+    return int(plain(given))
+
+
+def _spacing(given: object) -> float:
+    """Return a spacing [m]. Raises: ValueError where it cannot be."""
+    step = finite("spacing", given)
+    if step <= 0.0:
+        raise ValueError(f"spacing = {given!r}: must be positive and finite [m]")
+    return step
 
 
 def check_receiver_elsewhere(position: object, velocity: object, yaw_deg: object, transmitters: int) -> None:
@@ -107,8 +120,8 @@ def mimo_array(n_tx: int, n_rx: int, spacing: float) -> ArrayElements:
     >>> len(array["tx_elements"]), len(array["elements"])
     (3, 8)
     """
-    receivers = uniform_array(n_rx, spacing)
-    return {"tx_elements": uniform_array(n_tx, n_rx * spacing), "elements": receivers}
+    sent, heard, step = _count("n_tx", n_tx), _count("n_rx", n_rx), _spacing(spacing)
+    return {"tx_elements": uniform_array(sent, heard * step), "elements": uniform_array(heard, step)}
 
 
 def virtual_elements(tx: ArrayLike, rx: ArrayLike) -> Floats:

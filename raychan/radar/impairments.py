@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from raychan.radar.declared import check_declared, finite
+from raychan.radar.declared import check_declared, is_whole
+from raychan.scalars import shown
 from raychan.units import undb, watt
 
 Floats = NDArray[np.float64]
@@ -20,8 +20,8 @@ def _table(name: str, rows: ArrayLike, least: int, pair: str) -> tuple[tuple[flo
     wanted = f"{name}: at least {least} pair{'' if least == 1 else 's'} of finite numbers wanted, {pair}"
     try:
         table = np.array(rows, np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"{wanted}; {rows!r} given") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{wanted}; {shown(rows)} given") from None
     if not table.size:
         raise ValueError(f"{wanted}; none given")
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < least or not np.isfinite(table).all():
@@ -117,10 +117,9 @@ class Converter:
     full_scale_dbm: float
 
     def __post_init__(self) -> None:
-        whole = isinstance(self.bits, Real) and not isinstance(self.bits, bool) and float(self.bits).is_integer()
-        if not whole or not 1 <= self.bits <= 24:
-            raise ValueError(f"Converter.bits = {self.bits!r}: a whole number from 1 to 24 wanted")
-        finite("Converter.full_scale_dbm", self.full_scale_dbm)
+        if not (is_whole(self.bits) and 1 <= self.bits <= 24):
+            raise ValueError(f"Converter.bits = {shown(self.bits)}: a whole number from 1 to 24 wanted")
+        check_declared(Converter, vars(self))
 
     @property
     def step(self) -> float:

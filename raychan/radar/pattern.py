@@ -69,6 +69,8 @@ class MeasuredAntenna:
         Raises: PatternError naming file, row and column.
         """
         path = Path(path)
+        if "\0" in str(path):
+            raise PatternError(f"path = {str(path)!r}: a name without a zero byte is wanted")
         try:
             if path.exists() and (not path.is_file() or path.stat().st_size > _MOST_BYTES):
                 raise PatternError(f"{path}: must be a file of at most {_MOST_BYTES // 1_000_000} MB")

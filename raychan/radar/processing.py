@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from raychan.radar.declared import check_declared, is_whole
+from raychan.scalars import is_one_of, plain, shown
 
 
 @dataclass(frozen=True)
@@ -45,16 +46,16 @@ class Processing:
     def __post_init__(self) -> None:
         for name in ("range_window", "rate_window", "beam_window"):
             value = getattr(self, name)
-            if value not in ("rect", "hann"):  # others need scipy to be checked
+            if not is_one_of(value, ("rect", "hann")):  # others need scipy to be checked
                 from raychan.radar.windows import check_window
 
                 check_window(f"Processing.{name}", value)
-        if self.cfar not in ("ca", "os"):
-            raise ValueError(f"Processing.cfar = {self.cfar!r}: must be 'ca' or 'os'")
-        if self.beams not in ("coherent", "mean"):
-            raise ValueError(f"Processing.beams = {self.beams!r}: must be 'coherent' or 'mean'")
-        if self.doa not in ("bartlett", "capon", "music", "esprit"):
-            raise ValueError(f"Processing.doa = {self.doa!r}: must be 'bartlett', 'capon', 'music' or 'esprit'")
+        if not is_one_of(self.cfar, ("ca", "os")):
+            raise ValueError(f"Processing.cfar = {shown(self.cfar)}: must be 'ca' or 'os'")
+        if not is_one_of(self.beams, ("coherent", "mean")):
+            raise ValueError(f"Processing.beams = {shown(self.beams)}: must be 'coherent' or 'mean'")
+        if not is_one_of(self.doa, ("bartlett", "capon", "music", "esprit")):
+            raise ValueError(f"Processing.doa = {shown(self.doa)}: must be 'bartlett', 'capon', 'music' or 'esprit'")
         check_declared(Processing, vars(self))
         if not 0.0 < self.pfa < 1.0:
             raise ValueError(f"Processing.pfa = {self.pfa!r}: must lie between 0 and 1")
@@ -62,6 +63,7 @@ class Processing:
             pair = getattr(self, name)
             if pair is None and name != "pad":
                 continue
-            two = isinstance(pair, Sequence | np.ndarray) and len(pair) == 2
+            two = isinstance(pair, Sequence | np.ndarray) and np.ndim(pair) > 0 and len(pair) == 2
             if not (two and all(is_whole(n) and n >= least for n in pair)):
-                raise ValueError(f"Processing.{name} = {pair!r}: must be two whole numbers of at least {least}")
+                raise ValueError(f"Processing.{name} = {shown(pair)}: must be two whole numbers of at least {least}")
+            object.__setattr__(self, name, tuple(int(plain(n)) for n in pair))

@@ -25,6 +25,7 @@ from raychan.radar.pattern import gain_dbi
 from raychan.radar.processing import Processing
 from raychan.radar.spherical_vectors import turned, vectors
 from raychan.radar.waveform import OwnWaveform, Waveform
+from raychan.scalars import is_one_of, shown
 from raychan.units import K_BOLTZMANN, T0, dbm, undb, watt
 
 Floats = NDArray[np.float64]
@@ -121,9 +122,9 @@ class Radar:
                 given[name] = numbers(f"Radar.{name}", given[name], "(3,)")
         for name in ("elements", "tx_elements"):
             given[name] = offsets(f"Radar.{name}", given[name])
-        check_multiplexing(multiplexing, len(given["tx_elements"]), ddm_slots)
-        if rx_polarization not in (None, "V", "H", "both"):
-            raise ValueError(f"Radar.rx_polarization = {rx_polarization!r}: must be V, H or both")
+        check_multiplexing(multiplexing, len(given["tx_elements"]), given["ddm_slots"])
+        if not (rx_polarization is None or is_one_of(rx_polarization, ("V", "H", "both"))):
+            raise ValueError(f"Radar.rx_polarization = {shown(rx_polarization)}: must be V, H or both")
         if waveform.stagger and len(given["tx_elements"]) > 1:
             raise ValueError("Radar.tx_elements: one transmitter wanted where the repetition is staggered")
         for name, value in given.items():

@@ -87,7 +87,9 @@ class Waveform:
                 f"Waveform.bandwidth = {self.bandwidth:g} Hz: must be below the carrier of {self.carrier:g} Hz"
             )
         if self.repetition < self.chirp_duration * (1.0 - 1e-9):
-            raise ValueError(f"Waveform.repetition = {self.repetition:g} s: shorter than the chirp")
+            raise ValueError(
+                f"Waveform.repetition = {self.repetition:g} s: shorter than chirp_duration = {self.chirp_duration:g} s"
+            )
 
     def _check_stagger(self) -> None:
         least = self.chirp_duration * (1.0 - 1e-9)

@@ -8,6 +8,8 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.scalars import shown
+
 Floats = NDArray[np.float64]
 
 NAMES = ("rect", "hann", "hamming", "blackman", "taylor", "chebyshev")
@@ -27,8 +29,8 @@ def window(name: str, n: int) -> Floats:
     level = float(match[2]) if match and match[2] else _SIDE_LOBE.get(kind, 0.0)
     if kind not in NAMES or (match and match[2] and not (kind in _SIDE_LOBE and 10.0 <= level <= 200.0)):
         raise ValueError(
-            f"window {name!r}: must be one of {', '.join(NAMES)}; taylor and chebyshev may name their side lobes, as "
-            "taylor(40), from 10 to 200 dB"
+            f"window {shown(name)}: must be one of {', '.join(NAMES)}; taylor and chebyshev may name their side lobes, "
+            "as taylor(40), from 10 to 200 dB"
         )
     if n == 1 or kind == "rect":
         return np.ones(n)
@@ -52,7 +54,7 @@ def check_window(where: str, name: str) -> None:
     try:
         window(name, 2)
     except ValueError as e:
-        raise ValueError(f"{where} = {name!r}: {str(e).partition(': ')[2]}") from None
+        raise ValueError(f"{where} = {shown(name)}: {str(e).partition(': ')[2]}") from None
 
 
 def processing_gain(taper: Floats) -> float:

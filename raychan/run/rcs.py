@@ -13,6 +13,7 @@ from raychan.poses import direction
 from raychan.radar.declared import check_type, reals
 from raychan.run.rcs_refinement import Case, Value, refined
 from raychan.run.single_body import facets_of, mesh_of
+from raychan.scalars import plain, shown
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.body import MeshLike
@@ -88,17 +89,17 @@ def rcs(
     at 1 m. Raises: ValueError for arguments out of range.
     Source: Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5.
     """
-    _check(frequency, polarization, distance, tolerance_db, max_bounces, crease_deg)
+    frequency, polarization = FREQUENCY.check("frequency", frequency), _polarizations(polarization)
+    distance, rx_distance = _distances(distance, rx_distance)
+    tolerance_db = TOLERANCE_DB.check("tolerance_db", tolerance_db)
+    max_bounces = BOUNCES.check("max_bounces", max_bounces, whole=True)
+    crease_deg = None if crease_deg is None else CREASE.check("crease_deg", crease_deg)
     check_type("material", material, str, Material)
     check_type("simplify", simplify, bool)
     bistatic = rx_azimuth_deg is not None or rx_elevation_deg is not None or rx_distance is not None
-    if rx_distance is not None:
-        _check_distance("rx_distance", rx_distance)
-        if np.isinf(rx_distance) != np.isinf(distance):
-            raise ValueError(f"rx_distance = {rx_distance!r} m: must be inf where distance is, and only there")
     rx_az = azimuth_deg if rx_azimuth_deg is None else rx_azimuth_deg
     rx_el = elevation_deg if rx_elevation_deg is None else rx_elevation_deg
-    RAYS.check("max_rays", max_rays, whole=True)
+    max_rays = RAYS.check("max_rays", max_rays, whole=True)
     angles = _angles(azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, rx_azimuth_deg=rx_az, rx_elevation_deg=rx_el)
     k = 2.0 * np.pi * frequency / C0
     body = traced_alone(mesh_of(mesh, crease_deg), k, tolerance_db if simplify else None, crease_deg is not None)
@@ -108,14 +109,13 @@ def rcs(
     if crease_deg is not None:
         # The caller's word on what is an edge; the default is a guess.
         other = replace(other, creased=None, rounded=None, rounded_halved=None)
-    row, col = _POLARIZATIONS[polarization.upper()]
+    row, col = _POLARIZATIONS[polarization]
     found = []
     for az, el, raz, rel in zip(*(a.ravel() for a in angles), strict=True):
         leg = _leg(direction(az, el), distance)
         out = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
-        for end in (leg, out):
-            if not end.far:
-                refuse_within(geometry.facets.vertices, end.end, "radar")
+        _outside(geometry, leg, "distance")
+        _outside(geometry, out, "distance" if rx_distance is None else "rx_distance")
         found.append(refined(Case(geometry, other, leg, out, frequency, max_bounces, tolerance_db, max_rays, row, col)))
     return _collected(found, angles[0].shape, str(body.merged or ""))
 
@@ -156,19 +156,33 @@ def _leg(look: Floats, distance: float) -> Leg:
     return Leg(end=look, far=True) if np.isinf(distance) else Leg(end=look * distance)
 
 
-def _check(
-    frequency: float, polarization: str, distance: float, tolerance_db: float, bounces: int, crease_deg: float | None
-) -> None:
-    FREQUENCY.check("frequency", frequency)
-    if str(polarization).upper() not in _POLARIZATIONS:
-        raise ValueError(f"polarization = {polarization!r}: must be one of {', '.join(_POLARIZATIONS)}")
-    _check_distance("distance", distance)
-    TOLERANCE_DB.check("tolerance_db", tolerance_db)
-    BOUNCES.check("max_bounces", bounces, whole=True)
-    if crease_deg is not None:
-        CREASE.check("crease_deg", crease_deg)
+def _outside(geometry: Geometry, leg: Leg, name: str) -> None:
+    """Raise ValueError that names the distance by which an end is within the body or on it."""
+    if not leg.far:
+        far = float(np.linalg.norm(leg.end))
+        refuse_within(geometry.facets.vertices, leg.end, f"{name} = {far:g} m: the radar")
 
 
-def _check_distance(name: str, distance: float) -> None:
-    if distance != np.inf:
-        LENGTH.check(name, distance)
+def _polarizations(given: object) -> str:
+    """Return the polarisations of receiver and transmitter. Raises: ValueError where they are none."""
+    if not (isinstance(given, str) and given.upper() in _POLARIZATIONS):
+        raise ValueError(f"polarization = {shown(given)}: must be one of {', '.join(_POLARIZATIONS)}")
+    return given.upper()
+
+
+def _distances(distance: object, rx_distance: object) -> tuple[float, float | None]:
+    """Return the distances [m] of transmitter and receiver, the latter None where it is the same. Raises: ValueError
+    where one is none, or where one alone is infinite."""
+    sent = _distance("distance", distance)
+    if rx_distance is None:
+        return sent, None
+    heard = _distance("rx_distance", rx_distance)
+    if np.isinf(heard) != np.isinf(sent):
+        raise ValueError(f"rx_distance = {heard!r} m: must be inf where distance is, and only there")
+    return sent, heard
+
+
+def _distance(name: str, given: object) -> float:
+    """Return a distance [m], perhaps inf. Raises: ValueError where it is none."""
+    far = plain(given)
+    return np.inf if isinstance(far, float) and far == np.inf else float(LENGTH.check(name, given))

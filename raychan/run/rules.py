@@ -58,9 +58,9 @@ def asked(model: Any, tolerance_db: float | None, max_bounces: int | None) -> An
     Raises: ValueError where one is out of range.
     """
     if tolerance_db is not None:
-        TOLERANCE_DB.check("tolerance_db", tolerance_db)
+        tolerance_db = TOLERANCE_DB.check("tolerance_db", tolerance_db)
     if max_bounces is not None:
-        BOUNCES.check("max_bounces", max_bounces, whole=True)
+        max_bounces = BOUNCES.check("max_bounces", max_bounces, whole=True)
     changes = {k: v for k, v in (("tolerance_db", tolerance_db), ("max_bounces", max_bounces)) if v is not None}
     return model.model_copy(update=changes) if changes else model
 

@@ -54,10 +54,10 @@ def frames(
     runs into a body, or motion leads beyond the places that a scene may have.
     """
     check_scene(scene)
-    FRAMES.check("count", count, whole=True)
-    SEED.check("seed", seed, whole=True)
+    count = FRAMES.check("count", count, whole=True)
+    seed = SEED.check("seed", seed, whole=True)
     step = scene.radar.waveform.frame_duration if interval is None else interval
-    INTERVAL.check("interval", step)
+    step = INTERVAL.check("interval", step)
     for k in range(count):
         scene.at(k * step)  # a radar in a body, or one too far off, is an error before the first frame is computed
     return _frames(scene, count, step, seed, tolerance_db, max_bounces, progress)

@@ -51,7 +51,7 @@ def simulate(
     Returns: Result. Raises: ValueError on a tolerance or a number of bounces out of range, SceneError for no Scene.
     """
     check_scene(scene)
-    SEED.check("seed", seed, whole=True)
+    seed = SEED.check("seed", seed, whole=True)
     clock = Clock(progress)
     channel = channel_of(scene, tolerance_db, max_bounces, clock)
     return result_of(scene, channel, seed, clock)

@@ -85,8 +85,9 @@ def spectrogram(
     beyond the places that a scene may have.
     """
     check_scene(scene)
-    TRACED.check("tracings_per_second", tracings_per_second)
-    SEED.check("seed", seed, whole=True)
+    tracings_per_second = TRACED.check("tracings_per_second", tracings_per_second)
+    seed = SEED.check("seed", seed, whole=True)
+    duration, resolution = SECONDS.check("duration", duration), RATE_STEP.check("resolution", resolution)
     if len(scene.radar.tx_elements) > 1:
         raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
     chirps, length = _chirps(scene, duration, resolution)
@@ -124,8 +125,6 @@ def spectrogram(
 def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]:
     """Return how many chirps there are, and how many of them make a stretch. Raises: ValueError where that cannot be;
     SceneError for a target that fluctuates, which only `simulate` draws."""
-    SECONDS.check("duration", duration)
-    RATE_STEP.check("resolution", resolution)
     for body in scene.bodies:
         if body.fluctuates:
             key, allowed = f"bodies.{body.name}.swerling", "0: in a spectrogram targets are steady"
@@ -160,9 +159,10 @@ def _cells(radar: Radar, ranges: tuple[float, float] | None) -> NDArray[np.int64
         ends = reals("ranges", ranges)
         if ends.shape != (2,):
             raise ValueError(f"ranges = {ranges!r}: two numbers are wanted, from and to [m]")
-        CELL_RANGE.check("ranges[0]", ranges[0])
+        near, far = ends.tolist()
+        CELL_RANGE.check("ranges[0]", near)
         at = cells * wave.range_resolution
-        cells = cells[(at >= ranges[0]) & (at <= ranges[1])]
+        cells = cells[(at >= near) & (at <= far)]
     if not len(cells):
         raise ValueError(f"ranges = {ranges} m: no range cell lies there, of 0 to {wave.unambiguous_range:.4g} m")
     return cells

@@ -246,7 +246,7 @@ def specular_paths(
     for name, end in zip(given, ends, strict=True):
         for x in end:
             (SPEED if name.endswith("velocity") else PLACE).check(name, float(x))
-    replace(BOUNCES, low=0).check("max_bounces", max_bounces, whole=True)
+    max_bounces = replace(BOUNCES, low=0).check("max_bounces", max_bounces, whole=True)
     facets = scene.facets(0.0)
     routes = specular_routes(Geometry(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)
     gain = jones(routes, facets, scene.frequency)

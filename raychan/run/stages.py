@@ -122,7 +122,7 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     """
     check_type("paths", paths, Paths)
     check_type("radar", radar, Radar)
-    SEED.check("seed", seed, whole=True)
+    seed = SEED.check("seed", seed, whole=True)
     clean = samples_of(paths, radar)
     return received(clean, paths, radar, seed, clean=clean)[0]
 

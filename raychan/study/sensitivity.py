@@ -55,9 +55,8 @@ class Tolerances:
     each: bool = False
 
     def __post_init__(self) -> None:
-        TURN_DEG.check("turn_deg", self.turn_deg)
-        SHIFT_MM.check("shift_mm", self.shift_mm)
-        DRAWS.check("draws", self.draws, whole=True)
+        for name, limit in (("turn_deg", TURN_DEG), ("shift_mm", SHIFT_MM), ("draws", DRAWS)):
+            object.__setattr__(self, name, limit.check(name, getattr(self, name), whole=name == "draws"))
         if self.turn_deg == self.shift_mm == 0.0:
             raise ValueError("turn_deg and shift_mm are both 0: nothing would move")
 

@@ -17,6 +17,7 @@ from raychan.run.labels import Chains, chains, label_of
 from raychan.run.receiver import noise_of_beam
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
 from raychan.run.solver import paths_over_wedges
+from raychan.scalars import is_one_of, shown
 from raychan.signal.baseband import synthesize
 from raychan.tracing.occlusion import Occlusion, occlusion
 from raychan.units import db, undb
@@ -74,8 +75,8 @@ def check_target(scene: Scene | None, target: str) -> Scene:
     if scene is None:
         raise ValueError("the scene of this result cannot be read again")
     names = [b.name for b in scene.bodies]
-    if target not in names:
-        raise ValueError(f"no body '{target}'; there are {', '.join(names) or 'none'}")
+    if not is_one_of(target, names):
+        raise ValueError(f"no body {shown(target)}; there are {', '.join(names) or 'none'}")
     body = scene.bodies[names.index(target)]
     if is_background(body):
         raise ValueError(f"'{target}' is the ground or the radar's own vehicle, which is no target")

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 
 import numpy as np
 
-from raychan.radar.declared import reals
+from raychan.radar.declared import is_whole, reals
 from raychan.records import Role
+from raychan.scalars import plain
 from raychan.units import undb
 from raychan.world import limits, shapes
 from raychan.world.creases import uncertain_folds
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 MeshLike: TypeAlias = Union[Mesh, "trimesh.Trimesh", "trimesh.Scene", str, Path]
 """A mesh of ours, one of trimesh, or the name of a file."""
 ROLES = {role.name.lower(): role for role in Role}
+_SCALARS = ("yaw_deg", "pitch_deg", "roll_deg", "turn_rate_dps", "rcs_dbsm", "swerling", "scale", "crease_deg")
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ class Body:
     def __post_init__(self) -> None:
         # The mesh is made once: a later change would have no effect.
         if isinstance(self.params, Mapping):
-            object.__setattr__(self, "params", ReadOnly(self.params))
+            object.__setattr__(self, "params", ReadOnly({name: plain(value) for name, value in self.params.items()}))
+        for name in _SCALARS:
+            object.__setattr__(self, name, plain(getattr(self, name)))
 
     @cached_property
     def geometry(self) -> Mesh:
@@ -160,7 +164,7 @@ class Body:
     @property
     def fluctuates(self) -> bool:
         """Whether its RCS does; SceneError for an unknown Swerling case, or where no RCS is given."""
-        known = not isinstance(self.swerling, bool | np.bool_) and self.swerling in range(5)
+        known = is_whole(self.swerling) and self.swerling in range(5)
         if not known or (self.swerling and self.rcs_dbsm is None):
             key, allowed = f"{self.name}.swerling", "0, 1, 2, 3 or 4, above 0 only with rcs_dbsm"
             raise SceneError(f"{shown(self.swerling)} is not possible", key=key, value=self.swerling, allowed=allowed)

@@ -42,6 +42,8 @@ def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
         allowed = "a scene file, or the name of a bundled scene"
         raise SceneError(f"{shown(path)} is not possible", key="path", value=path, allowed=allowed)
     known = known or bundled.names() + bundled.ship_names()
+    if "\0" in str(path):
+        raise SceneError(f"{shown(str(path))} is not possible", value=str(path), allowed="a name without a zero byte")
     if not str(path).strip() or str(path) == ".":  # Path("") is the current directory
         raise SceneError("no scene file is named", value=str(path), allowed=_near(Path("?"), known))
     file = bundled.found(path)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+
+from raychan.scalars import shown
+
+__all__ = ["SceneError", "nearest", "shown"]
 
 
 class SceneError(ValueError):
@@ -39,12 +42,3 @@ def nearest(word: str, known: Iterable[str]) -> str:
     names = sorted(map(str, known))
     close = get_close_matches(word, names, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'?" if close else "one of " + ", ".join(names)
-
-
-def shown(value: Any) -> str:
-    """Return a value as messages show it, cut where it is long."""
-    try:
-        text = repr(value)
-    except ValueError:  # Python writes no whole number of more than 4300 digits
-        return "a number of thousands of digits"
-    return text if len(text) <= 80 else f"{text[:60]}... ({len(text)} characters)"

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from raychan.scalars import plain
 from raychan.world import checks
 from raychan.world.body import Body
-from raychan.world.errors import SceneError
+from raychan.world.errors import SceneError, shown
 from raychan.world.limits import LATER, PLACE
 from raychan.world.schema import RadarTable
 from raychan.world.surroundings import check_places
@@ -19,10 +20,11 @@ if TYPE_CHECKING:
     from raychan.radar.radar import Radar
 
 
-def check_time(time: Any) -> None:
-    """Raise SceneError unless a time [s] is a number within its limits."""
+def check_time(time: Any) -> float:
+    """Return a time [s] as Python's number. Raises: SceneError unless it is a number within its limits."""
     if LATER.problem(time):
-        raise SceneError(f"{time!r} is not possible", key="time", value=time, allowed=f"a number {LATER.allowed}")
+        raise SceneError(f"{shown(time)} is not possible", key="time", value=time, allowed=f"a number {LATER.allowed}")
+    return plain(time)  # type: ignore[no-any-return]
 
 
 def table_at(table: RadarTable, radar: Radar) -> RadarTable:

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from raychan.scalars import plain, shown
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -37,15 +39,16 @@ class Limit:
 
     def problem(self, value: Any, whole: bool = False) -> str:
         """Return what is wrong with a value that should be a number (a whole one) within the limits, or ''."""
-        number = hasattr(value, "__index__") or (not whole and hasattr(value, "__float__"))
-        if isinstance(value, bool) or not number:
-            return f"{value!r}: a {'whole ' if whole else ''}number is wanted; {self.text}"
-        return "" if self.allows(value if whole else float(value)) else f"{value!r}: {self.text}"
+        number = plain(value)
+        if isinstance(number, bool) or not isinstance(number, int if whole else int | float):
+            return f"{shown(value)}: a {'whole ' if whole else ''}number is wanted; {self.text}"
+        return "" if self.allows(number) else f"{shown(value)}: {self.text}"
 
-    def check(self, name: str, value: Any, whole: bool = False) -> None:
-        """Raise ValueError unless a value is a number (a whole one) within the limits."""
+    def check(self, name: str, value: Any, whole: bool = False) -> Any:
+        """Return a number (a whole one) within the limits as Python's own. Raises: ValueError where it is none."""
         if problem := self.problem(value, whole):
             raise ValueError(f"{name} = {problem}")
+        return plain(value)
 
     def times(self, factor: float, unit: str) -> Limit:
         """Return the same limits in another unit, smaller by a factor."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from raychan.em.diffuse import Diffuse
 from raychan.records import LAYER, MaterialKind, Materials
+from raychan.scalars import plain
 from raychan.units import EPS0
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import EPS_R, ROUGHNESS_MM, SIGMA, THICKNESS_MM
@@ -21,7 +22,7 @@ from raychan.world.limits import EPS_R, ROUGHNESS_MM, SIGMA, THICKNESS_MM
 _ROUGHNESS, _THICKNESS = ROUGHNESS_MM.times(1e-3, "m"), THICKNESS_MM.times(1e-3, "m")
 
 _TYPES = {
-    "pec": (bool | np.bool_, "true or false"),
+    "pec": (bool, "true or false"),
     "name": (str, "a text"),
     "source": (str, "a text"),
     "diffuse": (Diffuse | None, "a Diffuse, or None"),
@@ -51,6 +52,8 @@ class Material:
             value = getattr(self, key)
             if limit.problem(value) if value is not None else key != "thickness":
                 raise SceneError(f"{shown(value)} is not possible", key=key, value=value, allowed=limit.allowed)
+            object.__setattr__(self, key, plain(value))
+        object.__setattr__(self, "pec", plain(self.pec))
         for key, (kind, allowed) in _TYPES.items():
             value = getattr(self, key)
             if not isinstance(value, kind):

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from raychan.world.errors import SceneError, nearest
+from raychan.scalars import plain
+from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
 from raychan.world.whole_files import checked
@@ -44,10 +45,13 @@ def load(
         raise SceneError("mesh file not found", file=file, value=str(file), allowed="a path to a file that exists")
     if file.suffix.lower() not in SUFFIXES:
         raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
+    for key, word in (("unit", unit), ("up", up), ("forward", forward)):
+        if not isinstance(word, str) and (word is not None or key == "unit"):
+            raise SceneError(f"{shown(word)} is not possible", file=file, key=key, value=word, allowed="a text")
     if unit not in UNITS:
         raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
-    if not SCALE.allows(scale):
-        raise SceneError(f"{scale!r} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
+    if SCALE.problem(scale):
+        raise SceneError(f"{shown(scale)} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
     turn = _turn(*axes_taken(file, up, forward), file)
     if not file.stat().st_size:
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
@@ -59,7 +63,7 @@ def load(
         # Infinite coordinates are reported below, not as warnings of the reader.
         with np.errstate(all="ignore"):
             scene = trimesh.load_scene(str(file), process=False)
-        mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * scale))
+        mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * plain(scale)))
     except SceneError as e:
         raise e.at(file=file) from None
     except IndexError as e:

@@ -128,6 +128,9 @@ def antenna_table(given: str | AntennaTable, folder: Path, key: str, file: Any =
     """
     if isinstance(given, AntennaTable):
         return given, file
+    if "\0" in given:
+        allowed = "a name without a zero byte"
+        raise SceneError(f"{shown(given)} is not possible", file=file, key=key, value=given, allowed=allowed)
     path = bundled.found(given, folder)
     try:
         text = path.read_text(encoding="utf-8")

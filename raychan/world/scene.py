@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from raychan.records import LAYER, Facets, Points
 from raychan.reprs import Described
+from raychan.scalars import plain
 from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
 from raychan.world.build import body_of, material_of, scene_text
-from raychan.world.errors import SceneError, nearest
+from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.fixed import Fixed
 from raychan.world.idle_keys import idle_keys
 from raychan.world.later import check_later, check_time, table_at
@@ -86,10 +87,9 @@ class Scene(Fixed, Described):
         self.model: Model = checked(Model, Model() if model is None else model, path, "model")
         carrier = self.radar_table.waveform.carrier_ghz * 1e9 if self.radar_table else 77e9
         if frequency is not None and FREQUENCY.problem(frequency):
-            raise SceneError(
-                f"{frequency!r} is not possible", key="frequency", value=frequency, allowed=FREQUENCY.allowed
-            )
-        self.frequency = carrier if frequency is None else float(frequency)
+            problem, allowed = f"{shown(frequency)} is not possible", FREQUENCY.allowed
+            raise SceneError(problem, key="frequency", value=frequency, allowed=allowed)
+        self.frequency = carrier if frequency is None else float(plain(frequency))
         self.materials = materials_of({} if materials is None else materials)
         self.atmosphere = atmosphere_of(atmosphere, path)
         self.attenuation = attenuation_of(self.atmosphere, self.frequency, self.radar_table, path)
@@ -212,7 +212,7 @@ class Scene(Fixed, Described):
         Raises: SceneError for another type, or where by then the radar would be inside a body, or a body or the radar
         beyond the places that a scene may have.
         """
-        check_time(time)
+        time = check_time(time)
         if time == 0.0:
             return self
         moved = copy(self)

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from raychan.scalars import plain
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, shown
 from raychan.world.limbs import LimbMotion
@@ -26,7 +25,7 @@ _NAMES = {"shape": (str, "a text"), "role": (str, "a text"), "material": (str | 
 
 def bodies_of(given: Any) -> tuple[Body, ...]:
     """Return the bodies that a scene is given. Raises: SceneError where one is none, or has a field that cannot be."""
-    if isinstance(given, str | Body) or not isinstance(given, Iterable):
+    if isinstance(given, str | Body) or not isinstance(plain(given), Iterable):
         raise _refused(given, "bodies", "a list of Body")
     bodies = tuple(given)
     for number, body in enumerate(bodies):
@@ -74,8 +73,6 @@ def _plain(value: Any) -> Any:
     """Return a value as a table holds it: lists for arrays and tuples, names for materials."""
     if isinstance(value, Material):
         return value.name
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
     if isinstance(value, Mapping):
         return {name: _plain(one) for name, one in value.items()}
     return [_plain(one) for one in value] if isinstance(value, list | tuple) else value

@@ -6,11 +6,16 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from raychan.scalars import tabled
 from raychan.world.errors import SceneError, nearest, shown
 
 
 def checked(kind: type[Any], data: Any, file: Any = None, key: str = "") -> Any:
-    """Return `data` checked as a table of `kind`, which stands under a key. Raises: SceneError for the first error."""
+    """Return `data` checked as a table of `kind`, which stands under a key; numbers of NumPy stand for Python's.
+
+    Raises: SceneError for the first error.
+    """
+    data = tabled(data)
     try:
         return kind.model_validate(data)
     except ValidationError as e:

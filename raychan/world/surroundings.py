@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from raychan.em.atmosphere import Atmosphere
+from raychan.scalars import plain
 from raychan.world.body import Body
 from raychan.world.checks import outside
 from raychan.world.errors import SceneError, shown
@@ -51,7 +52,7 @@ def interferers_of(given: Any, folder: Path, file: Path | None) -> tuple[Interfe
     from raychan.radar.interferer import Interferer
 
     found: list[Interferer] = []
-    if isinstance(given, str) or not isinstance(given, Iterable):
+    if isinstance(given, str) or not isinstance(plain(given), Iterable):
         allowed = "a list of Interferer or their tables"
         raise SceneError(f"{shown(given)} is not possible", file=file, key="interferers", value=given, allowed=allowed)
     for one in given:

@@ -10,7 +10,7 @@ from support.places import TESTS
 ROOT = Path(__file__).parents[2] / "raychan"
 STOREYS = (
     ("crew",),
-    ("units", "parallel", "compile"),
+    ("units", "scalars", "parallel", "compile"),
     ("poses", "reprs", "kinds", "vectors"),
     ("columns",),
     ("records",),

@@ -94,6 +94,50 @@ def test_many_training_cells_are_known_noise():
         assert detection_probability(11.0, Detector(1e-5, 1, "ca", 1e7), swerling) == pytest.approx(known, abs=1e-4)
 
 
+@pytest.mark.parametrize("looks", [1, 8, 1000])
+@pytest.mark.parametrize("cells", [1e6, 1e9, 1e12, 1e15, 1e17, 1e18])
+def test_however_many_training_cells_are_known_noise(cells, looks):
+    snr_db = {1: 10.0, 8: 0.0, 1000: -10.0}[looks]
+    known = detection_probability(snr_db, Detector(looks=looks))
+    for cfar in ("ca", "os"):
+        found = detection_probability(snr_db, Detector(looks=looks, cfar=cfar, cells=cells))
+        assert found == pytest.approx(known, abs=100.0 / cells + 1e-10)
+
+
+def test_the_factor_of_many_training_cells_continues_that_of_fewer():
+    for looks in (1, 8, 100):
+        few, many = (factor(1e-6, cells, "ca", looks) for cells in (9999.0, 10001.0))
+        assert many == pytest.approx(few, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        *(({"cells": x}, f"Detector.cells = {x!r}: must be 1 or more") for x in (float("nan"), -1.0, 0.0)),
+        *(
+            ({"cells": x, "cfar": cfar}, r"Detector.cells = .*: a CFAR needs 1 to 1e\+18 training cells")
+            for x in (float("nan"), 0.0, 1e-300, 0.5, 1e300, np.inf)
+            for cfar in ("ca", "os")
+        ),
+        ({"cells": np.array([1, 2])}, "Detector.cells = array.*: a number is wanted"),
+        ({"cells": 10**400}, "Detector.cells = 1000.*: a number is wanted"),
+        ({"min_snr_db": 2**70}, "Detector.min_snr_db = 1.18.*e.21: must be a number, at most 300 dB"),
+        ({"looks": 10**7}, "Detector.looks = 10000000: must be a whole number from 1 on, to 1,000,000"),
+        ({"cfar": np.array(["ca", "os"])}, "Detector.cfar = array.*: must be None or one of ca, os"),
+    ],
+)
+def test_a_detector_that_cannot_be_is_told_where_it_is_declared(given, said):
+    with pytest.raises(ValueError, match=said):
+        Detector(**given)
+
+
+def test_scalars_of_numpy_and_large_whole_numbers_make_a_detector():
+    some = Detector(cfar="ca", cells=np.array(24), looks=np.float32(2), pfa=np.array(1e-4), min_snr_db=np.int64(3))
+    assert some == Detector(cfar="ca", cells=24.0, looks=2, pfa=1e-4, min_snr_db=3.0)
+    assert detection_probability(10.0, some) > 0.0
+    assert detection_probability(10.0, Detector(cells=2**70)) == detection_probability(10.0)
+
+
 @pytest.mark.parametrize("looks", [1, 10, 100])
 @pytest.mark.parametrize("pfa", [1e-3, 1e-5, 1e-7])
 def test_albersheim_is_within_a_third_of_a_decibel_where_it_is_meant_to_be_used(pfa, looks):

@@ -97,6 +97,29 @@ def test_azimuth_and_elevation_of_two_waves_at_arrays_of_any_form(method, elemen
     assert db(found.power) == pytest.approx(db([1.0, 0.49]), abs=0.05)
 
 
+@pytest.mark.parametrize("method", ["capon", "music", "esprit"])
+@pytest.mark.parametrize("kind", [np.complex128, np.complex64, np.int64])
+def test_a_direction_of_no_power_is_none(method, kind):
+    found = doa(np.ones(4, kind), line(4), 1.0, method, sources=3)
+    assert found.azimuth == pytest.approx([0.0], abs=1e-6) and found.power == pytest.approx([1.0])
+
+
+def test_a_wave_that_is_weak_but_above_rounding_is_told():
+    for level in (1e-2, 1e-5):
+        data = waves(line(8), 0.0) + level * waves(line(8), 30.0)
+        found = doa(data, line(8), 1.0, "esprit", sources=2)
+        assert np.degrees(found.azimuth) == pytest.approx([0.0, 30.0], abs=0.1)
+        assert found.power == pytest.approx([1.0, level**2], rel=0.05)
+
+
+def test_values_whose_power_no_float_holds_are_told():
+    for value in (1e200, -1e308 - 1e308j):
+        with pytest.raises(ValueError, match=r"snapshots: a value of 1e.[23]0[08] sqrt\(W\); at most 1e.150"):
+            doa(np.full(4, value), line(4), 1.0)
+    assert doa(np.ones((4, 6), complex).T, line(4), 1.0, sources=1).azimuth == pytest.approx([0.0], abs=1e-9)
+    assert doa(np.full(4, 1e-200), line(4), 1.0, sources=1).azimuth == pytest.approx([0.0], abs=1e-9)
+
+
 def test_a_line_along_z_measures_elevation_only():
     found = doa(waves(line(8, axis=2), 0.0, 17.0), line(8, axis=2), 1.0, "esprit", sources=1)
     assert np.isnan(found.azimuth).all() and np.degrees(found.elevation) == pytest.approx(17.0)

@@ -1,6 +1,8 @@
 """Wrong types and empty tables of receivers, interferers and rough surfaces are told in a sentence."""
 
 from dataclasses import replace
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from raychan.world.errors import SceneError
 WAVE = rc.Waveform(77e9, 500e6, 20e-6)
 
 NAN = float("nan")
+WORDS = np.array(["V", "ca"])
 
 
 def measured(**change):
@@ -100,6 +103,28 @@ def measured(**change):
         (lambda: Diffuse("gamma", -3.0, exponent="4"), "exponent = '4': a number is wanted"),
         (lambda: Diffuse("gamma", -3.0, k_shape=True), "k_shape = True: a number is wanted"),
         (lambda: Diffuse("gamma", -3.0, texture_m=None), "texture_m = None: a number is wanted"),
+        (lambda: Diffuse(WORDS, -3.0), "law = array.*: must be one of constant, gamma"),
+        (lambda: Diffuse("gamma", 10**400), "level_db = 1000.*: a number is wanted"),
+        (lambda: rc.IsotropicAntenna(WORDS), "polarization = array.*: must be V or H"),
+        (lambda: rc.Radar(WAVE, multiplexing=WORDS), "Radar.multiplexing = array.*: must be one of none, tdm, ddm"),
+        (lambda: rc.Radar(WAVE, rx_polarization=WORDS), "Radar.rx_polarization = array.*: must be V, H or both"),
+        *(
+            (lambda name=name: rc.Processing(**{name: WORDS}), f"Processing.{name} = array.*: must be ")
+            for name in ("range_window", "rate_window", "beam_window", "cfar", "beams", "doa")
+        ),
+        *(
+            (lambda name=name: rc.Processing(**{name: np.array(1)}), rf"{name} = array\(1\): must be two whole numbers")
+            for name in ("pad", "guard", "train")
+        ),
+        (lambda: rc.PhaseNoise([[10**400, -80.0]]), "PhaseNoise.mask: at least 1 pair of finite numbers wanted"),
+        (lambda: ChirpError([[0, 10**400], [1, 1]]), "ChirpError.table: at least 2 pairs of finite numbers wanted"),
+        (lambda: Converter(10**400, 0.0), "Converter.bits = 1000.*: a whole number from 1 to 24 wanted"),
+        (lambda: replace(WAVE, n_chirps=10**5000), "n_chirps = a number of thousands of digits: must be a whole"),
+        (lambda: rc.CosineAntenna(1e300, 20.0), r"must be below 180 deg: hpbw_h_deg = 1e\+300 deg"),
+        (lambda: replace(WAVE, repetition=1e-5), "repetition = 1e-05 s: shorter than chirp_duration = 2e-05 s"),
+        (lambda: rc.mimo_array(0, 8, 2e-3), "n_tx = 0: must lie between 1 and 4096"),
+        (lambda: rc.mimo_array(3, 0, 2e-3), "n_rx = 0: must lie between 1 and 4096"),
+        (lambda: rc.uniform_array(4, 2e-3, axis=WORDS), "axis = array.*: must be y or z"),
     ],
 )
 def test_a_wrong_type_or_an_empty_table_is_told_with_what_is_wanted(make, said):
@@ -113,6 +138,19 @@ def test_lists_scalars_of_numpy_and_whole_numbers_stay_allowed():
     assert rc.ArrayAntenna(np.int32(4), 2, 1, np.float32(0.5)).field(np.eye(3)).shape == (3, 2)
     assert rc.Radar(WAVE, position=[np.float32(1.0), 2, np.int8(3)], power=1).position.tolist() == [1.0, 2.0, 3.0]
     assert replace(WAVE, repetition=None, stagger=np.array([25e-6, 31e-6])).stagger == (25e-6, 31e-6)
+
+
+def test_fractions_and_decimals_become_floats():
+    wave = rc.Waveform(Fraction(77 * 10**9), Decimal(10**8), Fraction(1, 50000))
+    assert wave == rc.Waveform(77e9, 1e8, 2e-5) and type(wave.bandwidth) is float
+    assert Diffuse("gamma", Fraction(-7, 2)) == Diffuse("gamma", -3.5)
+    assert rc.uniform_array(np.array(4), Fraction(1, 500)).tolist() == rc.uniform_array(4, 2e-3).tolist()
+
+
+def test_an_element_far_off_is_told_without_a_warning_of_overflow(recwarn):
+    with pytest.raises(ValueError, match=r"Radar.elements: an element is 1e\+300 m off the phase centre"):
+        rc.Radar(WAVE, elements=[[0.0, 1e300, 0.0], [0.0, 0.0, 0.0]])
+    assert not recwarn.list
 
 
 def test_scenes_tell_of_interferers_and_materials_of_the_wrong_type():

@@ -1,5 +1,7 @@
 """Arguments of `rcs` that cannot be are refused in words that name them."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 import trimesh
@@ -32,11 +34,31 @@ PLATE = trimesh.creation.box((0.01, 0.3, 0.3))
         ({"azimuth_deg": 0.0, "simplify": "no"}, "simplify = 'no': must be true or false"),
         ({"azimuth_deg": 0.0, "max_rays": 0}, "max_rays"),
         ({"azimuth_deg": 0.0, "max_rays": 10.5}, "max_rays"),
+        *(
+            ({"azimuth_deg": 0.0, name: x}, f"{name} = .*: a (whole )?number is wanted")
+            for name in ("tolerance_db", "crease_deg", "distance", "rx_distance", "max_rays", "max_bounces")
+            for x in (np.array([1, 2]), np.array([]))
+        ),
+        ({"azimuth_deg": 0.0, "tolerance_db": 10**400}, "tolerance_db = 1000.*: must lie between"),
+        ({"azimuth_deg": 0.0, "polarization": np.array(["VV"])}, "polarization = array.*: must be one of VV, VH"),
+        ({"azimuth_deg": 90.0, "distance": 0.1}, r"^distance = 0.1 m: the radar at .* is inside the mesh"),
+        (
+            {"azimuth_deg": 90.0, "distance": 1.0, "rx_distance": 0.1},
+            r"^rx_distance = 0.1 m: the radar at .* is inside the mesh",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(given, said):
     with pytest.raises(ValueError, match=said):
         rc.rcs(PLATE, 77e9, **given)
+
+
+def test_scalars_of_numpy_and_fractions_are_numbers():
+    given = {"azimuth_deg": 0.0, "max_bounces": np.array(1), "max_rays": np.array(100_000)}
+    some = rc.rcs(PLATE, 10e9, distance=Fraction(5, 2), tolerance_db=Fraction(3), crease_deg=np.array(20.0), **given)
+    assert some.sigma == rc.rcs(PLATE, 10e9, distance=2.5, tolerance_db=3.0, crease_deg=20.0, **given).sigma
+    with pytest.raises(ValueError, match=r"frequency = array\(\[.*\]\): a number is wanted"):
+        rc.rcs(PLATE, np.array([10e9, 20e9]), 0.0)
 
 
 def test_infinity_of_numpy_is_far():

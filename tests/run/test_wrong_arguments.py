@@ -1,6 +1,7 @@
 """Arguments of another type, and records of another radar, are refused by functions in words that name them."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ RDMAP = rc.range_doppler(CUBE, RADAR)
 SCENE = rc.Scene(bodies=[rc.Body("t", shape="box", rcs_dbsm=10.0, position=(12, 0, 0))], radar=RADAR)
 PATHS = rc.transfer(rc.trace(SCENE), RADAR)
 LINE = rc.uniform_array(8, 2e-3)
+WORDS = np.array(["a", "b"])
 OTHERS = (None, 3, "x", [], SCENE)
 
 
@@ -79,12 +81,36 @@ def test_stages_name_the_argument_that_is_of_another_type(call, said, given):
         (lambda: rc.doa(np.ones(8), LINE, 4e-3, sources="1"), "sources = '1': must be a whole number"),
         (lambda: rc.doa(np.ones(8), LINE, 4e-3, smoothing="3"), "smoothing = '3': must be finite, a number"),
         (lambda: rc.doa("x", LINE, 4e-3), "snapshots = 'x': numbers are wanted"),
+        (lambda: rc.doa(np.ones(8), LINE, 4e-3, method=WORDS), "method array.*: must be one of bartlett"),
+        (lambda: rc.doa(np.ones(8), LINE, 4e-3, criterion=WORDS), "criterion array.*: must be one of mdl, aic"),
+        (lambda: rc.visibility(rc.simulate(SCENE), WORDS), "no body array.*; there are t"),
+        *(
+            (lambda x=x, name=name: rc.simulate(SCENE, **{name: x}), f"{name} = array.*: a (whole )?number is wanted")
+            for name in ("seed", "tolerance_db", "max_bounces")
+            for x in (np.array([1, 2]), np.array([]))
+        ),
+        (lambda: rc.frames(SCENE, np.array([1, 2])), "count = array.*: a whole number is wanted"),
+        (lambda: rc.frames(SCENE, 2, np.array([])), "interval = array.*: a number is wanted"),
+        (lambda: rc.spectrogram(SCENE, np.array([])), "duration = array.*: a number is wanted"),
+        *(
+            (lambda name=name: rc.spectrogram(SCENE, 0.01, **{name: np.array([])}), f"{name} = array.*: a number is")
+            for name in ("resolution", "tracings_per_second")
+        ),
         (lambda: rc.doa(np.ones(8), "x", 4e-3), "elements = 'x': numbers are wanted"),
     ],
 )
 def test_functions_name_the_argument_that_cannot_be(call, said):
     with pytest.raises(ValueError, match=said):
         call()
+
+
+def test_scalars_of_numpy_are_seeds_counts_and_levels():
+    some = rc.simulate(SCENE, seed=np.array(3), tolerance_db=Fraction(1), max_bounces=np.array(1))
+    assert some.seed == 3 and type(some.seed) is int
+    again = rc.simulate(SCENE, seed=3, tolerance_db=1.0, max_bounces=1)
+    np.testing.assert_array_equal(some.rdmap.power, again.rdmap.power)
+    times = [frame.time for frame in rc.frames(SCENE, np.array(2), np.array(0.5))]
+    assert times == [0.0, 0.5] and SCENE.at(np.array(0.5)).radar.position.tolist() == RADAR.position.tolist()
 
 
 def test_a_result_that_is_not_there_is_told_by_a_public_error():

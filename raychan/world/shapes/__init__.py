@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from raychan.scalars import plain
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import HOOPS, LENGTH, PHASE, SAG, WALK
 from raychan.world.mesh import Mesh
@@ -52,7 +53,7 @@ def _made(name: str, params: dict[str, Any] | None) -> Mesh | Skeleton:
     """Return what a shape makes of its parameters, once they are checked."""
     if name not in SHAPES:
         raise SceneError(f"unknown shape '{name}'", key="shape", value=name, allowed=nearest(name, SHAPES))
-    make, given = SHAPES[name], params or {}
+    make, given = SHAPES[name], {key: plain(value) for key, value in (params or {}).items()}
     known = inspect.signature(make).parameters
     for key, value in given.items():
         if key not in known:
@@ -61,7 +62,7 @@ def _made(name: str, params: dict[str, Any] | None) -> Mesh | Skeleton:
         number = (isinstance(default, (int, float)) and not isinstance(default, bool)) or default is None
         if number and (isinstance(value, bool) or not isinstance(value, (int, float))):
             raise SceneError(
-                f"{value!r} is not a number", key=key, value=value, allowed=f"a number [{limit.unit or 1}]"
+                f"{shown(value)} is not a number", key=key, value=value, allowed=f"a number [{limit.unit or 1}]"
             )
         may_be_none = value == 0.0 and (default == 0.0 or key == "arm")
         if number and not may_be_none and not limit.allows(value):
