@@ -43,8 +43,8 @@ _PHASE, _TURN = 0.5, 0.5
 # levels in place of one lie beyond the errors stated (`make bench BENCH="--only auto"`, docs/measurements.md).
 _FLOOR = 2.0
 # rad: of 120 runs with echoes over two upright cylinders, 23 dB over the noise, 34 lose them with 0.1 and with
-# `scene_refinement._MARGIN_DB` of 6, 10 with this and 9, 6 with 0.03 and 9: wider tubes bring them 10 dB too weak. Rays
-# of the three scenes at 0.5, 1 and 3 dB: 13.7, 14.6 and 15.0 million (PYTHONPATH=tests python -m bench --only cylinders)
+# `scene_refinement._MARGIN_DB` of 6, 10 with this and 9, 6 with 0.03 and 9: wider tubes bring them 10 dB too weak
+# (`bench.cylinders`, seeds 30 to 89). Rays of the three scenes at 0.5, 1 and 3 dB: 13.7, 14.6 and 15.0 million.
 _FAN = 0.05
 # Times `Refinement.relative` squared: the error of the antennas' pattern at the middle of an edge of a first tube, over
 # its peak.
