@@ -1,9 +1,10 @@
 """Threads: whole frames on two against one, what of a frame is done outside every loop that threads share, for what the
-second thread waits, and how fast two frames at once are that share nothing but the interpreter: no division of one
-frame among threads is faster."""
+second thread waits, and how fast two frames at once are that share nothing but the interpreter, or, as processes, but
+the machine: no division of one frame among threads is faster."""
 
 from __future__ import annotations
 
+import multiprocessing
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -17,6 +18,7 @@ from bench.measure import Row, barred, paired, seconds
 from raychan import parallel
 
 _BAR, _SERIAL = 1.0 / 1.85, 0.1
+_PATIENCE = 1800.0  # s: a process that failed puts nothing
 
 
 def threads(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
@@ -37,6 +39,7 @@ def threads(scenes: Path, repeats: int, quick: bool) -> Iterator[Row]:
         )
         yield barred(row, f"<= {_BAR:.2f}", row.ratio <= _BAR)
         yield _at_once(scene, name, tolerance, repeats)
+        yield _processes(scene, name, tolerance, repeats)
         with _shared() as spent:
             whole = run(1)
         share = 1.0 - spent[0] / whole
@@ -102,6 +105,32 @@ def _at_once(scene: rc.Scene, name: str, tolerance: float, repeats: int) -> Row:
     finally:
         parallel.set_threads(None)
     return paired("threads", f"{name}: two frames at once, a thread each", pairs, "one after the other")
+
+
+def _processes(scene: rc.Scene, name: str, tolerance: float, repeats: int) -> Row:
+    """Return the row of two frames at once, each in a process of its own, against the same one after the other."""
+    many, pairs = multiprocessing.get_context("spawn"), []
+    for count in (1, 2):
+        start, times = many.Barrier(count), many.Queue()
+        given = str(scene.path), tolerance, repeats, start, times
+        workers = [many.Process(target=_frames, args=given) for _ in range(count)]
+        for worker in workers:
+            worker.start()
+        pairs.append([times.get(timeout=_PATIENCE) for _ in workers])
+        for worker in workers:
+            worker.join()
+    (one,), both = pairs
+    took = [(max(a, b), 2.0 * alone) for a, b, alone in zip(*both, one, strict=True)]
+    return paired("threads", f"{name}: two frames at once, a process each", took, "one after the other")
+
+
+def _frames(file: str, tolerance: float, repeats: int, start: Any, times: Any) -> None:
+    """Put the seconds of frames on one thread, once as many processes as shall run at once are ready."""
+    parallel.set_threads(1)
+    scene = rc.Scene.load(file)
+    rc.simulate(scene, tolerance_db=tolerance)
+    start.wait()
+    times.put([seconds(lambda: rc.simulate(scene, tolerance_db=tolerance)) for _ in range(repeats)])
 
 
 @contextmanager
