@@ -140,6 +140,10 @@ class MapCells:
         """By how much (c, 2) shallow and deep tubes may still change each level, rms sums."""
         return np.array([c.sums[1] for c in self._changes]).reshape(-1, 2)
 
+    def doubt_by_source(self, i: int) -> tuple[Sources, Floats]:
+        """Return the sources (n,) that changed cell i, and what may still change (n,) by each, over COVER."""
+        return self._changes[i].source, self._changes[i].doubt
+
     def slowness(self, i: int) -> tuple[Sources, Floats, Floats]:
         """Return the sources (n,) that changed cell i, by what factor (n,) the error of each exceeds COVER times its
         last change, and what share (n,) of what is allowed the latter is."""

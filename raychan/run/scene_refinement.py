@@ -231,7 +231,7 @@ class SceneRefinement:
             source, factor, share = cells.slowness(i)
             # Cells not reached are raised to what they may be wrong by: their factors need not count elsewhere.
             held.doubt(source, factor, share * reached[i])
-        return steps, tuple(unreached_of(cells)), ended
+        return steps, tuple(unreached_of(cells, self.geometry.facets)), ended
 
     def _again(
         self, launch: Launch, held: SourcedPaths, wanted: Sources, alone: Sources, rays: SourceRays, rings: Rings

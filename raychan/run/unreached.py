@@ -8,26 +8,35 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.records import Facets
 from raychan.run.map_cells import MapCells
+from raychan.tracing.sources import depth_of, facet_of
 
 Floats = NDArray[np.float64]
 
 _NAMED = 3  # cells that a line names
+_MOST = 0.8  # of what may change of a cell by a bounce, as a power: the bodies that are named bring so much
+_BODIES = 2  # named at most
 
 
 @dataclass(frozen=True)
 class Unreached:
-    """A cell that a budget left above the tolerance: range [m], rate [m/s], and whether it is `deep` tubes, those that
-    bounced, that change most."""
+    """A cell that a budget left above the tolerance: range [m], rate [m/s], the `bounce` at which those tubes scatter
+    that may change it most, 1 on first surfaces, and the `bodies` on which these start, `others` more not named."""
 
     range: float
     rate: float
-    deep: bool
+    bounce: int
+    bodies: tuple[str, ...]
+    others: int = 0
 
     @property
     def text(self) -> str:
         """Where the cell lies, and what changes there."""
-        return f"{self.range:.2f} m, {self.rate:+.2f} m/s ({'tubes that bounced' if self.deep else 'first surfaces'})"
+        more = f" and {self.others} more" if self.others else ""
+        names = " and ".join(self.bodies) if not more else ", ".join(self.bodies) + more
+        what = f"first surface: {names}" if self.bounce == 1 else f"bounce {self.bounce} of tubes off {names}"
+        return f"{self.range:.2f} m, {self.rate:+.2f} m/s ({what})"
 
 
 @dataclass(frozen=True)
@@ -70,10 +79,34 @@ class Remains:
         return said
 
 
-def unreached_of(cells: MapCells) -> Iterator[Unreached]:
+def unreached_of(cells: MapCells, facets: Facets) -> Iterator[Unreached]:
     """Give the cells that are still to be refined and may be wrong by more than is allowed: refinement aims at less."""
     beyond = cells.doubt > np.abs(cells.level) * cells.allowed
-    change, last = cells.change, np.flatnonzero(cells.open & beyond)
+    last = np.flatnonzero(cells.open & beyond)
     for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
-        (shallow, deep), place = change[i], cells.cell_of(i)
-        yield Unreached(float(place[0]), float(place[1]), bool(deep > shallow))
+        place = cells.cell_of(i)
+        yield Unreached(float(place[0]), float(place[1]), *_cause(cells, i, facets))
+
+
+def _cause(cells: MapCells, i: int, facets: Facets) -> tuple[int, tuple[str, ...], int]:
+    """Return the bounce at which the tubes scatter that may change level i most, and the bodies on which most of these
+    start: names, those that bring most first, and how many more."""
+    source, doubt = cells.doubt_by_source(i)
+    bounce, power = depth_of(source), doubt**2
+    worst = int(np.argmax(np.bincount(bounce, power)))
+    rows = np.flatnonzero(bounce == worst)
+    start = facet_of(source[rows])
+    pair, at = np.unique(np.stack([facets.body[start], facets.part[start]]), axis=1, return_inverse=True)
+    brings = np.bincount(at.ravel(), power[rows])
+    order = np.argsort(-brings, kind="stable")
+    count = int(np.searchsorted(np.cumsum(brings[order]), _MOST * brings.sum())) + 1
+    named = order[: min(count, _BODIES)]
+    names = tuple(_name(facets, *map(int, pair[:, k])) for k in named)
+    return worst, names, count - len(named)
+
+
+def _name(facets: Facets, body: int, part: int) -> str:
+    """Return the name of a body, and of its part if it has several."""
+    name = facets.body_names[body]
+    several = (facets.part[facets.body == body] != part).any()
+    return f"{name}.{facets.part_names[part]}" if several else name

@@ -1,11 +1,19 @@
 """Lines on cells that a budget left above the tolerance: detections, and what may still become one."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from raychan.run.map_cells import MapCells
 from raychan.run.unreached import Remains, Unreached, unreached_of
 
 SHALLOW, DEEP = 1 << 31, 2 << 31  # sources of facet 0: bounces 1 and 2
+FACETS = SimpleNamespace(
+    body=np.array([0, 0, 1, 2]),
+    part=np.array([0, 1, 0, 0]),
+    body_names=("car", "post", "wall"),
+    part_names=("a", "b"),
+)
 
 
 def said(unreached, steps, ranges, rates):
@@ -20,24 +28,39 @@ def test_weak_cells_are_told_apart_from_detections():
     cells.spare(np.full(3, 0.8))
     cells.changed(0, np.array([SHALLOW]), np.array([0.2 + 0j]))
     cells.changed(1, np.array([DEEP]), np.array([0.01 + 0.4j]))
-    found = list(unreached_of(cells))
-    assert found == [Unreached(10.0, 1.0, deep=False), Unreached(20.0, -2.0, deep=True)]
+    found = list(unreached_of(cells, FACETS))
+    assert found == [Unreached(10.0, 1.0, 1, ("car.a",)), Unreached(20.0, -2.0, 2, ("car.a",))]
     strong, weak = said(found, 2, [10.0], [1.0])
     assert strong == (
         "refined 2 times, ended by 8 steps: the level still changes by more than 0.5 dB at 10.00 m, +1.00 m/s "
-        "(first surfaces)"
+        "(first surface: car.a)"
     )
-    assert "where nothing is detected yet" in weak and "20.00 m, -2.00 m/s (tubes that bounced)" in weak
+    assert "where nothing is detected yet" in weak and "20.00 m, -2.00 m/s (bounce 2 of tubes off car.a)" in weak
 
 
 def test_nothing_is_said_where_all_is_reached_and_three_cells_are_named():
     assert said([], 1, [], []) == []
-    (line,) = said([Unreached(float(k), 0.0, True) for k in range(5)], 1, [], [])
-    assert line.startswith("refined once, ") and line.endswith("2.00 m, +0.00 m/s (tubes that bounced) and 2 more")
+    (line,) = said([Unreached(float(k), 0.0, 2, ("post",)) for k in range(5)], 1, [], [])
+    assert line.startswith("refined once, ") and line.endswith(
+        "2.00 m, +0.00 m/s (bounce 2 of tubes off post) and 2 more"
+    )
 
 
 def test_a_cell_is_a_detection_within_a_cell_of_one_in_range_and_in_rate_not_in_one_of_both():
-    cell = Unreached(13.64, -3.79, deep=True)
+    cell = Unreached(13.64, -3.79, 2, ("post",))
     for found, weak in (([13.66, -3.74], False), ([13.66, -2.9], True), ([14.2, -3.74], True)):
         (line,) = said([cell], 3, found[:1], found[1:])
         assert ("where nothing is detected yet" in line) == weak and "13.64 m" in line
+
+
+def test_the_bounce_and_the_bodies_that_may_change_a_cell_most_are_named():
+    cells = MapCells(np.array([[10.0, 1.0, 1.0]]), np.array([1.0], complex), 0.5)
+    source = np.array([SHALLOW, DEEP, DEEP + 1, DEEP + 2, DEEP + 3])
+    cells.changed(0, source, np.array([0.3, 0.3, 0.29, 0.28, 0.001], complex))
+    (cell,) = unreached_of(cells, FACETS)
+    assert (cell.bounce, cell.bodies, cell.others) == (2, ("car.a", "car.b"), 1)
+    assert cell.text.endswith("(bounce 2 of tubes off car.a, car.b and 1 more)")
+    cells.changed(0, source, np.array([0.3, 0.001, 0.001, 0.3, 0.001], complex))
+    cells.changed(0, source[:1], np.array([0.6], complex))
+    (cell,) = unreached_of(cells, FACETS)
+    assert (cell.bounce, cell.bodies) == (1, ("car.a",))
