@@ -11,7 +11,7 @@ import typer
 from raychan.cli import show
 from raychan.cli.options import Threads, within
 from raychan.cli.rcs_options import MOST_ANGLES, angles, can_be_polar, metres, writable
-from raychan.cli.rcs_output import beyond_budget, csv_text, further_bounces, rows, table_of, uncertainties
+from raychan.cli.rcs_output import beyond_budget, csv_text, edge_fields, further_bounces, rows, table_of, uncertainties
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -131,6 +131,7 @@ def rcs(
         show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
     show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
     show.warn(further_bounces(found, max_bounces, tolerance))
+    show.warn(edge_fields(found, tolerance))
     show.warn(beyond_budget(found, max_rays))
     show.warn(uncertainties(mesh, found, tolerance, crease is not None))
     if files:

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from raychan.run.rcs import Rcs
     from raychan.world.mesh import Mesh
 
-Row = tuple[float, float, float, float, float, float, int, int, bool]
+Row = tuple[float, float, float, float, float, float, int, int, bool, float, float]
 """Azimuth [deg], elevation [deg], RCS [m^2], RCS [dBsm], error [dB], its numerical part [dB], rays,
-bounces, converged."""
+bounces, converged, changes [dB] by a further bounce and by fringe fields of edges."""
 
 
 def rows(az: Any, el: Any, found: Rcs) -> list[Row]:
@@ -25,7 +25,8 @@ def rows(az: Any, el: Any, found: Rcs) -> list[Row]:
     with np.errstate(divide="ignore"):
         dbsm = 10.0 * np.log10(found.sigma)
     levels = (az, el, found.sigma, dbsm, found.error_db, found.numerical_db)
-    columns = [c.tolist() for c in (*levels, found.rays, found.bounces, found.converged)]
+    beyond = found.further_db, found.edges_db
+    columns = [c.tolist() for c in (*levels, found.rays, found.bounces, found.converged, *beyond)]
     return list(zip(*columns, strict=True))
 
 
@@ -33,10 +34,11 @@ def csv_text(rows: list[Row]) -> str:
     """Return the rows as the text of a CSV file."""
     head = "azimuth_deg,elevation_deg,sigma_m2,rcs_dbsm,error_db,numerical_db,rays,bounces,converged"
     lines = [
-        f"{a:.10g},{e:.10g},{s:.8g},{d:.6g},{_known(x, '.4g', '')},{_known(n, '.4g', '')},{r},{b},{str(c).lower()}"
-        for a, e, s, d, x, n, r, b, c in rows
+        f"{a:.10g},{e:.10g},{s:.8g},{d:.6g},{_known(x, '.4g', '')},{_known(n, '.4g', '')},{r},{b},{str(c).lower()},"
+        f"{_known(f, '.4g', '')},{_known(g, '.4g', '')}"
+        for a, e, s, d, x, n, r, b, c, f, g in rows
     ]
-    return "\n".join([head, *lines, ""])
+    return "\n".join([head + ",further_db,edges_db", *lines, ""])
 
 
 def table_of(title: str, rows: list[Row]) -> Table:
@@ -46,7 +48,7 @@ def table_of(title: str, rows: list[Row]) -> Table:
             *(f"{a:g}", f"{e:g}", f"{d:.2f}" if s else "no return"),
             *(_known(x, ".3f", "unknown"), _known(n, ".3f", "unknown"), f"{r}", f"{b}"),
         )
-        for a, e, s, d, x, n, r, b, _ in rows
+        for a, e, s, d, x, n, r, b, *_ in rows
     ]
     heads = ("azimuth deg", "elevation deg", "RCS dBsm", "error dB", "numerical dB", "rays", "bounces")
     return show.table(title, heads, cells, left=())
@@ -67,6 +69,22 @@ def further_bounces(found: Rcs, most: int, tolerance: float) -> list[str]:
     change = float(np.nanmax(found.further_db))
     estimate = f"one more changes up to {change:.2g} dB, by estimate"
     return [f"at {last} of {found.bounces.size} angles {beyond}: {estimate}"]
+
+
+def edge_fields(found: Rcs, tolerance: float) -> list[str]:
+    """Return a line on fringe fields of edges, where they may change levels by more than the tolerance."""
+    import numpy as np
+
+    some = found.sigma > 0.0
+    lost = int((np.isnan(found.edges_db) & some).sum())
+    over = int((found.edges_db > tolerance).sum()) + lost
+    if not over:
+        return []
+    most = f"at {lost} of them by as much as it is" if lost else f"by up to {np.nanmax(found.edges_db):.2g} dB"
+    return [
+        f"at {over} of {found.sigma.size} angles the error does not include fringe fields of edges, which physical "
+        f"optics leaves out: they may change the level {most}, by estimate"
+    ]
 
 
 def beyond_budget(found: Rcs, most: int) -> list[str]:

@@ -50,6 +50,9 @@ class Rcs:
     """Change [dB] if a bounce beyond max_bounces brought as much as the last allowed one, or, where that brings
     nothing, as much as a coarse launch finds: an estimate that is not in error_db; 0 for a convex body, NaN where
     max_bounces is 1 and the body is not convex."""
+    edges_db: Floats
+    """Change [dB] that fringe fields of edges may bring, which physical optics leaves out: an estimate for perfect
+    conductors that is not in error_db; 0 without edges, NaN where they may bring as much as the rest."""
 
     merged: str = ""
     """What was merged of a finely tessellated mesh: '327,680 facets merged into 7,956, deviation 0.24 um'."""
@@ -147,6 +150,7 @@ def _collected(found: list[Value], shape: tuple[int, ...], merged: str) -> Rcs:
         bounces=column("bounces", np.int64),
         amplitude=np.array([one.matrix for one in found], complex).reshape(*shape, 2, 2),
         further_db=column("further_db", float),
+        edges_db=column("edges_db", float),
         merged=merged,
     )
 

@@ -17,6 +17,7 @@ from raychan.channel.error import COVER, stated_error
 from raychan.channel.mesh_error import MeshError, creeping, has_edges
 from raychan.channel.terminator_error import terminator_error
 from raychan.run.rcs_doubt import Doubt
+from raychan.run.rcs_edges import edges_db
 from raychan.run.scattering import BodyLaunch, BySource
 from raychan.run.source_sums import SourceSums
 from raychan.tracing.legs import Leg
@@ -88,6 +89,7 @@ class Value:
     rays: int
     bounces: int
     further_db: float
+    edges_db: float
     matrix: Complexes
 
 
@@ -108,8 +110,9 @@ def refined(case: Case) -> Value:
     whole = float(case.geometry.area.sum()) * case.frequency / C0
     if abs(sums.value) <= _ROUNDING * max(np.abs(amplitudes).max(initial=0.0), whole):
         matrix[case.row, case.col], error_db, numerical_db = 0.0, np.nan, np.nan
-    sigma = 4.0 * np.pi * abs(matrix[case.row, case.col]) ** 2
-    return Value(sigma, error_db, numerical_db, case.rays - rays, most, further, matrix)
+    value, rays = complex(matrix[case.row, case.col]), case.rays - rays
+    edges = edges_db(case.geometry, (case.leg, case.out), rules[0].wavenumber, value, (case.col, case.row))
+    return Value(4.0 * np.pi * abs(value) ** 2, error_db, numerical_db, rays, most, further, edges, matrix)
 
 
 def _terminator(case: Case) -> float:
