@@ -18,6 +18,7 @@ from raychan.world.pieces import pieces
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Rows = NDArray[np.signedinteger] | slice
 
 # Factors trade coverage of the true error against statements too large. They were chosen on the shapes of
 # tests/truth/shapes.py of seed 1; tests/channel/test_mesh_error.py judges on another seed.
@@ -122,27 +123,28 @@ def has_edges(geometry: Geometry) -> bool:
     return bool(pieces(a, b, len(f.body)).any())
 
 
-def creeping(geometry: Geometry, wavenumber: float) -> tuple[float, float]:
+def creeping(geometry: Geometry, wavenumber: float, rows: Rows = slice(None)) -> tuple[float, float]:
     """Return bounds on what waves creeping around a body add to its amplitude: absolute [m] and relative to it.
+
+    Args: rows (n,) its facets, if there are others.
 
     Both are those of the PEC sphere as wide as the body's smallest extent: Mie's series less physical optics over
     k a = 0.3 to 300; infinite cylinders of both polarisations lie below. 0 for bodies without curved sides, which have
     no creeping wave, and for open sheets, for which no bound is known.
     Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
     """
-    if not geometry.curved.any() or geometry.both_sides.any():
+    if not geometry.curved[rows].any() or geometry.both_sides[rows].any():
         return 0.0, 0.0
-    size = wavenumber * 0.5 * _thinnest(geometry)
+    size = wavenumber * 0.5 * _thinnest(geometry.facets.vertices[rows], geometry.area[rows])
     x = max(size, _RESONANCE)
     wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-2.2 * np.cbrt(x))
     return float(wave / wavenumber), float(2.0 * wave / max(size, 1e-300))
 
 
-def _thinnest(geometry: Geometry) -> float:
-    """Return the least extent [m] of a body along its principal axes."""
-    v = geometry.facets.vertices
-    centre = np.average(v.mean(axis=1), axis=0, weights=geometry.area)
-    off = (v - centre).reshape(-1, 3)
-    weight = np.repeat(geometry.area, 3)
+def _thinnest(vertices: Floats, area: Floats) -> float:
+    """Return the least extent [m] of a body along its principal axes, by corners and areas of its facets."""
+    centre = np.average(vertices.mean(axis=1), axis=0, weights=area)
+    off = (vertices - centre).reshape(-1, 3)
+    weight = np.repeat(area, 3)
     axes = np.linalg.eigh((off * weight[:, None]).T @ off)[1]
     return float(np.ptp(off @ axes, axis=0).min())

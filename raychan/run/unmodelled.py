@@ -18,6 +18,7 @@ from raychan.run.ledger import NOTHING, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, layers_at_once, peak
 from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import coarsest, strongest_bend
+from raychan.run.unmodelled_waves import creeping_waves, over_band
 from raychan.tracing.diffuse_patches import PatchSize, visible_patches
 from raychan.units import db
 from raychan.world.body import Body
@@ -48,6 +49,8 @@ def ledger(
         "transmission": lambda: _transmission(paths, geometry.facets, radar, settings, model, weakest),
         "diffraction to point targets": lambda: _around(geometry, points, radar, settings, model, weakest),
         "diffuse scattering": lambda: _diffuse(geometry, radar, model, weakest),
+        "creeping waves": lambda: creeping_waves(paths, geometry, radar, settings, weakest),
+        "change over the band": lambda: over_band(paths, geometry.facets, radar, settings, weakest),
         "tessellation": lambda: _tessellation(paths, geometry, bodies, radar, settings, weakest),
         "intra-frame motion": lambda: _motion(paths, geometry.facets, radar),
         "diffraction": lambda: _diffraction(geometry, radar, weakest),
@@ -70,13 +73,21 @@ _NAMES = (
     "diffraction",
     "diffraction to point targets",
     "diffuse scattering",
+    "creeping waves",
+    "change over the band",
     "tessellation",
     "range migration",
     "intra-frame motion",
 )
 
 
-_MONOSTATIC = "diffraction", "diffraction to point targets", "diffuse scattering", "intra-frame motion"
+_MONOSTATIC = (
+    "diffraction",
+    "diffraction to point targets",
+    "diffuse scattering",
+    "creeping waves",
+    "intra-frame motion",
+)
 """Effects whose estimates take the way back to be the way out."""
 
 

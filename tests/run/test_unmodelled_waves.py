@@ -1,0 +1,56 @@
+"""Ledger entries on small curved bodies and on wide bands, against Mie's series and a layer's formula."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from truth import mie
+from truth.slab import layer as slab
+
+import raychan as rc
+
+C0 = 299_792_458.0
+WAVE = rc.Waveform(carrier=77e9, bandwidth=1e9, chirp_duration=40e-6, n_chirps=16, n_samples=256)
+
+
+def run(body, wave=WAVE):
+    """Return the run of one body."""
+    return rc.simulate(rc.Scene(radar=rc.Radar(position=(0, 0, 0.5), waveform=wave, power=1e3), bodies=[body]))
+
+
+@pytest.mark.parametrize("ka", [0.6, 1.0, 3.0, 8.0])
+def test_what_creeps_around_a_small_ball_is_told_and_covers_what_physical_optics_lacks_of_mie(ka):
+    wave = dataclasses.replace(WAVE, carrier=1e9, bandwidth=5e7)
+    k = 2.0 * np.pi * wave.middle / C0
+    found = run(rc.Body(name="ball", shape="sphere", params={"radius": ka / k}, position=(20, 0, 0.5)), wave)
+    entry = found.ledger["creeping waves"]
+    lacks = abs(np.sqrt(mie.rcs(ka / k, k) / (np.pi * (ka / k) ** 2)) - 1.0)
+    assert entry.kind == "bound" and "ball" in entry.how
+    assert 20.0 * np.log10(lacks) <= entry.level_db <= 10.0
+
+
+def test_a_large_ball_and_a_box_have_none_that_matters():
+    ball = run(rc.Body(name="ball", shape="sphere", params={"radius": 0.5}, position=(20, 0, 0.5)))
+    assert ball.ledger["creeping waves"].level_db < -40.0
+    assert run(rc.Body(name="box", shape="box", position=(20, 0, 0.5))).ledger["creeping waves"].level_db == "none"
+
+
+def test_a_layer_whose_coefficients_change_over_the_band_is_told_with_the_change():
+    """A pane of nine half waves at the middle of the band returns next to nothing there, and more beside it."""
+    wave = dataclasses.replace(WAVE, carrier=57e9, bandwidth=2e9)
+    thickness = 9.0 * C0 / (wave.middle + 0.2e9) / 2.0 / np.sqrt(6.0)
+    size = {"width": 0.1, "height": 0.1}
+    glass = rc.Material(eps_r=6.0, thickness=thickness)
+    entry = run(rc.Body(name="pane", shape="plate", params=size, position=(8, 0, 0.5), material=glass), wave).ledger[
+        "change over the band"
+    ]
+    bands = np.linspace(wave.carrier, wave.carrier + wave.bandwidth, 401)
+    size_at = [abs(slab(1.0, 6.0, thickness, 2.0 * np.pi * f / C0)[0]) for f in (*bands, wave.middle)]
+    change = 20.0 * np.log10(np.mean(size_at[:-1]) / size_at[-1] - 1.0)
+    assert entry.level_db >= change - 1.0 and entry.kind == "estimate"
+
+
+def test_a_conductor_changes_nothing_over_the_band():
+    assert (
+        run(rc.Body(name="box", shape="box", position=(20, 0, 0.5))).ledger["change over the band"].level_db == "none"
+    )
