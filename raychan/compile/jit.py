@@ -25,6 +25,7 @@ from numba.core.sigutils import normalize_signature
 
 from raychan.compile.code_cache import CodeCache, unkept
 from raychan.compile.linked import FITS, machine_code_where_called
+from raychan.compile.quick_numba import quick_numba
 from raychan.compile.typing_memo import remembered_typing
 
 _CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
@@ -77,6 +78,7 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
             _uncollected(),
             machine_code_where_called(self.targetctx),
             remembered_typing(),
+            quick_numba(),
         ):
             arguments, _ = normalize_signature(sig)
             if not callee and arguments in self.overloads and not _wrapped(self.overloads[arguments]):

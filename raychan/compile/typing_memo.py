@@ -42,11 +42,16 @@ def _get_call_type(function: Any, context: Any, args: tuple[Any, ...], kws: dict
     plain = type(function) is types.Function and not kws and all(isinstance(kind, _PLAIN) for kind in args)
     if not plain:
         return _asked(function, context, args, kws)
-    options = repr(getattr(ConfigStack.top_or_none(), "_values", None))
-    question = function, context, args, options
+    question: tuple[Any, ...] = function, context, args
+    if question not in _found:
+        question += (repr(getattr(ConfigStack.top_or_none(), "_values", None)),)
     if question not in _found:
         signature = _asked(function, context, args, kws)
-        _found[question] = signature, function._impl_keys[signature.args]
+        implementation = function._impl_keys[signature.args]
+        # Only what is compiled from Python depends on the options: else the answer serves all of them (740 of 927).
+        plain = implementation is function.typing_key
+        question = question[:3] if plain else question
+        _found[question] = signature, implementation
     signature, implementation = _found[question]
     function._impl_keys[signature.args] = implementation  # another's, after a question with other options
     return signature
