@@ -52,7 +52,8 @@ def sweep(
     Without --vary and --times the scene is simulated as it is. Levels of the direct, multipath and diffracted returns
     of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png."""
     from raychan.report.sweep_figures import sweep_picture
-    from raychan.run.output_files import Contents, staging
+    from raychan.run.contents import Contents
+    from raychan.run.output_files import staging
     from raychan.study import sweep as study
     from raychan.world.errors import SceneError
     from raychan.world.scene import Scene

@@ -15,9 +15,10 @@ import numpy as np
 
 from raychan.radar.declared import check_type
 from raychan.radar.waveform import Waveform
+from raychan.run.contents import Contents
 from raychan.run.ledger import entry_of
 from raychan.run.netcdf import GROUPS, as_netcdf, read_record
-from raychan.run.output_files import Contents, StoreError, csv_bytes
+from raychan.run.output_files import StoreError, csv_bytes
 from raychan.run.receiver import aperture_of
 from raychan.run.result import Contribution, Explanation, Receiver, Result
 from raychan.units import dbm
@@ -27,9 +28,10 @@ _READS = (2, FORMAT)  # format 2 has delay and range rate of paths instead of le
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
 ARRAY_PICTURES = ("range_azimuth.png", "beams.png")
 """Drawn where an array measures azimuth."""
+_FRAMES = tuple("frame_" + digits * "[0-9]" for digits in (4, 5))
 CONTENTS = Contents(
-    names=("result.nc", "detections.csv", "summary.json", *PICTURES, *ARRAY_PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
-    signs=("result.nc", "summary.json", "frame_[0-9][0-9][0-9][0-9]*/result.nc"),
+    names=("result.nc", "detections.csv", "summary.json", *PICTURES, *ARRAY_PICTURES, *(f"{x}/" for x in _FRAMES)),
+    signs=("result.nc", "summary.json", *(f"{x}/result.nc" for x in _FRAMES)),
 )
 """What `raychan run` writes into its folder; a sequence has a folder of the same for each frame."""
 _CHANGED = "# changed: "  # how a scene notes overridden keys below its text

@@ -16,7 +16,8 @@ from support.scene_texts import PLATE, but_compiling
 
 from raychan.cli import invoke
 from raychan.run import atomic_swap, output_files
-from raychan.run.output_files import Contents, StoreError, staging, write_together, write_whole
+from raychan.run.contents import Contents
+from raychan.run.output_files import StoreError, staging, write_together, write_whole
 from raychan.run.storage import CONTENTS, save_result
 
 FOLDERS = [str(TESTS), str(TESTS / "run")]
