@@ -88,15 +88,15 @@ def _list() -> None:
 def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:
     from raychan.run.output_files import staging
     from raychan.run.simulate import simulate
-    from raychan.run.storage import CONTENTS, save_result
+    from raychan.run.storage import CONTENTS, write_result
 
     with staging(out, CONTENTS) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
         warnings = list(result.warnings)
         if pictures:
-            warnings += _pictures(result, stage, tell, lambda: save_result(result, stage))
+            warnings += _pictures(result, stage, tell, lambda: write_result(result, stage))
         else:
-            save_result(result, stage)
+            write_result(result, stage)
     try:
         _report(result, out, warnings, pictures)
     except KeyboardInterrupt:

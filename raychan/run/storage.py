@@ -18,9 +18,10 @@ from raychan.radar.waveform import Waveform
 from raychan.run.contents import Contents
 from raychan.run.ledger import entry_of
 from raychan.run.netcdf import GROUPS, as_netcdf, read_record
-from raychan.run.output_files import StoreError, csv_bytes
+from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.receiver import aperture_of
 from raychan.run.result import Contribution, Explanation, Receiver, Result
+from raychan.scalars import shown
 from raychan.units import dbm
 
 FORMAT = 3
@@ -54,11 +55,27 @@ _JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
 
 
 def save_result(result: Result, directory: str | Path) -> None:
+    """Write a result into a directory as `raychan run` does, without pictures; `load_result` reads it.
+
+    Args: directory, made where it is missing; an earlier result there is replaced, pictures and frames included, all at
+    once, and other files stay.
+    Raises: StoreError for errors of the disk, for a file in its place, or where files of the same names stand in a
+    directory without results; ValueError for another type, or a name
+    with a zero byte.
+    """
+    check_type("result", result, Result)
+    check_type("directory", directory, str, PathLike)
+    if "\0" in str(directory):
+        raise ValueError(f"directory = {shown(str(directory))}: a name without a zero byte is wanted")
+    with staging(directory, CONTENTS) as stage:
+        write_result(result, stage)
+
+
+def write_result(result: Result, directory: Path) -> None:
     """Write result.nc, detections.csv and summary.json into an existing directory.
 
     Use inside `output_files.staging`, which makes all files appear at once. Raises: StoreError for errors of the disk.
     """
-    directory = Path(directory)
     try:
         (directory / "result.nc").write_bytes(as_netcdf(result, _attrs(result)))
         (directory / "detections.csv").write_bytes(csv_bytes([columns_of(result), *rows(result)]))
@@ -78,7 +95,7 @@ def load_result(path: str | Path) -> Result:
     path = Path(path)
     file = path / "result.nc" if path.is_dir() else path
     if not file.is_file():
-        raise StoreError(f"{file}: no such file; `raychan run` writes it")
+        raise StoreError(f"{file}: no such file; `raychan run` and rc.save_result write it")
     try:
         with xr.open_dataset(file, engine="h5netcdf") as root:
             attrs = dict(root.attrs)
