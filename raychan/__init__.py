@@ -62,6 +62,7 @@ _HOME = {
     "Result": "raychan.run.result",
     "explain": "raychan.run.explain",
     "load_result": "raychan.run.storage",
+    "save_result": "raychan.run.storage",
     "StoreError": "raychan.run.output_files",
     "spectrogram": "raychan.run.spectrogram",
     "Spectrogram": "raychan.run.spectrogram",
@@ -107,6 +108,7 @@ if TYPE_CHECKING:
     from raychan.run.spectrogram import spectrogram as spectrogram
     from raychan.run.specular_paths import specular_paths as specular_paths
     from raychan.run.storage import load_result as load_result
+    from raychan.run.storage import save_result as save_result
     from raychan.study.visibility import visibility as visibility
     from raychan.world.body import Body as Body
     from raychan.world.errors import SceneError as SceneError

@@ -90,7 +90,8 @@ def rcs(
 ) -> None:
     """Compute the radar cross-section of a mesh or a built-in shape against angle, with its stated error.
 
-    Angles point from the target to the radar in the target's frame (x forward, y left, z up).
+    Angles point from the target to the radar in the target's frame (x forward, y left, z up). After Ctrl-C the table of
+    --out has the angles that are done.
     """
     import numpy as np
 
@@ -117,8 +118,14 @@ def rcs(
         "max_rays": max_rays,
         "crease_deg": crease,
     }
-    with show.progress(kernels="rcs") as tell:
-        found = _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell)
+    parts: list[Rcs] = []
+
+    def keep() -> str:
+        return _kept(out, grid[0].ravel(), grid[1].ravel(), parts)
+
+    with show.keeping(keep), show.progress(kernels="rcs") as tell:
+        _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell, parts)
+    found = _joined(parts)
     place = "far field" if np.isinf(far) else f"radar at {far:g} m"
     title = f"{name}, {frequency_ghz:g} GHz, {polarization.upper()}, {place}"
     table = rows(grid[0].ravel(), grid[1].ravel(), found)
@@ -195,14 +202,27 @@ def _parameter(text: str) -> tuple[str, Any]:
         return key, value
 
 
-def _sweep(mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, Any], tell: Callable[..., None]) -> Rcs:
-    """Return the RCS at all angles, computed in chunks so that progress can be shown."""
+def _kept(out: Path | None, az: Any, el: Any, parts: list[Rcs]) -> str:
+    """Write the table of the angles that are done, if one is asked for; return how many these are, '' for none."""
+    if out is None or not parts:
+        return ""
+    from raychan.run.output_files import write_whole
+
+    found = _joined(parts)
+    count = found.sigma.size
+    write_whole(out, csv_text(rows(az[:count], el[:count], found)).encode())
+    return f"{count} of {len(az)} angles are in {out}"
+
+
+def _sweep(
+    mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, Any], tell: Callable[..., None],
+    parts: list[Rcs],
+) -> None:  # fmt: skip
+    """Add the RCS at all angles to parts, in chunks so that progress can be shown."""
     import numpy as np
 
-    from raychan.run.rcs import Rcs
     from raychan.run.rcs import rcs as compute
 
-    parts: list[Rcs] = []
     done = 0
     tell("rcs", 0.0)
     for some in np.array_split(np.arange(len(az)), min(_CHUNKS, len(az))):
@@ -216,6 +236,14 @@ def _sweep(mesh: Mesh, frequency: float, az: Any, el: Any, settings: dict[str, A
             raise typer.BadParameter(str(error)) from error
         done += len(some)
         tell("rcs", done / len(az))
+
+
+def _joined(parts: list[Rcs]) -> Rcs:
+    """Return parts of a sweep as one."""
+    import numpy as np
+
+    from raychan.run.rcs import Rcs
+
     columns = {f.name: [getattr(p, f.name) for p in parts] for f in fields(Rcs)}
     merged = columns.pop("merged")[0]
     return Rcs(**{name: np.concatenate(found) for name, found in columns.items()}, merged=merged)

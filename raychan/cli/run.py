@@ -88,15 +88,15 @@ def _list() -> None:
 def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:
     from raychan.run.output_files import staging
     from raychan.run.simulate import simulate
-    from raychan.run.storage import CONTENTS, save_result
+    from raychan.run.storage import CONTENTS, write_result
 
     with staging(out, CONTENTS) as stage, show.progress() as tell:
         result = simulate(scene, **options, progress=tell)
         warnings = list(result.warnings)
         if pictures:
-            warnings += _pictures(result, stage, tell, lambda: save_result(result, stage))
+            warnings += _pictures(result, stage, tell, lambda: write_result(result, stage))
         else:
-            save_result(result, stage)
+            write_result(result, stage)
     try:
         _report(result, out, warnings, pictures)
     except KeyboardInterrupt:
@@ -126,33 +126,30 @@ def _report(result: Result, out: Path, warnings: list[str], pictures: bool) -> N
 def _sequence(
     scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
 ) -> None:
-    from raychan.parallel import was_interrupted
     from raychan.run.messages import findings, marks
     from raychan.run.sequence import Store, frames
 
     store, told, screen = Store(out), set(), show.console()
     start = perf_counter()
-    try:
-        with show.progress() as tell:
-            for frame in frames(scene, count, interval, **options, progress=tell):
-                drawn: list[str] = []
-                store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
-                # A sequence prints each warning once. Lines on detections differ from frame to frame; each frame's own
-                # line counts them.
-                said = [] if frame.number == 0 else findings(frame.result)
-                new = [w for w in dict.fromkeys([*frame.result.warnings, *drawn]) if w not in told and w not in said]
-                told.update(new)
-                show.warn(new)
-                found = len(frame.result.detections.range)
-                took = sum(frame.result.timings.values())
-                plural = "" if found == 1 else "s"
-                marked = marks(frame.result.detections)
-                screen.print(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}{marked}  in {took:.2f} s")
-    except (KeyboardInterrupt, SystemError) as stop:
-        if not (isinstance(stop, KeyboardInterrupt) or was_interrupted(stop)):
-            raise
-        done = f"{store.count} of {count} frames are in {out}" if store.count else "nothing was written"
-        raise show.Interrupted(f"interrupted; {done}") from None
+
+    def keep() -> str:
+        return f"{store.count} of {count} frames are in {out}" if store.count else ""
+
+    with show.keeping(keep), show.progress() as tell:
+        for frame in frames(scene, count, interval, **options, progress=tell):
+            drawn: list[str] = []
+            store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
+            # A sequence prints each warning once. Lines on detections differ from frame to frame; each frame's own
+            # line counts them.
+            said = [] if frame.number == 0 else findings(frame.result)
+            new = [w for w in dict.fromkeys([*frame.result.warnings, *drawn]) if w not in told and w not in said]
+            told.update(new)
+            show.warn(new)
+            found = len(frame.result.detections.range)
+            took = sum(frame.result.timings.values())
+            plural = "" if found == 1 else "s"
+            marked = marks(frame.result.detections)
+            screen.print(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}{marked}  in {took:.2f} s")
     took = perf_counter() - start
     screen.print(f"{count} frame{'' if count == 1 else 's'} in {took:.1f} s; seeds from {options['seed']}")
     screen.print(

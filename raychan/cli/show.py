@@ -28,6 +28,20 @@ class Interrupted(Exception):
     """Ctrl-C in a command that keeps its finished results; the message says which."""
 
 
+@contextmanager
+def keeping(keep: Callable[[], str]) -> Iterator[None]:
+    """Turn Ctrl-C into Interrupted with what `keep` returns: it writes what is finished, if anything, and says which
+    that is, '' for none."""
+    from raychan.parallel import was_interrupted
+
+    try:
+        yield
+    except (KeyboardInterrupt, SystemError) as stop:
+        if not (isinstance(stop, KeyboardInterrupt) or was_interrupted(stop)):
+            raise
+        raise Interrupted(f"interrupted; {keep() or 'nothing was written'}") from None
+
+
 class _Console(Console):
     def on_broken_pipe(self) -> None:
         """Raise the error for the command line; rich would end the process with code 1."""

@@ -52,7 +52,8 @@ def sensitivity(
     independent Gaussian amounts; the receiver's noise stays. A level whose spread exceeds the tolerance
     and the stated error is speckle.
     With --out, writes sensitivity.csv and sensitivity.png, and with --each, each.csv."""
-    from raychan.run.output_files import Contents, staging
+    from raychan.run.contents import Contents
+    from raychan.run.output_files import staging
     from raychan.study.sensitivity import Tolerances
     from raychan.study.sensitivity import sensitivity as study
     from raychan.world.errors import SceneError

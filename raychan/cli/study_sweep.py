@@ -10,12 +10,15 @@ import typer
 
 from raychan.cli import show
 from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, directory
+from raychan.run.contents import Contents
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from raychan.study.sweep import Step, Sweep
+    from raychan.study.sweep import Axis, Step, Sweep
     from raychan.study.visibility import Level
+
+_CONTENTS = Contents(("sweep.csv", "sweep.png"), signs=("sweep.csv",))
 
 
 def sweep(
@@ -50,20 +53,23 @@ def sweep(
     """Follow one body through varied scenes: its hidden share, the bodies that hide it, and its detections.
 
     Without --vary and --times the scene is simulated as it is. Levels of the direct, multipath and diffracted returns
-    of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png."""
+    of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png; after Ctrl-C
+    sweep.csv has the steps that are done."""
     from raychan.report.sweep_figures import sweep_picture
-    from raychan.run.output_files import Contents, staging
+    from raychan.run.output_files import staging
     from raychan.study import sweep as study
     from raychan.world.errors import SceneError
     from raychan.world.scene import Scene
 
     loaded = Scene.load(scene).override(set_ or [])
-    contents = Contents(("sweep.csv", "sweep.png"), signs=("sweep.csv",))
-    with staging(out, contents) as stage, show.progress() as tell:
+    axes, steps = _axes(vary or [], times), list[study.Step]()
+
+    def keep() -> str:
+        return _kept(study.Sweep(loaded.title, target, axes, tuple(steps)), out)
+
+    with show.keeping(keep), staging(out, _CONTENTS) as stage, show.progress() as tell:
         try:
-            axes = [study.Axis.of(text) for text in vary or ()]
-            axes += [study.Axis.time(times)] if times else []
-            done = study.sweep(loaded, target, axes, seed, tolerance, max_bounces, tell)
+            done = study.sweep(loaded, target, axes, seed, tolerance, max_bounces, tell, steps)
         except SceneError:
             raise
         except ValueError as error:
@@ -75,6 +81,29 @@ def sweep(
     found = sum(s.seen is not None for s in done.steps)
     screen.print(f"{target} is detected in {found} of {len(done.steps)} steps")
     screen.print(f"table and figure: {out / 'sweep.csv'}, {out / 'sweep.png'}", soft_wrap=True)
+
+
+def _axes(vary: list[str], times: str | None) -> tuple[Axis, ...]:
+    """Return the axes that options describe. Raises: typer.BadParameter."""
+    from raychan.study.sweep import Axis
+
+    try:
+        return (*map(Axis.of, vary), *([Axis.time(times)] if times else []))
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def _kept(done: Sweep, out: Path) -> str:
+    """Write the table of the steps that are done; return how many these are, '' for none."""
+    from raychan.run.output_files import staging
+    from raychan.study.sweep import write_csv
+
+    if not done.steps:
+        return ""
+    with staging(out, _CONTENTS) as stage:
+        write_csv(done, stage / "sweep.csv")
+    count = math.prod(len(axis.values) for axis in done.axes)
+    return f"{len(done.steps)} of {count} steps are in {out / 'sweep.csv'}"
 
 
 def _table(done: Sweep) -> Table:

@@ -36,7 +36,7 @@ class Detector:
     0.874
     """
 
-    pfa: float = 1e-6
+    pfa: float = 1e-7
     """Probability of false alarm of a cell."""
     looks: int = 1
     """Powers added in a cell."""
@@ -138,7 +138,7 @@ def _threshold(detector: Detector) -> float:
     return max(float(gammainccinv(detector.looks, detector.pfa)), _least(detector))
 
 
-def albersheim(pd: ArrayLike, pfa: float = 1e-6, looks: int = 1) -> Floats:
+def albersheim(pd: ArrayLike, pfa: float = 1e-7, looks: int = 1) -> Floats:
     """Return the SNR per look [dB] at which a steady target is detected with probability `pd`.
 
     Within 0.33 dB of the exact curves for pd 0.4 to 0.95, pfa 1e-7 to 1e-3 and 1 to 100 looks; 4 dB too low at pd 0.1
@@ -150,7 +150,7 @@ def albersheim(pd: ArrayLike, pfa: float = 1e-6, looks: int = 1) -> Floats:
     return np.asarray(-5.0 * np.log10(looks) + (6.2 + 4.54 / np.sqrt(looks + 0.44)) * np.log10(argument))
 
 
-def shnidman(pd: ArrayLike, pfa: float = 1e-6, looks: int = 1, swerling: int = 0) -> Floats:
+def shnidman(pd: ArrayLike, pfa: float = 1e-7, looks: int = 1, swerling: int = 0) -> Floats:
     """Return the SNR per look [dB] at which a target of a Swerling case is detected with probability `pd`.
 
     Within 0.5 dB of the exact curves for pd 0.2 to 0.9, pfa 1e-7 to 1e-5 and 1 to 100 looks.

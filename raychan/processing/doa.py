@@ -43,7 +43,7 @@ def doa(
     snapshots: ArrayLike,
     elements: ArrayLike,
     wavelength: float,
-    method: str = "music",
+    method: str = "bartlett",
     sources: int | None = None,
     criterion: str = "mdl",
     smoothing: float | None = None,

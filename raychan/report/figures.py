@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from raychan.records import RangeDoppler
 from raychan.report.canvas import MARKS, Placer, on, outlined, save, style
 from raychan.run.labels import chains, explain_cell, response_of
-from raychan.run.result import Explanation, Result
+from raychan.run.result import LINE_OF_SIGHT, Explanation, Result
 from raychan.units import dbm, watt
 
 Floats = NDArray[np.float64]
@@ -208,4 +208,4 @@ def _short(why: Explanation) -> str:
     if not why.contributions:
         return "noise"
     bodies = [link.split(".")[0] for link in why.contributions[0].chain if not link.startswith("(")]
-    return " > ".join(b for i, b in enumerate(bodies) if i == 0 or b != bodies[i - 1]) or "line of sight"
+    return " > ".join(b for i, b in enumerate(bodies) if i == 0 or b != bodies[i - 1]) or LINE_OF_SIGHT

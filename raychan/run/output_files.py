@@ -14,44 +14,16 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from raychan.run.atomic_swap import MARK, UNFINISHED, acquire, exchange, is_dead, is_mark, locked, release, stale_of
+from raychan.run.atomic_swap import MARK, UNFINISHED, acquire, exchange, locked, release, stale_of
+from raychan.run.contents import Contents
 
 
 class StoreError(OSError):
     """A result could not be written or read; says which and why."""
-
-
-@dataclass(frozen=True)
-class Contents:
-    """Patterns of the names that a command writes into a folder of its own.
-
-    names: all that it may write; those of an earlier run are replaced. signs: every such folder has at least one of
-    these; in a folder without any, files of these names are foreign and stay untouched. A pattern 'a_*/' is a folder
-    with the same contents."""
-
-    names: tuple[str, ...]
-    signs: tuple[str, ...]
-
-    def owns(self, entry: Path) -> bool:
-        """Return whether a file, or a folder and all in it, has a name that the command writes."""
-        if is_mark(entry):
-            return is_dead(entry)
-        if entry.is_dir() and not entry.is_symlink():
-            return self.nests(entry) and all(map(self.owns, entry.iterdir()))
-        return any(fnmatch(entry.name, name) for name in self.names)
-
-    def nests(self, entry: Path) -> bool:
-        """Return whether an inner folder is one with the same contents."""
-        return any(name.endswith("/") and fnmatch(entry.name, name[:-1]) for name in self.names)
-
-    def signed(self, folder: Path) -> bool:
-        """Return whether the command wrote this folder."""
-        return any(any(folder.glob(sign)) for sign in self.signs)
 
 
 @contextmanager
@@ -171,15 +143,8 @@ def _check(out: Path, what: Contents) -> None:
         if out.exists():
             raise StoreError(f"{out}: is a file; name a directory")
         return
-    signed = what.signed(out)
-    for entry in (e for e in out.iterdir() if not is_mark(e)):
-        plain = entry.is_symlink() or not entry.is_dir()
-        if not plain and any(fnmatch(entry.name, n) for n in what.names if not n.endswith("/")):
-            raise StoreError(f"{entry}: is a directory in the place of a file; move it away or name another folder")
-        if plain and not signed and what.owns(entry):
-            raise StoreError(
-                f"{entry}: exists, and {out} is not a folder of results; move it away or name another folder"
-            )
+    if obstacle := what.obstacle(out):
+        raise StoreError(obstacle)
 
 
 def _stage(out: Path) -> tuple[Path, Path, int | None]:
@@ -254,7 +219,7 @@ def _move_foreign(old: Path, new: Path, what: Contents) -> None:
             there.mkdir(exist_ok=True)
             _move_foreign(entry, there, what)
             continue
-        while os.path.lexists(there):
+        while os.path.lexists(there):  # made since the check
             there = there.with_name(f"{there.name}.kept")
         os.rename(entry, there)
     (old / UNFINISHED).touch()

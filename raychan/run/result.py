@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from raychan.world.scene import Scene
 
 DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
+LINE_OF_SIGHT = "line of sight"
+"""Names the way straight from a transmitter to a receiver elsewhere, which meets no body."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Contribution:
 
     def text(self) -> str:
         """Return 'radar > truck.tail > pedestrian > truck.tail > radar, 3 interactions, 14.20 m, 81 %'."""
-        way = " > ".join(["radar", *self.chain, "radar"])
+        way = " > ".join(["radar", *self.chain, "radar"]) if self.chain else LINE_OF_SIGHT
         plural = "" if self.interactions == 1 else "s"
         return f"{way}, {self.interactions} interaction{plural}, {self.range:.2f} m, {100.0 * self.share:.0f} %"
 
@@ -87,8 +89,8 @@ class Explanation:
 
     @property
     def bodies(self) -> str:
-        """Chain of the leading contribution; 'noise' if no path explains the cell."""
-        return " > ".join(self.contributions[0].chain) if self.contributions else "noise"
+        """Chain of the leading contribution, 'line of sight' if it meets none; 'noise' if no path explains the cell."""
+        return (" > ".join(self.contributions[0].chain) or LINE_OF_SIGHT) if self.contributions else "noise"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.simulate import result_of
-from raychan.run.storage import CONTENTS, columns_of, rows, save_result
+from raychan.run.storage import CONTENTS, columns_of, rows, write_result
 from raychan.world.geometry import geometry_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
@@ -158,6 +158,6 @@ class Store:
 
 
 def _fill(place: Path, frame: Frame, draw: Callable[[Result, Path], None] | None) -> None:
-    save_result(frame.result, place)
+    write_result(frame.result, place)
     if draw is not None:
         draw(frame.result, place)

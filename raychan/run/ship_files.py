@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.run.contents import Contents
 from raychan.run.netcdf import CONVENTIONS
-from raychan.run.output_files import Contents, write_whole
+from raychan.run.output_files import write_whole
 from raychan.run.ship_loop import Frame, ShipLoop, hit_points
 from raychan.run.ship_scene import ShipScene
 from raychan.run.storage import versions

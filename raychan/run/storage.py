@@ -15,11 +15,13 @@ import numpy as np
 
 from raychan.radar.declared import check_type
 from raychan.radar.waveform import Waveform
+from raychan.run.contents import Contents
 from raychan.run.ledger import entry_of
 from raychan.run.netcdf import GROUPS, as_netcdf, read_record
-from raychan.run.output_files import Contents, StoreError, csv_bytes
+from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.receiver import aperture_of
 from raychan.run.result import Contribution, Explanation, Receiver, Result
+from raychan.scalars import shown
 from raychan.units import dbm
 
 FORMAT = 3
@@ -27,9 +29,10 @@ _READS = (2, FORMAT)  # format 2 has delay and range rate of paths instead of le
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
 ARRAY_PICTURES = ("range_azimuth.png", "beams.png")
 """Drawn where an array measures azimuth."""
+_FRAMES = tuple("frame_" + digits * "[0-9]" for digits in (4, 5))
 CONTENTS = Contents(
-    names=("result.nc", "detections.csv", "summary.json", *PICTURES, *ARRAY_PICTURES, "frame_[0-9][0-9][0-9][0-9]*/"),
-    signs=("result.nc", "summary.json", "frame_[0-9][0-9][0-9][0-9]*/result.nc"),
+    names=("result.nc", "detections.csv", "summary.json", *PICTURES, *ARRAY_PICTURES, *(f"{x}/" for x in _FRAMES)),
+    signs=("result.nc", "summary.json", *(f"{x}/result.nc" for x in _FRAMES)),
 )
 """What `raychan run` writes into its folder; a sequence has a folder of the same for each frame."""
 _CHANGED = "# changed: "  # how a scene notes overridden keys below its text
@@ -52,11 +55,27 @@ _JSON = ("receiver", "provenance", "timings", "ledger", "stats", "warnings")
 
 
 def save_result(result: Result, directory: str | Path) -> None:
+    """Write a result into a directory as `raychan run` does, without pictures; `load_result` reads it.
+
+    Args: directory, made where it is missing; an earlier result there is replaced, pictures and frames included, all at
+    once, and other files stay.
+    Raises: StoreError for errors of the disk, for a file in its place, or where files of the same names stand in a
+    directory without results; ValueError for another type, or a name
+    with a zero byte.
+    """
+    check_type("result", result, Result)
+    check_type("directory", directory, str, PathLike)
+    if "\0" in str(directory):
+        raise ValueError(f"directory = {shown(str(directory))}: a name without a zero byte is wanted")
+    with staging(directory, CONTENTS) as stage:
+        write_result(result, stage)
+
+
+def write_result(result: Result, directory: Path) -> None:
     """Write result.nc, detections.csv and summary.json into an existing directory.
 
     Use inside `output_files.staging`, which makes all files appear at once. Raises: StoreError for errors of the disk.
     """
-    directory = Path(directory)
     try:
         (directory / "result.nc").write_bytes(as_netcdf(result, _attrs(result)))
         (directory / "detections.csv").write_bytes(csv_bytes([columns_of(result), *rows(result)]))
@@ -76,7 +95,7 @@ def load_result(path: str | Path) -> Result:
     path = Path(path)
     file = path / "result.nc" if path.is_dir() else path
     if not file.is_file():
-        raise StoreError(f"{file}: no such file; `raychan run` writes it")
+        raise StoreError(f"{file}: no such file; `raychan run` and rc.save_result write it")
     try:
         with xr.open_dataset(file, engine="h5netcdf") as root:
             attrs = dict(root.attrs)

@@ -14,7 +14,7 @@ from raychan.tracing.sources import depth_of, facet_of
 
 Floats = NDArray[np.float64]
 
-_NAMED = 3  # cells that a line names
+_NAMED = 3  # detections or cells that a line names
 _MOST = 0.8  # of what may change of a cell by a bounce, as a power: the bodies that are named bring so much
 _BODIES = 2  # named at most
 
@@ -31,12 +31,22 @@ class Unreached:
     others: int = 0
 
     @property
-    def text(self) -> str:
-        """Where the cell lies, and what changes there."""
+    def cause(self) -> str:
+        """What changes there."""
         more = f" and {self.others} more" if self.others else ""
         names = " and ".join(self.bodies) if not more else ", ".join(self.bodies) + more
-        what = f"first surface: {names}" if self.bounce == 1 else f"bounce {self.bounce} of tubes off {names}"
-        return f"{self.range:.2f} m, {self.rate:+.2f} m/s ({what})"
+        return f"first surface: {names}" if self.bounce == 1 else f"bounce {self.bounce} of tubes off {names}"
+
+    @property
+    def text(self) -> str:
+        """Where the cell lies, and what changes there."""
+        return f"{_place(self.range, self.rate)} ({self.cause})"
+
+    def detection(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> int | None:
+        """Return the row of the nearest detection within a cell, None where there is none; args as of `notes`."""
+        away, off = (np.abs(x - at) / cell for x, at, cell in zip(found, (self.range, self.rate), size, strict=True))
+        near = np.flatnonzero((away <= 1.0) & (off <= 1.0))
+        return int(near[np.argmin(np.hypot(away, off)[near])]) if len(near) else None
 
 
 @dataclass(frozen=True)
@@ -52,7 +62,8 @@ class Remains:
 
     def notes(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> list[str]:
         """Return a line on the cells that are speckle, one on the detections whose levels are not within the tolerance,
-        and one on cells that may still become detections, with what ended the refinement.
+        and one on cells that may still become detections, with what ended the refinement. Detections go by their
+        numbers and places in the table.
 
         Args: found ranges and rates (n,) of the detections; size of a cell [m], [m/s].
         """
@@ -62,21 +73,37 @@ class Remains:
                 f"{self.speckled} cells of the map are speckle (model.speckle): displacing bodies by 0.05 deg and 1 mm "
                 f"moves them by more than {tolerance}, and they are refined to that only"
             )
-        ranges, rates = found
-        detected = [
-            bool(((np.abs(ranges - u.range) <= size[0]) & (np.abs(rates - u.rate) <= size[1])).any())
-            for u in self.unreached
-        ]
+        causes: dict[int, list[str]] = {}
+        weak = []
+        for cell in self.unreached:
+            row = cell.detection(found, size)
+            if row is None:
+                weak.append(cell.text)
+            else:
+                causes.setdefault(row, []).append(cell.cause)
         how = f"refined {'once' if self.steps == 1 else f'{self.steps} times'}, ended by {self.ended}"
-        for one, what in (
-            (True, f"the level still changes by more than {tolerance} at"),
-            (False, "where nothing is detected yet, what may still change makes a detection at"),
-        ):
-            some = [u.text for u, is_one in zip(self.unreached, detected, strict=True) if is_one == one]
-            if some:
-                more = f" and {len(some) - _NAMED} more" if len(some) > _NAMED else ""
-                said.append(f"{how}: {what} {'; '.join(some[:_NAMED])}{more}")
+        if causes:
+            some = [_numbered(i, found, causes[i]) for i in sorted(causes)]
+            numbers = "number" if len(some) == 1 else "numbers"
+            said.append(f"{how}: the level still changes by more than {tolerance} at {numbers} {_first(some, ', ')}")
+        if weak:
+            what = "where nothing is detected yet, what may still change makes a detection at"
+            said.append(f"{how}: {what} {_first(weak, '; ')}")
         return said
+
+
+def _place(range: float, rate: float) -> str:
+    return f"{range:.2f} m, {rate:+.2f} m/s"
+
+
+def _numbered(row: int, found: tuple[Floats, Floats], causes: list[str]) -> str:
+    """Return a detection by its number, counted from 1 as the table does, its place there, and what changes in it."""
+    return f"{row + 1} ({'; '.join([_place(*(float(x[row]) for x in found)), *dict.fromkeys(causes)])})"
+
+
+def _first(some: list[str], between: str) -> str:
+    more = f" and {len(some) - _NAMED} more" if len(some) > _NAMED else ""
+    return between.join(some[:_NAMED]) + more
 
 
 def unreached_of(cells: MapCells, facets: Facets) -> Iterator[Unreached]:

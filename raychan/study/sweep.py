@@ -131,11 +131,13 @@ def sweep(
     tolerance_db: float | None = None,
     max_bounces: int | None = None,
     progress: Progress | None = None,
+    steps: list[Step] | None = None,
 ) -> Sweep:
     """Simulate a scene at each value of an axis, or at each pair of values of two, and return a body's visibility.
 
     Args: scene from a file or from tables; target a body's name; axes at most two, none for the scene as it is; seed,
-    tolerance_db [dB] and max_bounces as for `simulate`; progress is called with ('sweep', share done).
+    tolerance_db [dB] and max_bounces as for `simulate`; progress is called with ('sweep', share done); steps a
+    list to which each step is added when it is done, so that they outlast Ctrl-C.
     Raises: SceneError for a change that makes no scene, ValueError for a body that is no target or too many axes.
     """
     if len(axes) > 2:
@@ -149,7 +151,7 @@ def sweep(
     for place in (places[0], places[-1]):
         check_target(_scene(scene, axes, place), target)
     tell = progress or (lambda stage, share: None)
-    steps = []
+    steps = [] if steps is None else steps
     for i, place in enumerate(places):
 
         def inner(stage: str, share: float, done: int = i) -> None:

@@ -38,21 +38,28 @@ class Limit:
         return f"must lie {self.allowed}"
 
     def problem(self, value: Any, whole: bool = False) -> str:
-        """Return what is wrong with a value that should be a number (a whole one) within the limits, or ''."""
-        number = plain(value)
+        """Return what is wrong with a value that should be a number (a whole one, which a float may be) within the
+        limits, or ''."""
+        number = _of_whole(plain(value)) if whole else plain(value)
         if isinstance(number, bool) or not isinstance(number, int if whole else int | float):
             return f"{shown(value)}: a {'whole ' if whole else ''}number is wanted; {self.text}"
         return "" if self.allows(number) else f"{shown(value)}: {self.text}"
 
     def check(self, name: str, value: Any, whole: bool = False) -> Any:
-        """Return a number (a whole one) within the limits as Python's own. Raises: ValueError where it is none."""
+        """Return a number (a whole one, as int) within the limits as Python's own. Raises: ValueError where it is
+        none."""
         if problem := self.problem(value, whole):
             raise ValueError(f"{name} = {problem}")
-        return plain(value)
+        return _of_whole(plain(value)) if whole else plain(value)
 
     def times(self, factor: float, unit: str) -> Limit:
         """Return the same limits in another unit, smaller by a factor."""
         return Limit(self.low * factor, self.high * factor, unit, self.why, self.above)
+
+
+def _of_whole(value: Any) -> Any:
+    """Return a float that is a whole number as int, anything else as it is."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _exact(value: float) -> str:

@@ -18,7 +18,6 @@ _KEYS = (
     "params", "unit", "up", "forward", "scale", "crease_deg", "materials", "rcs_dbsm", "rcs_point",
 )  # fmt: skip
 """Fields of a body that its table limits; those of its motion have checks of their own."""
-_LONGEST = 100  # characters of a name, as in a file; spaces, which a table of names has not, are allowed here
 _NAMES = {"shape": (str, "a text"), "role": (str, "a text"), "material": (str | Material, "a name or a Material")}
 """Fields whose checks propose names, with the types they take."""
 
@@ -57,8 +56,10 @@ def check_texts(**given: Any) -> None:
 
 def _check(body: Body, number: int) -> None:
     """Raise SceneError where a field of a body could not stand in its table."""
-    if not (isinstance(body.name, str) and 0 < len(body.name) <= _LONGEST and "." not in body.name):
-        raise _refused(body.name, f"bodies.{number}.name", f"a text of 1 to {_LONGEST} characters without a dot")
+    try:
+        checked(BodyTable, {"name": body.name, "shape": ""})
+    except SceneError as e:
+        raise e.at(key=f"bodies.{number}") from None
     try:
         checked(BodyTable, {"name": "body", "shape": ""} | {key: _plain(getattr(body, key)) for key in _KEYS})
     except SceneError as e:

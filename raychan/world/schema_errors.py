@@ -95,7 +95,7 @@ def _dotted(loc: tuple[Any, ...], data: Any, whole: bool) -> str:
         if isinstance(data, list) and isinstance(step, int) and step < len(data):
             data = data[step]
             name = data.get("name") if isinstance(data, dict) else None
-            words.append(str(name if isinstance(name, str) else step))
+            words.append(name if isinstance(name, str) and name and name.isprintable() else str(step))
         elif isinstance(data, dict) and (step in data or (whole and step == loc[-1])):
             data = data.get(step)
             words.append(str(step))

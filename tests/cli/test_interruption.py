@@ -5,9 +5,12 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 from support.scene_texts import PLATE, but_compiling
+
+from raychan.cli import invoke
 
 
 @pytest.fixture
@@ -110,3 +113,63 @@ def test_ctrl_c_after_the_results_are_written_says_where_they_are(scene, tmp_pat
     assert done.returncode == 130
     assert f"raychan: interrupted; the results are in {out}\n" in done.stderr
     assert (out / "result.nc").exists()
+
+
+@pytest.fixture
+def stop_at(monkeypatch):
+    """Have a function raise what is given at its call of such a number."""
+
+    def prepare(name, number, stop=KeyboardInterrupt):
+        module, _, function = name.rpartition(".")
+        real, calls = getattr(import_module(module), function), []
+
+        def one(*given, **named):
+            calls.append(given)
+            if len(calls) == number:
+                raise stop
+            return real(*given, **named)
+
+        monkeypatch.setattr(name, one)
+
+    return prepare
+
+
+def interrupted_in_compiled_code():
+    stop = SystemError("returned a result with an exception set")
+    stop.__cause__ = KeyboardInterrupt()
+    return stop
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt(), interrupted_in_compiled_code()], ids=["Python", "compiled"])
+def test_ctrl_c_in_rcs_keeps_the_angles_that_are_done(stop, stop_at, tmp_path, capsys):
+    out, figure = tmp_path / "a.csv", tmp_path / "a.png"
+    command = ["rcs", "--shape", "plate", "--azimuth", "0:8:2", "--out", str(out), "--plot", str(figure)]
+    assert invoke(command[:-2]) == 0
+    whole = out.read_text().splitlines()
+    stop_at("raychan.run.rcs.rcs", 4, stop)
+    out.unlink()
+    capsys.readouterr()
+    assert invoke(command) == 130
+    assert but_compiling(capsys.readouterr().err) == f"raychan: interrupted; 3 of 5 angles are in {out}\n"
+    assert out.read_text().splitlines() == whole[:4] and not figure.exists()
+
+
+def test_ctrl_c_in_rcs_without_a_table_writes_nothing(stop_at, tmp_path, capsys):
+    stop_at("raychan.run.rcs.rcs", 2)
+    figure = tmp_path / "a.png"
+    assert invoke(["rcs", "--shape", "plate", "--azimuth", "0:8:2", "--plot", str(figure)]) == 130
+    assert but_compiling(capsys.readouterr().err) == "raychan: interrupted; nothing was written\n"
+    assert not figure.exists()
+
+
+def test_ctrl_c_in_a_sweep_keeps_the_steps_that_are_done(scene, stop_at, tmp_path, capsys):
+    out = tmp_path / "out"
+    command = ["study", "sweep", str(scene), "--target", "sign", "--times", "0:0.2:3", "--out", str(out)]
+    assert invoke(command) == 0
+    whole = (out / "sweep.csv").read_text().splitlines()
+    stop_at("raychan.study.sweep.visibility", 3)
+    capsys.readouterr()
+    assert invoke(command) == 130
+    assert capsys.readouterr() == ("", f"raychan: interrupted; 2 of 3 steps are in {out / 'sweep.csv'}\n")
+    assert (out / "sweep.csv").read_text().splitlines() == whole[:3]
+    assert [p.name for p in out.iterdir()] == ["sweep.csv"]

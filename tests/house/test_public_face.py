@@ -23,7 +23,6 @@ from raychan.records import Cube, Detections, Profile, RangeDoppler
 from raychan.run.explain import CellExplanation
 from raychan.run.rcs import Rcs
 from raychan.run.sequence import Frame
-from raychan.run.storage import save_result
 from raychan.study.visibility import Visibility
 
 ELSEWHERE = {"trace", "transfer", "synthesize", "range_doppler", "detect", "SceneRoutes", "StoreError"}
@@ -261,8 +260,8 @@ def test_frames_and_visibility() -> None:
     assert seen.occlusion.blocked == pytest.approx(0.0, abs=0.05)
 
 
-def test_explain_and_load_result(result: rc.Result, tmp_path: Path) -> None:
-    save_result(result, tmp_path)
+def test_explain_and_a_result_saved_and_loaded(result: rc.Result, tmp_path: Path) -> None:
+    assert_type(rc.save_result(result, tmp_path), None)
     back = assert_type(rc.load_result(tmp_path), rc.Result)
     assert back.paths.length.tobytes() == result.paths.length.tobytes()
     why = assert_type(rc.explain(back, detection=1), CellExplanation)

@@ -1,10 +1,13 @@
 """Probability of detection: closed forms against each other, against published approximations, and against noise."""
 
+import inspect
+
 import numpy as np
 import pytest
 from scipy.special import gammainc
 from support.echoes import SMALL, echoes, make_radar
 
+import raychan as rc
 from raychan.processing.cfar import Grid, factor, training
 from raychan.processing.detection import detect
 from raychan.processing.detection_theory import (
@@ -86,6 +89,11 @@ def test_cfar_of_case_1_is_that_of_gandhi_and_kassam(cells):
     i = np.arange(cells // 2)
     ordered = detection_probability(db(snr), Detector(1e-5, 1, "os", cells), 1)
     assert ordered == pytest.approx(np.prod((cells - i) / (cells - i + scale), axis=1), abs=5e-6)
+
+
+def test_defaults_are_those_of_processing():
+    assert Detector().pfa == rc.Processing().pfa
+    assert inspect.signature(rc.doa).parameters["method"].default == rc.Processing().doa
 
 
 def test_many_training_cells_are_known_noise():

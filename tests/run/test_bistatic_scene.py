@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.cli import invoke
 from raychan.units import C0, db
 
 F = 77e9
@@ -52,6 +55,21 @@ def test_line_of_sight_is_the_exact_one():
     true = C0 / F / (4.0 * np.pi * far) * np.exp(-2j * np.pi * F * far / C0)
     # V and V of a line of sight that rises a little.
     assert abs(found.amplitude[row[0]]) == pytest.approx(abs(true), rel=2e-2)
+
+
+def test_a_detection_of_the_line_of_sight_says_so_wherever_bodies_are_named(tmp_path, capsys):
+    file, out = tmp_path / "scene.toml", tmp_path / "out"
+    file.write_text(scene(["ground"], noise=True).to_toml())
+    assert invoke(["run", str(file), "--out", str(out), "--no-pictures"]) == 0
+    assert re.search("clutter +line of sight", capsys.readouterr().out)
+    result = rc.load_result(out)
+    straight = [why for why in result.provenance if why.bodies == "line of sight"]
+    assert [why.label for why in straight] == ["clutter"] and straight[0].contributions[0].chain == ()
+    assert straight[0].range == pytest.approx(0.5 * np.linalg.norm(RX - TX), abs=0.3)
+    assert ",clutter,line of sight\n" in (out / "detections.csv").read_text()
+    number = result.provenance.index(straight[0]) + 1
+    assert invoke(["explain", str(out), "--detection", str(number)]) == 0
+    assert "  line of sight, 0 interactions, " in capsys.readouterr().out
 
 
 def test_ground_reflection_is_that_of_the_exact_specular_path():

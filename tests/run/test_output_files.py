@@ -16,8 +16,9 @@ from support.scene_texts import PLATE, but_compiling
 
 from raychan.cli import invoke
 from raychan.run import atomic_swap, output_files
-from raychan.run.output_files import Contents, StoreError, staging, write_together, write_whole
-from raychan.run.storage import CONTENTS, save_result
+from raychan.run.contents import Contents
+from raychan.run.output_files import StoreError, staging, write_together, write_whole
+from raychan.run.storage import CONTENTS, write_result
 
 FOLDERS = [str(TESTS), str(TESTS / "run")]
 KIND = Contents(("data", "*.png", "part_*/"), signs=("data", "part_*/data"))
@@ -222,7 +223,7 @@ def test_a_full_disk_ends_with_2_and_one_sentence_and_the_old_result(more, tmp_p
     out, scene = tmp_path / "out", tmp_path / "plate.toml"
     scene.write_text(PLATE)
     with staging(out, CONTENTS) as stage:
-        save_result(result(paths([9.0], [-7.0], [1e-5], [[(2, 3)]]), [(9.0, -7.0, 5e-10)]), stage)
+        write_result(result(paths([9.0], [-7.0], [1e-5], [[(2, 3)]]), [(9.0, -7.0, 5e-10)]), stage)
     old = {p.name: p.read_bytes() for p in out.iterdir()}
     argv = ["run", str(scene), "--out", str(out), "--no-pictures", *more]
     code = _FULL.format(folders=FOLDERS, argv=argv, limit=100_000)
@@ -274,7 +275,7 @@ def test_pictures_of_an_earlier_run_do_not_stay_beside_new_data(tmp_path):
     one = result(paths([9.0], [-7.0], [1e-5], [[(2, 3)]]), [(9.0, -7.0, 5e-10)])
     for pictures in (("scene.png", "rdmap.png"), ()):
         with staging(tmp_path / "out", CONTENTS) as stage:
-            save_result(one, stage)
+            write_result(one, stage)
             for name in pictures:
                 (stage / name).write_text("")
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"result.nc", "detections.csv", "summary.json"}

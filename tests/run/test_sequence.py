@@ -114,6 +114,36 @@ def test_the_command_writes_a_directory_a_frame_and_one_list_of_detections(file,
     assert "--frames" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "name, said",
+    [
+        ("frame_0000", "frame_0000: is a file in the place of a directory"),
+        ("frame_0001", "frame_0001: is a file in the place of a directory"),
+        ("frame_0001/detections.csv", "frame_0001/detections.csv: exists"),
+        ("detections.csv", "detections.csv: exists"),
+    ],
+)
+def test_files_of_ones_own_in_the_place_of_frames_are_told_and_stay(name, said, file, tmp_path, capsys):
+    mine = tmp_path / "out" / name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    assert invoke(["run", str(file), "--out", str(tmp_path / "out"), "--no-pictures", "--frames", "2"]) == 2
+    told = capsys.readouterr().err
+    assert said in told and "move it away or name another folder" in told
+    assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [mine] and mine.read_text() == "mine"
+
+
+def test_other_files_of_ones_own_beside_and_in_frames_stay(file, tmp_path):
+    names = ("frame_0000/notes.txt", "frame_0001/notes.txt", "frame_0000.png", "frame_000")
+    for name in names:
+        (tmp_path / "out" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "out" / name).write_text("mine")
+    assert invoke(["run", str(file), "--out", str(tmp_path / "out"), "--no-pictures", "--frames", "2"]) == 0
+    assert [(tmp_path / "out" / name).read_text() for name in names] == 4 * ["mine"]
+    assert (tmp_path / "out" / "frame_0001" / "result.nc").is_file()
+    assert not list((tmp_path / "out").rglob("*.kept"))
+
+
 _STOPPED = """
 import os, signal, sys
 import raychan.cli, raychan.run.sequence as s

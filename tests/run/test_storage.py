@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from support.results import paths, result
 
+import raychan as rc
 from raychan.records import REFLECT, SCATTER
 from raychan.run.ledger import Entry, ModelChoice
 from raychan.run.output_files import StoreError
@@ -185,3 +186,35 @@ def test_a_file_that_is_not_ours_is_refused(tmp_path):
     (tmp_path / "result.nc").write_bytes(b"not a netCDF file")
     with pytest.raises(StoreError, match="cannot be read"):
         load_result(tmp_path)
+
+
+def test_a_result_is_saved_by_the_rules_of_the_command(made, tmp_path):
+    out = tmp_path / "a" / "b"
+    assert rc.save_result(made, str(out)) is None
+    assert {p.name for p in out.iterdir()} == {"result.nc", "detections.csv", "summary.json"}
+    back = rc.load_result(out)
+    assert back.paths.amplitude.tobytes() == made.paths.amplitude.tobytes() and back.provenance == made.provenance
+    (out / "rdmap.png").write_text("of the earlier result")
+    (out / "notes.txt").write_text("mine")
+    rc.save_result(back, out)
+    assert {p.name for p in out.iterdir()} == {"result.nc", "detections.csv", "summary.json", "notes.txt"}
+
+
+def test_a_place_where_no_result_can_be_saved_is_told_and_stays(made, tmp_path):
+    (tmp_path / "detections.csv").write_text("mine")
+    file = tmp_path / "detections.csv"
+    for where, said in (
+        (tmp_path, "detections.csv: exists, and .* is not a folder of results; move it away or name another folder"),
+        (file, "detections.csv: is a file; name a directory"),
+        (file / "out", "cannot be made|cannot write"),
+    ):
+        with pytest.raises(rc.StoreError, match=said):
+            rc.save_result(made, where)
+    for given, said in (
+        ((3, "a"), "result = 3"),
+        ((made, None), "directory = None: a text or a path"),
+        ((made, "\0"), "zero"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            rc.save_result(*given)
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["mine"]

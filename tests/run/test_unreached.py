@@ -30,10 +30,10 @@ def test_weak_cells_are_told_apart_from_detections():
     cells.changed(1, np.array([DEEP]), np.array([0.01 + 0.4j]))
     found = list(unreached_of(cells, FACETS))
     assert found == [Unreached(10.0, 1.0, 1, ("car.a",)), Unreached(20.0, -2.0, 2, ("car.a",))]
-    strong, weak = said(found, 2, [10.0], [1.0])
+    strong, weak = said(found, 2, [10.02], [0.9])
     assert strong == (
-        "refined 2 times, ended by 8 steps: the level still changes by more than 0.5 dB at 10.00 m, +1.00 m/s "
-        "(first surface: car.a)"
+        "refined 2 times, ended by 8 steps: the level still changes by more than 0.5 dB at number 1 "
+        "(10.02 m, +0.90 m/s; first surface: car.a)"
     )
     assert "where nothing is detected yet" in weak and "20.00 m, -2.00 m/s (bounce 2 of tubes off car.a)" in weak
 
@@ -50,7 +50,22 @@ def test_a_cell_is_a_detection_within_a_cell_of_one_in_range_and_in_rate_not_in_
     cell = Unreached(13.64, -3.79, 2, ("post",))
     for found, weak in (([13.66, -3.74], False), ([13.66, -2.9], True), ([14.2, -3.74], True)):
         (line,) = said([cell], 3, found[:1], found[1:])
-        assert ("where nothing is detected yet" in line) == weak and "13.64 m" in line
+        assert ("where nothing is detected yet" in line) == weak and ("13.64 m" in line) == weak
+
+
+def test_detections_go_by_number_and_place_of_the_table_the_nearest_of_several_once_each():
+    cells = [Unreached(r, 0.0, bounce, ("post",)) for r, bounce in ((20.18, 2), (10.0, 1), (20.0, 3), (20.18, 2))]
+    (line,) = said(cells, 2, [5.0, 20.2, 10.1, 20.04, 9.95], [0.0, 0.0, 0.0, 0.01, 0.0])
+    assert line.endswith(
+        "at numbers 2 (20.20 m, +0.00 m/s; bounce 2 of tubes off post), 4 (20.04 m, +0.01 m/s; bounce 3 of tubes off "
+        "post), 5 (9.95 m, +0.00 m/s; first surface: post)"
+    )
+    (line,) = said(cells[:3:2], 2, [20.1], [0.0])
+    assert line.endswith("number 1 (20.10 m, +0.00 m/s; bounce 2 of tubes off post; bounce 3 of tubes off post)")
+    (line,) = said([Unreached(float(k), 0.0, 2, ("post",)) for k in range(5)], 1, np.arange(5.0), np.zeros(5))
+    assert " at numbers 1 (0.00 m, " in line and line.endswith(
+        ", 3 (2.00 m, +0.00 m/s; bounce 2 of tubes off post) and 2 more"
+    )
 
 
 def test_the_bounce_and_the_bodies_that_may_change_a_cell_most_are_named():

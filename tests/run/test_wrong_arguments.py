@@ -1,5 +1,6 @@
 """Arguments of another type, and records of another radar, are refused by functions in words that name them."""
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 
@@ -111,6 +112,24 @@ def test_scalars_of_numpy_are_seeds_counts_and_levels():
     np.testing.assert_array_equal(some.rdmap.power, again.rdmap.power)
     times = [frame.time for frame in rc.frames(SCENE, np.array(2), np.array(0.5))]
     assert times == [0.0, 0.5] and SCENE.at(np.array(0.5)).radar.position.tolist() == RADAR.position.tolist()
+
+
+def test_whole_floats_stand_for_whole_numbers_everywhere_and_truth_values_nowhere():
+    some = rc.simulate(SCENE, seed=3.0, max_bounces=np.float64(1.0))
+    assert type(some.seed) is int and some.stats == rc.simulate(SCENE, seed=3, max_bounces=1).stats
+    assert len(list(rc.frames(SCENE, 2.0, seed=1.0))) == 2
+    flat, wave = rc.Body("p", shape="plate").geometry, {"carrier": 77e9, "bandwidth": 1e9, "chirp_duration": 2e-5}
+    assert rc.rcs(flat, 10e9, 0.0, max_bounces=1.0, max_rays=1e5).sigma == rc.rcs(flat, 10e9, 0.0, max_bounces=1).sigma
+    assert rc.Waveform(**wave, n_chirps=16.0) == rc.Waveform(**wave, n_chirps=16)
+    for wrong in (True, np.True_, 2.5, math.inf, math.nan):
+        for call in (
+            lambda wrong: rc.simulate(SCENE, seed=wrong),
+            lambda wrong: rc.frames(SCENE, wrong),
+            lambda wrong: rc.rcs(flat, 10e9, 0.0, max_bounces=wrong),
+            lambda wrong: rc.Waveform(**wave, n_chirps=wrong),
+        ):
+            with pytest.raises(ValueError, match="whole number"):
+                call(wrong)
 
 
 def test_a_result_that_is_not_there_is_told_by_a_public_error():

@@ -250,7 +250,7 @@ sys.exit(raychan.cli.invoke(["study", "sweep", {scene!r}, "--target", "walker", 
 """
 
 
-def test_ctrl_c_in_a_sweep_leaves_nothing(file, tmp_path):
+def test_ctrl_c_in_the_first_step_of_a_sweep_leaves_nothing(file, tmp_path):
     code = _STOPPED.format(scene=str(file), out=str(tmp_path / "out"))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stdout) == (130, ""), done.stderr

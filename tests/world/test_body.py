@@ -12,6 +12,8 @@ import pytest
 
 import raychan as rc
 
+WORD = "allowed: a text without dots, spaces and control characters"
+
 
 def test_parameters_cannot_be_changed_in_a_made_body_but_in_a_new_one():
     body = rc.Body("ball", shape="sphere", params={"radius": 0.5})
@@ -37,8 +39,11 @@ def test_a_body_is_copied_pickled_and_compared_with_its_parameters():
     ("given", "said"),
     [
         ({"name": 3}, "bodies.0.name: 3 is not possible; allowed: a text"),
-        ({"name": ""}, "bodies.0.name: '' is not possible; allowed: a text of 1 to 100 characters"),
-        ({"name": "a.b"}, "bodies.0.name: 'a.b' is not possible; allowed: a text of 1 to 100 characters without a dot"),
+        ({"name": ""}, "bodies.0.name: '' is not possible; allowed: a text of at least 1 character"),
+        ({"name": 101 * "a"}, r"bodies.0.name: .* is not possible; allowed: a text of at most 100 characters"),
+        ({"name": "a.b"}, f"bodies.0.name: 'a.b' is not possible; {WORD}"),
+        ({"name": "a > b"}, f"bodies.0.name: 'a > b' is not possible; {WORD}"),
+        ({"name": "p\n"}, r"bodies.0.name: 'p\\n' is not possible; " + WORD),
         ({"params": [1]}, r"bodies.b.params: \[1\] is not possible; allowed: a table"),
         ({"material": 3}, "bodies.b.material: 3 is not possible; allowed: a name or a Material"),
         ({"materials": [3]}, r"bodies.b.materials: \[3\] is not possible; allowed: a table"),
