@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.ends import RadarEnds, paths_record, rx_fields
+from raychan.channel.ends import RadarEnds, paths_record, rx_fields, swept_by
 from raychan.em.diffraction import diffract
 from raychan.em.fresnel import coefficients
 from raychan.records import DiffractedRoutes, Facets, Paths
@@ -20,11 +20,11 @@ Complexes = NDArray[np.complex128]
 
 
 def diffracted_paths(routes: DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float) -> Paths:
-    """Return what diffracted routes carry for a radar at a frequency [Hz].
+    """Return what diffracted routes carry for a radar; frequency as for `paths_of`.
 
     Source: Kouyoumjian and Pathak 1974, eqs. 17 to 25; a point target scatters by the root of its RCS over 4 pi.
     """
-    k = 2.0 * np.pi * frequency / C0
+    k = 2.0 * np.pi * (frequency + swept_by(radar)) / C0
     n = len(routes.kind)
     ends = rx_fields(radar)
     received = {name: np.zeros(n, complex) for name in ("amplitude", "cross")[: len(ends)]}
@@ -34,8 +34,8 @@ def diffracted_paths(routes: DiffractedRoutes, facets: Facets, radar: RadarEnds,
             back = leg_field(_leg(routes, r, 1), facets, rx_field, k)
             out[r] = 0.5 / k * np.sqrt(routes.sigma[r] / (4.0 * np.pi)) * (there @ back)
     length = (routes.near + routes.far).sum(axis=1)
-    if facets.attenuation:
-        received = {name: x * np.exp(-facets.attenuation * length) for name, x in received.items()}
+    back = np.exp((2j * np.pi * swept_by(radar) / C0 - facets.attenuation) * length)
+    received = {name: x * back for name, x in received.items()}
     rate = np.array([_length_rate(routes, r, facets, np.asarray(radar.velocity)) for r in range(n)])
     return paths_record(radar).of(
         length=length,

@@ -45,6 +45,12 @@ def ends_of(radar: RadarEnds) -> Ends:
     return Ends(here, np.asarray(there, float), moves, np.asarray(given.rx_motion, float))
 
 
+def swept_by(radar: RadarEnds) -> float:
+    """Return the frequency [Hz] that a radar sweeps from the carrier, to which phases refer, to the middle of its ramp,
+    where gains are taken: of a wide band they are those of the mean frequency. 0 for ends without a waveform."""
+    return float(getattr(getattr(radar, "waveform", None), "swept", 0.0))
+
+
 def rx_fields(radar: RadarEnds) -> tuple[Any, ...]:
     """Return the receivers' fields: the co-polarised, and the cross-polarised where the radar has such receivers."""
     if getattr(radar, "rx_polarization", None) == "both":

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from raychan.channel.corner_places import corner_places
 from raychan.channel.corner_rays import departures
 from raychan.channel.edge_diffraction import diffracted_paths
-from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields
+from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields, swept_by
 from raychan.channel.pieces import Split, parts_of
 from raychan.channel.rates import rates
 from raychan.channel.slow_time import APART, corner_rates
@@ -44,13 +44,15 @@ _MANY = 20_000  # trajectories from which on a second thread pays; not measured
 def paths_of(
     routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float, noise: float = 0.0
 ) -> Paths:
-    """Return what routes carry for a radar at a frequency [Hz]; a footprint long in range becomes three paths.
+    """Return what routes carry for a radar; a footprint long in range becomes three paths.
 
-    Args: noise amplitude of a path as strong as the noise in a map cell: footprints stay one path where it hides the
-    difference; then the radar has a waveform.
+    Args: frequency [Hz] of the amplitudes' phases, that of the carrier; gains are those of the middle of the ramp, if
+    the radar has a waveform; noise amplitude of a path as strong as the noise in a map cell: footprints stay one path
+    where it hides the difference; then the radar has a waveform.
     """
     if isinstance(routes, DiffractedRoutes):
         return diffracted_paths(routes, facets, radar, frequency)
+    carrier, frequency = frequency, frequency + swept_by(radar)
     gains = corner_gains(routes, facets, radar, frequency)
     speeds = ends_of(radar).tx_velocity, ends_of(radar).rx_velocity
     rate = rates(routes, facets, *speeds)
@@ -69,15 +71,17 @@ def paths_of(
     count = _pieces(noise, size[split], turn[split])
     several = Split(rows, gains[rows], corner_rate[split], places[split])
     parts = parts_of(routes, several, count, facets, radar, frequency)
+    length = np.concatenate([routes.length[whole], parts.length])
+    back = np.exp(2j * np.pi * (frequency - carrier) / C0 * length)
     received = {
-        name: np.concatenate([_over_three(np.add, gains[whole, i]), parts.gain[:, i]])
+        name: np.concatenate([_over_three(np.add, gains[whole, i]), parts.gain[:, i]]) * back
         for i, name in enumerate(("amplitude", "cross")[: gains.shape[1]])
     }
     return over_routes(
         routes,
         facets,
         radar,
-        length=np.concatenate([routes.length[whole], parts.length]),
+        length=length,
         **received,
         length_rate=np.concatenate([2.0 * rate[whole], parts.rate]),
         trajectory=np.concatenate([whole, parts.route]).astype(np.int32),

@@ -149,7 +149,8 @@ class Waveform:
 
     @property
     def middle(self) -> float:
-        """Frequency at the middle sample of a ramp [Hz]: what turns a Doppler shift into the range rate of a map."""
+        """Frequency at the middle sample of a ramp [Hz]: what turns a Doppler shift into the range rate of a map. Gains
+        are those of this frequency."""
         return self.carrier + self.swept
 
     @property

@@ -57,7 +57,7 @@ def clutter_of(geometry: Geometry, radar: Radar, model: Any, rng: np.random.Gene
         )
     patches = visible_patches(geometry, np.asarray(radar.position, float), which, patch_size(radar))
     return diffuse_paths(
-        patches, geometry.facets, geometry.normal, radar, radar.waveform.carrier, laws_of(geometry.facets), rng
+        patches, geometry.facets, geometry.normal, radar, radar.waveform.middle, laws_of(geometry.facets), rng
     )
 
 

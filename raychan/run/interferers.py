@@ -15,6 +15,7 @@ from raychan.run.specular_paths import Chain, exact_routes
 from raychan.run.streams import Stage, stream
 from raychan.signal.interference import burst
 from raychan.tracing.legs import legs_over
+from raychan.units import C0
 from raychan.world.geometry import Geometry
 from raychan.world.scene import Scene
 
@@ -37,7 +38,8 @@ def interference(scene: Scene, geometry: Geometry, seed: int) -> NDArray[np.comp
 
 def interferer_paths(scene: Scene, geometry: Geometry, interferer: Interferer) -> Paths:
     """Return the paths from an interferer to the receivers of the scene's radar: straight, and over one plane mirror of
-    half a square metre or more, both antennas in, at the interferer's carrier."""
+    half a square metre or more, both antennas in, with gains of the middle of the interferer's ramp and phases of its
+    carrier."""
     sender, victim, facets = interferer.radar, scene.radar, geometry.facets
     chains: list[Chain] = []
     for leg in legs_over(geometry, np.asarray(sender.position), _BOUNCES):
@@ -49,10 +51,11 @@ def interferer_paths(scene: Scene, geometry: Geometry, interferer: Interferer) -
     gains = transfer(
         routes,
         facets,
-        sender.waveform.carrier,
+        sender.waveform.middle,
         lambda d: np.asarray(sender.tx_field(d))[:, None],
         lambda d: np.stack([np.asarray(f(d)) for f in ends], axis=1),
     )[:, :, 0]
+    gains *= np.exp(2j * np.pi * sender.waveform.swept / C0 * routes.length)[:, None]
     return over_routes(
         routes,
         facets,

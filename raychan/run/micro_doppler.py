@@ -153,13 +153,13 @@ class _Frame:
         """Return the keyframe at a chirp, traced unless the tracing is known."""
         now = self.scene.at(chirp * self.step)
         self.times.append(chirp * self.step)
-        carrier = self.radar.waveform.carrier
+        wave = self.radar.waveform
         geometry = (surface_at if known is None else geometry_of)(now, self.model.tolerance_db)
         if known is None:
             found: list[Batch] = []
             parts: list[Paths] = []
             rule = dataclasses.replace(self.rule, position=np.asarray(now.radar.position, float))
-            stats = solve_into(parts.append, geometry, now.points(), now.radar, carrier, rule, keep=found.append)
+            stats = solve_into(parts.append, geometry, now.points(), now.radar, wave.carrier, rule, keep=found.append)
             self.rays += stats.rays
             known = Traced(join(parts), tuple(found))
         turned = [take(r, self.touches(r.body, r.kind)) for r in known.routes if isinstance(r, Routes)]
@@ -172,7 +172,7 @@ class _Frame:
             chirp,
             now,
             routes,
-            tuple(strengths(r, geometry.facets, now.radar, carrier) for r in routes),
+            tuple(strengths(r, geometry.facets, now.radar, wave.middle) for r in routes),
             tuple(PartFronts.of(r, geometry.facets) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
         )
@@ -200,8 +200,10 @@ class _Frame:
                 # One instant more than chirps: the rate is the change from chirp to chirp.
                 at = np.arange(start, start + count + 1, dtype=float)
                 lengths, amplitudes = carried_between(
-                    routes, strength, partial(self.poses, key), at, self.every, wave.carrier
+                    routes, strength, partial(self.poses, key), at, self.every, wave.middle
                 )
+                # Phases are those of the carrier, from where the ramp begins.
+                amplitudes *= np.exp(2j * np.pi * wave.swept / C0 * lengths)
                 rows = out[0, :, start - first : start - first + count]
                 for sent in self.radar.transmissions:
                     self.add_ramps(rows, start, sent, lengths, amplitudes, fronts)

@@ -160,7 +160,7 @@ class SceneRefinement:
         steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", 0
         if len(cells.place) and self.model.speckle:
             speckled = cells.loosened(
-                spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.carrier)
+                spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.middle)
             )
         if len(cells.place):
             steps, unreached, ended = self._refined(first.launch, held, response, cells)

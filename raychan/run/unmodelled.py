@@ -20,7 +20,7 @@ from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import coarsest, strongest_bend
 from raychan.run.unmodelled_waves import creeping_waves, over_band
 from raychan.tracing.diffuse_patches import PatchSize, visible_patches
-from raychan.units import db
+from raychan.units import C0, db
 from raychan.world.body import Body
 from raychan.world.geometry import Geometry
 
@@ -141,7 +141,7 @@ def _diffraction(geometry: Geometry, radar: Radar, weakest: float) -> Entry:
     middle = edges.mean(axis=1)
     look, r, gain = _gain(radar, middle)
     span = edges[:, 1] - edges[:, 0]
-    wavelength = radar.waveform.wavelength
+    wavelength = C0 / radar.waveform.middle
     # Only one Fresnel zone of a long edge adds in phase; off broadside a pattern sinc^2 remains.
     length = np.linalg.norm(span, axis=1)
     zone = np.minimum(length, np.sqrt(0.5 * wavelength * r))
@@ -187,8 +187,8 @@ def _diffuse(geometry: Geometry, radar: Radar, model: Any, weakest: float) -> En
         how = "modelled: what" if modelled.any() else "nothing that"
         return Entry(NOTHING, "exact", f"{how} the radar sees directly of rough surfaces")
     cosine = np.abs(np.einsum("ij,ij->i", look, geometry.normal[patches.facet]))
-    sigma = mean_sigma0(f, row, cosine, wave.carrier, laws) * patches.area * np.exp(-4.0 * f.attenuation * r)
-    power = radar.power * gain * wave.wavelength**2 * sigma / ((4 * np.pi) ** 3 * r**4)
+    sigma = mean_sigma0(f, row, cosine, wave.middle, laws) * patches.area * np.exp(-4.0 * f.attenuation * r)
+    power = radar.power * gain * (C0 / wave.middle) ** 2 * sigma / ((4 * np.pi) ** 3 * r**4)
     summed = np.bincount((r[left] % reach / step).astype(int), power[left]) * (cell / step)
     best = int(np.argmax(summed))
     far = f" of what lies beyond the unambiguous range of {reach:.4g} m," if (r[left] > reach).all() else ""
@@ -238,7 +238,7 @@ def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     turning = np.linalg.norm(facets.spin, axis=1)[body]
     # Lever arm of turning bodies: 2.5 m, of a vehicle (not measured).
     bend = np.where(used, across / nearest[taken, None] + turning**2 * 2.5, 0.0).max(axis=1)
-    phase = 2.0 * np.pi / radar.waveform.wavelength * bend * frame**2 / 4.0
+    phase = 2.0 * np.pi * radar.waveform.middle / C0 * bend * frame**2 / 4.0
     worst = float(phase.max(initial=0.0))
     how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level relative to the echo that has it"
     return Entry(float(db(max(worst, 1e-15) ** 2)), "bound", how)

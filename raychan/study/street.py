@@ -42,7 +42,7 @@ class Road:
     def __init__(self, case: Street) -> None:
         self.scene = Scene.load(case.path)
         self.radar: Any = dataclasses.replace(self.scene.radar, noise=False)
-        self.frequency = float(self.radar.waveform.carrier)
+        self.frequency = float(self.radar.waveform.middle)
         self.bounces = self.scene.model.max_bounces
         self.tolerance_db = float(self.scene.model.tolerance_db)
         self.facets = self.scene.facets(0.0)
@@ -72,9 +72,10 @@ class Road:
         columns = {f.name: np.concatenate([getattr(e, f.name) for e in parts]) for f in dataclasses.fields(Echo)}
         keep = columns["amplitude"] != 0.0
         n, none = int(keep.sum()), np.full((int(keep.sum()), 1), -1, np.int16)
+        length, swept = columns["length"][keep], self.radar.waveform.swept
         return Paths.of(
-            length=columns["length"][keep],
-            amplitude=wave * columns["amplitude"][keep],
+            length=length,
+            amplitude=wave * columns["amplitude"][keep] * np.exp(2j * np.pi * swept / C0 * length),
             length_rate=2.0 * columns["rate"][keep],
             departure=columns["away"][keep],
             arrival=columns["look"][keep],
@@ -103,7 +104,7 @@ def tubes(road: Road, tolerance_db: float, checked: bool = True) -> Run:
     rules = [refinement(f, tolerance_db, road.floor, cell=cell)]
     if checked:
         rules.append(refinement(f, 3.0 * tolerance_db, road.floor, jitter=0.13, cell=cell))
-    paths = [solve(geometry, points, s, f, rule, road.bounces)[0] for rule in rules]
+    paths = [solve(geometry, points, s, s.waveform.carrier, rule, road.bounces)[0] for rule in rules]
     return Run(road.map_of(paths[0]), geometry.rays, perf_counter() - since)
 
 
@@ -111,7 +112,7 @@ def converged(road: Road, tolerance_db: float) -> Floats:
     """Return the reference map, by a launch on a lattice of cuts that no method uses."""
     cell = C0 / road.radar.waveform.bandwidth
     rule = refinement(road.frequency, tolerance_db, road.floor, jitter=0.2, cell=cell)
-    paths, _ = solve(road.facets, road.scene.points(0.0), road.radar, road.frequency, rule, road.bounces)
+    paths, _ = solve(road.facets, road.scene.points(0.0), road.radar, road.radar.waveform.carrier, rule, road.bounces)
     return road.map_of(paths)
 
 
