@@ -179,7 +179,7 @@ def noise_equivalent_amplitude(radar: Radar, settings: Any) -> float:
         look = direction(azimuth.ravel(), elevation.ravel()) @ radar.axes.T
         ends = (np.linalg.norm(f(look), axis=1).max() for f in (radar.tx_field, radar.rx_field))
         gain = radar.kept[noise_equivalent_amplitude] = float(np.prod(list(ends)))
-    return float(noise_amplitude(radar, settings) * 4.0 * np.pi / radar.waveform.wavelength / gain)
+    return float(noise_amplitude(radar, settings) * 4.0 * np.pi * radar.waveform.middle / C0 / gain)
 
 
 def noise_of_cell(radar: Radar, settings: Any) -> float:

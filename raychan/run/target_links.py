@@ -11,7 +11,7 @@ from raychan.processing.detection_theory import Detector, detection_probability
 from raychan.radar.radar import Radar
 from raychan.run.receiver import looks_of, noise_of_beam
 from raychan.tracing.point_targets import bistatic_sigma
-from raychan.units import db
+from raychan.units import C0, db
 from raychan.world.scene import Scene
 
 _COHERENT_DB = (0.0, 0.0, -1.049, 0.0, -0.537)
@@ -65,7 +65,9 @@ def target_links(scene: Scene) -> tuple[TargetLink, ...]:
         sent, look = there[None] / near, back[None] / far
         gain = float(np.abs(radar.tx_field(sent)[0] @ radar.rx_field(look)[0]) ** 2)
         sigma = bistatic_sigma(points, p, -sent[0], -look[0])
-        power = radar.power * gain * radar.waveform.wavelength**2 * sigma / ((4.0 * np.pi) ** 3 * (near * far) ** 2)
+        power = (
+            radar.power * gain * (C0 / radar.waveform.middle) ** 2 * sigma / ((4.0 * np.pi) ** 3 * (near * far) ** 2)
+        )
         case = scene.bodies[b].swerling
         snr = float(db(power / noise))
         probability = detection_probability(snr + _COHERENT_DB[case], detector, case if case in (1, 3) else 0)

@@ -18,7 +18,7 @@ from raychan.units import C0
 from raychan.world.geometry import geometry_of
 
 WAVE = rc.Waveform(carrier=24e9, bandwidth=200e6, chirp_duration=30e-6, n_chirps=8, n_samples=64)
-K = 2.0 * np.pi * WAVE.carrier / C0
+K = 2.0 * np.pi * WAVE.middle / C0  # gains are those of the middle of the ramp
 WIDTH, HEIGHT, CENTRE, YAW_DEG, EYE = 1.2, 0.5, (4.0, 0.9, 0.9), 8.0, (0.0, 0.0, 0.5)
 EPS = {"slab": 4.0, "soil": 3.0}
 UP = np.array([0.0, 0.0, 1.0])
@@ -45,7 +45,8 @@ def launched(of: rc.Scene, step: int, over_ground: bool) -> complex:
         kind = paths.trajectories.kind
         slots = np.array([SCATTER, REFLECT] if over_ground else [SCATTER])
         meant = ((kind > 0).sum(axis=1) == len(slots)) & (kind[:, : len(slots)] == slots[: kind.shape[1]]).all(axis=1)
-        total += paths.amplitude[meant[paths.trajectory]].sum()
+        waves = paths.amplitude * np.exp(-2j * np.pi * WAVE.swept / C0 * paths.length)
+        total += waves[meant[paths.trajectory]].sum()
     return total
 
 

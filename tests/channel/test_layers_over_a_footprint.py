@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import raychan as rc
@@ -12,6 +13,7 @@ from raychan.records import SCATTER
 from raychan.run.rules import step_rule
 from raychan.tracing.solver import launch_routes
 from raychan.tracing.stats import Stats
+from raychan.units import C0
 from raychan.world.geometry import geometry_of
 
 WAVE = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=30e-6, n_chirps=8, n_samples=64)
@@ -40,7 +42,8 @@ def behind_a_pane(yaw_deg: float, step: int) -> complex:
         paths = paths_of(routes, geometry.facets, of.radar, WAVE.carrier)
         way = paths.trajectories
         hit = ((way.body == 1) & (way.kind == SCATTER)).any(axis=1)
-        total += paths.amplitude[hit[paths.trajectory]].sum()
+        waves = paths.amplitude * np.exp(-2j * np.pi * WAVE.swept / C0 * paths.length)  # of the middle of the ramp
+        total += waves[hit[paths.trajectory]].sum()
     return total
 
 

@@ -117,7 +117,7 @@ def test_an_interferer_is_heard_straight_and_over_the_road_by_friis():
     away = np.linalg.norm(scene.interferers[0].radar.position - scene.radar.position)
     assert paths.length[direct] == pytest.approx(away)
     # Both antennas radiate into half a sphere: gain 3 dBi each.
-    friis = 2.0 * scene.radar.waveform.wavelength / (4.0 * np.pi * away)
+    friis = 2.0 * 299792458.0 / scene.interferers[0].radar.waveform.middle / (4.0 * np.pi * away)
     assert np.abs(paths.amplitude[direct]) == pytest.approx(friis, rel=1e-3)
 
 

@@ -91,7 +91,7 @@ def test_ground_below_returns_what_its_image_sends_times_the_arrays_gain_down_sq
     carrier = radar.waveform.carrier
     root = np.sqrt(5.0 - 2.0j / (2.0 * math.pi * carrier * EPS0))
     reflected = abs((1.0 - root) / (1.0 + root))
-    wanted = (gain * C0 / carrier / (4.0 * math.pi * 2.0 * height) * reflected) ** 2
+    wanted = (gain * C0 / radar.waveform.middle / (4.0 * math.pi * 2.0 * height) * reflected) ** 2
     got = float((np.abs(simulate(scene, seed=0).paths.amplitude) ** 2).sum())
     assert got == pytest.approx(wanted, rel=1e-6, abs=1e-30)
     if element == "cosine" and pitch <= 0.0:
