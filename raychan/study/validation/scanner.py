@@ -67,7 +67,7 @@ def scanner_off_exact(bench: Bench) -> Seen:
 @measure
 def scanner_front(bench: Bench) -> Seen:
     """Return the name of the body that the middle beam meets, of two boxes in line, the rear one given first."""
-    names = "rear box", "front box"
+    names = "rear_box", "front_box"
     bodies = [
         Body(name=n, shape="box", params={"height": 9.0}, position=(x, 0.0, 0.0))
         for n, x in zip(names, (20, 10), strict=True)
