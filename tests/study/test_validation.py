@@ -237,7 +237,8 @@ def test_link_budget_is_the_radar_equation_over_thermal_noise(bench):
     noise = 1.380649e-23 * 290.0 * 25.6e6 * 10**1.5
     hann = [np.hanning(n + 2)[1:-1] for n in (128, 1024)]
     cell = noise * np.prod([(w**2).sum() / w.sum() ** 2 for w in hann])
-    power = 0.01 * 10 ** (0.2 * gain) * LAMBDA**2 * rcs / ((4 * math.pi) ** 3 * r**4)
+    middle = 299792458.0 / bench.scene("street").radar.waveform.middle
+    power = 0.01 * 10 ** (0.2 * gain) * middle**2 * rcs / ((4 * math.pi) ** 3 * r**4)
     assert found["snr_db"] == pytest.approx(10 * math.log10(power / cell), abs=0.05)
 
 

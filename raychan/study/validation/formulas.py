@@ -17,7 +17,7 @@ from raychan.run.receiver import noise_of_cell
 from raychan.signal.baseband import synthesize
 from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure
-from raychan.units import db, dbm
+from raychan.units import C0, db, dbm
 
 Floats = NDArray[np.float64]
 
@@ -111,8 +111,12 @@ def point_loss(bench: Bench, run: str, at: float, rcs_dbsm: float) -> Seen:
 
     The radar equation (Skolnik, Introduction to Radar Systems, 2001, ch. 1): (4 pi)^3 R^4 / (lambda^2 sigma).
     """
-    wavelength = bench.scene(run).radar.waveform.wavelength
-    return float(db((4.0 * np.pi) ** 3 * at**4 / wavelength**2) - rcs_dbsm)
+    return _point_loss(bench.scene(run).radar.waveform.carrier, at, rcs_dbsm)
+
+
+def _point_loss(frequency: float, at: float, rcs_dbsm: float) -> float:
+    """Return the loss [dB] of `point_loss` at a frequency [Hz]."""
+    return float(db((4.0 * np.pi) ** 3 * at**4 / (C0 / frequency) ** 2) - rcs_dbsm)
 
 
 @measure
@@ -145,7 +149,8 @@ def link_snr(bench: Bench, run: str, target: str) -> dict[str, float]:
     """Return the link budget of a target of given RCS in free space: range, azimuth, RCS, gain and SNR.
 
     SNR = P G^2 lambda^2 sigma / ((4 pi)^3 R^4) over the noise of a map cell: k T0 F f_s of a sample, less the gain of
-    the windowed transforms. Gain at the target's azimuth and elevation, RCS at its aspect, noise figure of the run.
+    the windowed transforms. Lambda of the middle of the ramp, as a run has it; gain at the target's azimuth and
+    elevation, RCS at its aspect, noise figure of the run.
     """
     scene = bench.scene(run)
     radar, points = scene.radar, scene.points(0.0)
@@ -157,7 +162,7 @@ def link_snr(bench: Bench, run: str, target: str) -> dict[str, float]:
     back = (azimuth + np.pi - points.heading[k] + np.pi) % (2.0 * np.pi) - np.pi
     sigma = float(np.interp(back, points.azimuth, points.sigma[k], period=2.0 * np.pi))
     gain = gain_dbi(radar.tx, azimuth - np.radians(radar.yaw_deg), elevation)
-    loss = float(point_loss(bench, run, distance, float(db(sigma))) or 0.0)
+    loss = _point_loss(radar.waveform.middle, distance, float(db(sigma)))
     snr = dbm(radar.power) + 2.0 * gain - loss - dbm(noise_of_cell(radar, scene.processing))
     return {
         "range": distance,
