@@ -28,7 +28,7 @@ def body(x, table, label):
 
 
 def text_of(kernel):
-    """Return the lines of machine code of a compiled function, without the numbers in which no two compilations are alike."""
+    """Return the lines of a function's machine code, without the numbers in which no two compilations are alike."""
     (signature,) = kernel.inspect_asm()
     lines = re.sub(r"v\d+|\b0x[0-9a-f]+|\d{6,}|B\d+", "", kernel.inspect_asm()[signature]).splitlines()
     return [line for line in lines if "missing Environment" not in line]  # its size is that of a name with numbers
