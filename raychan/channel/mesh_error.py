@@ -18,7 +18,7 @@ from raychan.world.pieces import pieces
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Rows = NDArray[np.signedinteger] | slice
+Rows = NDArray[np.signedinteger]
 
 # Factors trade coverage of the true error against statements too large. They were chosen on the shapes of
 # tests/truth/shapes.py of seed 1; tests/channel/test_mesh_error.py judges on another seed.
@@ -123,22 +123,28 @@ def has_edges(geometry: Geometry) -> bool:
     return bool(pieces(a, b, len(f.body)).any())
 
 
-def creeping(geometry: Geometry, wavenumber: float, rows: Rows = slice(None)) -> tuple[float, float]:
+def creeping(geometry: Geometry, wavenumber: float, rows: Rows | None = None) -> tuple[float, float]:
     """Return bounds on what waves creeping around a body add to its amplitude: absolute [m] and relative to it.
 
-    Args: rows (n,) its facets, if there are others.
-
-    Both are those of the PEC sphere as wide as the body's smallest extent: Mie's series less physical optics over
-    k a = 0.3 to 300; infinite cylinders of both polarisations lie below. 0 for bodies without curved sides, which have
-    no creeping wave, and for open sheets, for which no bound is known.
+    Both are those of the PEC sphere as wide as the smallest extent of each connected piece: Mie's series less physical
+    optics over k a = 0.3 to 300; infinite cylinders of both polarisations lie below. Of several pieces those count by
+    the roots of their areas, as echoes of unrelated phase do. 0 for pieces without curved sides, which have no creeping
+    wave, and for open sheets, for which no bound is known.
+    Args: rows (n,) the facets of the body, if there are others.
     Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
     """
-    if not geometry.curved[rows].any() or geometry.both_sides[rows].any():
-        return 0.0, 0.0
-    size = wavenumber * 0.5 * _thinnest(geometry.facets.vertices[rows], geometry.area[rows])
-    x = max(size, _RESONANCE)
-    wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-2.2 * np.cbrt(x))
-    return float(wave / wavenumber), float(2.0 * wave / max(size, 1e-300))
+    every = np.arange(len(geometry.area)) if rows is None else rows
+    order = every[np.argsort(geometry.piece[every], kind="stable")]
+    around, share, whole = [0.0], 0.0, float(geometry.area[every].sum())
+    for piece in np.split(order, np.flatnonzero(np.diff(geometry.piece[order])) + 1):
+        if not len(piece) or not geometry.curved[piece].any() or geometry.both_sides[piece].any():
+            continue
+        size = wavenumber * 0.5 * _thinnest(geometry.facets.vertices[piece], geometry.area[piece])
+        x = max(size, _RESONANCE)
+        wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-2.2 * np.cbrt(x))
+        around.append(float(wave / wavenumber))
+        share += (2.0 * wave / max(size, 1e-300)) ** 2 * float(geometry.area[piece].sum()) / whole
+    return float(np.linalg.norm(around)), float(np.sqrt(share))
 
 
 def _thinnest(vertices: Floats, area: Floats) -> float:

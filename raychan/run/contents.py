@@ -8,6 +8,8 @@ from pathlib import Path
 
 from raychan.run.atomic_swap import is_dead, is_mark
 
+_BEGINNING = 64  # bytes of a file that are looked at
+_BEGINS: dict[str, bytes | tuple[bytes, ...]] = {".nc": (b"\x89HDF", b"CDF"), ".json": b"{"}
 _ELSEWHERE = "move it away or name another folder"
 
 
@@ -36,7 +38,7 @@ class Contents:
 
     def signed(self, folder: Path) -> bool:
         """Return whether the command wrote this folder."""
-        return any(any(folder.glob(sign)) for sign in self.signs)
+        return any(map(_is_sign, (file for sign in self.signs for file in folder.glob(sign))))
 
     def obstacle(self, folder: Path, signed: bool = False) -> str:
         """Return what of others is in the way in a folder and its inner ones, '' where nothing is.
@@ -55,6 +57,16 @@ class Contents:
                 if not signed:
                     return f"{entry}: exists, and {folder} is not a folder of results; {_ELSEWHERE}"
         return ""
+
+
+def _is_sign(file: Path) -> bool:
+    """Return whether a file named as a result is of the kind that its name says: a note of one's own is none."""
+    try:
+        with file.open("rb") as opened:
+            begins = opened.read(_BEGINNING).lstrip()
+    except OSError:
+        return False
+    return begins.startswith(_BEGINS.get(file.suffix, b""))
 
 
 def _is_folder(entry: Path) -> bool:

@@ -132,7 +132,9 @@ def _listed(ledger: Mapping[str, Entry], least: float, below: float) -> str:
     detection, the strongest first."""
     found = [(e.level_db, name, e.kind) for name, e in ledger.items() if isinstance(e.level_db, float)]
     found = sorted((x for x in found if least <= x[0] < below), reverse=True)
-    return ", ".join(f"{name} {'at most ' if kind == 'bound' else ''}{level:+.0f} dB" for level, name, kind in found)
+    return ", ".join(
+        f"{name} {'at most ' if kind == 'bound' else ''}{round(level) + 0.0:+.0f} dB" for level, name, kind in found
+    )
 
 
 def _of(chosen: Any) -> str:

@@ -60,13 +60,12 @@ def save_result(result: Result, directory: str | Path) -> None:
     Args: directory, made where it is missing; an earlier result there is replaced, pictures and frames included, all at
     once, and other files stay.
     Raises: StoreError for errors of the disk, for a file in its place, or where files of the same names stand in a
-    directory without results; ValueError for another type, or a name
-    with a zero byte.
+    directory without results; ValueError for another type, no name, or one with a zero byte.
     """
     check_type("result", result, Result)
     check_type("directory", directory, str, PathLike)
-    if "\0" in str(directory):
-        raise ValueError(f"directory = {shown(str(directory))}: a name without a zero byte is wanted")
+    if "\0" in str(directory) or not str(directory):
+        raise ValueError(f"directory = {shown(str(directory))}: a name is wanted, without a zero byte")
     with staging(directory, CONTENTS) as stage:
         write_result(result, stage)
 

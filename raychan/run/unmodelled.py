@@ -42,15 +42,16 @@ def ledger(
     Args: settings, the scene's processing; model, what was modelled; bodies of the scene.
     """
     if not weakest > 0.0 or not len(geometry.facets.vertices):
-        return {name: Entry(UNKNOWN, "none", "nothing was detected") for name in _NAMES}
+        why = "the scene has no bodies" if weakest > 0.0 else "nothing was detected"
+        return {name: Entry(UNKNOWN, "none", why) for name in _NAMES}
     # Those that take longest first: at the end threads wait for the last one.
     entries: dict[str, Callable[[], Entry]] = {
         "further bounces": lambda: _further(paths, radar, settings, model.max_bounces, weakest),
         "transmission": lambda: _transmission(paths, geometry.facets, radar, settings, model, weakest),
         "diffraction to point targets": lambda: _around(geometry, points, radar, settings, model, weakest),
         "diffuse scattering": lambda: _diffuse(geometry, radar, model, weakest),
-        "creeping waves": lambda: creeping_waves(paths, geometry, radar, settings, weakest),
-        "change over the band": lambda: over_band(paths, geometry.facets, radar, settings, weakest),
+        "creeping waves": lambda: creeping_waves(paths, geometry, points, radar, settings, weakest),
+        "change over the band": lambda: over_band(paths, geometry, radar, settings, weakest),
         "tessellation": lambda: _tessellation(paths, geometry, bodies, radar, settings, weakest),
         "intra-frame motion": lambda: _motion(paths, geometry.facets, radar),
         "diffraction": lambda: _diffraction(geometry, radar, weakest),

@@ -10,7 +10,7 @@ from truth import mie, shapes
 
 from raychan.channel.mesh_error import creeping
 from raychan.run.rcs import rcs
-from raychan.run.single_body import facets_of
+from raychan.run.single_body import facets_of, mesh_of
 from raychan.units import C0
 from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
@@ -161,3 +161,14 @@ def test_thin_cylinders_lie_within_what_creeping_waves_may_change(radius_k):
     share = creeping(Geometry(facets_of(mesh, "pec", F)), K)[1]
     for field in (jv(n, radius_k) / hankel2(n, radius_k), jvp(n, radius_k) / h2vp(n, radius_k)):
         assert abs(abs(np.sum(fold * field)) / optics - 1.0) < share
+
+
+def test_several_bodies_in_one_mesh_have_the_creeping_waves_of_each():
+    ball = trimesh.creation.icosphere(3, 0.01)
+    others = [ball.copy().apply_translation(x) for x in ((1.5, 0.5, 0.0), (1.6, -0.6, 0.8))]
+    k = 2.0 * np.pi * 5e9 / 299_792_458.0
+    one, three = (
+        creeping(Geometry(facets_of(mesh_of(m, 20.0), "pec", 5e9)), k)
+        for m in (ball, trimesh.util.concatenate([ball, *others]))
+    )
+    assert three[1] == pytest.approx(one[1], rel=1e-3) and three[0] == pytest.approx(np.sqrt(3.0) * one[0], rel=1e-3)

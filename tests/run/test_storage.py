@@ -218,3 +218,13 @@ def test_a_place_where_no_result_can_be_saved_is_told_and_stays(made, tmp_path):
         with pytest.raises(ValueError, match=said):
             rc.save_result(*given)
     assert [p.read_text() for p in tmp_path.iterdir()] == ["mine"]
+
+
+@pytest.mark.parametrize("name", ["result.nc", "summary.json"])
+def test_a_note_of_ones_own_named_as_a_result_makes_no_folder_of_results(tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(StoreError, match="not a folder of results"):
+        save_result(result(paths([], [], [], []), []), tmp_path)
+    assert (tmp_path / name).read_text() == "mine"
+    with pytest.raises(ValueError, match="a name is wanted"):
+        save_result(result(paths([], [], [], []), []), "")
