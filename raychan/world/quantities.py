@@ -18,11 +18,14 @@ class Within(WrapValidator):
     """The check that a value is a number within a limit."""
 
 
-def _within(limit: Limit, number: str = "a number") -> Within:
-    """Return the check that a value is a number within a limit; its error says what is allowed."""
-    allowed = f"{number} {limit.allowed}"
+def _within(limit: Limit, whole: bool = False) -> Within:
+    """Return the check that a value is a number within a limit, or a whole one, which may be written as a float; its
+    error says what is allowed."""
+    allowed = f"{'a whole number' if whole else 'a number'} {limit.allowed}"
 
     def check(value: Any, parsed: ValidatorFunctionWrapHandler) -> Any:
+        if whole and isinstance(value, float) and value.is_integer():
+            value = int(value)  # 1e6 is how a large one is written
         try:
             found = parsed(value)
         except ValidationError as e:
@@ -36,7 +39,7 @@ def _within(limit: Limit, number: str = "a number") -> Within:
 
 def _whole(limit: Limit) -> Within:
     """Return the check that a value is a whole number within a limit."""
-    return _within(limit, "a whole number")
+    return _within(limit, whole=True)
 
 
 def _listed(allowed: str) -> WrapValidator:

@@ -166,3 +166,13 @@ def test_samples_of_another_radar_are_refused(change):
     for run in (rc.range_doppler, rc.range_azimuth):
         with pytest.raises(ValueError, match=r"cube of shape \(4, 16, 32\) \(receiver, chirp, sample\); the radar"):
             run(CUBE, replace(RADAR, **change))
+
+
+def test_whole_numbers_of_scene_files_may_be_written_as_floats():
+    text = "[radar.waveform]\nbandwidth_mhz = 500.0\nchirp_us = 20.0\nchirps = 64.0\n[model]\nmax_rays = 1e6\n"
+    scene = rc.Scene.from_text(text)
+    assert (scene.model.max_rays, scene.radar.waveform.n_chirps) == (1_000_000, 64)
+    assert type(scene.model.max_rays) is int
+    for wrong in ("64.5", "true", "inf"):
+        with pytest.raises(ValueError, match="a whole number"):
+            rc.Scene.from_text(text.replace("64.0", wrong))
