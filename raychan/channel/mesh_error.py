@@ -134,11 +134,13 @@ def creeping(geometry: Geometry, wavenumber: float, rows: Rows | None = None) ->
     Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
     """
     every = np.arange(len(geometry.area)) if rows is None else rows
-    order = every[np.argsort(geometry.piece[every], kind="stable")]
+    # Only what has a bound is looked at piece by piece: loose triangles are thousands of pieces.
+    own = geometry.piece[every]
+    sides, bends = (np.bincount(own, x[every]) > 0 for x in (geometry.both_sides, geometry.curved * geometry.area))
+    rows = every[(bends & ~sides)[own]]
+    order = rows[np.argsort(geometry.piece[rows], kind="stable")]
     around, share, whole = [0.0], 0.0, float(geometry.area[every].sum())
-    for piece in np.split(order, np.flatnonzero(np.diff(geometry.piece[order])) + 1):
-        if not len(piece) or not geometry.curved[piece].any() or geometry.both_sides[piece].any():
-            continue
+    for piece in np.split(order, np.flatnonzero(np.diff(geometry.piece[order])) + 1) if len(order) else ():
         size = wavenumber * 0.5 * _thinnest(geometry.facets.vertices[piece], geometry.area[piece])
         x = max(size, _RESONANCE)
         wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-2.2 * np.cbrt(x))

@@ -47,6 +47,8 @@ def creeping_waves(
         if (geometry.curved & geometry.both_sides)[rows].any():
             left = left or f.body_names[body]
         around, share = creeping(geometry, k, rows)
+        if around == 0.0:
+            continue
         away = f.vertices[rows].mean(axis=(0, 1)) - np.asarray(radar.position)
         r = float(np.linalg.norm(away))
         look = (away / r)[None]
