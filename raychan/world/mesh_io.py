@@ -13,6 +13,7 @@ from raychan.scalars import plain
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
+from raychan.world.plain_obj import read_by
 from raychan.world.whole_files import checked
 
 _SIZES = 0.01, 150.0  # m: sizes outside are warned of
@@ -62,7 +63,8 @@ def load(
         logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
         # Infinite coordinates are reported below, not as warnings of the reader.
         with np.errstate(all="ignore"):
-            scene = trimesh.load_scene(str(file), process=False)
+            how = read_by(file) if file.suffix.lower() == ".obj" else {"file_obj": str(file)}
+            scene = trimesh.load_scene(process=False, **how)
         mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * plain(scale)))
     except SceneError as e:
         raise e.at(file=file) from None
