@@ -31,11 +31,16 @@ class Interrupted(Exception):
 @contextmanager
 def keeping(keep: Callable[[], str]) -> Iterator[None]:
     """Turn Ctrl-C into Interrupted with what `keep` returns: it writes what is finished, if anything, and says which
-    that is, '' for none."""
+    that is, '' for none. Where a later part is no possible scene, what is finished is written and said, too."""
     from raychan.parallel import was_interrupted
+    from raychan.world.errors import SceneError
 
     try:
         yield
+    except SceneError:
+        if kept := keep():
+            warn([kept])
+        raise
     except (KeyboardInterrupt, SystemError) as stop:
         if not (isinstance(stop, KeyboardInterrupt) or was_interrupted(stop)):
             raise

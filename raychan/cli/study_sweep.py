@@ -53,8 +53,8 @@ def sweep(
     """Follow one body through varied scenes: its hidden share, the bodies that hide it, and its detections.
 
     Without --vary and --times the scene is simulated as it is. Levels of the direct, multipath and diffracted returns
-    of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png; after Ctrl-C
-    sweep.csv has the steps that are done."""
+    of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png; after Ctrl-C,
+    or where a step is no possible scene, sweep.csv has the steps that are done."""
     from raychan.report.sweep_figures import sweep_picture
     from raychan.run.output_files import staging
     from raychan.study import sweep as study

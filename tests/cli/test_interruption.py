@@ -173,3 +173,15 @@ def test_ctrl_c_in_a_sweep_keeps_the_steps_that_are_done(scene, stop_at, tmp_pat
     assert capsys.readouterr() == ("", f"raychan: interrupted; 2 of 3 steps are in {out / 'sweep.csv'}\n")
     assert (out / "sweep.csv").read_text().splitlines() == whole[:3]
     assert [p.name for p in out.iterdir()] == ["sweep.csv"]
+
+
+def test_a_step_that_is_no_scene_keeps_the_steps_before_it(scene, tmp_path, capsys):
+    """The radar stands in the box at the third of four steps."""
+    out = tmp_path / "out"
+    scene.write_text(PLATE.replace('shape = "plate"', 'shape = "box"'))
+    command = ["study", "sweep", str(scene), "--target", "sign", "--out", str(out)]
+    assert invoke([*command, "--vary", "bodies.sign.position.x=20:-10:4"]) == 2
+    warned, told = but_compiling(capsys.readouterr().err).splitlines()
+    assert warned == f"warning: 2 of 4 steps are in {out / 'sweep.csv'}"
+    assert "(step bodies.sign.position.x = 0)" in told
+    assert len((out / "sweep.csv").read_text().splitlines()) == 3
