@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.curved_patches import edge_to_cut, halved
+from raychan.geometry.patch_cuts import edge_to_cut, halved
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import Beam
 from raychan.radar.radar import Radar

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.geometry.curved_patches import edge_of_fan, edge_to_cut, halved
 from raychan.geometry.lit_parts import lit_parts
+from raychan.geometry.patch_cuts import edge_of_fan, edge_to_cut, halved
 from raychan.poses import sizes
 from raychan.records import REFLECT, SCATTERER, TRANSMIT
 from raychan.tracing.cache import cache_of

@@ -94,11 +94,15 @@ def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:
 
 
 def nearest_point(body: Body, at: Floats) -> Floats:
-    """Return the corner or face centre of a body (world, (3,)) that is nearest to a point (3,)."""
-    mesh = body.geometry
-    points = np.concatenate([mesh.vertices, mesh.corners.mean(axis=1)])
-    local = body.motion.to_body(at)
-    return np.asarray(body.motion.to_world(points[np.argmin(np.linalg.norm(points - local, axis=1))]))
+    """Return the point of a body's facets (world, (3,)) that is nearest to a point (3,)."""
+    from trimesh.triangles import closest_point
+
+    corners, local = body.geometry.corners, body.motion.to_body(at)
+    middle = corners.mean(axis=1)
+    far, size = np.linalg.norm(middle - local, axis=1), np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    near = corners[far - size <= (far + size).min()]
+    found = closest_point(near, np.broadcast_to(local, (len(near), 3)))
+    return np.asarray(body.motion.to_world(found[np.argmin(np.linalg.norm(found - local, axis=1))]))
 
 
 def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> list[str]:

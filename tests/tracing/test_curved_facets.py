@@ -11,7 +11,7 @@ from support.targets import F
 from support.triangles import nodes, on_patch
 from truth import po
 
-from raychan.geometry.curved_patches import edge_of_fan, halved
+from raychan.geometry.patch_cuts import edge_of_fan, halved
 from raychan.run.rcs_refinement import refinements
 from raychan.run.single_body import facets_of
 from raychan.tracing.footprints import element_of

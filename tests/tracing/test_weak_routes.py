@@ -7,7 +7,7 @@ import pytest
 
 import raychan as rc
 from raychan.channel.paths import join, paths_of
-from raychan.geometry.curved_patches import edge_to_cut
+from raychan.geometry.patch_cuts import edge_to_cut
 from raychan.run.receiver import noise_of_cell, quiet_map
 from raychan.run.rules import first_rule
 from raychan.signal.baseband import synthesize
