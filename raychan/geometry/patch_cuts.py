@@ -1,4 +1,4 @@
-"""Which patches of curved surfaces are bisected, and at which edge (numba kernels); arguments as in `curved_patches`."""
+"""At which edge patches of curved surfaces are bisected (numba kernels); arguments as in `curved_patches`."""
 
 from __future__ import annotations
 
