@@ -42,7 +42,7 @@ def _air(scene: Any) -> list[tuple[str, str]]:
     if scene.atmosphere is None:
         return []
     wave = "V" if scene.radar_table is None else scene.radar_table.polarization
-    causes = scene.atmosphere.specific(scene.frequency, wave)
+    causes = scene.atmosphere.specific(scene.material_frequency, wave)
     each = ", ".join(f"{name} {loss:.3g}" for name, loss in causes.items())
     far = scene.radar.waveform.unambiguous_range
     both = 2e-3 * far * sum(causes.values())

@@ -247,7 +247,7 @@ def specular_paths(
         for x in end:
             (SPEED if name.endswith("velocity") else PLACE).check(name, float(x))
     max_bounces = replace(BOUNCES, low=0).check("max_bounces", max_bounces, whole=True)
-    facets = scene.facets(0.0)
+    facets = scene.facets(0.0, scene.frequency)
     routes = specular_routes(Geometry(facets), ends[0], ends[1], max_bounces, scene.model.max_transmissions)
     gain = jones(routes, facets, scene.frequency)
     order = np.argsort(routes.length, kind="stable")

@@ -102,8 +102,14 @@ def _sizes(facets: Facets, radar: Radar) -> Floats:
     band = wave.carrier + wave.bandwidth * np.arange(_STEPS) / (_STEPS - 1)
     which = np.repeat(np.arange(len(m.kind)), _COSINES)
     cosine = np.tile(np.arange(1, _COSINES + 1) / _COSINES, len(m.kind))
-    columns = m.kind[which], m.eps[which], m.thickness[which], m.roughness[which], cosine
-    every = np.array([np.abs(coefficients_array(*columns, 2.0 * np.pi * f / C0)) for f in (*band, wave.middle)])
+    columns = m.thickness[which], m.roughness[which], cosine
+
+    def at(f: float) -> Floats:
+        # A conductivity that stays the same over the band.
+        eps = m.eps.real + 1j * m.eps.imag * (wave.middle / f)
+        return np.abs(coefficients_array(m.kind[which], eps[which], *columns, 2.0 * np.pi * f / C0))
+
+    every = np.array([at(f) for f in (*band, wave.middle)])
     held = np.maximum(every[-1], _FADED)
     sizes = np.where(every[-1] > _FADED, every[:-1] / held, 1.0)
     return np.asarray(sizes.reshape(_STEPS, len(m.kind), _COSINES, 2, 2).transpose(0, 4, 3, 1, 2))

@@ -46,6 +46,7 @@ class MeshReport:
     duplicates: int = 0
     flipped: int = 0
     unread_normals: int = 0
+    folded: int = 0
 
     def warnings(self) -> list[str]:
         """Return one sentence for each thing a user should know."""
@@ -60,6 +61,11 @@ class MeshReport:
             said.append(f"{self.flipped} faces turned to face outward")
         if self.unread_normals:
             said.append(f"{self.unread_normals} of the file's normals are no three numbers and were left out")
+        if self.folded:
+            said.append(
+                f"faces of more than three corners are not convex: {self.folded} pairs of the triangles that they are "
+                "cut into lie on each other and return too much; divide such faces"
+            )
         if not self.watertight:
             said.append(f"not watertight: {self.open_edges} open and {self.non_manifold_edges} non-manifold edges")
         return said

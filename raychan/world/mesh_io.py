@@ -14,6 +14,7 @@ from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
 from raychan.world.plain_obj import read_by
+from raychan.world.polygons import folded
 from raychan.world.whole_files import checked
 
 _SIZES = 0.01, 150.0  # m: sizes outside are warned of
@@ -65,15 +66,21 @@ def load(
         with np.errstate(all="ignore"):
             how = read_by(file) if file.suffix.lower() == ".obj" else {"file_obj": str(file)}
             scene = trimesh.load_scene(process=False, **how)
+            folds = folded(file, scene)
         mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * plain(scale)))
     except SceneError as e:
         raise e.at(file=file) from None
     except IndexError as e:
         problem = "cannot be read as a mesh: a face names a vertex that the file does not hold"
         raise SceneError(f"{problem} ({e})", file=file, allowed="a valid " + file.suffix) from e
+    except KeyError as e:
+        problem = f"cannot be read as a mesh: {shown(str(e.args[0]))} is missing"
+        raise SceneError(problem, file=file, allowed="a valid " + file.suffix) from e
     except Exception as e:  # trimesh's readers raise whatever their parsers do
         raise SceneError(f"cannot be read as a mesh ({e})", file=file, allowed="a valid " + file.suffix) from e
-    return replace(mesh, report=replace(mesh.report, unread_normals=unread)) if unread else mesh
+    if not unread and not folds:
+        return mesh
+    return replace(mesh, report=replace(mesh.report, unread_normals=unread, folded=folds))
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:
@@ -82,12 +89,18 @@ def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[s
     return taken, forward or ("z" if taken.endswith("y") else "x")
 
 
-def unit_hint(size: float, unit: str = "m") -> str:
-    """Return the unit in which a body of a size [m], read in `unit`, would be a few metres large; '' if there is
-    none."""
+def _unit_hint(size: float, unit: str, key: str) -> str:
+    """Return the setting of the unit in which a body of a size [m], read in `unit`, would be a few metres large, or of
+    its scale if there is none."""
     sizes = {name: size / UNITS[unit] * metres for name, metres in UNITS.items() if name != unit}
     best = min(sizes, key=lambda name: abs(np.log(sizes[name] / _USUAL)))
-    return f'unit = "{best}" makes it {sizes[best]:.3g} m' if 0.1 <= sizes[best] / _USUAL <= 10.0 else ""
+    fits = 0.1 <= sizes[best] / _USUAL <= 10.0
+    return f"{_setting(key, 'unit', best)} makes it {sizes[best]:.3g} m" if fits else f"{key}scale"
+
+
+def _setting(key: str, name: str, value: str) -> str:
+    """Return how a setting is written in a scene file, or as an option where the key is '--'."""
+    return f"--{name} {value}" if key == "--" else f'{key}{name} = "{value}"'
 
 
 def oddities(mesh: Mesh, path: str | Path, unit: str = "m", up: str | None = None, key: str = "") -> list[str]:
@@ -97,8 +110,7 @@ def oddities(mesh: Mesh, path: str | Path, unit: str = "m", up: str | None = Non
     """
     said, size = [], max(mesh.report.size)
     if not _SIZES[0] <= size <= _SIZES[1]:
-        hint = f"{key}{h}" if (h := unit_hint(size, unit)) else f"{key}scale"
-        said.append(f"{size:.4g} m across: check unit and scale ({hint})")
+        said.append(f"{size:.4g} m across: check unit and scale ({_unit_hint(size, unit, key)})")
     if up is None:
         taken, ahead = axes_taken(path, up, None)
         low, extent = mesh.bounds[0], np.ptp(mesh.bounds, axis=0)
@@ -108,7 +120,8 @@ def oddities(mesh: Mesh, path: str | Path, unit: str = "m", up: str | None = Non
         # A body that stands on a coordinate plane shows which axis is up.
         if not stands[2] and stands[:2].sum() == 1 and extent[stands].min() > 0.0:
             meant = (ahead, "xyz".replace(taken, "").replace(ahead, ""))[int(np.argmax(stands[:2]))]
-            said.append(f'{taken} was taken as up, but it stands on {meant} = 0: {facts}; {key}up = "{meant}" turns it')
+            turns = f"{_setting(key, 'up', meant)} turns it"
+            said.append(f"{taken} was taken as up, but it stands on {meant} = 0: {facts}; {turns}")
         elif taken == "y":
             said.append(f"{taken} was taken as up, as glTF has it: {facts}; {key}up says otherwise")
     return said

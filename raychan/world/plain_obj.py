@@ -1,5 +1,6 @@
-"""OBJ files as trimesh reads them right: of indented lines, tabs, and faces that count vertices backwards from where
-they stand, it loses or misreads faces; of several objects it takes the first one's name for all."""
+"""OBJ files as trimesh reads them right: of indented lines, tabs, comments within lines, a byte-order mark, and faces
+that count vertices backwards from where they stand, it loses or misreads faces; of several objects it takes the first
+one's name for all."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ from typing import Any
 
 from raychan.world.errors import SceneError, shown
 
-_ODD = re.compile(rb"^[ \t]+(?:f|v|vn|vt|o|g|usemtl|mtllib)[ \t]|^(?:f|v|vn|vt|o|g)\t|^f .*-\d", re.M)
+_ODD = re.compile(rb"^[ \t]+(?:f|v|vn|vt|o|g|usemtl|mtllib)[ \t]|^(?:f|v|vn|vt|o|g)\t|^f .*[-#]|^v.*#|\r(?!\n)", re.M)
+_MARK = b"\xef\xbb\xbf"  # of byte order
 _OBJECT, _PAINT = re.compile(rb"^o ", re.M), re.compile(rb"^usemtl (.*)", re.M)
 _LIBRARY = re.compile(rb"^mtllib (.*)", re.M)
 _KINDS = (b"v", b"vt", b"vn")  # what the numbers of one corner of a face, v/vt/vn, count
@@ -34,6 +36,7 @@ def read_by(file: Path) -> dict[str, Any]:
 
 def _plain(data: bytes, file: Path) -> bytes:
     """Return the text of an OBJ without indents and tabs, all vertices counted from the file's begin."""
+    data = data.removeprefix(_MARK)
     if not _ODD.search(data):
         return data
     lines = [b" ".join(x.split()) for x in re.sub(rb"\\\r?\n", b" ", data).splitlines()]
@@ -42,6 +45,7 @@ def _plain(data: bytes, file: Path) -> bytes:
         word, _, rest = line.partition(b" ")
         if word in count:
             count[word] += 1
+            lines[i] = line.split(b"#")[0]
         elif word == b"f":
             corners = rest.split(b"#")[0].split()
             lines[i] = b" ".join([word, *(_forwards(corner, count, line, file) for corner in corners)])

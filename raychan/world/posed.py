@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from raychan.geometry.triangles import pose
 from raychan.records import LAYER, MIRROR, Facets, Points
 from raychan.world.body import Body
-from raychan.world.material import Material, resolve
+from raychan.world.errors import SceneError, nearest
+from raychan.world.material import Material, material, names, resolve
 from raychan.world.mesh import Floats
 from raychan.world.static_geometry import StaticGeometry
 
@@ -61,6 +62,18 @@ def index_of(bodies: Sequence[Body], chosen: Sequence[Sequence[Material]]) -> In
         kind = [materials.setdefault(m, len(materials)) for m in own]
         rows.append((np.array(kind, np.int32), np.array(part, np.int32)))
     return list(materials), list(parts), rows
+
+
+def materials_chosen(body: Body, known: Mapping[str, Material], frequency: float) -> list[Material]:
+    """Return the materials of a body's parts at a frequency [Hz]: those `known` to the scene first, then the built-in
+    ones."""
+    found = []
+    for part, m in zip(body.geometry.part_names, body.part_materials(), strict=True):
+        if isinstance(m, str) and m not in known and m not in names():
+            key = f"{body.name}.materials.{part}" if part in body.materials else f"{body.name}.material"
+            raise SceneError(f"unknown material '{m}'", key=key, value=m, allowed=nearest(m, [*known, *names()]))
+        found.append((known.get(m) or material(m, frequency)) if isinstance(m, str) else m)
+    return found
 
 
 def spheres_inside(

@@ -19,14 +19,14 @@ from raychan.scalars import plain
 from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
 from raychan.world.build import body_of, material_of, scene_text
-from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.errors import SceneError, shown
 from raychan.world.fixed import Fixed
 from raychan.world.idle_keys import idle_keys
 from raychan.world.later import check_later, check_time, table_at
 from raychan.world.limits import FREQUENCY
-from raychan.world.material import Material, material, names, validity
+from raychan.world.material import Material, validity
 from raychan.world.mesh import Floats
-from raychan.world.posed import index_of, points_of, posed, spheres_inside
+from raychan.world.posed import index_of, materials_chosen, points_of, posed, spheres_inside
 from raychan.world.radar_mount import mount, processing_of, radar_of
 from raychan.world.scene_arguments import bodies_of, check_texts, materials_of
 from raychan.world.schema import PREVIEW, BodyTable, InterfererTable, Model, RadarTable, SceneFile
@@ -49,10 +49,10 @@ __all__ = ["Body", "Scene", "SceneError"]
 class Scene(Fixed, Described):
     """Bodies, materials, a radar and settings.
 
-    Args: bodies; frequency [Hz] of the materials (default the radar's carrier, or 77 GHz); radar an object, a table as
-    in a scene file, or None; processing of the receiver, an object or a table (default the radar's own); model a table
-    of what is modelled; materials by name, which bodies may use; folder to which file names refer; atmosphere, an
-    object or a table (default none: no loss on the way); interferers, objects or tables.
+    Args: bodies; frequency [Hz] (default the radar's carrier, or 77 GHz), also of the materials if given (default the
+    middle of the ramp); radar an object, a table as in a scene file, or None; processing of the receiver, an object or
+    a table (default the radar's own); model a table of what is modelled; materials by name, which bodies may use;
+    folder to which file names refer; atmosphere, an object or a table (default none: no loss on the way); interferers.
     Raises: SceneError for a scene that cannot be.
 
     >>> Scene(bodies=[Body(name="wall", shape="plate", position=(10, 0, 0))]).frequency
@@ -90,9 +90,11 @@ class Scene(Fixed, Described):
             problem, allowed = f"{shown(frequency)} is not possible", FREQUENCY.allowed
             raise SceneError(problem, key="frequency", value=frequency, allowed=allowed)
         self.frequency = carrier if frequency is None else float(plain(frequency))
+        middle = self.radar_table.waveform.middle_ghz * 1e9 if self.radar_table else self.frequency
+        self.material_frequency = middle if frequency is None else self.frequency
         self.materials = materials_of({} if materials is None else materials)
         self.atmosphere = atmosphere_of(atmosphere, path)
-        self.attenuation = attenuation_of(self.atmosphere, self.frequency, self.radar_table, path)
+        self.attenuation = attenuation_of(self.atmosphere, self.material_frequency, self.radar_table, path)
         self.interferers = interferers_of(interferers, self.folder, path)
         self._data: dict[str, Any] | None = None
         self._tables: Sequence[BodyTable] = ()
@@ -181,7 +183,7 @@ class Scene(Fixed, Described):
     def _stands_as(self, other: Scene) -> bool:
         """Return whether both scenes have the same bodies at the same places, of the same materials."""
         alike = len(self.bodies) == len(other.bodies) and all(map(is_, self.bodies, other.bodies))
-        mine, others = ((x.materials, x.frequency, x.attenuation) for x in (self, other))
+        mine, others = ((x.materials, x.material_frequency, x.attenuation) for x in (self, other))
         return alike and mine == others
 
     def _prepare(self) -> None:
@@ -189,7 +191,7 @@ class Scene(Fixed, Described):
         checks.names_differ(self.bodies)
         for body in self.bodies:
             try:
-                self._chosen(body)
+                materials_chosen(body, self.materials, self.material_frequency)
                 _ = body.motion, body.resolved_role, body.fluctuates, body.rcs_table
             except SceneError as e:
                 raise e.at(key="bodies") from None
@@ -243,7 +245,7 @@ class Scene(Fixed, Described):
         said = [note for body in self.bodies for note in body.notes()]
         said += idle_keys(self._given, self.materials, self.radar_table)
         used = {m for b in self.bodies for m in b.part_materials() if isinstance(m, str) and m not in self.materials}
-        said += [note for name in sorted(used) if (note := validity(name, self.frequency))]
+        said += [note for name in sorted(used) if (note := validity(name, self.material_frequency))]
         opaque = [all(m.kind != LAYER for m in own) for own in self._own_materials]
         said += overlaps.overlaps(self.bodies, opaque, self._static.setdefault("overlaps", {}))
         if self.radar_table is None:
@@ -251,21 +253,14 @@ class Scene(Fixed, Described):
         said += checks.edge_on(self.bodies, self.radar_table) + overlaps.unseen(self.bodies, self.radar)
         return said + checks.aliases(self.bodies, self.radar_table, self.radar.waveform)
 
-    def _chosen(self, body: Body) -> list[Material]:
-        """Return the materials of a body's parts: the scene's own first, then the built-in ones."""
-        found = []
-        for part, m in zip(body.geometry.part_names, body.part_materials(), strict=True):
-            if isinstance(m, str) and m not in self.materials and m not in names():
-                key = f"{body.name}.materials.{part}" if part in body.materials else f"{body.name}.material"
-                allowed = nearest(m, [*self.materials, *names()])
-                raise SceneError(f"unknown material '{m}'", key=key, value=m, allowed=allowed)
-            found.append((self.materials.get(m) or material(m, self.frequency)) if isinstance(m, str) else m)
-        return found
-
     @cached_property
     def _own_materials(self) -> list[list[Material]]:
         """For each body the materials of its parts."""
-        return [self._chosen(b) for b in self.bodies]
+        return self._materials_at(self.material_frequency)
+
+    def _materials_at(self, frequency: float) -> list[list[Material]]:
+        """Return for each body the materials of its parts at a frequency [Hz]."""
+        return [materials_chosen(body, self.materials, frequency) for body in self.bodies]
 
     @cached_property
     def _index(self) -> tuple[list[Material], list[str], list[tuple[Any, Any]]]:
@@ -280,10 +275,15 @@ class Scene(Fixed, Described):
         static = self._static[StaticGeometry]
         return static and static.at(self.bodies)
 
-    def facets(self, time: float = 0.0) -> Facets:
-        """Return all triangles in the world at a time [s]; bodies in the scene's order."""
-        found = posed(self.bodies, self._index, self.frequency, time, self.static_geometry)
-        return found.replace(attenuation=self.attenuation) if self.attenuation else found
+    def facets(self, time: float = 0.0, frequency: float | None = None) -> Facets:
+        """Return all triangles in the world at a time [s]; bodies in the scene's order; frequency [Hz] of materials and
+        air (default `material_frequency`)."""
+        index, loss, at = self._index, self.attenuation, self.material_frequency
+        if frequency is not None and frequency != at:
+            at, index = frequency, index_of(self.bodies, self._materials_at(frequency))
+            loss = attenuation_of(self.atmosphere, at, self.radar_table, self.path)
+        found = posed(self.bodies, index, at, time, self.static_geometry)
+        return found.replace(attenuation=loss) if loss else found
 
     @property
     def topology(self) -> list[MeshTopology]:

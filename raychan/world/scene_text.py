@@ -42,11 +42,13 @@ def toml_of(scene: Scene) -> str:
     """
     materials = dict(scene.materials)
     data: dict[str, Any] = {
-        "scene": {"title": scene.title, "frequency_ghz": figure(scene.frequency / 1e9, scene.frequency, _giga)},
+        "scene": {"title": scene.title},
         "processing": {k: v for k, v in vars(scene.processing).items() if v is not None},
         "model": scene.model.model_dump(),
-        "bodies": [_body_table(body, materials, scene.frequency) for body in wholes(scene.bodies)],
+        "bodies": [_body_table(body, materials, scene.material_frequency) for body in wholes(scene.bodies)],
     }
+    if scene.material_frequency == scene.frequency:  # given, or of no radar
+        data["scene"]["frequency_ghz"] = figure(scene.frequency / 1e9, scene.frequency, _giga)
     if scene.radar_table is not None:
         if scene.is_radar_object and not _antennas(scene.radar):
             raise ValueError("antennas of a class of their own, from files, or of two polarisations cannot be written")

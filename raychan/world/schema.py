@@ -54,7 +54,7 @@ class Header(Table):
 
     title: str = ""
     frequency_ghz: Carrier | None = None
-    """Frequency of the materials; default the radar's carrier, or 77 GHz without a radar."""
+    """Frequency of the materials; default the middle of the radar's ramp, or 77 GHz without a radar."""
 
 
 class WaveformTable(Table):
@@ -86,6 +86,11 @@ class WaveformTable(Table):
         if self.bandwidth_mhz >= 1e3 * self.carrier_ghz:
             raise ValueError(f"bandwidth_mhz below the carrier of {self.carrier_ghz:g} GHz")
         return self
+
+    @property
+    def middle_ghz(self) -> float:
+        """Frequency at the middle sample of a ramp (see `Waveform.middle`)."""
+        return self.carrier_ghz + 0.5e-3 * self.bandwidth_mhz * (1.0 - 1.0 / self.samples)
 
 
 class RadarTable(Table):

@@ -100,7 +100,10 @@ def _whole_ply(file: Path) -> None:
             word, *rest = line.decode("latin-1").split() or [""]
             if word == "format":
                 text = rest[:1] == ["ascii"]
-            elif word == "element" and len(rest) == 2 and rest[1].isdigit():
+            elif word == "element" and len(rest) == 2:
+                if not rest[1].isdigit():
+                    problem = f"holds {rest[1]} of '{rest[0]}'"
+                    raise SceneError(problem, file=file, value=rest[1], allowed="a number from 0 on")
                 counts[rest[0]], lists = int(rest[1]), []
             elif word == "property":
                 lists.append(rest[:1] == ["list"])
@@ -114,10 +117,11 @@ def _whole_ply(file: Path) -> None:
             if line.strip():
                 there, last = there + 1, line
     expected, problem = sum(counts.values()), ""
-    if there < expected:
+    if there != expected:
         elements = ", ".join(f"{name} {n}" for name, n in counts.items())
-        problem = f"is cut short: {there} lines after the header, {expected} expected ({elements})"
-    elif there == expected and (missing := _missing(last.split(), lists)):
+        wrong = "is cut short" if there < expected else "does not end with its elements"
+        problem = f"{wrong}: {there} lines after the header, {expected} expected ({elements})"
+    elif missing := _missing(last.split(), lists):
         problem = f"is cut short: its last line lacks {missing} of its numbers"
     if problem:
         raise SceneError(problem, file=file, value=there, allowed="a whole PLY")

@@ -168,3 +168,18 @@ def test_an_obj_with_a_face_of_vertex_0_is_refused(face, tmp_path):
     file.write_text(f"{corners}f 1 2 3\n{face}\nf 1 2 4\n")
     with pytest.raises(SceneError, match=r"z\.obj:14: .* names vertex 0; allowed: vertices counted from 1"):
         load(file)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("element face 4", "element face 3", "does not end with its elements: 8 lines after the header, 7 expected"),
+        ("element face 4", "element face -4", "holds -4 of 'face'; allowed: a number from 0 on"),
+        ("property float z\n", "", "'z' is missing"),
+    ],
+)
+def test_a_ply_with_other_counts_or_without_z_is_refused(old, new, problem, tmp_path):
+    file = tmp_path / "m.ply"
+    file.write_text(PLY.replace(old, new))
+    with pytest.raises(SceneError, match=problem):
+        load(file)

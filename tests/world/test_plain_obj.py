@@ -54,3 +54,29 @@ def test_a_vertex_before_the_first(tmp_path):
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nf -1 -2 -3\nv 0 1 0\n")
     with pytest.raises(rc.SceneError, match=r"m\.obj: 'f -1 -2 -3' names v -3, but 2 'v' lines before it"):
         load(tmp_path / "m.obj")
+
+
+_L = [(2, 1), (1, 1), (1, 2), (0, 2), (0, 0), (2, 0)]  # an L of area 3
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply"])
+@pytest.mark.parametrize(("first", "folds"), [(0, True), (1, False)])
+def test_faces_that_a_fan_of_triangles_does_not_fit_are_told(tmp_path, ending, first, folds):
+    corners, file = _L[first:] + _L[:first], tmp_path / f"m.{ending}"
+    if ending == "obj":
+        file.write_text("".join(f"v {x} {y} 0\n" for x, y in corners) + "f 1 2 3 4 5 6\n")
+    else:
+        head = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+        head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        file.write_text(head + "".join(f"{x} {y} 0\n" for x, y in corners) + "6 0 1 2 3 4 5\n")
+    told = [line for line in load(file).report.warnings() if "not convex" in line]
+    assert bool(told) == folds
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("f 1 2 3", "f 1 2 3 # the first"), ("v 0 0 0", "v 0 0 0 # origin"), ("", "\ufeff")]
+)
+def test_comments_and_a_mark_of_byte_order_in_an_obj(tmp_path, old, new):
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    (tmp_path / "m.obj").write_text(text.replace(old, new, 1), encoding="utf-8")
+    assert load(tmp_path / "m.obj").bounds[1].tolist() == [1.0, 1.0, 0.0]
