@@ -10,6 +10,9 @@ from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import copy_corners, middle, normal_on, place_on
 from raychan.vectors import distance, largest, length_to, twice_area_across
 
+# Bisections from which on the longest edge is cut: between two bends of the phase that cancel at its middle an edge
+# tells no bend, and cuts of the other two leave ever narrower patches along it, without end. Not measured.
+_MANY = 20
 _FAR = 0.5  # of a patch's distance from an end: smaller ones are told by the distance of their centre; not measured
 
 
@@ -149,8 +152,8 @@ def edge_of_fan(facet, bary, n, fan):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def halved(facet, bary, edge, rows, jitter, level):  # type: ignore[no-untyped-def]
-    """Return (facet, bary) of both halves of the patches `rows` (m,), cut from a point of `edge` (n,) to the opposite
-    corner.
+    """Return (facet, bary) of both halves of the patches `rows` (m,), cut from a point of `edge` (n,), after many cuts of
+    the longest one, to the opposite corner.
 
     The point is the middle, or a share `jitter` of the edge to either side of it.
     """
@@ -158,7 +161,10 @@ def halved(facet, bary, edge, rows, jitter, level):  # type: ignore[no-untyped-d
     facets, barys = np.empty(2 * m, facet.dtype), np.empty((2 * m, 3, 3))
     for j in range(m):
         i = rows[j]
-        a, c = edge[i], (edge[i] + 1) % 3
+        w, a = bary[i], np.int64(edge[i])
+        if level >= _MANY:
+            a = np.int64(largest(distance(w[0], w[1]), distance(w[1], w[2]), distance(w[2], w[0])))
+        c = (a + 1) % 3
         # To which side is pseudo-random, by facet and level, and the same in every run.
         share = 0.5 + (jitter if ((facet[i] * 40503 >> 7) + level) & 1 else -jitter)
         facets[2 * j], facets[2 * j + 1] = facet[i], facet[i]
