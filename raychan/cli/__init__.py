@@ -19,7 +19,7 @@ from raychan.cli.options import help_of, unread
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
 from raychan.cli.ship import ship
-from raychan.cli.show import Interrupted
+from raychan.cli.show import Interrupted, open_streams, say, silence
 from raychan.cli.spectrogram import spectrogram
 from raychan.cli.study import study
 from raychan.cli.validate import validate
@@ -147,6 +147,7 @@ def _interrupt() -> None:
 
 def invoke(argv: list[str]) -> int:
     """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C, 143 for SIGTERM."""
+    open_streams()
     try:
         code = typer.main.get_command(app).main(args=argv, prog_name="raychan", standalone_mode=False)
         if (trouble := _unprinted()) is not None:
@@ -182,19 +183,16 @@ def invoke(argv: list[str]) -> int:
 
 def _unprinted() -> int | None:
     """Flush standard output; return the exit code where it cannot be written."""
-    if sys.stdout is None:  # closed by the calling process
-        return None
     try:
         sys.stdout.flush()
         return None
     except OSError as error:
-        # Python would complain again when it flushes at the end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        silence(sys.stdout)
         if isinstance(error, BrokenPipeError):
             return 0  # the reader of a pipe went away, as `head` does
         return _fail(f"standard output: {error.strerror or error}")
 
 
 def _fail(text: str, code: int = 2) -> int:
-    print(f"raychan: {text}", file=sys.stderr)
+    say(f"raychan: {text}")
     return code

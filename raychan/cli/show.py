@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -55,15 +55,40 @@ class _Console(Console):
 
 def console() -> Console:
     """Return the console of standard output."""
-    if sys.stdout is None:  # closed by the calling process
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    return _Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
+    # What is printed has names of files and bodies in it: brackets and colons stand for themselves.
+    wide = None if sys.stdout.isatty() else _WIDE
+    return _Console(width=wide, highlight=False, soft_wrap=False, markup=False, emoji=False)
+
+
+def open_streams() -> None:
+    """Have standard output and error take all text: what the calling process closed takes it to nowhere, and what the
+    encoding does not have, such as bytes of a name that are no text, is printed with backslashes."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def say(text: str) -> None:
+    """Print a line on standard error; where that cannot be written, the command goes on without."""
+    try:
+        print(text, file=sys.stderr, flush=True)
+    except OSError:
+        silence(sys.stderr)
+
+
+def silence(stream: TextIO) -> None:
+    """Let a stream that cannot be written end nowhere: Python would complain again when it flushes at the end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 def warn(warnings: Iterable[str]) -> None:
     """Print warnings on standard error, a line each."""
     for text in warnings:
-        print(f"warning: {text}", file=sys.stderr)
+        say(f"warning: {text}")
 
 
 def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,)) -> Table:
@@ -175,6 +200,6 @@ def _line() -> Callable[[int, int, float], None]:
     def compiling(done: int, ahead: int, seconds: float) -> None:
         if seconds > _LONG and not said:
             said.append(seconds)
-            print(f"{_COMPILING}, once, about {seconds:.0f} s ({ahead} kernels)", file=sys.stderr)
+            say(f"{_COMPILING}, once, about {seconds:.0f} s ({ahead} kernels)")
 
     return compiling
