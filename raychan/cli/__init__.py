@@ -125,6 +125,7 @@ def _ignore() -> None:
 
 def _stopped(text: str) -> int:
     """Print that the command was interrupted; return the exit code, 128 plus the signal's number."""
+    _unprinted()
     return _fail(text, 128 + (_ended[0] if _ended else signal.SIGINT))
 
 

@@ -211,7 +211,7 @@ def _kept(out: Path | None, az: Any, el: Any, parts: list[Rcs]) -> str:
     found = _joined(parts)
     count = found.sigma.size
     write_whole(out, csv_text(rows(az[:count], el[:count], found)).encode())
-    return f"{count} of {len(az)} angles are in {out}"
+    return f"{show.share(count, len(az), 'angles')} in {out}"
 
 
 def _sweep(

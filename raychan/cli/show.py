@@ -47,6 +47,11 @@ def keeping(keep: Callable[[], str]) -> Iterator[None]:
         raise Interrupted(f"interrupted; {keep() or 'nothing was written'}") from None
 
 
+def share(done: int, count: int, things: str) -> str:
+    """Return how many of some things are done, with the verb that says where they are."""
+    return f"{done} of {count} {things} {'is' if done == 1 else 'are'}"
+
+
 class _Console(Console):
     def on_broken_pipe(self) -> None:
         """Raise the error for the command line; rich would end the process with code 1."""
@@ -58,6 +63,24 @@ def console() -> Console:
     # What is printed has names of files and bodies in it: brackets and colons stand for themselves.
     wide = None if sys.stdout.isatty() else _WIDE
     return _Console(width=wide, highlight=False, soft_wrap=False, markup=False, emoji=False)
+
+
+@contextmanager
+def to_the_end() -> Iterator[Callable[[str], None]]:
+    """Yield a function that prints a line; where standard output cannot be written, as its reader went away, the block
+    goes on without a word, and the error is raised at its end."""
+    screen, lost = console(), list[OSError]()
+
+    def tell(line: str) -> None:
+        if not lost:
+            try:
+                screen.print(line, soft_wrap=True)
+            except OSError as error:
+                lost.append(error)
+
+    yield tell
+    if lost:
+        raise lost[0]
 
 
 def open_streams() -> None:
