@@ -197,8 +197,8 @@ def _first(wanted: bool) -> Iterator[bool]:
 def _stops() -> Iterator[Callable[[], bool]]:
     """Yield whether a signal to end has come; they end the run, not the process."""
     asked: list[int] = []
-    deaf = [n for n in show.ENDS if n not in _ALWAYS and signal.getsignal(n) is signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda n, frame: asked.append(n)) for number in show.ENDS if number not in deaf}
+    heard = [n for n in show.ENDS if n in _ALWAYS or signal.getsignal(n) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, lambda n, frame: asked.append(n)) for number in heard}
     try:
         yield lambda: bool(asked)
     finally:

@@ -154,8 +154,9 @@ class Store:
         """Raise StoreError unless the directory is as the last frame left it: of two sequences that share one, or of a
         sequence and a run, the first to begin ends here, and the last keeps the directory for itself."""
         if self._left is None or self._found() != self._left:
+            frames = f"{self.count} frame{'' if self.count == 1 else 's'}"
             kept = "something else writes there, or has changed detections.csv; name another directory"
-            raise StoreError(f"{self.directory}: is not as this sequence left it after {self.count} frames: {kept}")
+            raise StoreError(f"{self.directory}: is not as this sequence left it after {frames}: {kept}")
 
     def _found(self) -> tuple[int, int] | None:
         """Return which file detections.csv is, and its size; None where there is none, or not the first frame."""

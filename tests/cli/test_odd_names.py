@@ -45,7 +45,7 @@ def test_brackets_and_colons_in_titles_of_tables_are_printed(tmp_path, monkeypat
 
 @pytest.fixture
 def cafe(scene, tmp_path):
-    """The end of a name that is no text in UTF-8; skips where the system has no such names."""
+    """Return a name that is no text in UTF-8, of a scene; skip where the system has no such names."""
     try:
         (tmp_path / "caf\udce9.toml").write_text(PLATE)
     except (OSError, UnicodeError):

@@ -64,7 +64,7 @@ def test_override_changes_keys_and_keeps_the_file():
         ("radar.waveform.iq=0", "radar.waveform.iq", "allowed: true or false"),
         ("scene.title.x=1", "scene.title", "table"),
         ("bodies=3", "bodies", "list"),
-        ("bodies.suv=1", "bodies.suv", "is a whole table; allowed: one of its keys, as bodies.suv.position=[0, 0, 0.5]"),
+        ("bodies.suv=1", "bodies.suv", "allowed: one of its keys, as bodies.suv.position=[0, 0, 0.5]"),
         ("bodies.suw=1", "bodies.suw", "did you mean 'suv'?"),
         ("scene.title=caf\udce9", "", r"'scene.title=caf\udce9' is not possible; allowed: a text in UTF-8"),
     ],
