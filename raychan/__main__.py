@@ -2,6 +2,7 @@
 
 import os
 import signal
+from contextlib import suppress
 from types import FrameType
 
 
@@ -15,7 +16,8 @@ def main() -> None:
 
 
 def _interrupted(number: int, frame: FrameType | None) -> None:
-    os.write(2, b"raychan: interrupted; nothing was written\n")
+    with suppress(OSError):  # standard error may be closed
+        os.write(2, b"raychan: interrupted; nothing was written\n")
     os._exit(128 + number)
 
 

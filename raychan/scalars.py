@@ -50,6 +50,16 @@ def is_one_of(value: object, words: Iterable[str]) -> bool:
     return isinstance(value, str) and value in tuple(words)
 
 
+def as_text(name: object) -> str:
+    """Return the name of a file as text that can be written: bytes of it that are no text stand with backslashes."""
+    return str(name).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def is_text(given: str) -> bool:
+    """Return whether a text can be written as UTF-8: bytes that are no text, as a command line may hold, cannot."""
+    return given.isascii() or as_text(given) == given
+
+
 def shown(value: Any) -> str:
     """Return a value as messages show it, on one line, cut where it is long."""
     try:

@@ -19,7 +19,7 @@ from raychan.cli.options import help_of, unread
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
 from raychan.cli.ship import ship
-from raychan.cli.show import Interrupted
+from raychan.cli.show import ENDS, Interrupted, open_streams, say, silence
 from raychan.cli.spectrogram import spectrogram
 from raychan.cli.study import study
 from raychan.cli.validate import validate
@@ -44,7 +44,7 @@ Ranges are in metres, speeds in m/s; a positive range rate means receding.
 Exit code 0: done
   1: validate found a difference that is not listed, or a listed one that is gone
   2: wrong input; the message says what, where, and what is allowed
-  130: interrupted, 143: ended by SIGTERM; the message says what was written"""
+  130: interrupted, 143: ended by SIGTERM, 129: by the end of its terminal; the message says what was written"""
 
 _STOPPED = "interrupted; nothing was written"
 _ended: list[int] = []  # signals that asked this process to end, the first counts
@@ -89,9 +89,10 @@ def main(argv: list[str] | None = None) -> None:
     sys.unraisablehook = _interrupt_again
     if threading.current_thread() is threading.main_thread():
         atexit.register(_ignore)  # before modules that commands import, so that it is called last
-        signal.signal(signal.SIGTERM, _end)
-        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a job in the background ignores Ctrl-C
-            signal.signal(signal.SIGINT, _end)
+        for number in ENDS:
+            # A job in the background ignores Ctrl-C, one under nohup the end of its terminal.
+            if number == signal.SIGTERM or signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, _end)
     code = invoke(sys.argv[1:] if argv is None else argv)
     # A KeyboardInterrupt in code that is a text, as dataclasses make it, has Python end by SIGINT in place of this
     # code, though it was caught; the next such code takes that back.
@@ -112,19 +113,20 @@ def _settle(code: int) -> None:
     def leave(number: int, frame: FrameType | None) -> None:
         os._exit(code)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ENDS:
         if signal.getsignal(number) is _end:
             signal.signal(number, leave)
 
 
 def _ignore() -> None:
     """Ignore signals while Python takes itself down: it does without its handlers then, and would end by the signal."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ENDS:
         signal.signal(number, signal.SIG_IGN)
 
 
 def _stopped(text: str) -> int:
     """Print that the command was interrupted; return the exit code, 128 plus the signal's number."""
+    _unprinted()
     return _fail(text, 128 + (_ended[0] if _ended else signal.SIGINT))
 
 
@@ -146,7 +148,9 @@ def _interrupt() -> None:
 
 
 def invoke(argv: list[str]) -> int:
-    """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C, 143 for SIGTERM."""
+    """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C, 143 for SIGTERM, 129 for
+    SIGHUP."""
+    open_streams()
     try:
         code = typer.main.get_command(app).main(args=argv, prog_name="raychan", standalone_mode=False)
         if (trouble := _unprinted()) is not None:
@@ -182,19 +186,16 @@ def invoke(argv: list[str]) -> int:
 
 def _unprinted() -> int | None:
     """Flush standard output; return the exit code where it cannot be written."""
-    if sys.stdout is None:  # closed by the calling process
-        return None
     try:
         sys.stdout.flush()
         return None
     except OSError as error:
-        # Python would complain again when it flushes at the end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        silence(sys.stdout)
         if isinstance(error, BrokenPipeError):
             return 0  # the reader of a pipe went away, as `head` does
         return _fail(f"standard output: {error.strerror or error}")
 
 
 def _fail(text: str, code: int = 2) -> int:
-    print(f"raychan: {text}", file=sys.stderr)
+    say(f"raychan: {text}")
     return code

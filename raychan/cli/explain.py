@@ -67,12 +67,12 @@ def explain(
         raise typer.BadParameter(str(error)) from error
     screen = show.console()
     for line in _head(why, range is not None and not cell):
-        screen.print(line, soft_wrap=True, markup=False)
+        screen.print(line, soft_wrap=True)
     if not why.contributions:
         screen.print("no path explains this cell: noise")
         return
     for line in _chains(why):
-        screen.print(line, soft_wrap=True, markup=False)
+        screen.print(line, soft_wrap=True)
     if why.paths is not None and paths:
         screen.print(_listed(why.paths, paths))
     screen.print(_sum(why), soft_wrap=True)

@@ -29,7 +29,8 @@ _BAUDS = (9600, 19200, 38400, 500000)
 _NMEA_BAUD = Limit(4800, 500_000, "bit/s", "NMEA 0183 runs at 4800, its fast form at 38400")
 _RATE = Limit(0.1, 50.0, "per second", "a satellite receiver tells its place 1 to 20 times a second")
 _DURATION = Limit(0.0, 1e7, "s", "a run of months is a mistake", above=True)
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_ALWAYS = (signal.SIGINT, signal.SIGTERM)
+"""Signals that end a run even if they were ignored; nohup ignores that of a closed terminal."""
 _ORIGIN = "54.0,8.0"
 _TRACK = (
     "utc", "t_s", "north_m", "east_m", "latitude_deg", "longitude_deg", "heading_deg", "roll_deg", "pitch_deg",
@@ -98,7 +99,8 @@ def hil(
     """Run a ship in real time: scanner telegrams, position, heading and attitude on four serial lines; orders for
     rudder and shaft come back.
 
-    Without SCENE: ship_turn. Once the ports are named, Ctrl-C or SIGTERM ends the run in order, with exit code 0.
+    Without SCENE: ship_turn. Once the ports are named, Ctrl-C, SIGTERM or SIGHUP ends the run in order, with exit
+    code 0.
     """
     place = _origin(origin)
     names = {"scanner": scanner, "position": position, "heading": heading, "attitude": attitude}
@@ -193,9 +195,10 @@ def _first(wanted: bool) -> Iterator[bool]:
 
 @contextmanager
 def _stops() -> Iterator[Callable[[], bool]]:
-    """Yield whether SIGINT or SIGTERM has come; they end the run, not the process."""
+    """Yield whether a signal to end has come; they end the run, not the process."""
     asked: list[int] = []
-    before = {number: signal.signal(number, lambda n, frame: asked.append(n)) for number in _SIGNALS}
+    heard = [n for n in show.ENDS if n in _ALWAYS or signal.getsignal(n) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, lambda n, frame: asked.append(n)) for number in heard}
     try:
         yield lambda: bool(asked)
     finally:

@@ -119,7 +119,7 @@ def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
 
 def _scene(scene: Any) -> None:
     screen = show.console()
-    screen.print(scene.title, style="bold", markup=False)
+    screen.print(scene.title, style="bold")
     for made in (_bodies(scene), _parts(scene), *_radar(scene.radar), *_targets(scene), *_antennas(scene)):
         screen.print(made)
     if rows := impairment_rows(scene):

@@ -12,6 +12,7 @@ from raychan.cli import show
 from raychan.cli.options import Threads, within
 from raychan.cli.rcs_options import MOST_ANGLES, angles, can_be_polar, metres, writable
 from raychan.cli.rcs_output import beyond_budget, csv_text, edge_fields, further_bounces, rows, table_of, uncertainties
+from raychan.scalars import as_text
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -178,7 +179,7 @@ def _target(
         if len(source) != 1:
             raise typer.BadParameter("give one mesh file, or --shape NAME with its parameters")
         angle = CREASE_DEG if crease is None else crease
-        return load(source[0], unit=unit, up=up, scale=scale, crease_deg=angle), Path(source[0]).name
+        return load(source[0], unit=unit, up=up, scale=scale, crease_deg=angle), as_text(Path(source[0]).name)
     from raychan.world.shapes import build
 
     params = dict[str, Any]()
@@ -211,7 +212,7 @@ def _kept(out: Path | None, az: Any, el: Any, parts: list[Rcs]) -> str:
     found = _joined(parts)
     count = found.sigma.size
     write_whole(out, csv_text(rows(az[:count], el[:count], found)).encode())
-    return f"{count} of {len(az)} angles are in {out}"
+    return f"{show.share(count, len(az), 'angles')} in {out}"
 
 
 def _sweep(

@@ -129,13 +129,13 @@ def _sequence(
     from raychan.run.messages import findings, marks
     from raychan.run.sequence import Store, frames
 
-    store, told, screen = Store(out), set(), show.console()
+    store, told = Store(out), set()
     start = perf_counter()
 
     def keep() -> str:
-        return f"{store.count} of {count} frames are in {out}" if store.count else ""
+        return f"{show.share(store.count, count, 'frames')} in {out}" if store.count else ""
 
-    with show.keeping(keep), show.progress() as tell:
+    with show.to_the_end() as say, show.keeping(keep), show.progress() as tell:
         for frame in frames(scene, count, interval, **options, progress=tell):
             drawn: list[str] = []
             store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
@@ -149,12 +149,10 @@ def _sequence(
             took = sum(frame.result.timings.values())
             plural = "" if found == 1 else "s"
             marked = marks(frame.result.detections)
-            screen.print(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}{marked}  in {took:.2f} s")
-    took = perf_counter() - start
-    screen.print(f"{count} frame{'' if count == 1 else 's'} in {took:.1f} s; seeds from {options['seed']}")
-    screen.print(
-        f"results: {out / 'frame_0000'} and on; detections of all frames: {out / 'detections.csv'}", soft_wrap=True
-    )
+            say(f"{frame.name}  {frame.time:9.4f} s  {found:4} detection{plural}{marked}  in {took:.2f} s")
+        took = perf_counter() - start
+        say(f"{count} frame{'' if count == 1 else 's'} in {took:.1f} s; seeds from {options['seed']}")
+        say(f"results: {out / 'frame_0000'} and on; detections of all frames: {out / 'detections.csv'}")
 
 
 def _pictures(  # type: ignore[no-untyped-def]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -17,6 +18,8 @@ from rich.text import Text
 if TYPE_CHECKING:
     from raychan.run.result import Result
 
+ENDS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
+"""Signals that ask a command to end; SIGHUP comes as its terminal is closed."""
 _COMPILING = "compiling"
 _LONG = 3.0  # s: compiling for longer prints a line where there is no progress bar
 _SOME = ("azimuth deg", "elevation deg", "error dB", "folded: true m", "true m/s")
@@ -47,6 +50,11 @@ def keeping(keep: Callable[[], str]) -> Iterator[None]:
         raise Interrupted(f"interrupted; {keep() or 'nothing was written'}") from None
 
 
+def share(done: int, count: int, things: str) -> str:
+    """Return how many of some things are done, with the verb that says where they are."""
+    return f"{done} of {count} {things} {'is' if done == 1 else 'are'}"
+
+
 class _Console(Console):
     def on_broken_pipe(self) -> None:
         """Raise the error for the command line; rich would end the process with code 1."""
@@ -55,15 +63,58 @@ class _Console(Console):
 
 def console() -> Console:
     """Return the console of standard output."""
-    if sys.stdout is None:  # closed by the calling process
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    return _Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False)
+    # What is printed has names of files and bodies in it: brackets and colons stand for themselves.
+    wide = None if sys.stdout.isatty() else _WIDE
+    return _Console(width=wide, highlight=False, soft_wrap=False, markup=False, emoji=False)
+
+
+@contextmanager
+def to_the_end() -> Iterator[Callable[[str], None]]:
+    """Yield a function that prints a line; where standard output cannot be written, as its reader went away, the block
+    goes on without a word, and the error is raised at its end."""
+    screen, lost = console(), list[OSError]()
+
+    def tell(line: str) -> None:
+        if not lost:
+            try:
+                screen.print(line, soft_wrap=True)
+            except OSError as error:
+                lost.append(error)
+
+    yield tell
+    if lost:
+        raise lost[0]
+
+
+def open_streams() -> None:
+    """Have standard output and error take all text: what the calling process closed takes it to nowhere, and what the
+    encoding does not have, such as bytes of a name that are no text, is printed with backslashes."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def say(text: str) -> None:
+    """Print a line on standard error; where that cannot be written, the command goes on without."""
+    try:
+        print(text, file=sys.stderr, flush=True)
+    except OSError:
+        silence(sys.stderr)
+
+
+def silence(stream: TextIO) -> None:
+    """Let a stream that cannot be written end nowhere: Python would complain again when it flushes at the end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 def warn(warnings: Iterable[str]) -> None:
     """Print warnings on standard error, a line each."""
     for text in warnings:
-        print(f"warning: {text}", file=sys.stderr)
+        say(f"warning: {text}")
 
 
 def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,)) -> Table:
@@ -175,6 +226,6 @@ def _line() -> Callable[[int, int, float], None]:
     def compiling(done: int, ahead: int, seconds: float) -> None:
         if seconds > _LONG and not said:
             said.append(seconds)
-            print(f"{_COMPILING}, once, about {seconds:.0f} s ({ahead} kernels)", file=sys.stderr)
+            say(f"{_COMPILING}, once, about {seconds:.0f} s ({ahead} kernels)")
 
     return compiling

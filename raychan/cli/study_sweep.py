@@ -103,7 +103,7 @@ def _kept(done: Sweep, out: Path) -> str:
     with staging(out, _CONTENTS) as stage:
         write_csv(done, stage / "sweep.csv")
     count = math.prod(len(axis.values) for axis in done.axes)
-    return f"{len(done.steps)} of {count} steps are in {out / 'sweep.csv'}"
+    return f"{show.share(len(done.steps), count, 'steps')} in {out / 'sweep.csv'}"
 
 
 def _table(done: Sweep) -> Table:

@@ -52,19 +52,26 @@ def one_line(numbers: dict[str, Any]) -> str:
     """Return a summary on one line."""
     channels, scans, host = (numbers[key] for key in ("channels", "scans", "host"))
     first = channels[SCANNER]
-    worst = max(c["jitter_p99_ms"] for c in channels.values())
-    drift = max((c["drift_ms"] for c in channels.values()), key=abs)
     parts = [
         f"{numbers['seconds']:.1f} s ({numbers['ended']})",
         "sent: " + ", ".join(f"{name} {c['sent']} of {c['made']}" for name, c in channels.items()),
         f"scans dropped: {first['busy']} line busy, {first['no_peer']} no peer, {first['not_reading']} not read",
         f"ticks missed {scans['missed']}",
-        f"drift {drift:.2f} ms, jitter {worst:.2f} ms (99 %), {'first' if scans['realtime'] else 'ordinary'} in turn",
+        f"{_kept(channels)}, {'first' if scans['realtime'] else 'ordinary'} in turn",
         f"telegrams {host['telegrams']}, damaged {host['telegrams_damaged']}, refused {host['telegrams_refused']}",
         f"orders {host['orders']}",
         f"reconnects {sum(c['reconnects'] for c in channels.values())}",
     ]
     return "; ".join(parts)
+
+
+def _kept(channels: dict[str, Any]) -> str:
+    """Return how well the lines on which anything was sent kept their times."""
+    timed = [c for c in channels.values() if c["sent"]]
+    if not timed:
+        return "nothing sent, no drift and jitter measured"
+    drift, worst = max((c["drift_ms"] for c in timed), key=abs), max(c["jitter_p99_ms"] for c in timed)
+    return f"drift {drift:.2f} ms, jitter {worst:.2f} ms (99 %)"
 
 
 def warnings(numbers: dict[str, Any]) -> list[str]:

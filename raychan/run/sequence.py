@@ -34,7 +34,7 @@ class Frame:
     @property
     def name(self) -> str:
         """Name of the frame's directory."""
-        return f"frame_{self.number:04d}"
+        return _name(self.number)
 
 
 def frames(
@@ -110,16 +110,22 @@ def _shifted(channel: Channel, scene: Scene, time: float) -> Channel:
     )
 
 
+def _name(number: int) -> str:
+    return f"frame_{number:04d}"
+
+
 class Store:
     """A directory of frames: frame_0000, frame_0001, ..., each as `raychan run` writes it, and detections.csv of all.
 
     The first frame replaces the results of an earlier run, all at once. Each further frame is written whole or not at
-    all, and detections.csv lists the frames that are there. Raises: StoreError for errors of the disk.
+    all, and detections.csv lists the frames that are there. Raises: StoreError for errors of the disk, and where
+    something else has written into the directory since the last frame.
     """
 
     def __init__(self, directory: str | Path) -> None:
         self.directory = Path(directory).resolve()
         self.count = 0
+        self._left: tuple[int, int] | None = None
 
     def add(self, frame: Frame, draw: Callable[[Result, Path], None] | None = None) -> None:
         """Write a frame; `draw(result, directory)` adds pictures to it."""
@@ -132,14 +138,34 @@ class Store:
                 (stage / "detections.csv").write_bytes(csv_bytes([(*HEAD, *columns_of(frame.result))]) + lines)
         else:
             place = self.directory / frame.name
+            self._check()
             with staging(place, CONTENTS) as stage:
                 _fill(stage, frame, draw)
+                self._check()  # pictures take a while
             try:
                 self._append(lines)
             except StoreError:
                 shutil.rmtree(place, ignore_errors=True)
                 raise
         self.count += 1
+        self._left = self._found()
+
+    def _check(self) -> None:
+        """Raise StoreError unless the directory is as the last frame left it: of two sequences that share one, or of a
+        sequence and a run, the first to begin ends here, and the last keeps the directory for itself."""
+        if self._left is None or self._found() != self._left:
+            frames = f"{self.count} frame{'' if self.count == 1 else 's'}"
+            kept = "something else writes there, or has changed detections.csv; name another directory"
+            raise StoreError(f"{self.directory}: is not as this sequence left it after {frames}: {kept}")
+
+    def _found(self) -> tuple[int, int] | None:
+        """Return which file detections.csv is, and its size; None where there is none, or not the first frame."""
+        try:
+            there = (self.directory / "detections.csv").stat()
+        except OSError:
+            return None
+        whole = (self.directory / _name(0) / "result.nc").is_file()
+        return (there.st_ino, there.st_size) if whole else None
 
     def _append(self, lines: bytes) -> None:
         """Append lines to detections.csv, or leave it unchanged."""

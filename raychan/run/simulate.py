@@ -25,6 +25,7 @@ from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.unmodelled import ledger
+from raychan.scalars import as_text
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.world.limits import SEED
@@ -105,7 +106,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         ),
         scene=scene.without_caches(),
         text=scene.text,
-        path=str(scene.path.resolve()) if scene.path else "",
+        path=as_text(scene.path.resolve()) if scene.path else "",
     )
 
 

@@ -84,6 +84,8 @@ class Axis:
 def _values(text: str, start: str, stop: str, steps: str) -> list[float]:
     if not 1 <= int(steps) <= MOST:
         raise ValueError(f"'{text}': {steps} steps; 1 to {MOST} are allowed")
+    if not math.isfinite(float(stop) - float(start)):
+        raise ValueError(f"'{text}': the range from {start} to {stop} is not finite; smaller numbers are wanted")
     # Rounded so that steps of 0.1 print as such; no key needs more digits.
     return [float(f"{v:.12g}") for v in np.linspace(float(start), float(stop), int(steps))]
 

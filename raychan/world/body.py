@@ -175,12 +175,12 @@ class Body:
         mesh = self.geometry
         own = mesh.part_materials or ("pec",) * len(mesh.part_names)
         for pattern in self.materials:
-            if not any(fnmatchcase(part, pattern) for part in mesh.part_names):
+            if not any(_means(pattern, part, mesh.part_names) for part in mesh.part_names):
                 allowed = nearest(pattern, mesh.part_names)
                 raise SceneError("no such part", key=f"{self.name}.materials.{pattern}", value=pattern, allowed=allowed)
         chosen: list[str | Material] = []
         for part, default in zip(mesh.part_names, own, strict=True):
-            fits = [m for pattern, m in self.materials.items() if fnmatchcase(part, pattern)]
+            fits = [m for pattern, m in self.materials.items() if _means(pattern, part, mesh.part_names)]
             exact = self.materials.get(part)
             chosen.append(exact or (fits[-1] if fits else None) or self.material or default)
         return chosen
@@ -235,4 +235,10 @@ class Body:
 
     def _bare_parts(self) -> list[str]:
         """Return the parts for which `materials` has no name or pattern."""
-        return [p for p in self.geometry.part_names if not any(fnmatchcase(p, known) for known in self.materials)]
+        parts = self.geometry.part_names
+        return [part for part in parts if not any(_means(pattern, part, parts) for pattern in self.materials)]
+
+
+def _means(pattern: str, part: str, parts: Sequence[str]) -> bool:
+    """Return whether a name or pattern means a part; the name of a part is no pattern, whatever brackets it has."""
+    return pattern == part if pattern in parts else fnmatchcase(part, pattern)

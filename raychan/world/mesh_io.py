@@ -64,8 +64,7 @@ def load(
         logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
         # Infinite coordinates are reported below, not as warnings of the reader.
         with np.errstate(all="ignore"):
-            how = read_by(file) if file.suffix.lower() == ".obj" else {"file_obj": str(file)}
-            scene = trimesh.load_scene(process=False, **how)
+            scene = trimesh.load_scene(process=False, **read_by(file))
             folds = folded(file, scene)
         mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * plain(scale)))
     except SceneError as e:

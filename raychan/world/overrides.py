@@ -9,6 +9,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+from raychan.scalars import is_text
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.mesh_io import SUFFIXES
 
@@ -30,6 +31,8 @@ def parsed(text: str, file: Any = None) -> dict[str, Any]:
     """Return the tables of TOML text; SceneError with the line where it is broken."""
     if not isinstance(text, str):
         raise SceneError(f"{shown(text)} is not possible", file=file, value=text, allowed="the text of a scene file")
+    if not is_text(text):
+        raise SceneError("holds bytes that are no text", file=file, allowed="a text in UTF-8")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as e:
@@ -57,6 +60,8 @@ def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -
     out = deepcopy(dict(data))
     for change in changes:
         key, found, value = change.partition("=")
+        if not is_text(change):
+            raise SceneError(f"{shown(change)} is not possible", file=file, value=change, allowed="a text in UTF-8")
         words = key.strip().split(".")
         if not found or not all(words):
             raise SceneError(f"'{change}' is no change", file=file, key=key, allowed="dotted.key=value")
@@ -71,6 +76,10 @@ def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -
         if words[-2:-1] and words[-2] in _VECTORS:
             where, allowed = ".".join(words[:-1]), "all three numbers, as [0, 0, 0.5]; then each by its letter"
             raise SceneError("is not set", file=file, key=where, allowed=allowed)
+        if isinstance(at, list) and any(isinstance(one, dict) for one in at):
+            _step(at, words[-1], key.strip(), file)  # says which bodies there are
+            allowed = f"one of its keys, as {key.strip()}.position=[0, 0, 0.5]"
+            raise SceneError("is a whole table", file=file, key=key.strip(), allowed=allowed)
         if not isinstance(at, dict):
             raise SceneError("holds no keys", file=file, key=".".join(words[:-1]), value=at, allowed="a table")
         at[words[-1]] = _value(value.strip())

@@ -1,6 +1,6 @@
-"""OBJ files as trimesh reads them right: of indented lines, tabs, comments within lines, a byte-order mark, and faces
-that count vertices backwards from where they stand, it loses or misreads faces; of several objects it takes the first
-one's name for all."""
+"""Mesh files as trimesh reads them right: it fails over names that are no text. Of indented lines, tabs, comments within
+lines, a byte-order mark, and faces that count vertices backwards in an OBJ it loses or misreads faces; of several
+objects it takes the first one's name for all."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from raychan.scalars import as_text, is_text
 from raychan.world.errors import SceneError, shown
 
 _ODD = re.compile(rb"^[ \t]+(?:f|v|vn|vt|o|g|usemtl|mtllib)[ \t]|^(?:f|v|vn|vt|o|g)\t|^f .*[-#]|^v.*#|\r(?!\n)", re.M)
@@ -19,19 +20,25 @@ _KINDS = (b"v", b"vt", b"vn")  # what the numbers of one corner of a face, v/vt/
 
 
 def read_by(file: Path) -> dict[str, Any]:
-    """Return the arguments of `trimesh.load_scene` for an OBJ: parts are its materials where it has several, else its
-    objects.
+    """Return the arguments of `trimesh.load_scene` for a file. Parts of an OBJ are its materials where it has several,
+    else its objects.
 
-    Raises: SceneError for a face that names a vertex before the first.
+    Raises: SceneError for a face of an OBJ that names a vertex before the first.
     """
     from trimesh.resolvers import FilePathResolver
 
+    # The reader calls parts by the file, whose name must be a text.
+    beside = FilePathResolver(str(file.with_name(as_text(file.name))))
+    kind = file.suffix.lower().removeprefix(".")
+    if kind != "obj":
+        if is_text(file.name):
+            return {"file_obj": str(file)}
+        return {"file_obj": io.BytesIO(file.read_bytes()), "file_type": kind, "resolver": beside}
     text = _plain(file.read_bytes(), file)
     libraries = [file.parent / name.decode("latin-1").strip() for name in _LIBRARY.findall(text)]
     paints = len(set(_PAINT.findall(text))) if any(x.is_file() for x in libraries) else 0
     split = paints < 2 and len(_OBJECT.findall(text)) > 1
-    how = {"file_type": "obj", "resolver": FilePathResolver(str(file)), "split_objects": split}
-    return {"file_obj": io.BytesIO(text), **how}
+    return {"file_obj": io.BytesIO(text), "file_type": kind, "resolver": beside, "split_objects": split}
 
 
 def _plain(data: bytes, file: Path) -> bytes:

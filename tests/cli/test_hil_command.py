@@ -280,3 +280,10 @@ def test_an_unknown_scene_is_answered_with_ships_only(capsys):
     assert invoke(["hil", "nowhere"]) == 2
     said = capsys.readouterr().err
     assert "ship_turn" in said and "urban" not in said
+
+
+def test_a_closed_terminal_ends_a_run_in_order(tmp_path):
+    with Hil(tmp_path) as hil:
+        time.sleep(0.3)
+        code, said, numbers = hil.end(signal.SIGHUP)
+    assert code == 0 and numbers["ended"] == "stopped" and "nothing sent" in said

@@ -97,6 +97,30 @@ def test_a_signal_after_the_command_is_done_leaves_its_exit_code(late, number):
     assert "raychan run NAME --out DIR" in done.stdout
 
 
+_HUNG_UP = """
+import os, signal
+import raychan.run.simulate, raychan.cli
+signal.signal(signal.SIGHUP, signal.{before})
+real = raychan.run.simulate.result_of
+def result_of(*a):
+    os.kill(os.getpid(), signal.SIGHUP)
+    return real(*a)
+raychan.run.simulate.result_of = result_of
+raychan.cli.main(["run", {scene!r}, "--out", {out!r}, "--no-pictures"])
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="the system has no SIGHUP")
+@pytest.mark.parametrize(("before", "code", "left"), [("SIG_DFL", 129, []), ("SIG_IGN", 0, ["result"])])
+def test_a_closed_terminal_ends_a_run_in_order_and_not_one_under_nohup(before, code, left, scene, tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    command = [sys.executable, "-c", _HUNG_UP.format(before=before, scene=str(scene), out=str(folder / "result"))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, [p.name for p in folder.iterdir()]) == (code, left)
+    assert ("raychan: interrupted; nothing was written\n" in done.stderr) == (code == 129)
+
+
 _STOPPED_AS_IT_REPORTS = """
 import os, signal
 import raychan.run.messages, raychan.cli

@@ -102,6 +102,7 @@ def test_a_loop_that_is_too_slow_is_said_and_what_is_not_made_is_counted(session
     assert sentences["ticks"] + sentences["missed"] == pytest.approx(20, abs=3) and sentences["ticks"] >= 10
     assert scans["behind_at_end"] > 50 and "too slow" in warnings(numbers)[0]
     assert "ticks missed" in one_line(numbers) and session.ended == "duration"
+    assert "ms (99 %), ordinary in turn" in one_line(numbers)
     position = session.channels["position"].port.got.split(b"\r\n")
     times = [float(line.split(b",")[1]) for line in position if line.startswith(b"$GPGGA")]
     # hhmmss.ss, so that midnight is a step by 240000.
@@ -147,3 +148,13 @@ def test_a_ship_that_cannot_sail_on_ends_the_run(session):
     session.loop.step_scan = step_scan
     session.run(1.0, lambda: False)
     assert session.failed and "cannot sail on" in session.ended and "does not hold" in summary(session)["ended"]
+
+
+def test_a_run_without_a_host_states_no_drift(session):
+    for channel in session.channels.values():
+        channel.port.here = False
+    session.run(0.3, lambda: False)
+    numbers = summary(session)
+    assert {c["sent"] for c in numbers["channels"].values()} == {0}
+    line = one_line(numbers)
+    assert "; nothing sent, no drift and jitter measured, " in line and "ms (99 %)" not in line

@@ -160,7 +160,7 @@ sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}, "--frames", "9"
 def test_ctrl_c_keeps_the_frames_that_are_ready_and_says_so(file, tmp_path):
     code = _STOPPED.format(scene=str(file), out=str(tmp_path / "out"))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 130 and "1 of 9 frames are in" in done.stderr and "Traceback" not in done.stderr
+    assert done.returncode == 130 and "1 of 9 frames is in" in done.stderr and "Traceback" not in done.stderr
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"detections.csv", "frame_0000"}
 
 

@@ -81,6 +81,8 @@ def test_a_range_may_stand_for_any_number_of_a_value(text, key, values, changes)
         ("radar.power_dbm=1:3", "KEY=START:STOP:STEPS is wanted"),
         ("radar.power_dbm=1:3:2.5", "KEY=START:STOP:STEPS is wanted"),
         ("=1:3:2", "KEY=START:STOP:STEPS is wanted"),
+        ("radar.power_dbm=1e400:2:2", "the range from 1e400 to 2 is not finite"),
+        ("radar.power_dbm=-1e308:1e308:2", "the range from -1e308 to 1e308 is not finite"),
         ("radar.power_dbm=1:3:0", "1 to 100000 are allowed"),
         ("radar.power_dbm=1:3:1000000000", "1 to 100000 are allowed"),
         ("a.position=[0:1:2, 0:1:3, 0]", "same number of steps"),

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.world.mesh import make_mesh
 
 WORD = "allowed: a text without dots, spaces and control characters"
 
@@ -68,3 +69,12 @@ def test_a_cross_section_may_be_a_number_or_a_table_of_numpy():
     assert len(rc.Scene(bodies=[one]).points().sigma) == 1
     np.testing.assert_allclose(one.target()[1], 10.0, rtol=1e-6)
     np.testing.assert_allclose(table.target()[1], 10.0, rtol=1e-12)
+
+
+def test_a_part_whose_name_has_brackets_is_meant_by_its_name():
+    sheet = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]
+    mesh = make_mesh(np.array(sheet), np.array([[0, 1, 2], [1, 3, 2]]), np.arange(2, dtype=np.int32), ("[red]x", "rx"))
+    body = rc.Body("b", mesh=mesh, materials={"[red]x": "glass"})
+    assert body.part_materials() == ["glass", "pec"]
+    assert "parts rx is taken" in " ".join(body.notes())
+    assert rc.Body("b", mesh=mesh, materials={"[r]*": "glass"}).part_materials() == ["pec", "glass"]

@@ -64,6 +64,9 @@ def test_override_changes_keys_and_keeps_the_file():
         ("radar.waveform.iq=0", "radar.waveform.iq", "allowed: true or false"),
         ("scene.title.x=1", "scene.title", "table"),
         ("bodies=3", "bodies", "list"),
+        ("bodies.suv=1", "bodies.suv", "allowed: one of its keys, as bodies.suv.position=[0, 0, 0.5]"),
+        ("bodies.suw=1", "bodies.suw", "did you mean 'suv'?"),
+        ("scene.title=caf\udce9", "", r"'scene.title=caf\udce9' is not possible; allowed: a text in UTF-8"),
     ],
 )
 def test_bad_overrides_are_named(change, key, says):
@@ -189,6 +192,7 @@ def test_diffraction_to_a_receiver_elsewhere_is_refused_before_anything_is_trace
         (lambda: Scene().at("x"), "time: 'x' is not possible; allowed: a number between"),
         (lambda: Scene().at(float("nan")), "time: nan is not possible; allowed: a number between"),
         (lambda: Scene.from_text(BALL).override("a=b"), "changes: 'a=b' is not possible; allowed: a list of texts"),
+        (lambda: Scene.from_text("# caf\udce9"), "holds bytes that are no text; allowed: a text in UTF-8"),
         (lambda: Scene.from_text(BALL).override([3]), r"changes: \[3\] is not possible; allowed: a list of texts"),
     ],
 )
