@@ -152,8 +152,8 @@ def edge_of_fan(facet, bary, n, fan):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def halved(facet, bary, edge, rows, jitter, level):  # type: ignore[no-untyped-def]
-    """Return (facet, bary) of both halves of the patches `rows` (m,), cut from a point of `edge` (n,), after many cuts of
-    the longest one, to the opposite corner.
+    """Return (facet, bary) of both halves of the patches `rows` (m,), cut from a point of `edge` (n,), after many cuts
+    of the longest one, to the opposite corner.
 
     The point is the middle, or a share `jitter` of the edge to either side of it.
     """

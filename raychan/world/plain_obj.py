@@ -1,6 +1,6 @@
-"""Mesh files as trimesh reads them right: it fails over names that are no text. Of indented lines, tabs, comments within
-lines, a byte-order mark, and faces that count vertices backwards in an OBJ it loses or misreads faces; of several
-objects it takes the first one's name for all."""
+"""Mesh files as trimesh reads them right: it fails over names that are no text. Of indented lines, tabs, comments
+within lines, a byte-order mark, and faces that count vertices backwards in an OBJ it loses or misreads faces; of
+several objects it takes the first one's name for all."""
 
 from __future__ import annotations
 
