@@ -114,6 +114,5 @@ def _told(data: Complexes, aperture: Aperture, directions: Floats) -> CellEchoes
 
 def _nearest(directions: Floats, aperture: Aperture) -> float:
     """Return the least distance of two directions (k, 2), in beam widths."""
-    width = np.where(np.isfinite(aperture.beamwidth), aperture.beamwidth, 1.0)
-    apart = np.linalg.norm((directions[:, None] - directions[None]) / width, axis=2)
+    apart = aperture.apart(directions[:, None], directions[None])
     return float(apart[np.triu_indices(len(apart), 1)].min())

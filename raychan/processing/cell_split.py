@@ -162,6 +162,5 @@ class Splitter:
         """Return whether echoes of neighbouring peaks are one."""
         apart = np.abs(one.cell - other.cell)
         apart = np.minimum(apart, np.array(self.map.power.shape) - apart)
-        width = np.where(np.isfinite(self.scan.aperture.beamwidth), self.scan.aperture.beamwidth, 1.0)
-        turn = np.linalg.norm((one.direction - other.direction) / width)
+        turn = self.scan.aperture.apart(one.direction, other.direction)
         return bool((apart <= np.array(self.grid.pad)).all() and turn < _SAME_BEAM)

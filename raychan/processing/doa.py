@@ -109,7 +109,7 @@ def estimate(data: Complexes, aperture: Aperture, method: str, count: int, made:
         axis = 0 if aperture.scans[0] else 1
         found = np.zeros((1, 2))
         found[:, axis] = monopulse(data, aperture, np.full(len(data), start[0, axis])).mean()
-        return found
+        return aperture.visible(found)
     made = covariance(data, aperture) if made is None else made
     count = min(count, len(made.matrix) - 1)
     if method == "esprit":

