@@ -48,18 +48,24 @@ def range_azimuth(map: RangeDoppler, elements: Any, wavelength: float, taper: st
     if not aperture.scans[0]:
         raise ValueError("elements: no spread along y, or on a slanted line; such an array measures no azimuth")
     bank = BeamBank(aperture, taper)
-    grid = aperture.grid(PER_BEAM)
+    sines = _sines(aperture)
     heights = aperture.grid(2).w
-    power = np.zeros((len(grid.u), len(map.range)))
+    power = np.zeros((len(sines), len(map.range)))
     for w in heights:
-        look = np.stack([grid.u, np.full(len(grid.u), w)], axis=1)
+        look = np.stack([sines, np.full(len(sines), w)], axis=1)
         seen = (look**2).sum(axis=1) <= 1.0
         rows = (bank.weight * aperture.steering(look[seen]).conj()).astype(np.complex64)
         best = np.zeros((len(rows), len(map.range)), np.float32)
         parallel_for(-(-len(map.range) // _BLOCK), partial(_strongest_rate, rows, map.spectrum, best), 2)
         power[seen] = np.maximum(power[seen], best)
-    azimuth = np.arcsin(np.clip(grid.u, -1.0, 1.0))
-    return RangeAzimuth(map.range, azimuth, power, map.noise * bank.noise_gain)
+    return RangeAzimuth(map.range, np.arcsin(sines), power, map.noise * bank.noise_gain)
+
+
+def _sines(aperture: Aperture) -> Floats:
+    """Return the sines (b,) of a map's azimuths: where grating lobes join both ends, both are shown."""
+    grid = aperture.grid(PER_BEAM)
+    joined = grid.wraps[0] and len(grid.u) % 2 == 0
+    return np.clip(np.append(grid.u, -grid.u[0]) if joined else grid.u, -1.0, 1.0)
 
 
 def _strongest_rate(rows: Any, spectrum: Any, best: NDArray[np.float32], blocks: slice) -> None:

@@ -114,15 +114,17 @@ def test_the_range_azimuth_map_is_the_strongest_of_all_rates_and_heights_for_any
     try:
         for count in (1, 3):
             parallel.set_threads(count)
-            maps.append(range_azimuth(*given).power)
+            shown = range_azimuth(*given)
+            maps.append(shown.power)
     finally:
         parallel.set_threads(before)
     np.testing.assert_array_equal(*maps)
     aperture = aperture_of(radar)
-    grid, true = aperture.grid(PER_BEAM), np.zeros_like(maps[0])
+    sines, true = np.sin(shown.azimuth), np.zeros_like(maps[0])
+    np.testing.assert_allclose(sines[: len(aperture.grid(PER_BEAM).u)], aperture.grid(PER_BEAM).u, atol=1e-12)
     for w in aperture.grid(2).w:
-        seen = grid.u**2 + w**2 <= 1.0
-        look = np.stack([grid.u[seen], np.full(seen.sum(), w)], axis=1)
+        seen = sines**2 + w**2 <= 1.0
+        look = np.stack([sines[seen], np.full(seen.sum(), w)], axis=1)
         rows = aperture.steering(look).conj() / len(aperture.elements)
         level = (np.abs(np.einsum("ba,avr->bvr", rows, made.spectrum)) ** 2).max(axis=1)
         true[seen] = np.maximum(true[seen], level)

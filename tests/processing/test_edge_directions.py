@@ -106,10 +106,25 @@ def test_so_do_virtual_arrays_planes_and_upright_lines(multiplexing):
         assert np.degrees(found.elevation if multiplexing == "z" else found.azimuth) == pytest.approx([angle], abs=0.4)
 
 
+def test_the_range_azimuth_map_shows_a_target_near_its_side_on_that_side():
+    radar = rc.Radar(WAVE, elements=rc.uniform_array(4, 0.5 * C0 / WAVE.middle))
+    for azimuth in (-82.0, 82.0):
+        shown = rc.range_azimuth(result(radar, azimuth).rdmap, radar)
+        sines, peak = np.sin(shown.azimuth), shown.power.max(axis=1)
+        np.testing.assert_allclose(sines, -sines[::-1], atol=1e-9)
+        near = np.abs(sines - np.sin(np.radians(azimuth))).argmin()
+        assert peak[near] == pytest.approx(peak.max(), rel=1e-3)
+
+
 def seen(radar: rc.Radar, angle: float, upright: bool = False) -> rc.Detections:
-    """Return the detections of a strong point 12 m away, in a direction [deg] of azimuth or elevation."""
+    """Return the detections of `result`."""
+    return result(radar, angle, upright).detections
+
+
+def result(radar: rc.Radar, angle: float, upright: bool = False) -> rc.Result:
+    """Return the result of a strong point 12 m away, in a direction [deg] of azimuth or elevation."""
     ahead, aside = 12.0 * np.cos(np.radians(angle)), 12.0 * np.sin(np.radians(angle))
     place = (ahead, 0.0, aside) if upright else (ahead, aside, 0.0)
     place = tuple(np.add(place, radar.position))
     target = rc.Body(name="t", shape="sphere", params={"radius": 0.05}, position=place, rcs_dbsm=30.0)
-    return rc.simulate(rc.Scene([target], radar=radar)).detections
+    return rc.simulate(rc.Scene([target], radar=radar))
