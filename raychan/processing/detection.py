@@ -13,7 +13,8 @@ from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
 from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, training
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
-from raychan.processing.peaks import SideLobes, refine
+from raychan.processing.main_lobe import PeakShape
+from raychan.processing.peaks import SideLobes
 from raychan.radar.aperture import Aperture
 from raychan.radar.waveform import Waveform
 from raychan.records import Detections, RangeDoppler
@@ -92,6 +93,7 @@ def detect(
     train: tuple[int, int] = TRAIN,
     ego_speed: float = 0.0,
     windows: tuple[str, str] = ("hann", "hann"),
+    chirps: int | None = None,
     waveform: Waveform | None = None,
     elements: Floats | None = None,
     array: Array | None = None,
@@ -103,8 +105,9 @@ def detect(
     estimated from the training cells; of an echo with a direction, over the noise in its beam. Speed is rate plus
     ego_speed. Peaks below the window's response to stronger detections are dropped.
     Args: method ca or os; guard [resolution cells], train [cells a side] and windows: all (rate, range), see
-    processing.cfar; waveform, for the range migration of movers and, with elements (a, 3) [m], for angles; array, how
-    these are used; seen, the map as `seen_in` returns it, where it is known.
+    processing.cfar; chirps that the window along rate weighs, where they are not the map's resolution cells; waveform,
+    for the response and the range migration of echoes and, with elements (a, 3) [m], for angles; array, how these are
+    used; seen, the map as `seen_in` returns it, where it is known.
     Raises: ValueError on bad arguments.
     """
     grid, array, aperture = Grid.of(map), array or Array(), _aperture(map, waveform, elements)
@@ -116,7 +119,8 @@ def detect(
     local = bar.local(cells)
     over = seen.power[tuple(cells.T)] > bar.factor * local
     cells, local = cells[over], local[over]
-    shift, power = refine(seen.power, cells)
+    shape = PeakShape.of(grid, windows, waveform, chirps)
+    shift, power = shape.refine(seen.power, cells)
     noise = bar.noise(local)
     # The SNR of an echo with a direction is known when that is found; here it may be the dip lower.
     strong = np.flatnonzero(db(power / np.maximum(noise, _TINY)) >= min_snr_db + (db(seen.dip) if aperture else 0.0))
@@ -137,7 +141,7 @@ def detect(
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, beam * level, smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
-    echoes = Splitter(map, grid, lobes, scan, seen.receiver_noise, coherent).split(peaks)
+    echoes = Splitter(map, grid, lobes, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
     return _reported(map, grid, echoes.take(loud), ego_speed, aperture)
 
@@ -152,6 +156,7 @@ def least_power(
     guard: tuple[int, int] = GUARD,
     train: tuple[int, int] = TRAIN,
     windows: tuple[str, str] = ("hann", "hann"),
+    chirps: int | None = None,
     waveform: Waveform | None = None,
     elements: Floats | None = None,
     array: Array | None = None,
@@ -162,8 +167,10 @@ def least_power(
     Args and errors as for `detect`.
     """
     aperture, seen = _aperture(map, waveform, elements), seen or seen_in(map, waveform, elements, array)
-    bar = _Bar.of(seen, pfa, method, training(Grid.of(map), guard, train, windows))
-    local, (_, peak) = bar.local(cells), refine(bar.seen.power, cells)
+    grid = Grid.of(map)
+    bar = _Bar.of(seen, pfa, method, training(grid, guard, train, windows))
+    local = bar.local(cells)
+    _, peak = PeakShape.of(grid, windows, waveform, chirps).refine(seen.power, cells)
     above = peak / np.maximum(bar.seen.power[tuple(cells.T)], _TINY)
     loud = float(undb(min_snr_db)) * bar.noise(local) * (bar.seen.dip if aperture else 1.0) / above
     return np.asarray(np.maximum(bar.factor * local, loud))
