@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.angles import CellEchoes, Scan, echoes_in
 from raychan.processing.cfar import Grid
+from raychan.processing.line_lobes import LineLobes
 from raychan.processing.main_lobe import PeakShape
 from raychan.processing.peaks import MARGIN, SideLobes
 from raychan.records import RangeDoppler
@@ -90,6 +91,7 @@ class Splitter:
     map: RangeDoppler
     grid: Grid
     lobes: SideLobes
+    lines: LineLobes
     shape: PeakShape
     scan: Scan
     receiver_noise: float
@@ -100,11 +102,13 @@ class Splitter:
     def split(self, peaks: Peaks) -> Echoes:
         """Return the echoes in the cells of peaks, strongest first.
 
-        A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain."""
+        A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain, or those of what
+        is stronger in its row or column."""
         kept: list[Row] = []
         for i in range(len(peaks.cells)):
             beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
-            if not self._clear(float(peaks.power[i]), peaks.place[i], kept, peaks, beams):
+            clear = self._clear(float(peaks.power[i]), peaks.place[i], kept, peaks, beams)
+            if not (clear and self.lines.own(peaks.cells[i])):
                 continue
             v, r = peaks.cells[i]
             snapshot = self.map.spectrum[:, v, r]

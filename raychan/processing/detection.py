@@ -4,6 +4,7 @@ interpolation, and the echoes that an array tells apart within them."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
 from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, training
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
+from raychan.processing.line_lobes import LineLobes
 from raychan.processing.main_lobe import PeakShape
 from raychan.processing.peaks import SideLobes
 from raychan.radar.aperture import Aperture
@@ -71,6 +73,13 @@ class _Bar:
         """Return the thermal noise (c,) [W] of a cell, as estimated where it is unknown."""
         return np.full(len(local), self.seen.noise) if self.seen.noise > 0.0 else self.estimate(local)
 
+    def of_beam(self, bank: BeamBank, local: Floats, pfa: float) -> Floats:
+        """Return the power (c,) below which a beam of a cell is noise, by the level of its training cells."""
+        if isinstance(self.seen, StrongestBeam):
+            return self.factor * local
+        # The mean power of several looks has another threshold.
+        return factor(bank.single(pfa), self.ring.worth, self.method) * self.estimate(local) * bank.noise_gain
+
 
 def seen_in(
     map: RangeDoppler, waveform: Waveform | None = None, elements: Floats | None = None, array: Array | None = None
@@ -103,7 +112,8 @@ def detect(
 
     SNR is the power at the sub-bin peak over the thermal noise per cell, or, where that is unknown (0), over the noise
     estimated from the training cells; of an echo with a direction, over the noise in its beam. Speed is rate plus
-    ego_speed. Peaks below the window's response to stronger detections are dropped.
+    ego_speed. Peaks below the window's response to stronger detections, or to what is
+    stronger in their row or column, are dropped.
     Args: method ca or os; guard [resolution cells], train [cells a side] and windows: all (rate, range), see
     processing.cfar; chirps that the window along rate weighs, where they are not the map's resolution cells; waveform,
     for the response and the range migration of echoes and, with elements (a, 3) [m], for angles; array, how these are
@@ -114,7 +124,6 @@ def detect(
     bank = BeamBank(aperture, array.beam_window) if aperture else None
     seen = seen or seen_in(map, waveform, elements, array)
     bar = _Bar.of(seen, pfa, method, training(grid, guard, train, windows))
-
     cells = seen.maxima(seen.dip * float(undb(min_snr_db)) * seen.noise)
     local = bar.local(cells)
     over = seen.power[tuple(cells.T)] > bar.factor * local
@@ -129,19 +138,16 @@ def detect(
     power, noise, local = power[strong], noise[strong], local[strong]
 
     lobes = SideLobes(grid, windows)
-    duration = waveform.frame_duration if waveform else 0.0
-    smear = np.abs(_rate(map, grid, cells + shift)) * duration / map.range_resolution
+    smear = _smear(map, grid, cells + shift, waveform)
+    lines = LineLobes(seen, lobes, grid.pad, _smear(map, grid, np.arange(len(map.rate))[:, None], waveform))
     if aperture is None or bank is None:
         kept = lobes.own((cells + shift) / np.array(grid.pad), power, smear)
+        kept[kept] = [lines.own(cell) for cell in cells[kept]]
         return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
-    # A beam of a cell is noise below the threshold of the bank; the mean power of several looks has another one.
-    beam, level = bar.factor, local
-    if not isinstance(seen, StrongestBeam):
-        beam, level = factor(bank.single(pfa), bar.ring.worth, method), bar.estimate(local) * bank.noise_gain
     towards = bank.directions[bank.towards(map.spectrum, cells)]
-    peaks = Peaks(cells, shift, power, noise, beam * level, smear, towards)
+    peaks = Peaks(cells, shift, power, noise, bar.of_beam(bank, local, pfa), smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
-    echoes = Splitter(map, grid, lobes, shape, scan, seen.receiver_noise, coherent).split(peaks)
+    echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
     return _reported(map, grid, echoes.take(loud), ego_speed, aperture)
 
@@ -191,6 +197,12 @@ def _rate(map: RangeDoppler, grid: Grid, place: Floats) -> Floats:
     rate: Floats = map.rate[0] + place[:, 0] * (map.rate_resolution / grid.pad[0])
     limit = map.unambiguous_rate
     return np.where(np.abs(rate) <= limit, rate, (rate + limit) % (2.0 * limit) - limit)
+
+
+def _smear(map: RangeDoppler, grid: Grid, place: Any, waveform: Waveform | None) -> Floats:
+    """Return the range cells (n,) over which echoes at places (n, 1 or 2) in map cells migrate during the frame."""
+    duration = waveform.frame_duration if waveform else 0.0
+    return np.abs(_rate(map, grid, place)) * duration / map.range_resolution
 
 
 def _reported(
