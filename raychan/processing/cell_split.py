@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from raychan.processing.angles import CellEchoes, Scan, echoes_in
 from raychan.processing.cfar import Grid
-from raychan.processing.peaks import MARGIN, SideLobes, parabolas
+from raychan.processing.line_lobes import LineLobes
+from raychan.processing.main_lobe import PeakShape
+from raychan.processing.peaks import MARGIN, SideLobes
 from raychan.records import RangeDoppler
 
 Floats = NDArray[np.float64]
@@ -89,6 +91,8 @@ class Splitter:
     map: RangeDoppler
     grid: Grid
     lobes: SideLobes
+    lines: LineLobes
+    shape: PeakShape
     scan: Scan
     receiver_noise: float
     """Noise that SNR counts in a beam of weights w, over the noise of a peak: this times |w|^2."""
@@ -98,11 +102,13 @@ class Splitter:
     def split(self, peaks: Peaks) -> Echoes:
         """Return the echoes in the cells of peaks, strongest first.
 
-        A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain."""
+        A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain, or those of what
+        is stronger in its row or column."""
         kept: list[Row] = []
         for i in range(len(peaks.cells)):
             beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
-            if not self._clear(float(peaks.power[i]), peaks.place[i], kept, peaks, beams):
+            clear = self._clear(float(peaks.power[i]), peaks.place[i], kept, peaks, beams)
+            if not (clear and self.lines.own(peaks.cells[i])):
                 continue
             v, r = peaks.cells[i]
             snapshot = self.map.spectrum[:, v, r]
@@ -151,7 +157,7 @@ class Splitter:
             return None
         cell = np.array([v[at[0]], r[at[1]]])
         beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
-        shift, power = parabolas(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
+        shift, power = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
         row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)

@@ -4,6 +4,7 @@ interpolation, and the echoes that an array tells apart within them."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,9 @@ from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
 from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, training
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
-from raychan.processing.peaks import SideLobes, refine
+from raychan.processing.line_lobes import LineLobes
+from raychan.processing.main_lobe import PeakShape
+from raychan.processing.peaks import SideLobes
 from raychan.radar.aperture import Aperture
 from raychan.radar.waveform import Waveform
 from raychan.records import Detections, RangeDoppler
@@ -70,6 +73,13 @@ class _Bar:
         """Return the thermal noise (c,) [W] of a cell, as estimated where it is unknown."""
         return np.full(len(local), self.seen.noise) if self.seen.noise > 0.0 else self.estimate(local)
 
+    def of_beam(self, bank: BeamBank, local: Floats, pfa: float) -> Floats:
+        """Return the power (c,) below which a beam of a cell is noise, by the level of its training cells."""
+        if isinstance(self.seen, StrongestBeam):
+            return self.factor * local
+        # The mean power of several looks has another threshold.
+        return factor(bank.single(pfa), self.ring.worth, self.method) * self.estimate(local) * bank.noise_gain
+
 
 def seen_in(
     map: RangeDoppler, waveform: Waveform | None = None, elements: Floats | None = None, array: Array | None = None
@@ -92,6 +102,7 @@ def detect(
     train: tuple[int, int] = TRAIN,
     ego_speed: float = 0.0,
     windows: tuple[str, str] = ("hann", "hann"),
+    chirps: int | None = None,
     waveform: Waveform | None = None,
     elements: Floats | None = None,
     array: Array | None = None,
@@ -101,22 +112,24 @@ def detect(
 
     SNR is the power at the sub-bin peak over the thermal noise per cell, or, where that is unknown (0), over the noise
     estimated from the training cells; of an echo with a direction, over the noise in its beam. Speed is rate plus
-    ego_speed. Peaks below the window's response to stronger detections are dropped.
+    ego_speed. Peaks below the window's response to stronger detections, or to what is
+    stronger in their row or column, are dropped.
     Args: method ca or os; guard [resolution cells], train [cells a side] and windows: all (rate, range), see
-    processing.cfar; waveform, for the range migration of movers and, with elements (a, 3) [m], for angles; array, how
-    these are used; seen, the map as `seen_in` returns it, where it is known.
+    processing.cfar; chirps that the window along rate weighs, where they are not the map's resolution cells; waveform,
+    for the response and the range migration of echoes and, with elements (a, 3) [m], for angles; array, how these are
+    used; seen, the map as `seen_in` returns it, where it is known.
     Raises: ValueError on bad arguments.
     """
     grid, array, aperture = Grid.of(map), array or Array(), _aperture(map, waveform, elements)
     bank = BeamBank(aperture, array.beam_window) if aperture else None
     seen = seen or seen_in(map, waveform, elements, array)
     bar = _Bar.of(seen, pfa, method, training(grid, guard, train, windows))
-
     cells = seen.maxima(seen.dip * float(undb(min_snr_db)) * seen.noise)
     local = bar.local(cells)
     over = seen.power[tuple(cells.T)] > bar.factor * local
     cells, local = cells[over], local[over]
-    shift, power = refine(seen.power, cells)
+    shape = PeakShape.of(grid, windows, waveform, chirps)
+    shift, power = shape.refine(seen.power, cells)
     noise = bar.noise(local)
     # The SNR of an echo with a direction is known when that is found; here it may be the dip lower.
     strong = np.flatnonzero(db(power / np.maximum(noise, _TINY)) >= min_snr_db + (db(seen.dip) if aperture else 0.0))
@@ -125,19 +138,16 @@ def detect(
     power, noise, local = power[strong], noise[strong], local[strong]
 
     lobes = SideLobes(grid, windows)
-    duration = waveform.frame_duration if waveform else 0.0
-    smear = np.abs(_rate(map, grid, cells + shift)) * duration / map.range_resolution
+    smear = _smear(map, grid, cells + shift, waveform)
+    lines = LineLobes(seen, lobes, grid.pad, _smear(map, grid, np.arange(len(map.rate))[:, None], waveform))
     if aperture is None or bank is None:
         kept = lobes.own((cells + shift) / np.array(grid.pad), power, smear)
+        kept[kept] = [lines.own(cell) for cell in cells[kept]]
         return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
-    # A beam of a cell is noise below the threshold of the bank; the mean power of several looks has another one.
-    beam, level = bar.factor, local
-    if not isinstance(seen, StrongestBeam):
-        beam, level = factor(bank.single(pfa), bar.ring.worth, method), bar.estimate(local) * bank.noise_gain
     towards = bank.directions[bank.towards(map.spectrum, cells)]
-    peaks = Peaks(cells, shift, power, noise, beam * level, smear, towards)
+    peaks = Peaks(cells, shift, power, noise, bar.of_beam(bank, local, pfa), smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
-    echoes = Splitter(map, grid, lobes, scan, seen.receiver_noise, coherent).split(peaks)
+    echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
     return _reported(map, grid, echoes.take(loud), ego_speed, aperture)
 
@@ -152,6 +162,7 @@ def least_power(
     guard: tuple[int, int] = GUARD,
     train: tuple[int, int] = TRAIN,
     windows: tuple[str, str] = ("hann", "hann"),
+    chirps: int | None = None,
     waveform: Waveform | None = None,
     elements: Floats | None = None,
     array: Array | None = None,
@@ -162,8 +173,10 @@ def least_power(
     Args and errors as for `detect`.
     """
     aperture, seen = _aperture(map, waveform, elements), seen or seen_in(map, waveform, elements, array)
-    bar = _Bar.of(seen, pfa, method, training(Grid.of(map), guard, train, windows))
-    local, (_, peak) = bar.local(cells), refine(bar.seen.power, cells)
+    grid = Grid.of(map)
+    bar = _Bar.of(seen, pfa, method, training(grid, guard, train, windows))
+    local = bar.local(cells)
+    _, peak = PeakShape.of(grid, windows, waveform, chirps).refine(seen.power, cells)
     above = peak / np.maximum(bar.seen.power[tuple(cells.T)], _TINY)
     loud = float(undb(min_snr_db)) * bar.noise(local) * (bar.seen.dip if aperture else 1.0) / above
     return np.asarray(np.maximum(bar.factor * local, loud))
@@ -184,6 +197,12 @@ def _rate(map: RangeDoppler, grid: Grid, place: Floats) -> Floats:
     rate: Floats = map.rate[0] + place[:, 0] * (map.rate_resolution / grid.pad[0])
     limit = map.unambiguous_rate
     return np.where(np.abs(rate) <= limit, rate, (rate + limit) % (2.0 * limit) - limit)
+
+
+def _smear(map: RangeDoppler, grid: Grid, place: Any, waveform: Waveform | None) -> Floats:
+    """Return the range cells (n,) over which echoes at places (n, 1 or 2) in map cells migrate during the frame."""
+    duration = waveform.frame_duration if waveform else 0.0
+    return np.abs(_rate(map, grid, place)) * duration / map.range_resolution
 
 
 def _reported(

@@ -37,6 +37,9 @@ class DetectorMap(Protocol):
     def maxima(self, least: float) -> Ints:
         """Return the local maxima (c, 2) above a power [W]."""
 
+    def lines(self, cell: Ints) -> tuple[Floats, Floats]:
+        """Return the power of the column (v,) and the row (r,) of a cell (2,), by what is seen of that cell."""
+
     def single(self, pfa: float) -> float:
         """Return the false alarm probability that the threshold must keep for a cell to keep `pfa`."""
 
@@ -56,6 +59,10 @@ class MeanPower:
     def maxima(self, least: float) -> Ints:
         """Return the local maxima (c, 2) above a power [W]."""
         return maxima(self.power, least)
+
+    def lines(self, cell: Ints) -> tuple[Floats, Floats]:
+        """Return the power of the column (v,) and the row (r,) of a cell (2,)."""
+        return self.power[:, cell[1]], self.power[cell[0]]
 
     def single(self, pfa: float) -> float:
         """Return `pfa`."""
@@ -94,6 +101,13 @@ class StrongestBeam:
                 beside[at] = wave.real**2 + wave.imag**2
             cells = cells[self.power[tuple(cells.T)] >= beside * (1.0 - _ROUNDING)]
         return cells
+
+    def lines(self, cell: Ints) -> tuple[Floats, Floats]:
+        """Return the power of the column (v,) and the row (r,) of a cell (2,), in the beam that is strongest there."""
+        weights = self.bank.rows[self.beam[cell[0], cell[1]]]
+        waves = weights @ self.spectrum[:, :, cell[1]], weights @ self.spectrum[:, cell[0]]
+        column, row = (np.asarray(wave.real**2 + wave.imag**2, np.float64) for wave in waves)
+        return column, row
 
     def single(self, pfa: float) -> float:
         """Return the false alarm probability of each beam."""

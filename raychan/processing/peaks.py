@@ -1,4 +1,4 @@
-"""Peaks of a map: local maxima, their place between cells, and which of them are side lobes of others."""
+"""Peaks of a map: local maxima, and which of them are side lobes of others."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ MARGIN = 2.0
 """Side lobes of two equal echoes add in voltage: twice the sum of their powers."""
 _FLOOR = 1e-12  # of a peak: rounding errors of single precision and of the fast sum are below
 _SLACK = 0.25  # resolution cells by which side lobes of other echoes may shift a peak (not measured)
-_STEEP = 5.0  # Np of power: more than any window falls in half a resolution cell
-_TINY = 1e-300
 AROUND = [(v, r) for v in (-1, 0, 1) for r in (-1, 0, 1) if v or r]
 """Steps from a cell to the eight around it."""
 
@@ -30,36 +28,6 @@ def maxima(power: Floats, least: float) -> Ints:
         near = (cells + step) % power.shape
         cells = cells[power[tuple(cells.T)] >= power[tuple(near.T)]]
     return cells
-
-
-def refine(power: Floats, cells: Ints) -> tuple[Floats, Floats]:
-    """Return the offsets (c, 2) in cells and the power (c,) of the peaks, by parabolas in dB along both axes."""
-    around = [[power[_beside(power, cells, axis, step)] for step in (-1, 1)] for axis in (0, 1)]
-    return parabolas(power[tuple(cells.T)], np.array(around).reshape(2, 2, -1), cells, power.shape)
-
-
-def parabolas(top: Floats, around: Floats, cells: Ints, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
-    """Return what `refine` does, from the powers (c,) of cells (c, 2) and of those below and above (axis, 2, c)."""
-    shift = np.zeros(cells.shape)
-    gain = np.zeros(len(cells))
-    top = np.log(np.maximum(top, _TINY))
-    for axis, size in enumerate(shape):
-        # A null beside a peak (unpadded, or without noise) must not distort the parabola.
-        below, above = (np.maximum(np.log(np.maximum(x, _TINY)), top - _STEEP) for x in around[axis])
-        bend = below - 2.0 * top + above
-        inside = (bend < 0.0) & (size > 2)
-        if axis == 1:
-            inside &= (cells[:, 1] > 0) & (cells[:, 1] < size - 1)
-        offset = np.divide(0.5 * (below - above), bend, out=np.zeros(len(cells)), where=inside)
-        shift[:, axis] = np.clip(offset, -0.5, 0.5)
-        gain += 0.25 * (above - below) * shift[:, axis]
-    return shift, np.exp(top + gain)
-
-
-def _beside(power: Floats, cells: Ints, axis: int, step: int) -> tuple[Ints, ...]:
-    at = cells.copy()
-    at[:, axis] = (at[:, axis] + step) % power.shape[axis]
-    return tuple(at.T)
 
 
 class SideLobes:

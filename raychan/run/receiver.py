@@ -115,12 +115,15 @@ def _detector(rdmap: RangeDoppler, radar: Radar, settings: Any) -> dict[str, Any
     guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
     if guard is not None:
         sizes["guard"] = guard
+    # By Doppler division the window weighs all chirps, though the map of a channel has a share of the rates.
+    divided = radar.multiplexing == "ddm" and not radar.waveform.stagger
     return {
         # Each fold that is tested in a cell is one more chance of a false alarm.
         "pfa": settings.pfa / hypotheses(radar),
         "min_snr_db": settings.min_snr_db,
         "method": settings.cfar,
         "windows": (settings.rate_window, settings.range_window),
+        "chirps": (radar.waveform if divided else radar.channel_waveform).n_chirps,
         "waveform": radar.waveform,
         "elements": receivers(radar),
         "array": _array(settings),

@@ -62,10 +62,13 @@ def test_an_echo_ambiguities_away_is_folded_and_told_truly(ambiguities, folds, w
     at, slow = shown(SMALL, r, v)
     # A mover spreads over as many cells of rate as of range that it crosses within the frame.
     smear = 0.5 * abs(v) * SMALL.frame_duration / CELL
-    assert d.range[0] == pytest.approx(at, abs=0.3 * CELL)
-    assert d.rate[0] == pytest.approx(slow, abs=(0.3 + smear) * LINE)
-    assert d.folded[0] == bool(ambiguities or folds)
-    assert (d.true_range[0], d.true_rate[0]) == (pytest.approx(r, abs=1e-6), pytest.approx(v, abs=1e-9))
+    # Across several cells without a taper its response has ripples of equal height, each a peak: any may be the first.
+    equal = np.flatnonzero(d.power > 0.97 * d.power[0])
+    k = equal[np.abs(d.range[equal] - at).argmin()]
+    assert d.range[k] == pytest.approx(at, abs=0.3 * CELL)
+    assert d.rate[k] == pytest.approx(slow, abs=(0.3 + smear) * LINE)
+    assert d.folded[k] == bool(ambiguities or folds)
+    assert (d.true_range[k], d.true_rate[k]) == (pytest.approx(r, abs=1e-6), pytest.approx(v, abs=1e-9))
 
 
 @pytest.mark.parametrize("halves", [0, 1, 2, 3, 6])
