@@ -18,11 +18,14 @@ _WORDS = {
     "tx_gain": "transmit gain",
     "rx_gain": "receive gain",
     "eirp": "EIRP",
-    "max_path_loss": "largest one-way loss, receive gain left out",
+    "max_path_loss": "largest one-way loss to one channel, receive gain left out",
     "noise": "noise in a sample (kT0 F fs)",
-    "coherent_gain": "gain of chirps x samples",
-    "sensitivity": "noise in a cell of the map (rectangular windows)",
+    "coherent_gain": "gain of chirps x samples, of one channel",
+    "sensitivity": "noise in a cell of the map of one channel (rectangular windows)",
+    "array_gain": "gain of a beam over all channels",
+    "beam_sensitivity": "noise in a cell of a beam's map (rectangular windows)",
 }
+_OF_ARRAYS = ("array_gain", "beam_sensitivity")
 _TOLD = ("vertices", "faces", "size", "watertight")  # of a mesh's report, in other words
 _FIGURES = {
     "gain_dbi": "gain [dBi]",
@@ -182,6 +185,8 @@ def _radar(radar: Any) -> list[Table]:
     budget = []
     for key, value in radar.link_budget().items():
         name, unit = key.rsplit("_", 1)
+        if name in _OF_ARRAYS and len(radar.virtual_elements) == 1:
+            continue
         figure = f"{1e3 * value:.4g} mm" if unit == "m" else f"{value:.2f} {units[unit]}"
         budget.append((_WORDS.get(name, name.replace("_", " ")), figure))
     chirp_rows = _chirp(w)
