@@ -180,7 +180,6 @@ def _parts(scene: Any) -> Table:
 
 
 def _radar(radar: Any) -> list[Table]:
-    w = radar.waveform
     units = {"dbm": "dBm", "dbi": "dBi", "db": "dB", "m": "m"}
     budget = []
     for key, value in radar.link_budget().items():
@@ -189,7 +188,7 @@ def _radar(radar: Any) -> list[Table]:
             continue
         figure = f"{1e3 * value:.4g} mm" if unit == "m" else f"{value:.2f} {units[unit]}"
         budget.append((_WORDS.get(name, name.replace("_", " ")), figure))
-    chirp_rows = _chirp(w)
+    chirp_rows = _chirp(radar)
     return [
         show.table("Radar", ("link budget", ""), budget, left=(0,)),
         show.table("", ("waveform", ""), chirp_rows, left=(0,)),
@@ -227,7 +226,8 @@ def _drawn(scene: Any, plot: Path) -> None:
     show.console().print(f"written: {plot}", soft_wrap=True)
 
 
-def _chirp(w: Any) -> list[tuple[str, str]]:
+def _chirp(radar: Any) -> list[tuple[str, str]]:
+    w = radar.waveform
     # A map measures range rates at the frequency of the ramp's middle.
     of_middle = w.carrier / w.middle
     times = f"{w.repetition * 1e6:g} us"
@@ -243,7 +243,7 @@ def _chirp(w: Any) -> list[tuple[str, str]]:
         ("unambiguous range", f"{w.unambiguous_range:.4g} m"),
         (
             "unambiguous range rate" + (", by the staggered times" if w.stagger else ""),
-            f"+-{w.resolved_rate * of_middle:.4g} m/s",
+            f"+-{radar.resolved_rate * of_middle:.4g} m/s",
         ),
     ]
 

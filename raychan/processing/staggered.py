@@ -38,13 +38,17 @@ class ResolvedMap(RangeDoppler):
     """A map whose cells know by how many spans of unambiguous rates their echo is folded."""
 
     fold: NDArray[np.int8] = column("v r", np.int8, doc="true rate = rate + 2 unambiguous_rate fold")
+    resolved_rate: float
+    """Range rates between plus and minus this are told apart by the folds [m/s]."""
 
 
-def resolved(map: RangeDoppler, spectrum: Complexes, fold: NDArray[np.int8], noise: float) -> ResolvedMap:
-    """Return a map with another spectrum (channels, v, r), its folds (v, r) and its noise [W] a cell."""
+def resolved(map: RangeDoppler, spectrum: Complexes, fold: NDArray[np.int8], noise: float, tested: int) -> ResolvedMap:
+    """Return a map with another spectrum (channels, v, r), its folds (v, r) of so many tested, and its noise [W] a
+    cell."""
     held = {name: getattr(map, name) for name in RangeDoppler.__dataclass_fields__}
     power = (spectrum.real.astype(np.float64) ** 2 + spectrum.imag.astype(np.float64) ** 2).mean(axis=0)
-    return ResolvedMap(**(held | {"spectrum": spectrum, "power": power, "noise": noise, "fold": fold}))
+    held |= {"spectrum": spectrum, "power": power, "noise": noise}
+    return ResolvedMap(**held, fold=fold, resolved_rate=tested * map.unambiguous_rate)
 
 
 def fold_range(count: int) -> list[int]:
@@ -102,7 +106,7 @@ def staggered_map(cube: Cube, radar: Radar, given: Any, resolve: bool = True) ->
         better = np.flatnonzero(power > best + (clear if h else 0.0))
         best[better], fold[rows[better], columns[better]] = power[better], h
         sums[:, rows[better], columns[better]] = total[:, better]
-    return resolved(map, sums, fold, map.noise / count)
+    return resolved(map, sums, fold, map.noise / count, hypotheses(radar))
 
 
 def wrong_fold(snr: float, radar: Radar) -> float:

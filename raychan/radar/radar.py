@@ -204,6 +204,13 @@ class Radar:
         return self.ddm_slots or count + 1 if self.multiplexing == "ddm" else count
 
     @property
+    def resolved_rate(self) -> float:
+        """Range rates between plus and minus this are told apart [m/s], nominal: those of the waveform, or of one
+        channel where a single receiver leaves the folds of several transmitters open."""
+        apart = bool(self.waveform.stagger) or len(self.elements) > 1
+        return self.waveform.resolved_rate / (1 if apart else self.slots)
+
+    @property
     def transmissions(self) -> tuple[Transmission, ...]:
         """What each transmitter sends, as ramps at equal distances each."""
         places, slots = np.array(self.tx_elements @ self.axes.T), self.slots

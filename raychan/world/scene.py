@@ -249,7 +249,7 @@ class Scene(Fixed, Described):
         if self.radar_table is None:
             return said
         said += checks.edge_on(self.bodies, self.radar_table) + overlaps.unseen(self.bodies, self.radar)
-        return said + checks.aliases(self.bodies, self.radar_table, self.radar.waveform)
+        return said + checks.aliases(self.bodies, self.radar)
 
     def _chosen(self, body: Body) -> list[Material]:
         """Return the materials of a body's parts: the scene's own first, then the built-in ones."""
