@@ -46,7 +46,7 @@ def clipping(clipped: int, count: int) -> list[str]:
         return []
     return [
         f"the converter clips {clipped:,} of {count:,} samples ({100.0 * clipped / count:.3g} %): a higher "
-        "adc_full_scale_dbm avoids it"
+        "adc_full_scale_dbm avoids it; the errors stated do not hold what clipping does to levels, nor its spurs"
     ]
 
 
