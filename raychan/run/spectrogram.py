@@ -96,10 +96,6 @@ def spectrogram(
     tracings_per_second = TRACED.check("tracings_per_second", tracings_per_second)
     seed = SEED.check("seed", seed, whole=True)
     duration, resolution = SECONDS.check("duration", duration), RATE_STEP.check("resolution", resolution)
-    if len(scene.radar.tx_elements) > 1:
-        raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
-    if scene.radar.waveform.stagger:
-        raise ValueError("a spectrogram is of ramps at equal distances: radar.waveform has a stagger")
     chirps, length = _chirps(scene, duration, resolution)
     check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
@@ -150,6 +146,10 @@ def _left_out(scene: Scene) -> list[str]:
 def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]:
     """Return how many chirps there are, and how many of them make a stretch. Raises: ValueError where that cannot be;
     SceneError for a target that fluctuates, which only `simulate` draws."""
+    if len(scene.radar.tx_elements) > 1:
+        raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
+    if scene.radar.waveform.stagger:
+        raise ValueError("a spectrogram is of ramps at equal distances: radar.waveform has a stagger")
     for body in scene.bodies:
         if body.fluctuates:
             key, allowed = f"bodies.{body.name}.swerling", "0: in a spectrogram targets are steady"
