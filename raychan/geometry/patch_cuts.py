@@ -1,4 +1,4 @@
-"""Which patches of curved surfaces are bisected, and at which edge (numba kernels); arguments as in `curved_patches`."""
+"""Which patches of curved surfaces are bisected, at which edge (numba kernels); arguments as in `curved_patches`."""
 
 from __future__ import annotations
 
