@@ -256,7 +256,7 @@ class Profile(Record, Plotted):
 
 @dataclass(frozen=True)
 class Cube(Record):
-    """Dechirped samples; voltage waves in sqrt(W), so |x|^2 is received power before processing."""
+    """Dechirped samples, voltage waves in sqrt(W): |x|^2 is received power, with real sampling its mean half of it."""
 
     samples: NDArray[np.complex64] = column("a c s", np.complex64, unit="sqrt(W)", doc="antenna, chirp, sample")
     noise_power: float  # thermal, per complex sample, kT0BF [W]; 0 when noise is off

@@ -18,11 +18,14 @@ _WORDS = {
     "tx_gain": "transmit gain",
     "rx_gain": "receive gain",
     "eirp": "EIRP",
-    "max_path_loss": "largest one-way loss, receive gain left out",
+    "max_path_loss": "largest one-way loss to one channel, receive gain left out",
     "noise": "noise in a sample (kT0 F fs)",
-    "coherent_gain": "gain of chirps x samples",
-    "sensitivity": "noise in a cell of the map (rectangular windows)",
+    "coherent_gain": "gain of chirps x samples, of one channel",
+    "sensitivity": "noise in a cell of the map of one channel (rectangular windows)",
+    "array_gain": "gain of a beam over all channels",
+    "beam_sensitivity": "noise in a cell of a beam's map (rectangular windows)",
 }
+_OF_ARRAYS = ("array_gain", "beam_sensitivity")
 _TOLD = ("vertices", "faces", "size", "watertight")  # of a mesh's report, in other words
 _FIGURES = {
     "gain_dbi": "gain [dBi]",
@@ -177,14 +180,15 @@ def _parts(scene: Any) -> Table:
 
 
 def _radar(radar: Any) -> list[Table]:
-    w = radar.waveform
     units = {"dbm": "dBm", "dbi": "dBi", "db": "dB", "m": "m"}
     budget = []
     for key, value in radar.link_budget().items():
         name, unit = key.rsplit("_", 1)
+        if name in _OF_ARRAYS and len(radar.virtual_elements) == 1:
+            continue
         figure = f"{1e3 * value:.4g} mm" if unit == "m" else f"{value:.2f} {units[unit]}"
         budget.append((_WORDS.get(name, name.replace("_", " ")), figure))
-    chirp_rows = _chirp(w)
+    chirp_rows = _chirp(radar)
     return [
         show.table("Radar", ("link budget", ""), budget, left=(0,)),
         show.table("", ("waveform", ""), chirp_rows, left=(0,)),
@@ -222,7 +226,8 @@ def _drawn(scene: Any, plot: Path) -> None:
     show.console().print(f"written: {plot}", soft_wrap=True)
 
 
-def _chirp(w: Any) -> list[tuple[str, str]]:
+def _chirp(radar: Any) -> list[tuple[str, str]]:
+    w = radar.waveform
     # A map measures range rates at the frequency of the ramp's middle.
     of_middle = w.carrier / w.middle
     times = f"{w.repetition * 1e6:g} us"
@@ -238,7 +243,7 @@ def _chirp(w: Any) -> list[tuple[str, str]]:
         ("unambiguous range", f"{w.unambiguous_range:.4g} m"),
         (
             "unambiguous range rate" + (", by the staggered times" if w.stagger else ""),
-            f"+-{w.resolved_rate * of_middle:.4g} m/s",
+            f"+-{radar.resolved_rate * of_middle:.4g} m/s",
         ),
     ]
 

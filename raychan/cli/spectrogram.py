@@ -77,6 +77,7 @@ def spectrogram(
     }
     found = _computed(loaded, seconds, options)
     files = _written(loaded, out, found)
+    show.warn(found.warnings)
     screen = show.console()
     got = f"{found.resolution:.3g} m/s"
     asked = "" if got == f"{resolution:.3g} m/s" else f" ({resolution:g} asked: a stretch has whole chirps)"

@@ -3,7 +3,7 @@
 Training cells lie around the cell under test, beyond a guard, at every second resolution cell, where windowed noise is
 nearly independent for any zero padding; the remaining correlation lowers the effective number of cells. Rates wrap.
 Near an end of the range axis cells outside are replaced by ones farther out on the other side, so that their number is
-the same everywhere.
+the same everywhere. An even guard and the odd one above it (0 and 1, 2 and 3) leave the same training cells.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class Detector:
     """
 
     pfa: float = 1e-7
-    """Probability of false alarm of a cell."""
+    """Probability of false alarm of a single cell of the map, see `Processing.pfa`."""
     looks: int = 1
     """Powers added in a cell."""
     cfar: str | None = None

@@ -63,7 +63,7 @@ def virtual_range_doppler(
     spectrum = channels[:many].copy()
     for cells, h in _groups(fold):
         spectrum[:, :, *cells] = _under(channels[:, :, *cells], h, radar)
-    return resolved(plain, spectrum.reshape(-1, *spectrum.shape[2:]), fold, plain.noise)
+    return resolved(plain, spectrum.reshape(-1, *spectrum.shape[2:]), fold, plain.noise, hypotheses(radar))
 
 
 def _by_time(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Complexes]:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from raychan.columns import column
 from raychan.processing.own_waveform import map_by_waveform
 from raychan.radar.radar import Radar
-from raychan.radar.waveform import OwnWaveform, Waveform
+from raychan.radar.waveform import OwnWaveform
+from raychan.radar.windows import window
 from raychan.records import Cube, Detections, RangeDoppler
 from raychan.units import C0
 
@@ -28,6 +29,8 @@ _STRONG = 10.0
 """Times the noise, in the beam over all channels: weaker echoes keep the hypothesis "not folded" (not measured)."""
 CLEAR = 12.0
 """Times the noise by which a fold must beat a slower one: less gives folds of noise, more asks for a higher SNR."""
+WRONG = 0.01
+"""Share of wrong folds above the SNR that `least_snr` tells."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +38,17 @@ class ResolvedMap(RangeDoppler):
     """A map whose cells know by how many spans of unambiguous rates their echo is folded."""
 
     fold: NDArray[np.int8] = column("v r", np.int8, doc="true rate = rate + 2 unambiguous_rate fold")
+    resolved_rate: float
+    """Range rates between plus and minus this are told apart by the folds [m/s]."""
 
 
-def resolved(map: RangeDoppler, spectrum: Complexes, fold: NDArray[np.int8], noise: float) -> ResolvedMap:
-    """Return a map with another spectrum (channels, v, r), its folds (v, r) and its noise [W] a cell."""
+def resolved(map: RangeDoppler, spectrum: Complexes, fold: NDArray[np.int8], noise: float, tested: int) -> ResolvedMap:
+    """Return a map with another spectrum (channels, v, r), its folds (v, r) of so many tested, and its noise [W] a
+    cell."""
     held = {name: getattr(map, name) for name in RangeDoppler.__dataclass_fields__}
     power = (spectrum.real.astype(np.float64) ** 2 + spectrum.imag.astype(np.float64) ** 2).mean(axis=0)
-    return ResolvedMap(**(held | {"spectrum": spectrum, "power": power, "noise": noise, "fold": fold}))
+    held |= {"spectrum": spectrum, "power": power, "noise": noise}
+    return ResolvedMap(**held, fold=fold, resolved_rate=tested * map.unambiguous_rate)
 
 
 def fold_range(count: int) -> list[int]:
@@ -99,20 +106,55 @@ def staggered_map(cube: Cube, radar: Radar, given: Any, resolve: bool = True) ->
         better = np.flatnonzero(power > best + (clear if h else 0.0))
         best[better], fold[rows[better], columns[better]] = power[better], h
         sums[:, rows[better], columns[better]] = total[:, better]
-    return resolved(map, sums, fold, map.noise / count)
+    return resolved(map, sums, fold, map.noise / count, hypotheses(radar))
 
 
-def least_snr(waveform: Waveform) -> float:
-    """Return the SNR of a detection from which the folds of staggered ramps are told apart; inf: never.
+def wrong_fold(snr: float, radar: Radar) -> float:
+    """Return a bound on the probability that a detection of some SNR (in the beam, over all channels) has a wrong fold.
 
-    Two folds differ by the power that the wrong one loses: 1 - |mean_k exp(j 2 pi h t_k / P)|^2.
+    Under a fold h the sequences add up to P_h = |u_h^H z|^2, z = s + n the values of a cell and u_h unit vectors. In
+    white Gaussian noise of unit power the quadratic form P_0 - P_h has the mean |s|^2 d and, over c channels, the
+    variance L (2 |s|^2 + 2 c): d the share of power that the wrong fold loses, L = 1 - |u_0^H u_h|^2, +-sqrt(L) the
+    form's eigenvalues. A slower wrong fold is taken where the form is below CLEAR. The form counts as Gaussian, and the
+    probabilities of all wrong folds are added. An echo half a cell off its own along both axes of the map is meant: the
+    least power, and the turns between sequences half a row off.
+
+    Source: Proakis, Digital Communications, appendix B (quadratic forms of complex Gaussian variables).
     """
-    count = len(waveform.stagger)
-    starts = np.array([waveform.start_of(k) for k in range(count)])
-    apart = np.arange(1, waveform.fold_count)
-    turns = np.exp(2j * np.pi * np.outer(apart, starts) / sum(waveform.stagger))
-    lost = 1.0 - np.abs(turns.mean(axis=1)) ** 2
-    return float(CLEAR / lost.min()) if len(lost) and lost.min() > 0.0 else math.inf
+    wave, settings, count = radar.channel_waveform, radar.processing, len(radar.waveform.stagger)
+    starts = np.array([radar.waveform.start_of(k) for k in range(count)]) / wave.repetition
+    half = 0.5 / (wave.n_chirps * settings.pad[1])
+    rate, span = window(settings.rate_window, wave.n_chirps), window(settings.range_window, wave.n_samples)
+    inside = snr * _straddled(rate, settings.pad[1]) * _straddled(span, settings.pad[0])
+    folds = np.arange(1.0, radar.waveform.fold_count)
+
+    def passed(turns: Any) -> NDArray[np.float64]:
+        return np.asarray(np.abs(np.exp(2j * np.pi * np.multiply.outer(turns, starts)).mean(axis=-1)) ** 2)
+
+    # The wrong fold may lie to either side of the true one, as may the row of the cell.
+    lost = passed(half) - np.maximum(passed(folds + half), passed(folds - half))
+    apart = np.maximum(1.0 - passed(folds), np.finfo(float).tiny)
+    spread = np.sqrt(apart * (2.0 * inside + 2.0 * len(radar.elements)))
+    above = (inside * lost - CLEAR) / spread
+    return float(sum(0.5 * math.erfc(x / math.sqrt(2.0)) for x in above))
+
+
+def least_snr(radar: Radar) -> float:
+    """Return the SNR of a detection from which its fold by staggered ramps is wrong in less than WRONG of all cases, to
+    a hundredth of a dB; inf: from none below 200 dB."""
+    low, high = 0.0, 200.0
+    if wrong_fold(10.0 ** (0.1 * high), radar) > WRONG:
+        return math.inf
+    while high - low > 0.01:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if wrong_fold(10.0 ** (0.1 * middle), radar) > WRONG else (low, middle)
+    return float(10.0 ** (0.1 * high))
+
+
+def _straddled(taper: NDArray[np.float64], pad: int) -> float:
+    """Return the share of an echo's power that a cell holds whose middle is half a cell off."""
+    turns = np.exp(1j * np.pi * np.arange(len(taper)) / (len(taper) * pad))
+    return float(np.abs((taper * turns).sum() / taper.sum()) ** 2)
 
 
 def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:

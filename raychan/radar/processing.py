@@ -29,11 +29,13 @@ class Processing:
     cfar: str = "os"
     """Detector: 'ca' cell averaging, 'os' ordered statistic."""
     pfa: float = 1e-7
-    """Probability of false alarm of a cell."""
+    """Probability of false alarm of a single cell of the map, detector alone: per resolution cell some 1.5 ('os') to 2
+    times ('ca') this with Hann windows and a pad of (2, 2), for several cells hold one; see docs/theory.md."""
     min_snr_db: float = 20.0
     """Least signal-to-noise ratio that is reported [dB]."""
     guard: tuple[int, int] | None = None
-    """Guard cells to each side of the cell under test; None: the detector's choice."""
+    """Guard cells to each side of the cell under test; None: the detector's choice. Training cells are every second
+    resolution cell, so that 0 and 1 are the same, as are 2 and 3."""
     train: tuple[int, int] | None = None
     """Training cells to each side beyond the guard; None: the detector's choice."""
     beams: str = "coherent"

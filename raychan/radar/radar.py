@@ -204,6 +204,13 @@ class Radar:
         return self.ddm_slots or count + 1 if self.multiplexing == "ddm" else count
 
     @property
+    def resolved_rate(self) -> float:
+        """Range rates between plus and minus this are told apart [m/s], nominal: those of the waveform, or of one
+        channel where a single receiver leaves the folds of several transmitters open."""
+        apart = bool(self.waveform.stagger) or len(self.elements) > 1
+        return self.waveform.resolved_rate / (1 if apart else self.slots)
+
+    @property
     def transmissions(self) -> tuple[Transmission, ...]:
         """What each transmitter sends, as ramps at equal distances each."""
         places, slots = np.array(self.tx_elements @ self.axes.T), self.slots
@@ -257,12 +264,17 @@ class Radar:
     def link_budget(self, sensitivity_dbm: float | None = None) -> dict[str, float]:
         """Return the sums of the link at boresight, by name with unit.
 
-        Args: sensitivity_dbm [dBm], by default the noise of a frame after coherent processing without windows.
+        Args: sensitivity_dbm [dBm] of one channel (a receiver, or a pair of transmitter and receiver), by default the
+        noise in its map after coherent processing without windows: of all chirps, by time division of those of one
+        transmitter; with real sampling twice as much, for half of an echo's power lies at negative beat frequencies.
+        A beam adds all channels in phase, and its sensitivity is lower by `array_gain_db`.
         """
         tx, rx = gain_dbi(self.tx), gain_dbi(self.rx)
         power = float(dbm(self.power))
         noise = float(dbm(self.noise_power))
-        coherent = 10.0 * float(np.log10(self.waveform.n_chirps * self.waveform.n_samples))
+        wave = self.channel_waveform if self.multiplexing == "tdm" else self.waveform
+        added = wave.n_chirps * wave.n_samples / (1.0 if wave.complex_sampling else 2.0)
+        coherent, array = 10.0 * float(np.log10(added)), 10.0 * float(np.log10(len(self.virtual_elements)))
         sensitivity = noise - coherent if sensitivity_dbm is None else sensitivity_dbm
         return {
             "power_dbm": power,
@@ -274,6 +286,8 @@ class Radar:
             "noise_dbm": noise,
             "coherent_gain_db": coherent,
             "sensitivity_dbm": sensitivity,
+            "array_gain_db": array,
+            "beam_sensitivity_dbm": sensitivity - array,
             "max_path_loss_db": power + tx - sensitivity,
         }
 

@@ -22,6 +22,9 @@ from raychan.units import C0
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
+MOST_FOLDS = 64
+"""Folds of a rate that are tested at most."""
+
 
 @runtime_checkable
 class OwnWaveform(Protocol):
@@ -119,7 +122,7 @@ class Waveform:
         if not self.stagger:
             return 1
         steps = [round(1e9 * t) for t in self.stagger]
-        return min(sum(steps) // math.gcd(*steps), 64)
+        return min(sum(steps) // math.gcd(*steps), MOST_FOLDS)
 
     def every(self, step: int) -> Waveform:
         """Return the waveform of every `step`-th ramp. Raises: ValueError if the ramps are no multiple of it."""

@@ -52,9 +52,9 @@ def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown
     for mirrored in (False, True) if response.mirrors and shown.rate is not None else (False,):
         folds, near = _folds(paths, rows, response, shown, mirrored)
         taken = rows[near]
-        if not near.any():  # a side lobe: that of the strongest path
-            taken = np.array([strongest])
-            folds, near = _folds(paths, taken, response, shown, mirrored)[0], np.ones(1, bool)
+        side_lobe = not near.any()
+        if side_lobe:  # of the strongest path; it reaches round the ends of the map without being folded
+            taken, folds, near = np.array([strongest]), np.zeros((1, 2), np.int64), np.ones(1, bool)
         power = _powers(paths, taken, response, shown, mirrored)
         at, rate = response.stands(*_moving(paths, taken), shown.rate is not None)
         folds = folds[near]
@@ -67,10 +67,19 @@ def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown
             weight = power * (place.ravel() == i)
             total = float(weight.sum())
             if total > 0.0:
-                folded = mirrored or bool(whole.any())
+                folded = _outside(at[0], rate[0], response, shown) if side_lobe else mirrored or bool(whole.any())
                 found.append((total, Truth(float(weight @ at) / total, float(weight @ rate) / total, folded)))
     # Of equal ones (a target at range 0 is its own mirror image) the unfolded place.
     return max(found, key=lambda one: one[0] * (1.0 if one[1].folded else _EQUAL), default=(0.0, UNKNOWN))[1]
+
+
+def _outside(at: float, rate: float, response: PointSpread, shown: Shown) -> bool:
+    """Return whether the peak of an echo at a range [m] and rate [m/s] is folded, one of whose side lobes is shown."""
+    if not 0.0 <= at <= response.periods[0] / (2.0 if response.mirrors else 1.0):
+        return True
+    # A receiver that tells folds apart may have counted some.
+    period = response.periods[1]
+    return shown.rate is not None and round(rate / period) != round((shown.at_rate - shown.rate) / period)
 
 
 def aliased(at: Floats, shown: float, response: PointSpread) -> tuple[Floats, NDArray[np.bool_]]:

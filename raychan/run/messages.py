@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from raychan.processing.staggered import ResolvedMap
 from raychan.records import RangeDoppler
 from raychan.run.ledger import Entry
 from raychan.run.result import ExplainedDetections, Result
@@ -48,9 +49,14 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
             _place(found.range[first], found.rate[first]),
             _place(found.true_range[first], found.true_rate[first]),
         )
+        limit, open_ = rdmap.unambiguous_rate, ""
+        if isinstance(rdmap, ResolvedMap):
+            limit = rdmap.resolved_rate
+            near = (found.true_range <= rdmap.unambiguous_range) & (np.abs(found.true_rate) <= limit)
+            open_ = ", and a slower one where noise leaves its fold open" if (found.folded & near).any() else ""
         said.append(
             f"{_of(found.folded)} {_verb(found.folded)} folded ({_numbers(found.folded)}): beyond "
-            f"{rdmap.unambiguous_range:.4g} m or {rdmap.unambiguous_rate:.4g} m/s an echo shows elsewhere; "
+            f"{rdmap.unambiguous_range:.4g} m or {limit:.4g} m/s an echo shows elsewhere{open_}; "
             f"number {first + 1} is at {true}, shown at {shown}"
         )
     if found.ambiguous.any():

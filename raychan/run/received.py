@@ -28,7 +28,7 @@ def received(
     apply to them; seed; interference, samples (a, c, s) that other radars add; clean, the samples of `paths` without
     impairments where they are known (`quiet` itself, where it has nothing else).
     """
-    cube, said = quiet, []
+    cube = quiet
     if radar.impairments.phase_errors:
         clean = clean or synthesize(paths, radar)
         errors = faulty(paths, radar, stream(seed, Stage.PHASE_NOISE)).samples - clean.samples
@@ -37,13 +37,17 @@ def received(
         cube = Cube(samples=(cube.samples + interference).astype(np.complex64), noise_power=0.0)
     cube = noisy(cube, radar, stream(seed, Stage.NOISE))
     cube, clipped = digitized(cube, radar.impairments, radar.waveform.complex_sampling)
-    if clipped:
-        share = 100.0 * clipped / cube.samples.size
-        said.append(
-            f"the converter clips {clipped:,} of {cube.samples.size:,} samples ({share:.3g} %): a higher "
-            "adc_full_scale_dbm avoids it"
-        )
-    return cube, said
+    return cube, clipping(clipped, cube.samples.size)
+
+
+def clipping(clipped: int, count: int) -> list[str]:
+    """Return a line where the converter clips some of `count` samples."""
+    if not clipped:
+        return []
+    return [
+        f"the converter clips {clipped:,} of {count:,} samples ({100.0 * clipped / count:.3g} %): a higher "
+        "adc_full_scale_dbm avoids it; the errors stated do not hold what clipping does to levels, nor its spurs"
+    ]
 
 
 def notes(radar: Radar, whole: bool, turning: bool) -> list[str]:

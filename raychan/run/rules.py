@@ -231,11 +231,12 @@ def _ambiguities(scene: Scene) -> list[str]:
     """Return a line on staggered ramps that tell folds apart at high SNR only, and one on an array without angles."""
     radar, asked, said = scene.radar, scene.processing, []
     if radar.waveform.stagger and radar.noise:
-        least = 10.0 * math.log10(least_snr(radar.waveform))
+        least = 10.0 * math.log10(least_snr(radar))
         if least > asked.min_snr_db:
+            snr = f"above an SNR of {math.ceil(least)} dB only" if math.isfinite(least) else "at no SNR"
             said.append(
-                f"the staggered ramps tell folded rates apart above an SNR of {least:.0f} dB only; below it the "
-                "slowest rate that fits is taken (radar.waveform.stagger_us)"
+                f"the staggered ramps tell folded rates apart, in 99 of 100 cases, {snr}; else a slower rate may "
+                "be taken (radar.waveform.stagger_us)"
             )
     if len(radar.elements) > 1 and asked.beams == "coherent" and not any(aperture_of(radar).scans):
         said.append(

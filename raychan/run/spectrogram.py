@@ -22,9 +22,11 @@ from raychan.records import Cube
 from raychan.reprs import Plotted
 from raychan.run.clock import Clock, Progress
 from raychan.run.micro_doppler import stretches
+from raychan.run.received import clipping
 from raychan.run.rules import allowed_memory, asked, check_demand, fine_rule
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy
+from raychan.signal.converter import digitized
 from raychan.units import C0, db
 from raychan.world.errors import SceneError
 from raychan.world.limits import CELL_RANGE, RATE_STEP, SECONDS, SEED, TRACED
@@ -46,22 +48,28 @@ _OVERLAP = 8  # stretches that each instant belongs to: a picture without steps 
 
 @dataclass(frozen=True)
 class Spectrogram(Record, Plotted):
-    """Power against time and range rate; the peak of a lone echo of even motion reads its received power."""
+    """Power against time and range rate.
+
+    The peak of a lone echo of even motion reads its received power, less between two rates (up to 0.4 dB with a Hann
+    window), and where cells that its range window spreads it over are not asked for.
+    """
 
     time: Floats = column("t", unit="s", doc="middle of each stretch, from the start of the first chirp")
     rate: Floats = column("v", unit="m/s", doc="range rate, receding positive")
-    power: Floats = column("t v", unit="W", doc="summed over the range cells asked for, mean of the receivers")
+    power: Floats = column("t v", unit="W", doc="of the range cells asked for, mean of the receivers")
     ranges: tuple[float, float]
     """Range cells summed, from and to [m]."""
     resolution: float
     """Of the range rate, rectangular window [m/s]."""
     noise: float
-    """Thermal noise of a cell, all range cells summed [W]; 0 where noise is off."""
+    """Thermal noise of a cell, of all range cells asked for [W]; 0 where noise is off."""
     error_db: float
     """Power by which neighbouring tracings differ, over the power of all samples [dB]: the error of carrying on."""
     tracings: int
     """Tracings of the scene."""
     seed: int
+    warnings: tuple[str, ...] = ()
+    """What a user should know: samples that the converter clips, and what is left out."""
 
 
 def spectrogram(
@@ -88,8 +96,6 @@ def spectrogram(
     tracings_per_second = TRACED.check("tracings_per_second", tracings_per_second)
     seed = SEED.check("seed", seed, whole=True)
     duration, resolution = SECONDS.check("duration", duration), RATE_STEP.check("resolution", resolution)
-    if len(scene.radar.tx_elements) > 1:
-        raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
     chirps, length = _chirps(scene, duration, resolution)
     check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
@@ -101,30 +107,49 @@ def spectrogram(
     if (need := _BYTES * chirps * len(cells) * len(radar.elements)) > allowed_memory():
         raise ValueError(f"duration = {duration:g} s takes {need / 1e9:.0f} GB of memory: fewer ranges take less")
     tell = Clock(progress).tell
-    rng, slow, signal, error = stream(seed, Stage.NOISE), [], 0.0, 0.0
+    rng, slow, signal, error, clipped = stream(seed, Stage.NOISE), [], 0.0, 0.0, 0
     rule = fine_rule(scene.radar, scene.processing, model)
     for quiet, off in stretches(long, rule, model, count, lambda share: tell("trace", share)):
         signal, error = signal + float((np.abs(quiet) ** 2).sum()), error + float((np.abs(off) ** 2).sum())
-        slow.append(_range_cells(noisy(Cube(quiet.astype(np.complex64), 0.0), radar, rng), radar, cells))
+        cube = noisy(Cube(quiet.astype(np.complex64), 0.0), radar, rng)
+        cube, over = digitized(cube, radar.impairments, wave.complex_sampling)
+        clipped += over
+        slow.append(_range_cells(cube, radar, cells))
     time, rate, power, gain = _transformed(np.concatenate(slow, axis=1), radar, length)
-    noise = radar.noise_power * _range_gain(radar) * gain * len(cells) if radar.noise else 0.0
+    # The range window spreads an echo over neighbouring cells, whose powers add up to this times its own.
+    spread = wave.n_samples * _range_gain(radar)
+    noise = radar.noise_power / wave.n_samples * gain * len(cells) if radar.noise else 0.0
     step = wave.range_resolution
     return Spectrogram(
         time=time,
         rate=rate,
-        power=power,
+        power=power / spread,
         ranges=(float(cells[0] * step), float(cells[-1] * step)),
         resolution=0.5 * C0 / wave.middle / (length * wave.repetition),
         noise=noise * (1.0 if wave.complex_sampling else 2.0),
         error_db=float(db(error / signal)) if signal > 0.0 else float("-inf"),
         tracings=count,
         seed=seed,
+        warnings=(*clipping(clipped, chirps * wave.n_samples * scene.radar.receivers), *_left_out(scene)),
     )
+
+
+def _left_out(scene: Scene) -> list[str]:
+    """Return a line on what a scene has and its spectrogram is without."""
+    named = [f"interferer '{one.name}'" for one in scene.interferers]
+    wrong = scene.radar.impairments
+    named += [] if wrong.chirp_error is None else ["the chirp error"]
+    named += [] if wrong.phase_noise is None else ["phase noise"]
+    return [f"the spectrogram is without {', '.join(named)}: only `raychan run` has that"] if named else []
 
 
 def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]:
     """Return how many chirps there are, and how many of them make a stretch. Raises: ValueError where that cannot be;
     SceneError for a target that fluctuates, which only `simulate` draws."""
+    if len(scene.radar.tx_elements) > 1:
+        raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
+    if scene.radar.waveform.stagger:
+        raise ValueError("a spectrogram is of ramps at equal distances: radar.waveform has a stagger")
     for body in scene.bodies:
         if body.fluctuates:
             key, allowed = f"bodies.{body.name}.swerling", "0: in a spectrogram targets are steady"

@@ -23,7 +23,7 @@ def as_netcdf(found: Spectrogram, text: str = "") -> memoryview:
     made = io.BytesIO()
     with h5py.File(made, "w") as held, h5netcdf.File(held, "w") as file:
         file.attrs.update({"Conventions": CONVENTIONS, "title": "raychan spectrogram", "scene": text})
-        file.attrs["seed"] = found.seed
+        file.attrs.update({"seed": found.seed, "warnings": "\n".join(found.warnings)})
         for name, unit in _UNITS.items():
             file.attrs.update({name: np.array(getattr(found, name)), f"{name}_units": unit})
         file.dimensions = {"time": len(found.time), "range_rate": len(found.rate)}

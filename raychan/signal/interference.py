@@ -3,7 +3,8 @@
 The victim mixes what arrives with its own ramp. The difference frequency is f_i + S_i u - f_v - S_v t, with u the time
 in the interferer's ramp at which it left and t that in the victim's. The filter before the converter lets the band
 pass that the range axis shows: -fs to 0 with I/Q sampling, -fs/2 to fs/2 with real sampling. Ramps that cross give a
-burst of length fs / |S_i - S_v|, whose sum of |sample|^2 is P fs^2 / |S_i - S_v|; parallel ones a line in range.
+burst of length fs / |S_i - S_v|, whose sum of |sample|^2 is P fs^2 / |S_i - S_v|, with real sampling half of it, as
+samples are real parts; parallel ones a line in range.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 
 from raychan.radar.aperture import Aperture
 from raychan.radar.radar import Radar
-from raychan.radar.waveform import Waveform
+from raychan.radar.waveform import MOST_FOLDS
 from raychan.records import MIRROR
 from raychan.units import C0
 from raychan.world.body import Body
@@ -105,11 +105,13 @@ def nearest_point(body: Body, at: Floats) -> Floats:
     return np.asarray(body.motion.to_world(found[np.argmin(np.linalg.norm(found - local, axis=1))]))
 
 
-def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> list[str]:
+def aliases(bodies: Iterable[Body], radar: Radar) -> list[str]:
     """Return a warning for each body beyond the unambiguous range or range rate, with the value at which it appears."""
     said = []
-    at, own = np.array(radar.position), np.array(radar.velocity_mps)
-    limit, top = waveform.unambiguous_range, waveform.resolved_rate * waveform.carrier / waveform.middle
+    at, own, waveform = radar.position, radar.velocity, radar.waveform
+    limit, top = waveform.unambiguous_range, radar.resolved_rate * waveform.carrier / waveform.middle
+    # Where not all folds are tested, what lies beyond the last one looks like none of them.
+    known = waveform.fold_count < MOST_FOLDS
     for body in bodies:
         if body.resolved_role == MIRROR or _near_and_slow(body, at, own, limit, top):
             continue
@@ -127,7 +129,7 @@ def aliases(bodies: Iterable[Body], radar: RadarTable, waveform: Waveform) -> li
             seen = (rate + top) % (2.0 * top) - top
             said.append(
                 f"body '{body.name}' at {rate:.2f} m/s is beyond the unambiguous range rate {top:.2f} m/s: "
-                f"it appears near {seen:.1f} m/s"
+                + (f"it appears near {seen:.1f} m/s" if known else "it appears at another rate")
             )
     return said
 

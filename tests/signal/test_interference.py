@@ -44,6 +44,17 @@ def test_energy_of_a_crossing_ramp_is_p_fs_squared_over_the_difference_of_slopes
     assert db(energy / wanted) == pytest.approx(np.zeros(8), abs=0.1)
 
 
+def test_with_real_sampling_samples_and_bursts_have_half_of_the_received_power():
+    own = Waveform(77e9, 1e9, 25.6e-6, 30e-6, 8, 2048, complex_sampling=False)
+    echo = synthesize(echoes([10.0], 0.0, 0.5), make_radar(own)).samples
+    assert db((np.abs(echo) ** 2).mean() / 0.25) == pytest.approx(db(0.5), abs=0.05)
+    assert db(range_doppler(Cube(samples=echo, noise_power=0.0), own).power.max() / 0.25) == pytest.approx(0.0, abs=0.4)
+    other = Waveform(own.carrier + 0.25 * own.bandwidth, 0.5 * own.bandwidth, own.chirp_duration, own.repetition, 8)
+    found = burst(make_radar(own), Interferer(make_radar(other)), one_way(1.0, 0.0, 0.01), np.random.default_rng(1))
+    whole = 0.01**2 * own.sample_rate**2 / abs(other.slope - own.slope)
+    assert db((np.abs(found[0]) ** 2).sum(axis=1).mean() / whole) == pytest.approx(db(0.5), abs=0.2)
+
+
 @pytest.mark.parametrize("late", [0.1e-6, 0.25e-6])
 def test_ghost_of_parallel_ramps_stands_at_half_of_c_times_offset_and_delay(late):
     distance = 30.0

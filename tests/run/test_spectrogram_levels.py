@@ -1,0 +1,74 @@
+"""Spectrograms read received power, have what the receiver does to its samples, and say what they are without."""
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.cli import invoke
+from raychan.units import C0, db, undb
+
+WAVE = dict(carrier=77e9, bandwidth=300e6, chirp_duration=60e-6, n_chirps=64)
+RCS = 10.0
+
+
+def scene(rate=0.0, complex_sampling=True, interferers=(), **radar) -> rc.Scene:
+    """Return a lone point target at 10 m before a radar without noise."""
+    wave = rc.Waveform(**WAVE, n_samples=64 if complex_sampling else 128, complex_sampling=complex_sampling)
+    ball = rc.Body(
+        "ball", shape="sphere", params={"radius": 0.05}, position=(10.0, 0.0, 0.5), velocity=(rate, 0.0, 0.0),
+        rcs_dbsm=RCS,
+    )  # fmt: skip
+    return rc.Scene([ball], radar=rc.Radar(wave, **{"noise": False, **radar}), interferers=interferers)
+
+
+@pytest.mark.parametrize("complex_sampling", [True, False])
+@pytest.mark.parametrize("window", ["rect", "hann", "hamming", "blackman", "taylor(35)", "chebyshev(80)"])
+def test_the_peak_reads_the_received_power_with_every_window(window, complex_sampling):
+    one = scene(0.0, complex_sampling, processing=rc.Processing(range_window=window, rate_window=window))
+    radar = one.radar
+    power = radar.power * (C0 / radar.waveform.middle) ** 2 * undb(RCS) / ((4.0 * np.pi) ** 3 * 10.0**4)
+    power *= 4.0  # the gain of both isotropic antennas with a front, 3 dB each
+    for pad in ((1, 1), (2, 4)):
+        padded = rc.Processing(range_window=window, rate_window=window, pad=pad)
+        found = rc.spectrogram(scene(0.0, complex_sampling, processing=padded), 0.1)
+        assert db(found.power.max(axis=1) / power) == pytest.approx(np.zeros(len(found.time)), abs=0.05)
+
+
+def test_a_mover_between_two_rates_reads_less_by_what_is_told():
+    rates = np.linspace(1.0, 1.05, 3)
+    still = rc.spectrogram(scene(), 0.1).power.max()
+    lost = [db(rc.spectrogram(scene(v), 0.1).power[0].max() / still) for v in rates]
+    # They come from 10.0 m and go up to 0.02 m farther.
+    assert min(lost) > -0.45 and max(lost) < 0.05
+
+
+def test_the_receiver_imbalance_offset_and_converter_are_in_the_spectrogram():
+    plain = rc.spectrogram(scene(), 0.1)
+    unequal = rc.spectrogram(scene(impairments=rc.Impairments(iq_gain_db=3.0)), 0.1)
+    # K1 = (1 + g) / 2 for the echo, K2 = (1 - g) / 2 for its image in a far range cell.
+    g = np.sqrt(undb(3.0))
+    ours = ((1.0 + g) / 2.0) ** 2 + ((1.0 - g) / 2.0) ** 2
+    assert db(unequal.power.max() / plain.power.max()) == pytest.approx(db(ours), abs=0.02)
+    offset = rc.spectrogram(scene(impairments=rc.Impairments(dc_offset_dbm=-40.0)), 0.1, ranges=(0.0, 2.0))
+    # Of the three cells of a Hann window's main lobe, which hold 1/4, 1 and 1/4, the first lies below range 0.
+    assert db(offset.power.max()) == pytest.approx(-70.0 + db(1.25 / 1.5), abs=0.05)
+    coarse = rc.spectrogram(scene(impairments=rc.Impairments(converter=rc.Converter(3, -100.0))), 0.1)
+    assert coarse.power.max() < 0.5 * plain.power.max()
+    assert coarse.warnings[0].startswith("the converter clips") and not plain.warnings
+
+
+def test_what_a_spectrogram_is_without_is_said(tmp_path, capsys):
+    other = rc.Interferer(rc.Radar(rc.Waveform(**WAVE, n_samples=64), position=(30, 0, 0.5), yaw_deg=180), name="i")
+    noise = rc.Impairments(phase_noise=rc.PhaseNoise([(1e4, -60.0)]))
+    given = scene(impairments=noise, interferers=[other])
+    said = "the spectrogram is without interferer 'i', phase noise: only `raychan run` has that"
+    assert rc.spectrogram(given, 0.1).warnings == (said,)
+    (tmp_path / "s.toml").write_text(given.to_toml())
+    assert invoke(["spectrogram", str(tmp_path / "s.toml"), "--seconds", "0.1", "--out", str(tmp_path / "o")]) == 0
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_staggered_ramps_are_refused_in_words():
+    wave = rc.Waveform(**WAVE, n_samples=64, stagger=(60e-6, 70e-6))
+    with pytest.raises(ValueError, match=r"of ramps at equal distances: radar\.waveform has a stagger"):
+        rc.spectrogram(rc.Scene(radar=rc.Radar(wave)), 0.3)
