@@ -50,6 +50,7 @@ class MeasuredAntenna:
             value = reals(f"MeasuredAntenna.{name}", getattr(self, name))
             if not np.isfinite(value).all():
                 raise ValueError(f"MeasuredAntenna.{name}: finite numbers are wanted")
+            value.flags.writeable = False
             object.__setattr__(self, name, value)
         for name in ("azimuth", "elevation"):
             knots = getattr(self, name)
