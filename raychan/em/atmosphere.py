@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from raychan.em.gas_lines import OXYGEN, WATER
 from raychan.limits import CELSIUS, FOG_GM3, PRESSURE_HPA, RAIN_MMH, VAPOUR_GM3
-from raychan.scalars import is_one_of, shown
+from raychan.scalars import is_one_of, meant, shown
 
 _NP_M = math.log(10.0) / 20.0 / 1e3  # Np/m of a field over dB/km of its power
 _LOWEST, _HIGHEST, _FOG_HIGHEST = 1.0, 1000.0, 200.0  # GHz for which the Recommendations hold
@@ -67,7 +67,7 @@ class Atmosphere:
         polarization, and outside 1 GHz to 1 THz, with fog 200 GHz.
         """
         if not is_one_of(polarization, tuple(_RAIN)):
-            raise ValueError(f"polarization = {shown(polarization)}: must be V or H")
+            raise ValueError(f"polarization = {shown(polarization)}: must be V or H{meant(polarization, _RAIN)}")
         ghz = frequency * 1e-9
         return {
             "gas": gas(ghz, self.temperature_c + 273.15, self.pressure_hpa, self.vapour_gm3),

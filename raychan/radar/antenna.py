@@ -21,7 +21,7 @@ from raychan.limits import LOSS_DB
 from raychan.radar.declared import check_declared, check_type, finite, reals
 from raychan.radar.spherical_vectors import cosine_power
 from raychan.radar.windows import check_window, window
-from raychan.scalars import is_one_of, shown
+from raychan.scalars import is_one_of, meant, shown
 from raychan.units import undb
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ def directions(given: ArrayLike) -> Floats:
 def check(polarization: str, loss_db: float = 0.0, **positive: float) -> None:
     """Raise ValueError on a polarisation other than V or H, a loss beyond limits, or another figure not positive."""
     if not is_one_of(polarization, POLARIZATIONS):
-        raise ValueError(f"polarization = {shown(polarization)}: must be V or H")
+        raise ValueError(f"polarization = {shown(polarization)}: must be V or H{meant(polarization, POLARIZATIONS)}")
     LOSS_DB.check("loss_db", finite("loss_db", loss_db))
     for name, value in positive.items():
         if finite(name, value) <= 0.0:
