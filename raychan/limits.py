@@ -72,7 +72,6 @@ FREQUENCY = Limit(1e8, 1e12, "Hz", "below, bodies are no longer large in wavelen
 CARRIER_GHZ = FREQUENCY.times(1e-9, "GHz")
 BANDWIDTH_MHZ = Limit(1e-3, 1e6, "MHz", "a range cell from 0.15 mm to 150 km; it must also be below the carrier")
 RAMP_US = Limit(1e-3, 1e6, "us", "a ramp lasts between a nanosecond and a second")
-CHIRPS = Limit(1, 1 << 20, "", "no radar's frame has more ramps")
 SAMPLES = Limit(1, 1 << 20, "", "no radar samples a ramp more often")
 NOISE_DB = Limit(0.0, 60.0, "dB", "no receiver is quieter than 290 K noise in, nor useful above 60 dB")
 KELVIN = Limit(0.0, 1e5, "K", "what an antenna sees: 3 K of cold sky, 290 K of ground, more of the sun or a jammer")

@@ -16,7 +16,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.limits import BANDWIDTH_MHZ, CHIRPS, FREQUENCY, RAMP_US, SAMPLES, Limit
+from raychan.limits import BANDWIDTH_MHZ, FREQUENCY, RAMP_US, SAMPLES, Limit
 from raychan.radar.declared import check_declared, reals
 from raychan.units import C0
 
@@ -30,7 +30,6 @@ _LIMITS = {
     "chirp_duration": _RAMP,
     # Every ramp of a channel: up to 64 transmitters or slots take turns.
     "repetition": Limit(_RAMP.low, 64.0 * _RAMP.high, "s", "a ramp lasts at most a second"),
-    "n_chirps": CHIRPS,
     "n_samples": SAMPLES,
 }
 
@@ -93,6 +92,8 @@ class Waveform:
             object.__setattr__(self, "repetition", self.chirp_duration)
         for name, limit in _LIMITS.items():
             limit.check(f"Waveform.{name}", getattr(self, name))
+        if self.n_chirps < 1:  # a spectrogram has more than the most of a frame
+            raise ValueError(f"Waveform.n_chirps = {self.n_chirps!r}: must be 1 or more")
         if self.bandwidth >= self.carrier:
             raise ValueError(
                 f"Waveform.bandwidth = {self.bandwidth:g} Hz: must be below the carrier of {self.carrier:g} Hz"

@@ -8,7 +8,6 @@ from __future__ import annotations
 from raychan.limits import BANDWIDTH_MHZ as BANDWIDTH_MHZ
 from raychan.limits import CARRIER_GHZ as CARRIER_GHZ
 from raychan.limits import CELSIUS as CELSIUS
-from raychan.limits import CHIRPS as CHIRPS
 from raychan.limits import FOG_GM3 as FOG_GM3
 from raychan.limits import FREQUENCY as FREQUENCY
 from raychan.limits import KELVIN as KELVIN
@@ -36,6 +35,7 @@ CREASE = Limit(0.0, 180.0, "deg", "faces fold by at most half a turn")
 BEAM = Limit(0.1, 360.0, "deg", "no antenna of a vehicle or ship has a narrower beam")
 TURN = Limit(-1e7, 1e7, "deg/s", "no rotor turns faster than 1.6 million times a minute")
 
+CHIRPS = Limit(1, 1 << 20, "", "no radar's frame has more ramps")
 PAD = Limit(1, 64, "", "1 pads nothing; more than 64 only draws the same map finer")
 CELLS = Limit(0, 1000, "cells", "cells on each side of the one under test")
 

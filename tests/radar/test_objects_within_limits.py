@@ -39,7 +39,7 @@ ANTENNAS = (
         (lambda: replace(WAVE, repetition=100), "Waveform.repetition = 100.0: must lie between 1e-09 and 64 s"),
         (lambda: replace(WAVE, repetition=None, stagger=[3, 4]), r"stagger\[0\] = 3.0: must lie between 1e-09 and 1"),
         (lambda: replace(WAVE, carrier=77), "Waveform.carrier = 77.0: must lie between 1e.08 and 1e.12 Hz"),
-        (lambda: replace(WAVE, n_chirps=0), "Waveform.n_chirps = 0: must lie between 1 and 1,048,576"),
+        (lambda: replace(WAVE, n_chirps=0), "Waveform.n_chirps = 0: must be 1 or more"),
         (lambda: rc.MeasuredAntenna([-90, 90], [-1, 1], *np.zeros((2, 2, 2))), "azimuth: holds 90; radians within"),
         (lambda: rc.MeasuredAntenna([-1, 1], [-3, 3], *np.zeros((2, 2, 2))), "elevation: holds 3; radians within"),
         (lambda: rc.IsotropicAntenna(loss_db=-80), "loss_db = -80.0: must lie between -60 and 100 dB"),
