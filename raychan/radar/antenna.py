@@ -55,7 +55,8 @@ def directions(given: ArrayLike) -> Floats:
         found = found[None]
     if found.ndim != 2 or found.shape[1] != 3:
         raise ValueError(f"direction of shape {found.shape}: unit vectors of shape (n, 3) are wanted")
-    off = np.abs(np.einsum("nc,nc->n", found, found) - 1.0) > _NOT_UNIT
+    square = np.einsum("nc,nc->n", found, found)
+    off = (np.abs(square - 1.0) > _NOT_UNIT) & (square > 0.0)  # a path of no length has no direction
     if off.any():
         row = int(np.flatnonzero(off)[0])
         size = float(np.linalg.norm(found[row]))

@@ -53,7 +53,7 @@ def test_what_is_beyond_limits_is_refused_when_it_is_made(make, said):
 @pytest.mark.parametrize("antenna", ANTENNAS, ids=lambda x: type(x).__name__)
 def test_antennas_take_lists_and_refuse_directions_not_of_length_one(antenna):
     assert antenna.field([1, 0, 0]).tolist() == antenna.field(np.array([[1.0, 0.0, 0.0]])).tolist()
-    assert antenna.field([[1, 0, 0], [0, 1, 0]]).shape == (2, 2)
+    assert antenna.field([[1, 0, 0], [0, 1, 0], [0, 0, 0]]).shape == (3, 2)
     with pytest.raises(ValueError, match=r"direction\[1\] = \[2.0, 0.0, 0.0\]: of length 1 is wanted, not 2"):
         antenna.field([[1, 0, 0], [2, 0, 0]])
     with pytest.raises(ValueError, match=r"direction of shape \(1, 2\): unit vectors of shape"):
