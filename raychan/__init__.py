@@ -122,13 +122,44 @@ if TYPE_CHECKING:
 __all__ = [*_HOME, "__version__"]
 
 
+_TRIED = {
+    "load_scene": "Scene.load",
+    "load": "Scene.load",
+    "run": "simulate",
+    "music": "doa",
+    "esprit": "doa",
+    "capon": "doa",
+    "mvdr": "doa",
+    "cfar": "detect",
+    "target": "Body",
+    "pointtarget": "Body",
+    "transmitter": "Radar",
+    "receiver": "Radar",
+    "chirp": "Waveform",
+    "fmcw": "Waveform",
+    "patchantenna": "CosineAntenna",
+}
+"""Names that people try, in small letters, and what stands here for them."""
+
+
+def _hint(name: str) -> str:
+    """Return a question that names the nearest public name, or ''."""
+    if name.startswith("_"):  # Python itself asks for these
+        return ""
+    from difflib import get_close_matches
+
+    small = {known.lower(): known for known in _HOME}
+    near = _TRIED.get(name.lower()) or next((small[x] for x in get_close_matches(name.lower(), small, n=1)), "")
+    return f"; did you mean {near!r}?" if near else ""
+
+
 def _load(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
         return version("raychan")
     if name not in _HOME:
-        raise AttributeError(f"module 'raychan' has no attribute {name!r}")
+        raise AttributeError(f"module 'raychan' has no attribute {name!r}{_hint(name)}")
     value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value

@@ -24,7 +24,22 @@ def column(axes: str, dtype: Any = np.float64, unit: str = "1", doc: str = "", f
 
 
 class Record(Described):
-    """Base of all records: checks and freezes every declared column when built."""
+    """Base of all records: checks and freezes every declared column when built.
+
+    Records are equal if they are of one class with equal fields, arrays of equal type, shape and numbers (NaN is NaN).
+    """
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        cls.__eq__ = Record.__eq__  # type: ignore[method-assign]  # else dataclass asks arrays whether they are true
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        names = (f.name for f in dataclasses.fields(self))  # type: ignore[arg-type]
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in names)
+
+    __hash__ = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         sizes: dict[str, int] = {}
@@ -67,6 +82,15 @@ class Record(Described):
     def replace(self, **changes: object) -> Self:
         """Return a copy with some fields changed (and all checked again)."""
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
+
+
+def _equal(one: Any, other: Any) -> bool:
+    if not isinstance(one, np.ndarray):
+        return bool(one == other)
+    if one is other:
+        return True
+    alike = isinstance(other, np.ndarray) and (one.dtype, one.shape) == (other.dtype, other.shape)
+    return alike and bool(np.array_equal(one, other, equal_nan=one.dtype.kind in "fc"))
 
 
 def row_numbers(index: NDArray[np.generic]) -> NDArray[np.intp]:

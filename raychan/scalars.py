@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from typing import Any
 
 _DEEPEST = 8  # levels of tables and lists: no table of a scene goes deeper
@@ -58,6 +59,15 @@ def as_text(name: object) -> str:
 def is_text(given: str) -> bool:
     """Return whether a text can be written as UTF-8: bytes that are no text, as a command line may hold, cannot."""
     return given.isascii() or as_text(given) == given
+
+
+def meant(value: object, words: Iterable[str]) -> str:
+    """Return " (did you mean 'music'?)" where a text is one of some words but for capitals or a slip, else ''."""
+    if not isinstance(value, str):
+        return ""
+    known = {word.lower(): word for word in words}
+    close = get_close_matches(value.lower(), known, n=1)
+    return f" (did you mean {known[close[0]]!r}?)" if close else ""
 
 
 def shown(value: Any) -> str:

@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 
 from raychan.em.gas_lines import OXYGEN, WATER
+from raychan.limits import CELSIUS, FOG_GM3, PRESSURE_HPA, RAIN_MMH, VAPOUR_GM3
+from raychan.scalars import is_one_of, meant, shown
 
 _NP_M = math.log(10.0) / 20.0 / 1e3  # Np/m of a field over dB/km of its power
 _LOWEST, _HIGHEST, _FOG_HIGHEST = 1.0, 1000.0, 200.0  # GHz for which the Recommendations hold
@@ -27,11 +29,21 @@ _RAIN = {
     "V": ((_K_V, -0.16398, 0.63297), (_ALPHA_V, -0.053739, 0.83433)),
 }
 """P.838-3, Tables 1 to 4: rows (a_j, b_j, c_j), then m and c, of log10 k and of alpha."""
+_LIMITS = {
+    "temperature_c": CELSIUS,
+    "pressure_hpa": PRESSURE_HPA,
+    "vapour_gm3": VAPOUR_GM3,
+    "rain_mmh": RAIN_MMH,
+    "fog_gm3": FOG_GM3,
+}
 
 
 @dataclass(frozen=True)
 class Atmosphere:
-    """The air between radar and targets, the same everywhere; by default that of the ITU's reference, dry of rain."""
+    """The air between radar and targets, the same everywhere; by default that of the ITU's reference, dry of rain.
+
+    Raises: ValueError for values beyond the limits of scene files.
+    """
 
     temperature_c: float = 15.0
     """[deg C]"""
@@ -44,12 +56,18 @@ class Atmosphere:
     fog_gm3: float = 0.0
     """Liquid water of fog [g/m3]: about 0.05 where one sees 300 m, 0.5 where one sees 50 m (P.840-8, section 1)."""
 
+    def __post_init__(self) -> None:
+        for name, limit in _LIMITS.items():
+            object.__setattr__(self, name, float(limit.check(f"Atmosphere.{name}", getattr(self, name))))
+
     def specific(self, frequency: float, polarization: str = "V") -> dict[str, float]:
         """Return the specific attenuation [dB/km] by cause: gas, rain, fog.
 
-        Args: frequency [Hz]; polarization V or H of a horizontal path. Raises: ValueError outside 1 GHz to 1 THz, with
-        fog 200 GHz.
+        Args: frequency [Hz]; polarization V or H of a horizontal path. Raises: ValueError for another
+        polarization, and outside 1 GHz to 1 THz, with fog 200 GHz.
         """
+        if not is_one_of(polarization, tuple(_RAIN)):
+            raise ValueError(f"polarization = {shown(polarization)}: must be V or H{meant(polarization, _RAIN)}")
         ghz = frequency * 1e-9
         return {
             "gas": gas(ghz, self.temperature_c + 273.15, self.pressure_hpa, self.vapour_gm3),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.scalars import is_number, is_one_of, plain, shown
+from raychan.scalars import is_number, is_one_of, meant, plain, shown
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Diffuse:
 
     def __post_init__(self) -> None:
         if not is_one_of(self.law, LAWS):
-            raise ValueError(f"law = {self.law!r}: must be one of {', '.join(LAWS)}")
+            raise ValueError(f"law = {self.law!r}: must be one of {', '.join(LAWS)}{meant(self.law, LAWS)}")
         for name in ("level_db", "exponent", "cross_db", "k_shape", "texture_m"):
             value = plain(getattr(self, name))
             if not ((value is None and name in _MAY_MISS) or is_number(value)):

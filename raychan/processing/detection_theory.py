@@ -43,7 +43,7 @@ class Detector:
     cfar: str | None = None
     """'ca', 'os', or None for a threshold over known noise."""
     cells: float = np.inf
-    """Effective number of independent training cells (`processing.cfar.Training.worth`)."""
+    """Effective number of independent training cells (`processing.cfar.Training.worth`), only with `cfar`."""
     min_snr_db: float = -np.inf
     """Least power over the known noise that is reported [dB]."""
 
@@ -67,6 +67,8 @@ class Detector:
             raise ValueError(f"Detector.cells = {self.cells!r}: a CFAR needs 1 to {_MOST_CELLS:g} training cells")
         if not self.cells >= 1.0:
             raise ValueError(f"Detector.cells = {self.cells!r}: must be 1 or more")
+        if self.cfar is None and self.cells <= _MOST_CELLS:
+            raise ValueError(f"Detector.cells = {self.cells!r}: only with cfar = 'ca' or 'os', which learn the noise")
 
 
 def shape_of(swerling: int, looks: int = 1) -> float:

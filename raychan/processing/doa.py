@@ -16,7 +16,7 @@ from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, capon, climb, music, peaks
 from raychan.radar.aperture import Aperture
 from raychan.radar.declared import check_type, reals
-from raychan.scalars import is_one_of, shown
+from raychan.scalars import is_one_of, meant, shown
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
@@ -68,7 +68,7 @@ def doa(
     if data.ndim != 2 or data.shape[1] != len(aperture.elements) or not len(data) or not np.isfinite(data).all():
         raise ValueError(f"snapshots: finite numbers (n, {len(aperture.elements)}) wanted, {data.shape} given")
     if not is_one_of(method, METHODS):
-        raise ValueError(f"method {shown(method)}: must be one of {', '.join(METHODS)}")
+        raise ValueError(f"method {shown(method)}: must be one of {', '.join(METHODS)}{meant(method, METHODS)}")
     if not any(aperture.scans):
         raise ValueError("elements: no spread along y or z, or along a slanted line; such an array measures no angle")
     most = len(aperture.elements) - 1

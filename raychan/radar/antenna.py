@@ -2,6 +2,7 @@
 
 Every antenna has one method, field(direction): unit vectors (n, 3) in its own frame (boresight +x, y left, z up) to
 (n, 2) complex sqrt(gain) along theta-hat (V) and phi-hat (H). Gain is power gain over an isotropic radiator, losses in.
+Those below take lists and a single direction (3,), too, as (1, 3), and refuse vectors that are not of length 1.
 """
 
 from __future__ import annotations
@@ -14,17 +15,19 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebval
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from raychan.radar.declared import check_declared, check_type, finite
+from raychan.limits import LOSS_DB
+from raychan.radar.declared import check_declared, check_type, finite, reals
 from raychan.radar.spherical_vectors import cosine_power
 from raychan.radar.windows import check_window, window
-from raychan.scalars import is_one_of, shown
+from raychan.scalars import is_one_of, meant, shown
 from raychan.units import undb
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+_NOT_UNIT = 1e-3  # of a squared length: a direction of float32 is off by 1e-6
 _LONGEST = 1000  # elements of a row, whose pattern is integrated over the sphere; not measured
 POLARIZATIONS = ("V", "H")
 
@@ -45,11 +48,27 @@ def polarized(size: NDArray[np.generic], polarization: str) -> Complexes:
     return out
 
 
+def directions(given: ArrayLike) -> Floats:
+    """Return unit directions (n, 3). Raises: ValueError for another shape or length."""
+    found = given if isinstance(given, np.ndarray) and given.dtype == np.float64 else reals("direction", given)
+    if found.ndim == 1:
+        found = found[None]
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise ValueError(f"direction of shape {found.shape}: unit vectors of shape (n, 3) are wanted")
+    square = np.einsum("nc,nc->n", found, found)
+    off = (np.abs(square - 1.0) > _NOT_UNIT) & (square > 0.0)  # a path of no length has no direction
+    if off.any():
+        row = int(np.flatnonzero(off)[0])
+        size = float(np.linalg.norm(found[row]))
+        raise ValueError(f"direction[{row}] = {found[row].tolist()}: of length 1 is wanted, not {size:g}")
+    return found
+
+
 def check(polarization: str, loss_db: float = 0.0, **positive: float) -> None:
-    """Raise ValueError on a polarisation other than V or H, a loss not finite, or another figure not positive."""
+    """Raise ValueError on a polarisation other than V or H, a loss beyond limits, or another figure not positive."""
     if not is_one_of(polarization, POLARIZATIONS):
-        raise ValueError(f"polarization = {shown(polarization)}: must be V or H")
-    finite("loss_db", loss_db)
+        raise ValueError(f"polarization = {shown(polarization)}: must be V or H{meant(polarization, POLARIZATIONS)}")
+    LOSS_DB.check("loss_db", finite("loss_db", loss_db))
     for name, value in positive.items():
         if finite(name, value) <= 0.0:
             raise ValueError(f"{name} = {value!r}: must be positive and finite")
@@ -59,7 +78,7 @@ def check(polarization: str, loss_db: float = 0.0, **positive: float) -> None:
 class IsotropicAntenna:
     """Gain 1 everywhere, or, if `front`, gain 2 ahead of the plane x = 0 and none behind.
 
-    Args: polarization V or H; front; loss_db [dB].
+    Args: polarization V or H; front; loss_db [dB], below 0 where a published gain is above this pattern's.
     """
 
     polarization: str = "V"
@@ -71,8 +90,9 @@ class IsotropicAntenna:
         check_type("front", self.front, bool)
         check_declared(IsotropicAntenna, vars(self))
 
-    def field(self, direction: Floats) -> Complexes:
+    def field(self, direction: ArrayLike) -> Complexes:
         """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
+        direction = directions(direction)
         gain = float(undb(-self.loss_db)) * (2.0 * (direction[:, 0] >= 0.0) if self.front else np.ones(len(direction)))
         return polarized(np.sqrt(gain), self.polarization)
 
@@ -100,8 +120,9 @@ class CosineAntenna:
     """A patch: gain falls as cos^p of the angle off boresight, p by the half-power widths; nothing behind.
 
     Args: hpbw_h_deg, hpbw_v_deg half-power beam widths [deg] in the horizontal and the vertical plane; polarization V
-    or H; loss_db [dB]. Between the two planes p follows the direction's angle about the boresight, so that there is no
-    seam. Raises: ValueError for widths not between 0 and 180 deg.
+    or H; loss_db [dB], below 0 where a published gain is above this pattern's. Between the two planes p follows the
+    direction's angle about the boresight, so that there is no seam.
+    Raises: ValueError for widths not between 0 and 180 deg.
     """
 
     hpbw_h_deg: float
@@ -130,9 +151,9 @@ class CosineAntenna:
         """Gain at boresight, losses in."""
         return float(undb(-self.loss_db)) / mean_over_sphere(self.shape, 1.0)
 
-    def field(self, direction: Floats) -> Complexes:
+    def field(self, direction: ArrayLike) -> Complexes:
         """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
-        return polarized(np.sqrt(self.peak_gain * self.shape(direction)), self.polarization)
+        return polarized(np.sqrt(self.peak_gain * self.shape(directions(direction))), self.polarization)
 
 
 @dataclass(frozen=True)
@@ -185,9 +206,9 @@ class ArrayAntenna:
         power = mean_over_sphere(lambda d: (np.abs(self._unscaled(d)) ** 2).sum(axis=1), extent)
         return math.sqrt(float(undb(-self.loss_db)) / power)
 
-    def field(self, direction: Floats) -> Complexes:
+    def field(self, direction: ArrayLike) -> Complexes:
         """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
-        return self._unscaled(direction) * self._scale
+        return self._unscaled(directions(direction)) * self._scale
 
 
 def mean_over_sphere(power: Callable[[Floats], Floats], extent: float) -> float:

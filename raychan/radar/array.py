@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from raychan.radar.declared import check_type, finite, reals
-from raychan.scalars import is_one_of, plain, shown
+from raychan.scalars import is_one_of, meant, plain, shown
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +51,8 @@ def offsets(name: str, given: ArrayLike) -> Floats:
 def check_multiplexing(multiplexing: str, transmitters: int, slots: int | None) -> None:
     """Raise ValueError on an unknown way to tell transmitters apart, or one that does not fit their number."""
     if not is_one_of(multiplexing, MULTIPLEXING):
-        raise ValueError(f"Radar.multiplexing = {shown(multiplexing)}: must be one of {', '.join(MULTIPLEXING)}")
+        allowed = f"must be one of {', '.join(MULTIPLEXING)}{meant(multiplexing, MULTIPLEXING)}"
+        raise ValueError(f"Radar.multiplexing = {shown(multiplexing)}: {allowed}")
     if multiplexing == "none" and transmitters > 1:
         raise ValueError(f"Radar.multiplexing = 'none': {transmitters} transmitters need 'tdm' or 'ddm'")
     if slots is None:

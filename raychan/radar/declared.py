@@ -47,11 +47,13 @@ def check_type(name: str, value: object, *wanted: type[Any], or_none: bool = Fal
         says, allows = _ALLOWED[wanted[0]]
         if not allows(value):
             raise ValueError(f"{name} = {shown(value)}: {says}")
-    elif not isinstance(value, wanted):
+    elif not isinstance(value, wanted) or (isinstance(value, type) and Callable not in wanted):
+        # A class has the methods of its objects, and would pass for one by a protocol.
         names = [_CALLED.get(x, x.__name__) for x in wanted]
         kinds = " or ".join(f"{'an' if x[0] in 'AEIOU' else 'a'} {x}" for x in names)
-        text = " ".join(shown(value).split())
-        raise ValueError(f"{name} = {text}: {kinds} is wanted{', or None' if or_none else ''}")
+        text = value.__name__ if isinstance(value, type) else " ".join(shown(value).split())
+        made = f", an object of the class, as {text}(...)" if isinstance(value, type) else ""
+        raise ValueError(f"{name} = {text}: {kinds} is wanted{', or None' if or_none else ''}{made}")
 
 
 def check_declared(kind: Any, given: dict[str, Any]) -> None:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from raychan.poses import angles, direction
-from raychan.radar.antenna import Antenna, check, polarized
+from raychan.radar.antenna import Antenna, check, directions, polarized
 from raychan.radar.declared import reals
 from raychan.units import undb
 
@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _MOST_BYTES = 100_000_000  # a grid of tenths of a degree over the sphere
+_ROUNDED = 1e-3  # rad, by which pi may be rounded in a grid
 _CUTS = ("plane", "angle_deg", "gain_dbi")
 _SPHERE = ("azimuth_deg", "elevation_deg", "gain_dbi")
 
@@ -31,7 +32,13 @@ class PatternError(ValueError):
 class MeasuredAntenna:
     """A pattern on a grid of azimuth and elevation, linear in dB between its points and constant beyond its edges.
 
-    `MeasuredAntenna.load` reads one from a CSV file. Raises: ValueError for values that cannot be.
+    Args: azimuth (a,) and elevation (e,) [rad], increasing, within +-pi and +-pi/2; gain_db (a, e) [dBi]; phase (a, e)
+    [rad]; polarization V or H. `MeasuredAntenna.load` reads one from a CSV file, in degrees.
+    Raises: ValueError for values that cannot be.
+
+    >>> grid = np.radians([-90.0, 0.0, 90.0])
+    >>> MeasuredAntenna(grid, grid, np.zeros((3, 3)), np.zeros((3, 3))).polarization
+    'V'
     """
 
     azimuth: Floats
@@ -50,9 +57,14 @@ class MeasuredAntenna:
             value = reals(f"MeasuredAntenna.{name}", getattr(self, name))
             if not np.isfinite(value).all():
                 raise ValueError(f"MeasuredAntenna.{name}: finite numbers are wanted")
+            value.flags.writeable = False
             object.__setattr__(self, name, value)
-        for name in ("azimuth", "elevation"):
+        for name, most in (("azimuth", math.pi), ("elevation", 0.5 * math.pi)):
             knots = getattr(self, name)
+            far = float(np.abs(knots).max(initial=0.0))
+            if far > most + _ROUNDED:
+                allowed = f"radians within +-{most:.4g} are wanted, as np.radians gives them of degrees"
+                raise ValueError(f"MeasuredAntenna.{name}: holds {far:.6g}; {allowed}")
             if knots.ndim != 1 or len(knots) < 2 or (np.diff(knots) <= 0.0).any():
                 raise ValueError(f"MeasuredAntenna.{name}: 2 or more angles [rad] are wanted, increasing")
         wanted = len(self.azimuth), len(self.elevation)
@@ -89,9 +101,9 @@ class MeasuredAntenna:
             f"{path}, row 1: the columns must be {', '.join(_CUTS)} or {', '.join(_SPHERE)}[, phase_deg]"
         )
 
-    def field(self, direction: Floats) -> Complexes:
+    def field(self, direction: ArrayLike) -> Complexes:
         """Return sqrt(gain) along theta-hat and phi-hat (n, 2) of unit directions (n, 3)."""
-        azimuth, elevation = angles(direction)
+        azimuth, elevation = angles(directions(direction))
         i, s = _place(self.azimuth, azimuth)
         k, t = _place(self.elevation, elevation)
         corners = [

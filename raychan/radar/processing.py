@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from raychan.radar.declared import check_declared, is_whole
-from raychan.scalars import is_one_of, plain, shown
+from raychan.scalars import is_one_of, meant, plain, shown
+
+_WORDS = {"cfar": ("ca", "os"), "beams": ("coherent", "mean"), "doa": ("bartlett", "capon", "music", "esprit")}
 
 
 @dataclass(frozen=True)
@@ -52,12 +54,11 @@ class Processing:
                 from raychan.radar.windows import check_window
 
                 check_window(f"Processing.{name}", value)
-        if not is_one_of(self.cfar, ("ca", "os")):
-            raise ValueError(f"Processing.cfar = {shown(self.cfar)}: must be 'ca' or 'os'")
-        if not is_one_of(self.beams, ("coherent", "mean")):
-            raise ValueError(f"Processing.beams = {shown(self.beams)}: must be 'coherent' or 'mean'")
-        if not is_one_of(self.doa, ("bartlett", "capon", "music", "esprit")):
-            raise ValueError(f"Processing.doa = {shown(self.doa)}: must be 'bartlett', 'capon', 'music' or 'esprit'")
+        for name, words in _WORDS.items():
+            value = getattr(self, name)
+            if not is_one_of(value, words):
+                allowed = f"{', '.join(map(repr, words[:-1]))} or {words[-1]!r}"
+                raise ValueError(f"Processing.{name} = {shown(value)}: must be {allowed}{meant(value, words)}")
         check_declared(Processing, vars(self))
         if not 0.0 < self.pfa < 1.0:
             raise ValueError(f"Processing.pfa = {self.pfa!r}: must lie between 0 and 1")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from raychan.limits import KELVIN, NOISE_DB
 from raychan.poses import rotation
 from raychan.radar.antenna import Antenna, IsotropicAntenna, Repolarized
 from raychan.radar.array import (
@@ -110,8 +111,8 @@ class Radar:
         check_declared(Radar, given)
         if power <= 0.0:
             raise ValueError(f"Radar.power = {power!r}: must be positive")
-        if noise_temperature_k < 0.0:
-            raise ValueError(f"Radar.noise_temperature_k = {noise_temperature_k!r}: must be 0 or more")
+        NOISE_DB.check("Radar.noise_figure_db", noise_figure_db)
+        KELVIN.check("Radar.noise_temperature_k", noise_temperature_k)
         if not (impairments.iq_balanced or waveform.complex_sampling):
             raise ValueError("Radar.impairments: I/Q imbalance needs I/Q sampling, and the waveform has real sampling")
         if impairments.chirp_error is not None and isinstance(waveform, OwnWaveform):

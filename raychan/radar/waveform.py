@@ -16,6 +16,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.limits import BANDWIDTH_MHZ, FREQUENCY, RAMP_US, SAMPLES, Limit
 from raychan.radar.declared import check_declared, reals
 from raychan.units import C0
 
@@ -24,6 +25,16 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 
 MOST_FOLDS = 64
 """Folds of a rate that are tested at most."""
+
+_RAMP = RAMP_US.times(1e-6, "s")
+_LIMITS = {
+    "carrier": FREQUENCY,
+    "bandwidth": BANDWIDTH_MHZ.times(1e6, "Hz"),
+    "chirp_duration": _RAMP,
+    # Every ramp of a channel: up to 64 transmitters or slots take turns.
+    "repetition": Limit(_RAMP.low, 64.0 * _RAMP.high, "s", "a ramp lasts at most a second"),
+    "n_samples": SAMPLES,
+}
 
 
 @runtime_checkable
@@ -49,7 +60,7 @@ class OwnWaveform(Protocol):
 class Waveform:
     """A frame of `n_chirps` equal linear frequency ramps, `n_samples` samples in each; SI units.
 
-    Raises: ValueError for values that cannot be, or are of another type.
+    Raises: ValueError for values that cannot be, are beyond the limits of scene files, or are of another type.
 
     >>> wave = Waveform(carrier=77e9, bandwidth=1e9, chirp_duration=25e-6)
     >>> round(wave.range_resolution, 3), round(wave.unambiguous_rate, 1)
@@ -82,9 +93,10 @@ class Waveform:
             object.__setattr__(self, "repetition", sum(self.stagger) / len(self.stagger))
         if self.repetition is None:
             object.__setattr__(self, "repetition", self.chirp_duration)
-        for name in ("carrier", "bandwidth", "chirp_duration", "repetition", "n_chirps", "n_samples"):
-            if getattr(self, name) <= 0:
-                raise ValueError(f"Waveform.{name} = {getattr(self, name)!r}: must be positive")
+        for name, limit in _LIMITS.items():
+            limit.check(f"Waveform.{name}", getattr(self, name))
+        if self.n_chirps < 1:  # a spectrogram has more than the most of a frame
+            raise ValueError(f"Waveform.n_chirps = {self.n_chirps!r}: must be 1 or more")
         if self.bandwidth >= self.carrier:
             raise ValueError(
                 f"Waveform.bandwidth = {self.bandwidth:g} Hz: must be below the carrier of {self.carrier:g} Hz"
@@ -95,6 +107,8 @@ class Waveform:
             )
 
     def _check_stagger(self) -> None:
+        for number, time in enumerate(self.stagger):
+            _RAMP.check(f"Waveform.stagger[{number}]", time)
         least = self.chirp_duration * (1.0 - 1e-9)
         if any(not (math.isfinite(t) and t >= least) for t in self.stagger):
             raise ValueError(

@@ -25,7 +25,8 @@ def range_azimuth(data: Cube | RangeDoppler, radar: Radar) -> RangeAzimuth:
     """Return the range-azimuth map of samples or of a range-Doppler map, of all range rates the strongest.
 
     Args: data, a Cube or a RangeDoppler with all receivers; radar that recorded it, with its `processing`.
-    Raises: ValueError where the radar's receivers measure no azimuth, or the data are not of this radar.
+    Raises: ValueError where the radar's receivers measure no azimuth, or samples are not as many as it
+    records, or a map is of other antennas or cells.
     """
     check_type("data", data, Cube, RangeDoppler)
     if isinstance(data, Cube):

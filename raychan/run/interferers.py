@@ -36,6 +36,23 @@ def interference(scene: Scene, geometry: Geometry, seed: int) -> NDArray[np.comp
     )
 
 
+def never_heard(scene: Scene) -> list[str]:
+    """Return a line for each interferer whose ramps all arrive before or after those of the scene's radar."""
+    said, victim = [], scene.radar
+    for one in scene.interferers:
+        wave = one.radar.waveform
+        late = float(np.linalg.norm(one.radar.position - victim.rx_place)) / C0
+        begin, frame = one.start + late, victim.waveform.frame_duration
+        end = begin + wave.frame_duration
+        if begin >= frame or end <= 0.0:
+            when = f"arrive from {begin:.4g} s on" if begin > 0.0 else f"have arrived by {end:.4g} s"
+            key = f"interferers.{one.name}.start_us, waveform.chirps"
+            said.append(
+                f"interferer '{one.name}' is not heard: its ramps {when}, the frame lasts {frame:.4g} s ({key})"
+            )
+    return said
+
+
 def interferer_paths(scene: Scene, geometry: Geometry, interferer: Interferer) -> Paths:
     """Return the paths from an interferer to the receivers of the scene's radar: straight, and over one plane mirror of
     half a square metre or more, both antennas in, with gains of the middle of the interferer's ramp and phases of its

@@ -117,9 +117,12 @@ class ExplainedDetections(Detections):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Result(Described, PlottedTwice):
-    """Everything from the paths to the detections, and where each detection came from."""
+    """Everything from the paths to the detections, and where each detection came from.
+
+    A result equals only itself, for timings differ from run to run; its records compare by their numbers.
+    """
 
     paths: Paths
     profile: Profile

@@ -12,7 +12,7 @@ from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDoppler
 from raychan.run.clock import Clock, Progress
 from raychan.run.directions import beam_to
-from raychan.run.interferers import interference
+from raychan.run.interferers import interference, never_heard
 from raychan.run.labels import Chains, chains, provenance
 from raychan.run.ledger import Entry
 from raychan.run.messages import counts, told
@@ -125,7 +125,7 @@ def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, s
     # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
     clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
     cube, said = received(quiet, paths, scene.radar, seed, others, clean)
-    return cube, said + notes(scene.radar, launched.whole, turned is not None)
+    return cube, said + notes(scene.radar, launched.whole, turned is not None) + never_heard(scene)
 
 
 def _detected(scene: Scene, channel: Channel, cube: Cube) -> Detected:

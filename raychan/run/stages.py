@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
-from raychan.records import Cube, Detections, Paths, RangeDoppler
+from raychan.records import Cube, Detections, Facets, Paths, RangeDoppler
 from raychan.run.preview import preview_noise, preview_rule
 from raychan.run.preview_launch import preview_routes
 from raychan.run.received import received
@@ -42,7 +43,7 @@ class SceneRoutes:
     """The routes of one launch over a scene: where waves go, no field yet.
 
     `geometry` of the scene at the start of a frame, `rule` by which they were pruned, the routes in `batches`, and what
-    they cost (`stats`). They serve any radar within the rule.
+    they cost (`stats`). They serve any radar within the rule, and equal only themselves.
     """
 
     geometry: Geometry
@@ -55,8 +56,23 @@ class SceneRoutes:
     def __len__(self) -> int:
         return sum(len(batch.kind) for batch in self.batches)
 
+    def __copy__(self) -> SceneRoutes:
+        return self  # nothing of it changes
+
+    def __deepcopy__(self, memo: object) -> SceneRoutes:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Embree's scene and the counts of threads stay here: what routes carry is asked of the facets alone.
+        return _again, (self.geometry.facets, self.rule, self.batches, self.stats, self.noise)
+
     def __repr__(self) -> str:
         return f"SceneRoutes({len(self):,} routes in {len(self.batches)} batches, {self.stats.rays:,} rays)"
+
+
+def _again(facets: Facets, *rest: Any) -> SceneRoutes:
+    """Return routes that were pickled."""
+    return SceneRoutes(Geometry(facets), *rest)
 
 
 def trace(
@@ -131,7 +147,8 @@ def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler
     """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`.
 
     Args: cross: of the cross-polarised receivers of a radar with `rx_polarization="both"`, else of the co-polarised.
-    Raises: ValueError for samples that are not of this radar.
+    Raises: ValueError for samples of another number of receivers, chirps or samples than the radar's. A cube knows no
+    waveform: samples of another radar of as many give a map whose ranges and rates are wrong.
     """
     check_cube(cube, radar)
     check_type("cross", cross, bool)
@@ -141,7 +158,7 @@ def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler
 def detect(rdmap: RangeDoppler, radar: Radar) -> Detections:
     """Return what the radar's detector finds in a map, by the CFAR of `radar.processing`.
 
-    Raises: ValueError for a map that is not of this radar.
+    Raises: ValueError for a map of other antennas or cells than the radar's.
     """
     check_map(rdmap, radar)
     return detections_in(rdmap, radar, radar.processing)

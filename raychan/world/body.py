@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +25,7 @@ from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
 from raychan.world.mesh_io import from_trimesh, load, oddities
 from raychan.world.motion import Motion
-from raychan.world.read_only import ReadOnly
+from raychan.world.read_only import kept, listed
 
 if TYPE_CHECKING:
     import trimesh
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
 MeshLike: TypeAlias = Union[Mesh, "trimesh.Trimesh", "trimesh.Scene", str, Path]
 """A mesh of ours, one of trimesh, or the name of a file."""
 ROLES = {role.name.lower(): role for role in Role}
-_SCALARS = ("yaw_deg", "pitch_deg", "roll_deg", "turn_rate_dps", "rcs_dbsm", "swerling", "scale", "crease_deg")
+_SCALARS = ("yaw_deg", "pitch_deg", "roll_deg", "turn_rate_dps", "swerling", "scale", "crease_deg")
+_TABLES = ("params", "materials", "position", "velocity", "spin_dps", "rcs_dbsm", "rcs_point")
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class Body:
     Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; spin_dps (3,) [deg/s] about its own axes;
     `material` for all parts or `materials` by part (patterns), a name or a Material. `rcs_dbsm` [dBsm], a number or
     (azimuth_deg, dBsm) pairs relative to its heading, makes it a point target at `rcs_point` (body frame [m]) whose
-    mesh only blocks; that RCS fluctuates by its Swerling case `swerling`, 0 to 4.
+    mesh only blocks; that RCS fluctuates by its Swerling case `swerling`, 0 to 4. Lists and arrays are taken over as
+    tuples: what becomes of the caller's later does not matter.
     """
 
     name: str
@@ -69,11 +72,13 @@ class Body:
     crease_deg: float = CREASE_DEG
 
     def __post_init__(self) -> None:
-        # The mesh is made once: a later change would have no effect.
-        if isinstance(self.params, Mapping):
-            object.__setattr__(self, "params", ReadOnly({name: plain(value) for name, value in self.params.items()}))
-        for name in _SCALARS:
-            object.__setattr__(self, name, plain(getattr(self, name)))
+        # The caller's arrays and lists may go on to the next body, and meshes are made once: a later change of what is
+        # given would move bodies of a finished scene, or have no effect.
+        for names, taken in ((_SCALARS, plain), (_TABLES, kept)):
+            for name in names:
+                object.__setattr__(self, name, taken(getattr(self, name)))
+        if not isinstance(self.mesh, Mesh | str | Path | None) and hasattr(self.mesh, "copy"):
+            object.__setattr__(self, "mesh", self.mesh.copy())
 
     @cached_property
     def geometry(self) -> Mesh:
@@ -83,7 +88,7 @@ class Body:
         try:
             if self.shape is not None:
                 try:
-                    return shapes.build(self.shape, dict(self.params))
+                    return shapes.build(self.shape, listed(self.params))
                 except SceneError as e:
                     raise e.at(key="" if e.key == "shape" else "params") from None
             if isinstance(self.mesh, Mesh):
@@ -122,7 +127,7 @@ class Body:
         """The rigid bodies 'NAME.LIMB' of which a walker or a cyclist is made; of others the body itself."""
         try:
             try:
-                skeleton = shapes.skeleton(self.shape, dict(self.params))
+                skeleton = shapes.skeleton(self.shape, listed(self.params))
             except SceneError as e:
                 raise e.at(key=f"{self.name}.params") from None
             return (
@@ -144,7 +149,9 @@ class Body:
             return self
         then = self.motion.at(time)
         yaw, pitch, roll = (float(np.degrees(a)) for a in (then.yaw, then.pitch, then.roll))
-        moved = replace(self, position=then.position, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)
+        moved = copy(self)  # `replace` would copy a mesh in memory at each instant
+        moved.__dict__.pop("limbs", None)
+        moved.__dict__.update(position=then.position, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll)
         moved.__dict__.update(geometry=self.geometry, motion=then)
         return moved
 

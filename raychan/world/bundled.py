@@ -25,6 +25,12 @@ def ship_names() -> list[str]:
     return [name for name in _all() if name.startswith("ship_")]
 
 
+def antenna_names() -> list[str]:
+    """Return the names of the bundled antennas, such as 'antennas/patch'."""
+    there = folder()
+    return sorted(f"antennas/{file.stem}" for file in (there / "antennas").glob("*.toml")) if there else []
+
+
 def _all() -> list[str]:
     there = folder()
     return sorted(file.stem for file in there.glob("*.toml")) if there else []

@@ -1,11 +1,11 @@
-"""Keys of a scene that have no effect beside others: said, as they are most often a slip."""
+"""Keys of a scene without effect beside others, or that redefine what is built in: said, as most often a slip."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
 from raychan.world.body import Body
-from raychan.world.material import Material
+from raychan.world.material import Material, names
 from raychan.world.mesh import CREASE_DEG
 from raychan.world.schema import RadarTable
 
@@ -15,10 +15,12 @@ _OF_MESHES = {"unit": "m", "up": None, "forward": None, "scale": 1.0, "crease_de
 
 def idle_keys(bodies: Iterable[Body], materials: Mapping[str, Material], radar: RadarTable | None) -> list[str]:
     """Return a line for each table of a scene that has keys without effect, each set to another value than its
-    default."""
+    default, or that redefines a built-in material."""
     said = [] if radar is None or radar.noise else _told("radar", _noise(radar), "with noise = false")
     for name, made in materials.items():
         law = made.diffuse
+        if name in names():
+            said.append(f"materials.{name}: redefines the built-in material of that name")
         if made.pec and made.diffuse is None:
             idle = [key for key, value in (("eps_r", made.eps_r - 1.0), ("sigma", made.sigma)) if value]
             said += _told(f"materials.{name}", idle, "with pec = true")

@@ -5,67 +5,20 @@ A number beyond them is a mistake (a wrong unit, a digit too many) or asks for p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
-from raychan.scalars import plain, shown
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Lowest and highest plausible value, with unit and reason; `above`: the lowest itself is not allowed."""
-
-    low: float
-    high: float
-    unit: str
-    why: str
-    above: bool = False
-
-    def allows(self, value: float) -> bool:
-        """Return whether a value lies within the limits; NaN does not."""
-        return (self.low < value if self.above else self.low <= value) and value <= self.high
-
-    @property
-    def allowed(self) -> str:
-        """What is allowed, and why, as messages say it."""
-        unit = f" {self.unit}" if self.unit else ""
-        ends = f"above {_exact(self.low)} and at most" if self.above else f"between {_exact(self.low)} and"
-        return f"{ends} {_exact(self.high)}{unit}: {self.why}"
-
-    @property
-    def text(self) -> str:
-        """The same as a clause."""
-        return f"must lie {self.allowed}"
-
-    def problem(self, value: Any, whole: bool = False) -> str:
-        """Return what is wrong with a value that should be a number (a whole one, which a float may be) within the
-        limits, or ''."""
-        number = _of_whole(plain(value)) if whole else plain(value)
-        if isinstance(number, bool) or not isinstance(number, int if whole else int | float):
-            return f"{shown(value)}: a {'whole ' if whole else ''}number is wanted; {self.text}"
-        return "" if self.allows(number) else f"{shown(value)}: {self.text}"
-
-    def check(self, name: str, value: Any, whole: bool = False) -> Any:
-        """Return a number (a whole one, as int) within the limits as Python's own. Raises: ValueError where it is
-        none."""
-        if problem := self.problem(value, whole):
-            raise ValueError(f"{name} = {problem}")
-        return _of_whole(plain(value)) if whole else plain(value)
-
-    def times(self, factor: float, unit: str) -> Limit:
-        """Return the same limits in another unit, smaller by a factor."""
-        return Limit(self.low * factor, self.high * factor, unit, self.why, self.above)
-
-
-def _of_whole(value: Any) -> Any:
-    """Return a float that is a whole number as int, anything else as it is."""
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _exact(value: float) -> str:
-    """Return a number in short form; a whole one with all digits where the short form is another number."""
-    return f"{value:,}" if isinstance(value, int) and float(f"{value:g}") != value else f"{value:g}"
-
+from raychan.limits import BANDWIDTH_MHZ as BANDWIDTH_MHZ
+from raychan.limits import CARRIER_GHZ as CARRIER_GHZ
+from raychan.limits import CELSIUS as CELSIUS
+from raychan.limits import FOG_GM3 as FOG_GM3
+from raychan.limits import FREQUENCY as FREQUENCY
+from raychan.limits import KELVIN as KELVIN
+from raychan.limits import LOSS_DB as LOSS_DB
+from raychan.limits import NOISE_DB as NOISE_DB
+from raychan.limits import PRESSURE_HPA as PRESSURE_HPA
+from raychan.limits import RAIN_MMH as RAIN_MMH
+from raychan.limits import RAMP_US as RAMP_US
+from raychan.limits import SAMPLES as SAMPLES
+from raychan.limits import VAPOUR_GM3 as VAPOUR_GM3
+from raychan.limits import Limit as Limit
 
 LENGTH = Limit(0.0, 1e6, "m", "a scene is no wider than a radar's horizon", above=True)
 PLACE = Limit(-1e6, 1e6, "m", "a scene is no wider than a radar's horizon; count from an origin near it")
@@ -82,18 +35,11 @@ CREASE = Limit(0.0, 180.0, "deg", "faces fold by at most half a turn")
 BEAM = Limit(0.1, 360.0, "deg", "no antenna of a vehicle or ship has a narrower beam")
 TURN = Limit(-1e7, 1e7, "deg/s", "no rotor turns faster than 1.6 million times a minute")
 
-FREQUENCY = Limit(1e8, 1e12, "Hz", "below, bodies are no longer large in wavelengths; above, surfaces no longer smooth")
-CARRIER_GHZ = FREQUENCY.times(1e-9, "GHz")
-BANDWIDTH_MHZ = Limit(1e-3, 1e6, "MHz", "a range cell from 0.15 mm to 150 km; it must also be below the carrier")
-RAMP_US = Limit(1e-3, 1e6, "us", "a ramp lasts between a nanosecond and a second")
 CHIRPS = Limit(1, 1 << 20, "", "no radar's frame has more ramps")
-SAMPLES = Limit(1, 1 << 20, "", "no radar samples a ramp more often")
 PAD = Limit(1, 64, "", "1 pads nothing; more than 64 only draws the same map finer")
 CELLS = Limit(0, 1000, "cells", "cells on each side of the one under test")
 
 POWER_DBM = Limit(-100.0, 100.0, "dBm", "from less than a receiver's noise to ten megawatts")
-NOISE_DB = Limit(0.0, 60.0, "dB", "no receiver is quieter than 290 K noise in, nor useful above 60 dB")
-KELVIN = Limit(0.0, 1e5, "K", "what an antenna sees: 3 K of cold sky, 290 K of ground, more of the sun or a jammer")
 INSTANT_US = Limit(-1e6, 1e6, "us", "a ramp lasts at most a second")
 START_US = Limit(-1e7, 1e7, "us", "ten seconds are more than any frame")
 DEVIATION_KHZ = Limit(-1e8, 1e8, "kHz", "a ramp that errs by more than 100 GHz is another ramp")
@@ -101,14 +47,8 @@ OFFSET_HZ = Limit(0.0, 1e12, "Hz", "an offset from the carrier", above=True)
 DBC_HZ = Limit(-250.0, 0.0, "dBc/Hz", "below, quantum noise is higher; above, noise is above the carrier")
 IMBALANCE_DB = Limit(-20.0, 20.0, "dB", "beyond, a mixer has one branch")
 BITS = Limit(1, 24, "", "converters of more bits are not made")
-CELSIUS = Limit(-100.0, 100.0, "deg C", "the air of this planet; is it kelvin?")
-PRESSURE_HPA = Limit(0.0, 1100.0, "hPa", "the air of this planet; 1013 at sea level, 0 in vacuum; is it Pa?")
-VAPOUR_GM3 = Limit(0.0, 100.0, "g/m3", "7.5 in the reference air, 17 in saturated air of 20 deg C")
-RAIN_MMH = Limit(0.0, 400.0, "mm/h", "2 is light rain, 10 heavy, 100 a cloudburst; the heaviest minutes reach 400")
-FOG_GM3 = Limit(0.0, 5.0, "g/m3", "0.05 where one sees 300 m, 0.5 where one sees 50 m")
 RCS_DBSM = Limit(-100.0, 100.0, "dBsm", "from a grain of dust to more than any ship seen broadside")
 GAIN_DBI = Limit(-60.0, 80.0, "dBi", "from leakage to the largest dishes")
-LOSS_DB = Limit(-60.0, 100.0, "dB", "above, an antenna radiates nothing; below 0, it corrects a published gain")
 LEVEL_DB = Limit(-400.0, 400.0, "dB", "levels beyond are not physical")
 WAVELENGTHS = Limit(0.01, 100.0, "wavelengths", "closer elements couple; farther ones make no array")
 ELEMENTS = Limit(1, 256, "", "a row of at most 256 elements")

@@ -23,6 +23,7 @@ _WORK = 1_000_000  # most facets times points: bounds the time (not measured)
 _DEPTH = 1e-3  # m: bodies that only touch, within rounding, do not overlap
 _INSIDE = 0.75  # winding number: 1 inside a closed body, 1/2 on its surface, 0 outside
 _SAME = 0.75  # share of each surface inside the other: two equal boxes have it up to a tenth of their length apart
+_CROSSED = 1e-9  # of a whole wave: what rounding leaves of crossed ones
 _BEAM = 1e-6  # of the two-way peak gain, -60 dB: below, a body is outside the beam
 
 
@@ -129,6 +130,8 @@ def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
         return ["no body is in view: the scene has none but ground and the radar's own car (bodies)"]
     if unseen not in radar.kept:
         radar.kept[unseen] = float(np.max(_two_way(radar, _around() @ radar.axes.T)))
+    if lost := _cross_polarized(things, radar):
+        return lost
     peak, limit = radar.kept[unseen], radar.waveform.unambiguous_range
     gain, nearest, ahead = 0.0, np.inf, False
     for body in things:
@@ -148,6 +151,24 @@ def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
     if nearest > limit:
         return [f"no body is within the unambiguous range of {limit:.4g} m (radar.waveform.samples, bandwidth_mhz)"]
     return []
+
+
+def _cross_polarized(things: Sequence[Body], radar: Any) -> list[str]:
+    """Return a line where all bodies are point targets, which keep the polarisation, and the receivers hear none of
+    what is sent."""
+    if radar.rx_polarization == "both" or radar.rx_position is not None or any(b.rcs_dbsm is None for b in things):
+        return []
+    way = np.array([b.motion.to_world(b.target_point()) for b in things]) - radar.position
+    far = np.linalg.norm(way, axis=1)
+    look = way[far > 0.0] / far[far > 0.0, None]
+    sent, heard = radar.tx_field(look), radar.rx_field(look)
+    whole = np.linalg.norm(sent, axis=1) * np.linalg.norm(heard, axis=1)
+    if not whole.any() or (np.abs(np.einsum("nc,nc->n", sent, heard)) > _CROSSED * whole).any():
+        return []
+    return [
+        "no body is heard: receivers are cross-polarised to the transmitter, and targets given by rcs_dbsm return the "
+        "polarisation that they meet (radar.rx_polarization, radar.polarization)"
+    ]
 
 
 def _two_way(radar: Any, look: Floats) -> Floats:

@@ -137,8 +137,13 @@ def antenna_table(given: str | AntennaTable, folder: Path, key: str, file: Any =
     except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
         # Beside a scene lie scenes; by custom the antennas have a folder of their own.
         beside = (folder / "antennas" if path.parent == folder else path.parent).glob("*.toml")
-        found = [p.relative_to(folder).as_posix() for p in beside]
-        allowed = nearest(given, found) if found else "a table, or a TOML file by its path from the scene file"
+        found = [p.relative_to(folder).as_posix() for p in beside] + bundled.antenna_names()
+        named = [name for name in found if Path(name).stem == Path(given).stem]
+        allowed = (
+            nearest(named[0] if named else given, found)
+            if found
+            else "a table, or a TOML file by its path from the scene file"
+        )
         raise SceneError(f"no antenna file {path}", file=file, key=key, value=given, allowed=allowed) from None
     except (OSError, UnicodeDecodeError) as e:
         reason = getattr(e, "strerror", None) or e

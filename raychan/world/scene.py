@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from copy import copy
+from copy import copy, deepcopy
 from dataclasses import replace
 from functools import cached_property
 from operator import is_
@@ -118,12 +118,12 @@ class Scene(Fixed, Described):
     @classmethod
     def from_text(cls, text: str, path: str | Path | None = None) -> Scene:
         """Return the scene of TOML text; `path` is where it came from."""
-        return cls.from_dict(overrides.parsed(text, path), path, text)
+        return cls._of(overrides.parsed(text, path), path, text)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, object], path: str | Path | None = None, text: str = "") -> Scene:
         """Return the scene of tables as they stand in a scene file."""
-        return cls._of(data, path, text)
+        return cls._of(deepcopy(data), path, text)
 
     @classmethod
     def _of(cls, data: Mapping[str, object], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:

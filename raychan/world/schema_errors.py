@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from raychan.scalars import tabled
+from raychan.scalars import meant, tabled
 from raychan.world.errors import SceneError, nearest, shown
 
 
@@ -56,6 +57,8 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
     # A key that takes several types has an error for each.
     alike = [e for e in ranked if len(e["loc"]) == len(loc) and _dotted(e["loc"], data, False) == key]
     allowed = " or ".join(dict.fromkeys(map(_allowed, alike)))
+    if len(alike) == 1 and found["type"] == "literal_error":
+        allowed += meant(value, re.findall("'(.*?)'", found["ctx"]["expected"]))
     return SceneError(f"{shown(value)} is not possible", file=file, key=key, value=value, allowed=allowed)
 
 

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2] / "raychan"
 STOREYS = (
     ("crew",),
     ("units", "scalars", "parallel", "compile"),
-    ("poses", "reprs", "kinds", "vectors"),
+    ("poses", "reprs", "kinds", "vectors", "limits"),
     ("columns",),
     ("records",),
     ("em", "geometry"),

@@ -128,6 +128,7 @@ def test_the_factor_of_many_training_cells_continues_that_of_fewer():
             for cfar in ("ca", "os")
         ),
         ({"cells": np.array([1, 2])}, "Detector.cells = array.*: a number is wanted"),
+        ({"cells": 16}, "Detector.cells = 16.0: only with cfar = 'ca' or 'os', which learn the noise"),
         ({"cells": 10**400}, "Detector.cells = 1000.*: a number is wanted"),
         ({"min_snr_db": 2**70}, "Detector.min_snr_db = 1.18.*e.21: must be a number, at most 300 dB"),
         ({"looks": 10**7}, "Detector.looks = 10000000: must be a whole number from 1 on, to 1,000,000"),

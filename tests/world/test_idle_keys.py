@@ -60,3 +60,11 @@ def test_objects_from_python_are_told_alike():
     quiet = rc.Scene(radar=rc.Radar(wave, noise=False, noise_figure_db=9.0))
     assert idle(quiet) == ["radar: noise_figure_db has no effect with noise = false"]
     assert idle(rc.Scene(radar=rc.Radar(wave, noise=False))) == []
+
+
+@pytest.mark.parametrize("name", ["pec", "concrete", "asphalt", "car_glass"])
+def test_a_material_that_redefines_a_built_in_one_is_told(name):
+    said = f"materials.{name}: redefines the built-in material of that name"
+    assert said in rc.Scene.from_text(PLATE.replace("[radar]", f"[materials.{name}]\neps_r = 3\n[radar]")).warnings
+    own = rc.Scene.from_text(PLATE.replace("[radar]", "[materials.my_pec]\neps_r = 3\n[radar]"))
+    assert not any("redefines" in line for line in own.warnings)
