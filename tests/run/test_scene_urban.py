@@ -88,8 +88,7 @@ def test_ground_below_returns_what_its_image_sends_times_the_arrays_gain_down_sq
     # A positive pitch looks down.
     off = math.radians(90.0 - pitch)
     gain = float((np.abs(radar.tx.field(np.array([[math.cos(off), 0.0, -math.sin(off)]]))) ** 2).sum())
-    carrier = radar.waveform.carrier
-    root = np.sqrt(5.0 - 2.0j / (2.0 * math.pi * carrier * EPS0))
+    root = np.sqrt(5.0 - 2.0j / (2.0 * math.pi * radar.waveform.middle * EPS0))
     reflected = abs((1.0 - root) / (1.0 + root))
     wanted = (gain * C0 / radar.waveform.middle / (4.0 * math.pi * 2.0 * height) * reflected) ** 2
     got = float((np.abs(simulate(scene, seed=0).paths.amplitude) ** 2).sum())
