@@ -54,6 +54,8 @@ class Found:
 class Peaks(Found):
     """Peaks of a map before their directions are known."""
 
+    shown: Floats
+    """(n,) [W] power in their cells, `power` is that between cells"""
     least: Floats
     """(n,) [W] power below which a beam is noise"""
     smear: Floats
@@ -107,7 +109,7 @@ class Splitter:
         kept: list[Row] = []
         for i in range(len(peaks.cells)):
             beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
-            clear = self._clear(float(peaks.power[i]), peaks.place[i], kept, peaks, beams)
+            clear = self._clear(float(peaks.shown[i]), peaks.place[i], kept, peaks, beams)
             if not (clear and self.lines.own(peaks.cells[i])):
                 continue
             v, r = peaks.cells[i]
@@ -162,7 +164,8 @@ class Splitter:
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
         row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)
         beams = partial(held.weights.__getitem__, slice(k, k + 1))
-        return row if k == 0 or self._clear(row.power, cell + shift[0], kept, peaks, beams) else None
+        shown = float(level[at[0], at[1]])
+        return row if k == 0 or self._clear(shown, cell + shift[0], kept, peaks, beams) else None
 
     def _same(self, one: Row, other: Row) -> bool:
         """Return whether echoes of neighbouring peaks are one."""

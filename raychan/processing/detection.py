@@ -137,15 +137,15 @@ def detect(
     cells, shift = cells[strong], shift[strong]
     power, noise, local = power[strong], noise[strong], local[strong]
 
-    lobes = SideLobes(grid, windows)
+    lobes, shown = SideLobes(grid, windows), seen.power[tuple(cells.T)]
     smear = _smear(map, grid, cells + shift, waveform)
     lines = LineLobes(seen, lobes, grid.pad, _smear(map, grid, np.arange(len(map.rate))[:, None], waveform))
     if aperture is None or bank is None:
-        kept = lobes.own((cells + shift) / np.array(grid.pad), power, smear)
+        kept = lobes.own((cells + shift) / np.array(grid.pad), power, smear, shown)
         kept[kept] = [lines.own(cell) for cell in cells[kept]]
         return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
     towards = bank.directions[bank.towards(map.spectrum, cells)]
-    peaks = Peaks(cells, shift, power, noise, bar.of_beam(bank, local, pfa), smear, towards)
+    peaks = Peaks(cells, shift, power, noise, shown, bar.of_beam(bank, local, pfa), smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db

@@ -49,14 +49,15 @@ class SideLobes:
             response = response * envelope(np.maximum(away - 0.5 * smear - _SLACK, 0.0))
         return np.maximum(response, _FLOOR * power)
 
-    def own(self, place: Floats, power: Floats, smear: Floats) -> NDArray[np.bool_]:
+    def own(self, place: Floats, power: Floats, smear: Floats, shown: Floats | None = None) -> NDArray[np.bool_]:
         """Return which peaks (n,), strongest first, are not explained by side lobes of stronger ones.
 
-        Args: place (n, 2) and smear (n,) in resolution cells."""
-        lobes = np.zeros(len(power))
+        Args: place (n, 2) and smear (n,) in resolution cells; power (n,) [W] between the cells of the map; shown (n,)
+        [W] in them, if that is another: a side lobe between cells is not stronger by what a main lobe would be."""
+        lobes, shown = np.zeros(len(power)), power if shown is None else shown
         kept = np.zeros(len(power), bool)
         for i in range(len(power)):
-            kept[i] = power[i] > MARGIN * lobes[i]
+            kept[i] = shown[i] > MARGIN * lobes[i]
             if kept[i]:
                 lobes[i:] += self.at(place[i:], place[i], power[i], smear[i])
         return kept
