@@ -79,8 +79,8 @@ class PeakShape:
     """The main lobes of a map along rate and range."""
 
     def __init__(self, windows: tuple[str, str], samples: tuple[int, int], grid: Grid, skew: float = 0.0) -> None:
-        """Args: windows, and how many samples they have; skew, range cells by which an echo lies lower in the next row of
-        a map, per rate cell: rows are freed of their own Doppler shifts."""
+        """Args: windows, and how many samples they have; skew, range cells by which an echo lies lower in the next row
+        of a map, per rate cell: rows are freed of their own Doppler shifts."""
         given = zip(windows, samples, grid.pad, strict=True)
         self.lobes = [_main_lobe(name, n, pad) for name, n, pad in given]
         self._skew = skew * grid.pad[1] / grid.pad[0]
