@@ -14,6 +14,7 @@ from raychan.processing.cfar import Grid
 from raychan.processing.line_lobes import LineLobes
 from raychan.processing.main_lobe import PeakShape
 from raychan.processing.peaks import MARGIN, SideLobes
+from raychan.processing.staggered import ResolvedMap
 from raychan.records import RangeDoppler
 
 Floats = NDArray[np.float64]
@@ -132,15 +133,23 @@ class Splitter:
         pad = np.array(self.grid.pad)
         at = np.array([row.cell + row.shift for row in kept]) / pad
         smear = peaks.smear[[row.peak for row in kept]]
-        shown = MARGIN * self.lobes.at(place / pad, at, np.array([row.power for row in kept]), smear)
-        if beams is None or power > shown.sum():
-            return bool(power > shown.sum())
+        powers = np.array([row.power for row in kept])
+        shown, rest = MARGIN * self.lobes.at(place / pad, at, powers, smear), 0.0
+        if self.lobes.mirrors:
+            # A mirror image is no plane wave to several transmitters: it counts as if all beams let it through.
+            rest = MARGIN * float(self.lobes.of_images(place / pad, at, powers, smear).sum())
+        if beams is None or power > rest + shown.sum():
+            return bool(power > rest + shown.sum())
         # Echoes that all beams let through would matter little: they count as if they did.
         some = [kept[k] for k in np.flatnonzero(shown > _LITTLE * power)]
-        rest = float(shown[shown <= _LITTLE * power].sum())
+        rest += float(shown[shown <= _LITTLE * power].sum())
         distances = self.map.range[[row.cell[1] for row in some]]
         through = self.scan.through(beams(), np.array([row.direction for row in some]).reshape(-1, 2), distances)
         through = np.maximum(through, [row.misfit for row in some])
+        if isinstance(self.map, ResolvedMap):
+            # Under another fold an echo is no plane wave.
+            fold, cell = self.map.fold, np.rint(place).astype(np.int64) % self.map.power.shape
+            through[[fold[tuple(row.cell)] != fold[tuple(cell)] for row in some]] = 1.0
         return bool(power > rest + float(shown[shown > _LITTLE * power] @ through))
 
     def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int, kept: list[Row]) -> Row | None:

@@ -4,7 +4,6 @@ interpolation, and the echoes that an array tells apart within them."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, Stron
 from raychan.processing.line_lobes import LineLobes
 from raychan.processing.main_lobe import PeakShape
 from raychan.processing.peaks import SideLobes
+from raychan.processing.staggered import ResolvedMap
 from raychan.radar.aperture import Aperture
 from raychan.radar.waveform import Waveform
 from raychan.records import Detections, RangeDoppler
@@ -137,19 +137,19 @@ def detect(
     cells, shift = cells[strong], shift[strong]
     power, noise, local = power[strong], noise[strong], local[strong]
 
-    lobes, shown = SideLobes(grid, windows), seen.power[tuple(cells.T)]
-    smear = _smear(map, grid, cells + shift, waveform)
-    lines = LineLobes(seen, lobes, grid.pad, _smear(map, grid, np.arange(len(map.rate))[:, None], waveform))
+    lobes, shown = SideLobes.of(grid, windows, waveform, chirps), seen.power[tuple(cells.T)]
+    smears = _smears(map, waveform)
+    smear, lines = smears[tuple(cells.T)], LineLobes(seen, SideLobes(grid, windows, chirps), grid.pad, smears)
     if aperture is None or bank is None:
-        kept = lobes.own((cells + shift) / np.array(grid.pad), power, smear, shown)
-        kept[kept] = [lines.own(cell) for cell in cells[kept]]
-        return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
+        place = (cells + shift) / np.array(grid.pad)
+        kept = lobes.own(place, power, smear, shown, besides=lambda i: lines.own(cells[i]))
+        return _reported(map, grid, shape, Found(cells, shift, power, noise).take(kept), ego_speed)
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, shown, bar.of_beam(bank, local, pfa), smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
-    return _reported(map, grid, echoes.take(loud), ego_speed, aperture)
+    return _reported(map, grid, shape, echoes.take(loud), ego_speed, aperture)
 
 
 def least_power(
@@ -199,24 +199,34 @@ def _rate(map: RangeDoppler, grid: Grid, place: Floats) -> Floats:
     return np.where(np.abs(rate) <= limit, rate, (rate + limit) % (2.0 * limit) - limit)
 
 
-def _smear(map: RangeDoppler, grid: Grid, place: Any, waveform: Waveform | None) -> Floats:
-    """Return the range cells (n,) over which echoes at places (n, 1 or 2) in map cells migrate during the frame."""
+def _smears(map: RangeDoppler, waveform: Waveform | None) -> Floats:
+    """Return the range cells (v, r) over which echoes in map cells migrate during the frame, by their true rates where
+    the map knows how they fold."""
+    rate: Floats = map.rate[:, None]
+    if isinstance(map, ResolvedMap):
+        rate = rate + 2.0 * map.unambiguous_rate * map.fold
     duration = waveform.frame_duration if waveform else 0.0
-    return np.abs(_rate(map, grid, place)) * duration / map.range_resolution
+    return np.broadcast_to(np.abs(rate) * (duration / map.range_resolution), map.power.shape)
 
 
 def _reported(
-    map: RangeDoppler, grid: Grid, found: Found, ego_speed: float, aperture: Aperture | None = None
+    map: RangeDoppler,
+    grid: Grid,
+    shape: PeakShape,
+    found: Found,
+    ego_speed: float,
+    aperture: Aperture | None = None,
 ) -> Detections:
     """Return what is found as detections; with an aperture, of echoes with their directions."""
-    rate = _rate(map, grid, found.place)
+    place = shape.within(found.place, map.power.shape)
+    rate = _rate(map, grid, place)
     angles = np.full((2, len(rate)), np.nan)
     ambiguous = np.zeros(len(rate), bool)
     if aperture is not None and isinstance(found, Echoes):
         angles = np.array(aperture.angles(found.direction))
         ambiguous = aperture.ambiguous(found.direction)
     return Detections(
-        range=map.range[0] + found.place[:, 1] * (map.range_resolution / grid.pad[1]),
+        range=map.range[0] + place[:, 1] * (map.range_resolution / grid.pad[1]),
         rate=rate,
         speed=rate + ego_speed,
         azimuth=angles[0],

@@ -26,13 +26,13 @@ class LineLobes:
     lobes: SideLobes
     pad: tuple[int, int]
     smear: Floats
-    """(v,) resolution cells over which a mover migrates, by row"""
+    """(v, r) resolution cells over which a mover migrates, by cell"""
 
     def own(self, cell: Ints) -> bool:
         """Return whether a peak (2,) is more than the side lobes of what is stronger along its column and its row."""
         column, row = self.seen.lines(cell)
-        across = np.full(len(row), self.smear[cell[0]])
-        return self._own(column, int(cell[0]), 0, self.smear) and self._own(row, int(cell[1]), 1, across)
+        v, r = map(int, cell)
+        return self._own(column, v, 0, self.smear[:, r]) and self._own(row, r, 1, self.smear[v])
 
     def _own(self, line: Floats, at: int, axis: int, smear: Floats) -> bool:
         top = np.flatnonzero((line > line[at]) & (line >= np.roll(line, 1)) & (line >= np.roll(line, -1)))

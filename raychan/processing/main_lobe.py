@@ -78,12 +78,15 @@ class MainLobe:
 class PeakShape:
     """The main lobes of a map along rate and range."""
 
-    def __init__(self, windows: tuple[str, str], samples: tuple[int, int], grid: Grid, skew: float = 0.0) -> None:
+    def __init__(
+        self, windows: tuple[str, str], samples: tuple[int, int], grid: Grid, skew: float = 0.0, wraps: bool = False
+    ) -> None:
         """Args: windows, and how many samples they have; skew, range cells by which an echo lies lower in the next row
-        of a map, per rate cell: rows are freed of their own Doppler shifts."""
+        of a map, per rate cell: rows are freed of their own Doppler shifts; wraps, whether the last range cell is
+        beside the first."""
         given = zip(windows, samples, grid.pad, strict=True)
         self.lobes = [_main_lobe(name, n, pad) for name, n, pad in given]
-        self._skew = skew * grid.pad[1] / grid.pad[0]
+        self._skew, self._wraps = skew * grid.pad[1] / grid.pad[0], wraps
 
     @classmethod
     def of(cls, grid: Grid, windows: tuple[str, str], waveform: Waveform | None, chirps: int | None) -> PeakShape:
@@ -94,7 +97,12 @@ class PeakShape:
         if isinstance(waveform, OwnWaveform):
             # Its compression has no window's response: one sample has none, and the parabola stays.
             return cls((windows[0], "rect"), (rates, 1), grid)
-        return cls(windows, (rates, waveform.n_samples), grid, waveform.chirp_duration / waveform.frame_duration)
+        skew = waveform.chirp_duration / waveform.frame_duration
+        return cls(windows, (rates, waveform.n_samples), grid, skew, waveform.complex_sampling)
+
+    def within(self, place: Floats, shape: tuple[int, ...]) -> Floats:
+        """Return places (n, 2) in map cells with ranges that are on the axis."""
+        return np.stack([place[:, 0], place[:, 1] % shape[1] if self._wraps else place[:, 1]], axis=1)
 
     def refine(self, power: Floats, cells: Ints) -> tuple[Floats, Floats]:
         """Return the offsets (c, 2) in cells and the power (c,) of the peaks at map cells (c, 2)."""
@@ -105,7 +113,7 @@ class PeakShape:
         """Return what `refine` does, from the powers (c,) of cells and of those below and above (axis, 2, c)."""
         top, (rate, reach) = np.log(np.maximum(top, _TINY)), np.log(np.maximum(around, _TINY))
         shift, gain = np.zeros(cells.shape), np.zeros(len(cells))
-        inner = (cells[:, 1] > 0) & (cells[:, 1] < shape[1] - 1) & (shape[1] > 2)
+        inner = ((cells[:, 1] > 0) & (cells[:, 1] < shape[1] - 1) | self._wraps) & (shape[1] > 2)
         shift[inner, 1], gain[inner] = self.lobes[1].between(reach[0, inner], top[inner], reach[1, inner])
         if shape[0] > 2:
             here = self.lobes[1](shift[:, 1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.cfar import Grid
 from raychan.radar.side_lobes import SideLobeEnvelope
+from raychan.radar.waveform import OwnWaveform, Waveform
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -33,33 +35,75 @@ def maxima(power: Floats, least: float) -> Ints:
 class SideLobes:
     """How much peaks show elsewhere in a map, by the side lobes of its windows, named (rate, range)."""
 
-    def __init__(self, grid: Grid, windows: tuple[str, str]) -> None:
-        self.count = grid.count
-        self._envelopes = [SideLobeEnvelope(name, n) for name, n in zip(windows, grid.count, strict=True)]
+    def __init__(
+        self,
+        grid: Grid,
+        windows: tuple[str, str],
+        chirps: int | None = None,
+        mirrors: bool = False,
+        skew: float = 0.0,
+    ) -> None:
+        """Args: chirps that the window along rate weighs, where they are not the map's resolution cells but a multiple
+        of them: by Doppler division a map has a share of the rates; mirrors, whether echoes have images at minus their
+        range and minus their rate, as with real sampling, of which a map has half the ranges; skew, range cells by
+        which an echo lies lower in the next rate cell, as rows are freed of their own Doppler shifts."""
+        rates, ranges = grid.count
+        weighed = chirps if chirps and chirps % rates == 0 else rates
+        samples = ranges * (2 if mirrors else 1)
+        self.mirrors, self._period, self._skew = mirrors, (rates, samples), skew
+        self._standing = (rates * grid.pad[0] // 2) / grid.pad[0]
+        self._envelopes = SideLobeEnvelope(windows[0], weighed, weighed // rates), SideLobeEnvelope(windows[1], samples)
+
+    @classmethod
+    def of(cls, grid: Grid, windows: tuple[str, str], waveform: Waveform | None, chirps: int | None) -> SideLobes:
+        """Return the side lobes in a map; args as for `detection.detect`."""
+        if waveform is None or isinstance(waveform, OwnWaveform):
+            return cls(grid, windows, chirps)
+        skew = waveform.chirp_duration / waveform.frame_duration
+        return cls(grid, windows, chirps, not waveform.complex_sampling, skew)
 
     def at(self, places: Floats, place: Floats, power: Any, smear: Any) -> Floats:
-        """Return what peaks at `place` show at `places`, (n, 2) or (2,) each, all in resolution cells.
+        """Return what peaks at `place` show at `places`, (n, 2) or (2,) each, all in resolution cells, but for what
+        their mirror images show.
 
         Args: power [W] and smear of the peaks: range cells over which an echo migrates; it spreads over as many rate
         cells."""
+        off = places - place
+        # Round the end of the rates, too, a row is freed of the shift of its own rate.
+        both = off[..., 0], off[..., 1] + self._skew * off[..., 0]
         response = power
-        for axis, envelope in enumerate(self._envelopes):
-            away = np.abs(places[..., axis] - place[..., axis])
-            away = np.minimum(away, self.count[axis] - away)
+        for away, envelope, period in zip(both, self._envelopes, self._period, strict=True):
+            away = np.abs(away) % period
+            away = np.minimum(away, period - away)
             response = response * envelope(np.maximum(away - 0.5 * smear - _SLACK, 0.0))
         return np.maximum(response, _FLOOR * power)
 
-    def own(self, place: Floats, power: Floats, smear: Floats, shown: Floats | None = None) -> NDArray[np.bool_]:
-        """Return which peaks (n,), strongest first, are not explained by side lobes of stronger ones.
+    def of_images(self, places: Floats, place: Floats, power: Any, smear: Any) -> Floats:
+        """Return what the mirror images of peaks show; args as for `at`."""
+        return self.at(places, np.array([2.0 * self._standing, 0.0]) - place, power, smear)
+
+    def own(
+        self,
+        place: Floats,
+        power: Floats,
+        smear: Floats,
+        shown: Floats | None = None,
+        besides: Callable[[int], bool] = lambda i: True,
+    ) -> NDArray[np.bool_]:
+        """Return which peaks (n,), strongest first, are not explained by side lobes of stronger ones, or of their
+        mirror images.
 
         Args: place (n, 2) and smear (n,) in resolution cells; power (n,) [W] between the cells of the map; shown (n,)
-        [W] in them, if that is another: a side lobe between cells is not stronger by what a main lobe would be."""
+        [W] in them, if that is another: a side lobe between cells is not stronger by what a main lobe would be;
+        besides, what else a peak must meet to count, by its row."""
         lobes, shown = np.zeros(len(power)), power if shown is None else shown
         kept = np.zeros(len(power), bool)
         for i in range(len(power)):
-            kept[i] = shown[i] > MARGIN * lobes[i]
+            kept[i] = shown[i] > MARGIN * lobes[i] and besides(i)
             if kept[i]:
                 lobes[i:] += self.at(place[i:], place[i], power[i], smear[i])
+                if self.mirrors:
+                    lobes[i:] += self.of_images(place[i:], place[i], power[i], smear[i])
         return kept
 
     def shoulders(self, power: Floats, pad: tuple[int, int], peaks: Ints, cells: Ints) -> tuple[Ints, Floats]:

@@ -163,11 +163,12 @@ def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:
     if not isinstance(map, ResolvedMap) or not len(found.rate):
         return found
     span, (rows, columns) = 2.0 * map.unambiguous_rate, found.cell.T
-    # A peak between two cells may lie beyond the end of the axis that its own cell is on.
-    folds = map.fold[rows, columns] + np.rint((map.rate[rows] - found.rate) / span)
+    # A peak between two cells may lie beyond the end of the axis that its own cell is on; that cell's shift is undone.
+    beyond = np.rint((map.rate[rows] - found.rate) / span)
+    folds = map.fold[rows, columns] + beyond
     # Folds as many as are tested apart look alike.
     tested = hypotheses(radar)
     folds -= tested * np.rint((found.rate + span * folds) / (span * tested))
-    more, waveform = span * folds, radar.waveform
-    shift = 0.0 if isinstance(waveform, OwnWaveform) else more * waveform.middle / waveform.slope
+    more, left, waveform = span * folds, span * (folds - beyond), radar.waveform
+    shift = 0.0 if isinstance(waveform, OwnWaveform) else left * waveform.middle / waveform.slope
     return found.replace(rate=found.rate + more, speed=found.speed + more, range=found.range - shift)

@@ -15,10 +15,12 @@ _FINE = 16  # points per resolution cell
 class SideLobeEnvelope:
     """Least falling bound of a window's power response, 1 at the peak; offsets in resolution cells."""
 
-    def __init__(self, name: str, n: int) -> None:
+    def __init__(self, name: str, n: int, slots: int = 1) -> None:
+        """Args: window by name, of n samples; slots, parts of its period that fall on each other, as those of the
+        transmitters do by Doppler division: what they leak adds up as amplitudes."""
         taper = window(name, n)
-        half = n * _FINE // 2 + 1
-        response = np.abs(np.fft.rfft(taper / taper.sum(), n * _FINE))[:half] ** 2
+        period = np.abs(np.fft.fft(taper / taper.sum(), n * _FINE)).reshape(slots, -1).sum(axis=0)
+        response = period[: len(period) // 2 + 1] ** 2
         self.table: Floats = np.maximum.accumulate(response[::-1])[::-1]
 
     def __call__(self, cells: Floats) -> Floats:

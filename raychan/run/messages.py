@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from raychan.processing.staggered import ResolvedMap
+from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import Entry
+from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses
 from raychan.run.result import ExplainedDetections, Result
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry
@@ -33,8 +35,11 @@ def counts(found: ExplainedDetections, tolerance_db: float | None) -> dict[str, 
     }
 
 
-def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler) -> list[str]:
-    """Return a line if detections are not converged, and one if some are folded."""
+def warned(
+    found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, radar: Radar | None = None
+) -> list[str]:
+    """Return a line if detections are not converged, and one if some are folded, or ambiguous in direction, or lose by
+    what the receiver of a radar makes of them."""
     said = []
     if (~found.converged).any():
         verb = _verb(~found.converged)
@@ -65,6 +70,27 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
             "elements stand more than half a wavelength apart, so a grating lobe shows another direction alike; the "
             "one nearest boresight is given"
         )
+    return said if radar is None else said + lost(found, radar)
+
+
+def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
+    """Return a line if detections lose by spherical waves in a beam, and one if some do by migration over range
+    cells."""
+    said = []
+    loss = near_field_losses(found, radar)
+    if (near := loss > _LEAST_DB).any():
+        limit = far_field_distance(radar)
+        said.append(
+            f"{_of(near)} {_verb(near)} in the near field of the array ({_numbers(near)}), nearer than 2 D^2 / "
+            f"wavelength = {limit:.3g} m: beams are those of plane waves and read up to {loss.max():.1f} dB less of a "
+            "spherical one"
+        )
+    moved, loss = migration(found.true_rate, radar)
+    if (fast := loss > _LEAST_DB).any():
+        said.append(
+            f"{_of(fast)} {'moves' if fast.sum() == 1 else 'move'} over range cells during the frame "
+            f"({_numbers(fast)}), up to {moved.max():.1f}: peaks read up to {loss.max():.1f} dB less"
+        )
     return said
 
 
@@ -88,10 +114,14 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
 
 
 def told(
-    found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, ledger: Mapping[str, Entry]
+    found: ExplainedDetections,
+    tolerance_db: float,
+    rdmap: RangeDoppler,
+    ledger: Mapping[str, Entry],
+    radar: Radar | None,
 ) -> list[str]:
     """Return all lines on detections."""
-    return [*warned(found, tolerance_db, rdmap), *noted(found, tolerance_db, ledger)]
+    return [*warned(found, tolerance_db, rdmap, radar), *noted(found, tolerance_db, ledger)]
 
 
 def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
@@ -124,7 +154,8 @@ def notes(result: Result) -> list[str]:
 def findings(result: Result) -> list[str]:
     """Return all lines on a result's detections."""
     tolerance = float(result.stats.get("tolerance_db", math.inf))
-    return told(result.detections, tolerance, result.rdmap, result.ledger)
+    radar = result.scene.radar if result.scene is not None else None
+    return told(result.detections, tolerance, result.rdmap, result.ledger, radar)
 
 
 def marks(found: ExplainedDetections) -> str:

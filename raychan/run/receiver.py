@@ -104,7 +104,8 @@ def shoulders_in(
     least = max(float(undb(settings.min_snr_db)) * rdmap.noise, FAINT * float(power.max(initial=0.0)))
     cells = cells[power[tuple(cells.T)] >= least]
     cells = cells[power[tuple(cells.T)] >= least_in(rdmap, cells, radar, settings, seen)]
-    lobes = SideLobes(grid, (settings.rate_window, settings.range_window))
+    windows = settings.rate_window, settings.range_window
+    lobes = SideLobes.of(grid, windows, radar.channel_waveform, _weighed(radar))
     return lobes.shoulders(power, grid.pad, peaks, cells)
 
 
@@ -115,20 +116,25 @@ def _detector(rdmap: RangeDoppler, radar: Radar, settings: Any) -> dict[str, Any
     guard = fitting_guard(Grid.of(rdmap).count, sizes.get("guard"), sizes.get("train"))
     if guard is not None:
         sizes["guard"] = guard
-    # By Doppler division the window weighs all chirps, though the map of a channel has a share of the rates.
-    divided = radar.multiplexing == "ddm" and not radar.waveform.stagger
     return {
         # Each fold that is tested in a cell is one more chance of a false alarm.
         "pfa": settings.pfa / hypotheses(radar),
         "min_snr_db": settings.min_snr_db,
         "method": settings.cfar,
         "windows": (settings.rate_window, settings.range_window),
-        "chirps": (radar.waveform if divided else radar.channel_waveform).n_chirps,
+        "chirps": _weighed(radar),
         "waveform": radar.waveform,
         "elements": receivers(radar),
         "array": _array(settings),
         **sizes,
     }
+
+
+def _weighed(radar: Radar) -> int:
+    """Return the chirps that the window along rate weighs: by Doppler division all of them, though the map of a channel
+    has a share of the rates."""
+    divided = radar.multiplexing == "ddm" and not radar.waveform.stagger
+    return (radar.waveform if divided else radar.channel_waveform).n_chirps
 
 
 def _array(settings: Any) -> Array:

@@ -1,0 +1,72 @@
+"""What beams of plane waves lose of spherical ones, and peaks of echoes that migrate: as levels of runs, and told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.radar.array import mimo_array, uniform_array
+from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses
+from raychan.units import C0
+
+STEP = 0.5 * C0 / 77e9
+
+
+def run(place, rate=0.0, window="hann", **radar):
+    """Return a run of a point target of 10 dBsm on a direction of 0.2 rad, and its radar."""
+    wave = rc.Waveform(77e9, 1e9, 20e-6, 40e-6, 256, 128)
+    look = np.array([np.cos(0.2), np.sin(0.2), 0.0])
+    settings = rc.Processing(range_window=window, rate_window=window, pad=(4, 4))
+    made = rc.Radar(wave, noise=False, position=(0.0, 0.0, 0.0), processing=settings, **radar)
+    target = {"shape": "box", "rcs_dbsm": 10.0, "rcs_point": (0.0, 0.0, 0.0)}
+    body = rc.Body("target", position=place * look, velocity=rate * look, **target)
+    return rc.simulate(rc.Scene([body], radar=made)), made
+
+
+def level(result):
+    """Return the level [dB] of the only detection."""
+    (power,) = result.detections.power
+    return 10.0 * np.log10(power)
+
+
+@pytest.mark.parametrize("place", [3.0, 6.0, 9.0])
+@pytest.mark.parametrize("receivers", [2, 64, 112])
+def test_a_beam_loses_what_is_told_of_a_spherical_wave(receivers, place):
+    elements = uniform_array(receivers, STEP)
+    near, radar = run(place, elements=elements)
+    loss = near_field_losses(near.detections, radar)
+    assert loss == pytest.approx([level(run(place)[0]) - level(near)], abs=0.06)
+    said = [x for x in near.warnings if "near field" in x]
+    assert len(said) == (loss[0] > 0.5)
+    assert all(f"{loss[0]:.1f} dB less" in x and f"= {far_field_distance(radar):.3g} m" in x for x in said)
+
+
+def test_an_array_beside_the_phase_centre_loses_no_more_than_about_it():
+    elements = uniform_array(64, STEP)
+    about, beside = (run(4.0, elements=elements + np.array([0.0, off, 0.0]))[0] for off in (0.0, 0.2))
+    assert level(beside) == pytest.approx(level(about), abs=0.02)
+    radar = beside.scene.radar
+    assert near_field_losses(beside.detections, radar) == pytest.approx(
+        near_field_losses(about.detections, about.scene.radar), abs=0.03
+    )
+
+
+def test_transmitters_and_receivers_lose_each_by_itself():
+    near, radar = run(8.0, **mimo_array(8, 16, STEP), multiplexing="tdm")
+    far, _ = run(8.0)
+    assert near_field_losses(near.detections, radar) == pytest.approx([level(far) - level(near)], abs=0.06)
+
+
+@pytest.mark.parametrize("window", ["rect", "hann", "blackman"])
+def test_a_peak_loses_what_is_told_of_an_echo_that_migrates(window):
+    still = level(run(10.0, window=window)[0])
+    for rate in (3.0, -12.0, 24.0):
+        found, radar = run(10.0, rate, window)
+        moved, loss = migration(found.detections.true_rate, radar)
+        # The run has the target where it stands when the frame begins.
+        assert loss == pytest.approx([still - level(found)], abs=0.01)
+        assert moved == pytest.approx([abs(rate) * 256 * 40e-6 / (0.5 * C0 / 1e9)], rel=1e-3)
+        said = [x for x in found.warnings if "over range cells" in x]
+        assert len(said) == (loss[0] > 0.5)
+        assert all(f"up to {moved[0]:.1f}: peaks read up to {loss[0]:.1f} dB less" in x for x in said)
