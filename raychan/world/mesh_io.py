@@ -47,14 +47,7 @@ def load(
         raise SceneError("mesh file not found", file=file, value=str(file), allowed="a path to a file that exists")
     if file.suffix.lower() not in SUFFIXES:
         raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
-    for key, word in (("unit", unit), ("up", up), ("forward", forward)):
-        if not isinstance(word, str) and (word is not None or key == "unit"):
-            raise SceneError(f"{shown(word)} is not possible", file=file, key=key, value=word, allowed="a text")
-    if unit not in UNITS:
-        raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
-    if SCALE.problem(scale):
-        raise SceneError(f"{shown(scale)} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
-    turn = _turn(*axes_taken(file, up, forward), file)
+    matrix = matrix_of(unit, up, forward, scale, file)
     if not file.stat().st_size:
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
     unread = checked(file)
@@ -66,7 +59,7 @@ def load(
         with np.errstate(all="ignore"):
             scene = trimesh.load_scene(process=False, **read_by(file))
             folds = folded(file, scene)
-        mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * plain(scale)))
+        mesh = from_trimesh(scene, crease_deg, matrix)
     except SceneError as e:
         raise e.at(file=file) from None
     except IndexError as e:
@@ -80,6 +73,22 @@ def load(
     if not unread and not folds:
         return mesh
     return replace(mesh, report=replace(mesh.report, unread_normals=unread, folded=folds))
+
+
+def matrix_of(unit: str, up: str | None, forward: str | None, scale: float, file: Path | None = None) -> Floats:
+    """Return the matrix (3, 3) that brings corners of a file, or of an object where there is none, to the body frame.
+
+    Args: as of `load`.
+    Raises: SceneError for options not allowed.
+    """
+    for key, word in (("unit", unit), ("up", up), ("forward", forward)):
+        if not isinstance(word, str) and (word is not None or key == "unit"):
+            raise SceneError(f"{shown(word)} is not possible", file=file, key=key, value=word, allowed="a text")
+    if unit not in UNITS:
+        raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
+    if SCALE.problem(scale):
+        raise SceneError(f"{shown(scale)} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
+    return _turn(*axes_taken(file or "", up, forward), file) * (UNITS[unit] * plain(scale))
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:
@@ -188,7 +197,7 @@ def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
     return found
 
 
-def _turn(up: str, forward: str, file: Path) -> Floats:
+def _turn(up: str, forward: str, file: Path | None) -> Floats:
     """Return the rotation that brings the file's forward to +x and its up to +z."""
     axes = []
     for key, word in (("up", up), ("forward", forward)):
