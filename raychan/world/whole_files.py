@@ -1,4 +1,4 @@
-"""Mesh files that are cut short or damaged in a way that their readers do not tell."""
+"""Mesh files that are cut short, damaged or of a form, in a way that their readers do not tell."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from raychan.world.errors import SceneError, shown
+from raychan.world.gltf_forms import understood
 
 _STL_HEAD, _STL_FACET = 84, 50  # bytes
 _NUMBER = rb"[ \t]+[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)"
@@ -19,13 +20,15 @@ _VERTEX_0 = re.compile(rb"^[ \t]*f[ \t](?:.*[ \t])?[-+]?0+(?=[/\s]|\Z).*", re.M)
 def checked(file: Path) -> int:
     """Return how many normals of a mesh file are no three numbers (STL of text only).
 
-    Raises: SceneError for a file that is cut short, or that names a vertex that no file has.
+    Raises: SceneError for a file that is cut short, that names a vertex that no file has, or that would be misread.
     """
     kind = file.suffix.lower()
     if kind == ".ply":
         _whole_ply(file)
     elif kind == ".obj":
         _whole_obj(file)
+    elif kind in (".glb", ".gltf"):
+        understood(file)
     elif kind == ".stl":
         with file.open("rb") as stream:
             head = stream.read(1 << 10)
