@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
 from raychan.world.plain_obj import read_by
-from raychan.world.polygons import folded
+from raychan.world.ply import read_ply
+from raychan.world.polygons import folded, has_polygons
 from raychan.world.whole_files import checked
 
 _SIZES = 0.01, 150.0  # m: sizes outside are warned of
@@ -52,14 +54,12 @@ def load(
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
     unread = checked(file)
     try:
-        import trimesh
-
-        logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
         # Infinite coordinates are reported below, not as warnings of the reader.
         with np.errstate(all="ignore"):
-            scene = trimesh.load_scene(process=False, **read_by(file))
-            folds = folded(file, scene)
-        mesh = from_trimesh(scene, crease_deg, matrix)
+            source, polygons = _read(file)
+            meshes = getattr(source, "geometry", {"": source}).values()
+            folds = folded(x for x in meshes if len(getattr(x, "faces", ()))) if polygons else 0
+        mesh = from_trimesh(source, crease_deg, matrix)
     except SceneError as e:
         raise e.at(file=file) from None
     except IndexError as e:
@@ -73,6 +73,19 @@ def load(
     if not unread and not folds:
         return mesh
     return replace(mesh, report=replace(mesh.report, unread_normals=unread, folded=folds))
+
+
+def _read(file: Path) -> tuple[Any, bool]:
+    """Return what a file holds, a scene of trimesh or `vertices` and `faces`, and whether it may have polygons."""
+    if file.suffix.lower() == ".ply":
+        vertices, faces, polygons = read_ply(file)
+        return SimpleNamespace(vertices=vertices, faces=faces), polygons
+    import trimesh
+
+    logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
+    arguments = read_by(file)
+    polygons = file.suffix.lower() == ".obj" and has_polygons(arguments["file_obj"].getvalue())
+    return trimesh.load_scene(process=False, **arguments), polygons
 
 
 def matrix_of(unit: str, up: str | None, forward: str | None, scale: float, file: Path | None = None) -> Floats:

@@ -23,9 +23,7 @@ def checked(file: Path) -> int:
     Raises: SceneError for a file that is cut short, that names a vertex that no file has, or that would be misread.
     """
     kind = file.suffix.lower()
-    if kind == ".ply":
-        _whole_ply(file)
-    elif kind == ".obj":
+    if kind == ".obj":
         _whole_obj(file)
     elif kind in (".glb", ".gltf"):
         understood(file)
@@ -88,52 +86,3 @@ def _refuse(file: Path, data: bytes, line: re.Match[bytes], problem: str, allowe
     text = line[0].decode("latin-1").strip()
     number = data.count(b"\n", 0, line.start()) + 1
     raise SceneError(f"{shown(text)} {problem}", file=file, value=text, allowed=allowed, line=number)
-
-
-def _whole_ply(file: Path) -> None:
-    """Raise SceneError for a PLY whose header has no end, and for one of text that is cut short: as many lines as its
-    header says are expected. A binary one is refused by its reader."""
-    counts: dict[str, int] = {}
-    lists: list[bool] = []  # whether each property of the last element is a list
-    text, there, last = False, 0, b""
-    with file.open("rb") as stream:
-        if stream.readline().strip() != b"ply":
-            return
-        for line in stream:
-            word, *rest = line.decode("latin-1").split() or [""]
-            if word == "format":
-                text = rest[:1] == ["ascii"]
-            elif word == "element" and len(rest) == 2:
-                if not rest[1].isdigit():
-                    problem = f"holds {rest[1]} of '{rest[0]}'"
-                    raise SceneError(problem, file=file, value=rest[1], allowed="a number from 0 on")
-                counts[rest[0]], lists = int(rest[1]), []
-            elif word == "property":
-                lists.append(rest[:1] == ["list"])
-            elif word == "end_header":
-                break
-        else:
-            raise SceneError("is cut short: its header has no 'end_header'", file=file, allowed="a whole PLY")
-        if not text:
-            return
-        for line in stream:
-            if line.strip():
-                there, last = there + 1, line
-    expected, problem = sum(counts.values()), ""
-    if there != expected:
-        elements = ", ".join(f"{name} {n}" for name, n in counts.items())
-        wrong = "is cut short" if there < expected else "does not end with its elements"
-        problem = f"{wrong}: {there} lines after the header, {expected} expected ({elements})"
-    elif missing := _missing(last.split(), lists):
-        problem = f"is cut short: its last line lacks {missing} of its numbers"
-    if problem:
-        raise SceneError(problem, file=file, value=there, allowed="a whole PLY")
-
-
-def _missing(words: list[bytes], lists: list[bool]) -> int:
-    """Return how many numbers a line of a PLY lacks of its properties, lists or not."""
-    needed = 0
-    for listed in lists:
-        count = words[needed] if listed and needed < len(words) else b"0"
-        needed += 1 + (int(count) if count.isdigit() else 0)
-    return max(needed - len(words), 0)
