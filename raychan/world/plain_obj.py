@@ -12,7 +12,9 @@ from typing import Any
 from raychan.scalars import as_text, is_text
 from raychan.world.errors import SceneError, shown
 
-_ODD = re.compile(rb"^[ \t]+(?:f|v|vn|vt|o|g|usemtl|mtllib)[ \t]|^(?:f|v|vn|vt|o|g)\t|^f .*[-#]|^v.*#|\r(?!\n)", re.M)
+_ODD = re.compile(
+    rb"^[ \t]+(?:f|v|vn|vt|o|g|usemtl|mtllib)[ \t]|^(?:f|v|vn|vt|o|g)\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M
+)
 _MARK = b"\xef\xbb\xbf"  # of byte order
 _OBJECT, _PAINT = re.compile(rb"^o ", re.M), re.compile(rb"^usemtl (.*)", re.M)
 _LIBRARY = re.compile(rb"^mtllib (.*)", re.M)

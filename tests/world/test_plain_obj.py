@@ -74,6 +74,28 @@ def test_faces_that_a_fan_of_triangles_does_not_fit_are_told(tmp_path, ending, f
 
 
 @pytest.mark.parametrize(
+    "lines",
+    [
+        "  f 1 2 3 4 5 6\n",
+        "f\t1 2 3 4 5 6\n",
+        "f +1 +2 +3 +4 +5 +6\n",
+        "f 1 2 3 \\\n4 5 6\n",
+        "f 1 2 3\\\r\n4 5 6\r\n",
+        "f 1 2 3 \\\n  4 5 6\n",
+        "# a comment\rf 1 2 3 4 5 6\r",
+        "f 1// 2// 3// 4// 5// 6//\n",
+    ],
+)
+def test_faces_that_are_not_convex_are_told_however_their_lines_are_written(tmp_path, lines):
+    corners = "".join(f"v {x} {y} 0\n" for x, y in _L)
+    (tmp_path / "m.obj").write_bytes((corners.replace("\n", "\r") if lines.endswith("6\r") else corners).encode())
+    with (tmp_path / "m.obj").open("ab") as file:
+        file.write(lines.encode())
+    mesh = load(tmp_path / "m.obj")
+    assert len(mesh.faces) == 4 and any("not convex" in line for line in mesh.report.warnings())
+
+
+@pytest.mark.parametrize(
     ("old", "new"), [("f 1 2 3", "f 1 2 3 # the first"), ("v 0 0 0", "v 0 0 0 # origin"), ("", "\ufeff")]
 )
 def test_comments_and_a_mark_of_byte_order_in_an_obj(tmp_path, old, new):
