@@ -14,7 +14,8 @@ from raychan.scalars import plain
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
-from raychan.world.plain_obj import read_by
+from raychan.world.obj_lines import missing_vertex
+from raychan.world.plain_obj import plain_text, read_by
 from raychan.world.ply import read_ply
 from raychan.world.polygons import folded, has_polygons
 from raychan.world.whole_files import checked
@@ -64,7 +65,8 @@ def load(
         raise e.at(file=file) from None
     except IndexError as e:
         problem = "cannot be read as a mesh: a face names a vertex that the file does not hold"
-        raise SceneError(f"{problem} ({e})", file=file, allowed="a valid " + file.suffix) from e
+        told = missing_vertex(plain_text(file), file) if file.suffix.lower() == ".obj" else None
+        raise told or SceneError(f"{problem} ({e})", file=file, allowed="a valid " + file.suffix) from e
     except KeyError as e:
         problem = f"cannot be read as a mesh: {shown(str(e.args[0]))} is missing"
         raise SceneError(problem, file=file, allowed="a valid " + file.suffix) from e

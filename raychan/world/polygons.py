@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-_POLYGON = re.compile(rb"^f(?: [^\s#]+){4}", re.M)
+_POLYGON = re.compile(rb"^f(?: +[^\s#]+){4}", re.M)
 _OPPOSITE = -0.9999  # cosine between normals of triangles that lie on each other
 
 

@@ -14,18 +14,15 @@ _REST = rb"(?!(?:" + _NUMBER + rb"){3}(?:\s*$|[ \t]+[a-z])).*"  # of a line, oth
 _SOLID = re.compile(rb"^[ \t]*(end)?solid\b.*", re.I | re.M)
 _ODD_VERTEX = re.compile(rb"^[ \t]*vertex\b" + _REST, re.I | re.M)
 _ODD_NORMAL = re.compile(rb"^[ \t]*facet\b(?:[ \t]+normal\b)?+" + _REST, re.I | re.M)
-_VERTEX_0 = re.compile(rb"^[ \t]*f[ \t](?:.*[ \t])?[-+]?0+(?=[/\s]|\Z).*", re.M)
 
 
 def checked(file: Path) -> int:
     """Return how many normals of a mesh file are no three numbers (STL of text only).
 
-    Raises: SceneError for a file that is cut short, that names a vertex that no file has, or that would be misread.
+    Raises: SceneError for a file that is cut short, damaged, or of a form that would be misread.
     """
     kind = file.suffix.lower()
-    if kind == ".obj":
-        _whole_obj(file)
-    elif kind in (".glb", ".gltf"):
+    if kind in (".glb", ".gltf"):
         understood(file)
     elif kind == ".stl":
         with file.open("rb") as stream:
@@ -72,13 +69,6 @@ def _whole_text_stl(file: Path) -> int:
         problem = f"is damaged: {vertices} vertices for {facets} facets, {3 * facets} expected"
         raise SceneError(problem, file=file, value=vertices, allowed="three vertices a facet")
     return sum(1 for _ in _ODD_NORMAL.finditer(data))
-
-
-def _whole_obj(file: Path) -> None:
-    """Raise SceneError for an OBJ with a face that names vertex 0: they count from 1."""
-    data = file.read_bytes()
-    if face := _VERTEX_0.search(data):
-        _refuse(file, data, face, "names vertex 0", "vertices counted from 1")
 
 
 def _refuse(file: Path, data: bytes, line: re.Match[bytes], problem: str, allowed: str) -> None:
