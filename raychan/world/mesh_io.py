@@ -18,6 +18,7 @@ from raychan.world.obj_lines import missing_vertex
 from raychan.world.plain_obj import plain_text, read_by
 from raychan.world.ply import read_ply
 from raychan.world.polygons import folded, has_polygons
+from raychan.world.text_stl import solids, text_of
 from raychan.world.whole_files import checked
 
 _SIZES = 0.01, 150.0  # m: sizes outside are warned of
@@ -83,8 +84,18 @@ def _read(file: Path) -> tuple[Any, bool]:
         vertices, faces, polygons = read_ply(file)
         return SimpleNamespace(vertices=vertices, faces=faces), polygons
     import trimesh
+    from trimesh.util import unique_name
 
     logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
+    text = text_of(file) if file.suffix.lower() == ".stl" else None
+    if text is not None:
+        scene = trimesh.Scene()
+        for name, corners in solids(text):
+            faces = np.arange(len(corners)).reshape(-1, 3)
+            scene.add_geometry(
+                trimesh.Trimesh(corners, faces, process=False), geom_name=unique_name(name, scene.geometry)
+            )
+        return scene, False
     arguments = read_by(file)
     polygons = file.suffix.lower() == ".obj" and has_polygons(arguments["file_obj"].getvalue())
     return trimesh.load_scene(process=False, **arguments), polygons
