@@ -19,7 +19,7 @@ _WRONG = tuple(
         (rb"^vt(?= )(?!(?:" + _NUMBER + rb"){1,}" + _ENDS + rb").*", "is no texture of numbers", "'vt' and numbers"),
         (rb"^vn(?= )(?!(?:" + _NUMBER + rb"){1,}" + _ENDS + rb").*", "is no normal of numbers", "'vn' and numbers"),
         (
-            rb"^f(?=[ \r\n]|\Z)(?!(?:" + _CORNER + rb")+" + _ENDS + rb").*",
+            rb"^f(?!(?:" + _CORNER + rb")+" + _ENDS + rb").*",
             "is no face of numbered vertices",
             "'f' and corners such as 7, 7/1, 7//2 or 7/1/2",
         ),

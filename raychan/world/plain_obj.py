@@ -12,10 +12,7 @@ from typing import Any
 from raychan.scalars import as_text, is_text
 from raychan.world.obj_lines import checked_lines, refused
 
-_ODD = re.compile(
-    rb"^[ \t]+(?:f|v|vn|vt|o|g|usemtl|mtllib)[ \t]|^(?:f|v|vn|vt|o|g|usemtl|mtllib)\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$",
-    re.M,
-)
+_ODD = re.compile(rb"^ +(?:f|v|vn|vt|o|g|usemtl|mtllib) |\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M)
 _MARK = b"\xef\xbb\xbf"  # of byte order
 _OBJECT, _PAINT = re.compile(rb"^o +(.*)", re.M), re.compile(rb"^usemtl +(.*)", re.M)
 _LIBRARY, _NAMES = re.compile(rb"^mtllib +(.*)", re.M), re.compile(rb"^(?:#|usemtl\b|mtllib\b).*", re.M)

@@ -105,6 +105,8 @@ def test_parts_are_the_materials_of_a_library_that_is_there_else_the_objects(tmp
         ("f 1 2 3.5", "'f 1 2 3.5' is no face of numbered vertices"),
         ("f 1 2 x", "'f 1 2 x' is no face of numbered vertices"),
         ("f 1 2 99999999999999999999", "is no face of numbered vertices"),
+        ("f1 2 3", "'f1 2 3' is no face of numbered vertices"),
+        ("fo 1 2 3", "'fo 1 2 3' is no face of numbered vertices"),
         ("f", "'f' is no face of numbered vertices"),
         ("f 1 2 99", "'f 1 2 99' names vertex 99, which the file does not hold; allowed: 1 to 4"),
         ("f 1 2 -9", "'f 1 2 -9' names v -9, but 4 'v' lines before it"),
@@ -116,6 +118,11 @@ def test_a_line_that_is_no_vertex_or_face_is_refused_by_its_number(tmp_path, lin
     with pytest.raises(rc.SceneError) as told:
         load(tmp_path / "m.obj")
     assert f"m.obj:{before.count(chr(10)) + 6}: " in str(told.value) and words in str(told.value)
+
+
+def test_tabs_between_numbers_are_blanks(tmp_path):
+    (tmp_path / "m.obj").write_text(_FOUR.replace("1 1 0", "1\t1\t 0") + "f 1 2\t3 4\nvn 0 0\t1\n")
+    assert load(tmp_path / "m.obj").areas.sum() == pytest.approx(1.0)
 
 
 def test_vertices_of_other_lengths_keep_their_places(tmp_path):
