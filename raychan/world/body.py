@@ -23,7 +23,7 @@ from raychan.world.limbs import LimbMotion, limbs_of
 from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
-from raychan.world.mesh_io import from_trimesh, load, oddities
+from raychan.world.mesh_io import from_trimesh, load, matrix_of, oddities
 from raychan.world.motion import Motion
 from raychan.world.read_only import kept, listed
 
@@ -41,6 +41,7 @@ _TABLES = ("params", "materials", "position", "velocity", "spin_dps", "rcs_dbsm"
 class Body:
     """A body of the scene: `mesh` (Mesh, trimesh or a path) or built-in `shape` with `params`, one of both.
 
+    `unit`, `up`, `forward` (as of a mesh file; of a trimesh `up` is z) and `scale` say how a path or trimesh is read.
     Angles in degrees, turn_rate_dps [deg/s], velocity [m/s], world axes; spin_dps (3,) [deg/s] about its own axes;
     `material` for all parts or `materials` by part (patterns), a name or a Material. `rcs_dbsm` [dBsm], a number or
     (azimuth_deg, dBsm) pairs relative to its heading, makes it a point target at `rcs_point` (body frame [m]) whose
@@ -95,7 +96,8 @@ class Body:
                 return self.mesh
             if isinstance(self.mesh, (str, Path)):
                 return load(self.mesh, self.unit, self.up, self.forward, self.scale, self.crease_deg)
-            return from_trimesh(self.mesh, self.crease_deg)
+            turn = matrix_of(self.unit, self.up, self.forward, self.scale)
+            return from_trimesh(self.mesh, self.crease_deg, turn)
         except SceneError as e:
             raise e.at(key=self.name) from None
 

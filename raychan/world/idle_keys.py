@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from raychan.world.body import Body
 from raychan.world.material import Material, names
-from raychan.world.mesh import CREASE_DEG
+from raychan.world.mesh import CREASE_DEG, Mesh
 from raychan.world.schema import RadarTable
 
 _OF_MESHES = {"unit": "m", "up": None, "forward": None, "scale": 1.0, "crease_deg": CREASE_DEG}
-"""Keys that say how a mesh file is read, and their defaults."""
+"""Keys that say how a mesh file or a trimesh is read, and their defaults."""
 
 
 def idle_keys(bodies: Iterable[Body], materials: Mapping[str, Material], radar: RadarTable | None) -> list[str]:
@@ -32,11 +32,16 @@ def idle_keys(bodies: Iterable[Body], materials: Mapping[str, Material], radar: 
         if body.rcs_dbsm is None and body.rcs_point is not None:
             said += _told(f"bodies.{body.name}", ["rcs_point"], "without rcs_dbsm")
         if body.shape is not None:
-            idle = [key for key, default in _OF_MESHES.items() if getattr(body, key) != default]
-            said += _told(f"bodies.{body.name}", idle, f"with shape = '{body.shape}'")
+            said += _told(f"bodies.{body.name}", _of_meshes(body), f"with shape = '{body.shape}'")
         elif body.params:
             said += _told(f"bodies.{body.name}", ["params"], "with a mesh")
+        if isinstance(body.mesh, Mesh):
+            said += _told(f"bodies.{body.name}", _of_meshes(body), "with a Mesh, which is in metres")
     return said
+
+
+def _of_meshes(body: Body) -> list[str]:
+    return [key for key, default in _OF_MESHES.items() if getattr(body, key) != default]
 
 
 def _noise(radar: RadarTable) -> Iterator[str]:

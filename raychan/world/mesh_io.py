@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,11 @@ from raychan.scalars import plain
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limits import SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
-from raychan.world.plain_obj import read_by
-from raychan.world.polygons import folded
+from raychan.world.obj_lines import missing_vertex
+from raychan.world.plain_obj import plain_text, read_by
+from raychan.world.ply import read_ply
+from raychan.world.polygons import folded, has_polygons
+from raychan.world.text_stl import solids, text_of
 from raychan.world.whole_files import checked
 
 _SIZES = 0.01, 150.0  # m: sizes outside are warned of
@@ -47,31 +51,23 @@ def load(
         raise SceneError("mesh file not found", file=file, value=str(file), allowed="a path to a file that exists")
     if file.suffix.lower() not in SUFFIXES:
         raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
-    for key, word in (("unit", unit), ("up", up), ("forward", forward)):
-        if not isinstance(word, str) and (word is not None or key == "unit"):
-            raise SceneError(f"{shown(word)} is not possible", file=file, key=key, value=word, allowed="a text")
-    if unit not in UNITS:
-        raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
-    if SCALE.problem(scale):
-        raise SceneError(f"{shown(scale)} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
-    turn = _turn(*axes_taken(file, up, forward), file)
+    matrix = matrix_of(unit, up, forward, scale, file)
     if not file.stat().st_size:
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
     unread = checked(file)
     try:
-        import trimesh
-
-        logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
         # Infinite coordinates are reported below, not as warnings of the reader.
         with np.errstate(all="ignore"):
-            scene = trimesh.load_scene(process=False, **read_by(file))
-            folds = folded(file, scene)
-        mesh = from_trimesh(scene, crease_deg, turn * (UNITS[unit] * plain(scale)))
+            source, polygons = _read(file)
+            meshes = getattr(source, "geometry", {"": source}).values()
+            folds = folded(x for x in meshes if len(getattr(x, "faces", ()))) if polygons else 0
+        mesh = from_trimesh(source, crease_deg, matrix)
     except SceneError as e:
         raise e.at(file=file) from None
     except IndexError as e:
         problem = "cannot be read as a mesh: a face names a vertex that the file does not hold"
-        raise SceneError(f"{problem} ({e})", file=file, allowed="a valid " + file.suffix) from e
+        told = missing_vertex(plain_text(file), file) if file.suffix.lower() == ".obj" else None
+        raise told or SceneError(f"{problem} ({e})", file=file, allowed="a valid " + file.suffix) from e
     except KeyError as e:
         problem = f"cannot be read as a mesh: {shown(str(e.args[0]))} is missing"
         raise SceneError(problem, file=file, allowed="a valid " + file.suffix) from e
@@ -80,6 +76,45 @@ def load(
     if not unread and not folds:
         return mesh
     return replace(mesh, report=replace(mesh.report, unread_normals=unread, folded=folds))
+
+
+def _read(file: Path) -> tuple[Any, bool]:
+    """Return what a file holds, a scene of trimesh or `vertices` and `faces`, and whether it may have polygons."""
+    if file.suffix.lower() == ".ply":
+        vertices, faces, polygons = read_ply(file)
+        return SimpleNamespace(vertices=vertices, faces=faces), polygons
+    import trimesh
+    from trimesh.util import unique_name
+
+    logging.getLogger("trimesh").addHandler(_SILENT)  # without one Python prints what it logs
+    text = text_of(file) if file.suffix.lower() == ".stl" else None
+    if text is not None:
+        scene = trimesh.Scene()
+        for name, corners in solids(text):
+            faces = np.arange(len(corners)).reshape(-1, 3)
+            scene.add_geometry(
+                trimesh.Trimesh(corners, faces, process=False), geom_name=unique_name(name, scene.geometry)
+            )
+        return scene, False
+    arguments = read_by(file)
+    polygons = file.suffix.lower() == ".obj" and has_polygons(arguments["file_obj"].getvalue())
+    return trimesh.load_scene(process=False, **arguments), polygons
+
+
+def matrix_of(unit: str, up: str | None, forward: str | None, scale: float, file: Path | None = None) -> Floats:
+    """Return the matrix (3, 3) that brings corners of a file, or of an object where there is none, to the body frame.
+
+    Args: as of `load`.
+    Raises: SceneError for options not allowed.
+    """
+    for key, word in (("unit", unit), ("up", up), ("forward", forward)):
+        if not isinstance(word, str) and (word is not None or key == "unit"):
+            raise SceneError(f"{shown(word)} is not possible", file=file, key=key, value=word, allowed="a text")
+    if unit not in UNITS:
+        raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
+    if SCALE.problem(scale):
+        raise SceneError(f"{shown(scale)} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
+    return _turn(*axes_taken(file or "", up, forward), file) * (UNITS[unit] * plain(scale))
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:
@@ -188,7 +223,7 @@ def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
     return found
 
 
-def _turn(up: str, forward: str, file: Path) -> Floats:
+def _turn(up: str, forward: str, file: Path | None) -> Floats:
     """Return the rotation that brings the file's forward to +x and its up to +z."""
     axes = []
     for key, word in (("up", up), ("forward", forward)):

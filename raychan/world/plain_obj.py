@@ -1,6 +1,6 @@
-"""Mesh files as trimesh reads them right: it fails over names that are no text. Of indented lines, tabs, comments
-within lines, a byte-order mark, and faces that count vertices backwards in an OBJ it loses or misreads faces; of
-several objects it takes the first one's name for all."""
+"""Mesh files as trimesh reads them right: it fails over names that are no text. Of an OBJ with indents, tabs, comments
+within lines, a byte-order mark, and faces that count vertices backwards it loses or misreads faces; names of parts it
+loses with all but the simplest libraries, and makes up where there is none."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from raychan.scalars import as_text, is_text
-from raychan.world.errors import SceneError, shown
+from raychan.world.obj_lines import checked_lines, refused
 
-_ODD = re.compile(rb"^[ \t]+(?:f|v|vn|vt|o|g|usemtl|mtllib)[ \t]|^(?:f|v|vn|vt|o|g)\t|^f .*[-#]|^v.*#|\r(?!\n)", re.M)
+_ODD = re.compile(rb"^ +(?:f|v|vn|vt|o|g|usemtl|mtllib) |\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M)
 _MARK = b"\xef\xbb\xbf"  # of byte order
-_OBJECT, _PAINT = re.compile(rb"^o ", re.M), re.compile(rb"^usemtl (.*)", re.M)
-_LIBRARY = re.compile(rb"^mtllib (.*)", re.M)
+_OBJECT, _PAINT = re.compile(rb"^o +(.*)", re.M), re.compile(rb"^usemtl +(.*)", re.M)
+_LIBRARY, _NAMES = re.compile(rb"^mtllib +(.*)", re.M), re.compile(rb"^(?:#|usemtl\b|mtllib\b).*", re.M)
+_MORE = re.compile(rb"^(v(?: +[^\s]+){3})[ \t].*", re.M)  # weight or colour behind a vertex
 _KINDS = (b"v", b"vt", b"vn")  # what the numbers of one corner of a face, v/vt/vn, count
 
 
 def read_by(file: Path) -> dict[str, Any]:
-    """Return the arguments of `trimesh.load_scene` for a file. Parts of an OBJ are its materials where it has several,
-    else its objects.
+    """Return the arguments of `trimesh.load_scene` for a file. Parts of an OBJ are its materials where it has several
+    and its library is there, else its objects.
 
-    Raises: SceneError for a face of an OBJ that names a vertex before the first.
+    Raises: SceneError for a line of an OBJ that is no vertex or face, or names a vertex before the first.
     """
     from trimesh.resolvers import FilePathResolver
 
@@ -34,40 +35,61 @@ def read_by(file: Path) -> dict[str, Any]:
         if is_text(file.name):
             return {"file_obj": str(file)}
         return {"file_obj": io.BytesIO(file.read_bytes()), "file_type": kind, "resolver": beside}
-    text = _plain(file.read_bytes(), file)
-    libraries = [file.parent / name.decode("latin-1").strip() for name in _LIBRARY.findall(text)]
-    paints = len(set(_PAINT.findall(text))) if any(x.is_file() for x in libraries) else 0
-    split = paints < 2 and len(_OBJECT.findall(text)) > 1
+    text = plain_text(file)
+    checked_lines(text, file)
+    text = _MORE.sub(rb"\1", _parts(text, file))
+    split = len(_OBJECT.findall(text)) > 1
     return {"file_obj": io.BytesIO(text), "file_type": kind, "resolver": beside, "split_objects": split}
 
 
-def _plain(data: bytes, file: Path) -> bytes:
-    """Return the text of an OBJ without indents and tabs, all vertices counted from the file's begin."""
-    data = data.removeprefix(_MARK)
+def _parts(text: bytes, file: Path) -> bytes:
+    """Return the text of an OBJ whose objects are its parts: the reader takes names of these as they are."""
+    paints = {name.strip() for name in _PAINT.findall(text)}
+    if len(paints) > 1 and any(_is_there(said, file) for said in _LIBRARY.findall(text)):
+        text = _PAINT.sub(rb"o \1", _OBJECT.sub(b"", text))
+    return _NAMES.sub(b"", text)
+
+
+def _is_there(said: bytes, file: Path) -> bool:
+    """Return whether a library, or one of several on a line, is there; the name of one may have blanks."""
+    names = [x.decode("latin-1").strip() for x in (said, *said.split())]
+    return any(name and (file.parent / name).is_file() for name in names)
+
+
+def plain_text(file: Path) -> bytes:
+    """Return the text of an OBJ without indents and tabs, all vertices counted from the file's begin, on its lines.
+
+    Raises: SceneError for a face that names a vertex before the first.
+    """
+    data = file.read_bytes().removeprefix(_MARK)
     if not _ODD.search(data):
         return data
-    lines = [b" ".join(x.split()) for x in re.sub(rb"\\\r?\n", b" ", data).splitlines()]
+    lines = data.splitlines()
+    for i in range(len(lines) - 2, -1, -1):
+        if lines[i].endswith(b"\\") and not lines[i].lstrip().startswith(b"#"):
+            lines[i], lines[i + 1] = lines[i][:-1] + b" " + lines[i + 1], b""
     count = dict.fromkeys(_KINDS, 0)
-    for i, line in enumerate(lines):
+    for i, line in enumerate(b" ".join(x.split()) for x in lines):
         word, _, rest = line.partition(b" ")
+        lines[i] = line
         if word in count:
             count[word] += 1
             lines[i] = line.split(b"#")[0]
         elif word == b"f":
             corners = rest.split(b"#")[0].split()
-            lines[i] = b" ".join([word, *(_forwards(corner, count, line, file) for corner in corners)])
+            lines[i] = b" ".join([word, *(_forwards(corner, count, line, i + 1, file) for corner in corners)])
     return b"\n".join(lines) + b"\n"
 
 
-def _forwards(corner: bytes, count: dict[bytes, int], line: bytes, file: Path) -> bytes:
+def _forwards(corner: bytes, count: dict[bytes, int], line: bytes, at: int, file: Path) -> bytes:
     """Return one corner of a face with its numbers counted from the file's begin."""
     numbers = corner.split(b"/")
-    for at, (kind, number) in enumerate(zip(_KINDS, numbers, strict=False)):
-        if number.startswith(b"-") and number[1:].isdigit():
+    for i, (kind, number) in enumerate(zip(_KINDS, numbers, strict=False)):
+        if number.startswith(b"-") and number[1:].isdigit() and int(number):
             found = count[kind] + 1 + int(number)
             if found < 1:
-                text, there = line.decode("latin-1"), f"'{kind.decode()}' lines before it"
-                problem = f"{shown(text)} names {kind.decode()} {int(number)}, but {count[kind]} {there}"
-                raise SceneError(problem, file=file, value=text, allowed=f"-{count[kind]} to -1, or from 1 on")
-            numbers[at] = b"%d" % found
+                there = f"'{kind.decode()}' lines before it"
+                problem = f"names {kind.decode()} {int(number)}, but {count[kind]} {there}"
+                raise refused(line, problem, f"-{count[kind]} to -1, or from 1 on", at, file)
+            numbers[i] = b"%d" % found
     return b"/".join(numbers)

@@ -4,23 +4,23 @@ convex, the fan folds over itself and covers more than the face."""
 from __future__ import annotations
 
 import re
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-_POLYGON = re.compile(rb"^f(?:[ \t]+[^\s#]+){4}", re.M)
-_PLY_FACES = re.compile(rb"^element face (\d+)\s", re.M)
-_HEADER = 1 << 16  # bytes that hold the header of a PLY
+_POLYGON = re.compile(rb"^f(?: +[^\s#]+){4}", re.M)
 _OPPOSITE = -0.9999  # cosine between normals of triangles that lie on each other
 
 
-def folded(file: Path, scene: Any) -> int:
-    """Return how many pairs of triangles with a common edge lie on each other, of a scene of trimesh that was read from
-    a file with polygons; 0 where all its faces are triangles."""
-    meshes = [g for g in scene.geometry.values() if len(getattr(g, "faces", ()))]
-    if not _has_polygons(file, sum(len(g.faces) for g in meshes)):
-        return 0
+def has_polygons(text: bytes) -> bool:
+    """Return whether an OBJ, its text without indents, tabs and divided lines, has faces of more than 3 corners."""
+    return _POLYGON.search(text) is not None
+
+
+def folded(meshes: Iterable[Any]) -> int:
+    """Return how many pairs of triangles with a common edge lie on each other, of `vertices` and `faces` that were read
+    from a file with polygons."""
     from trimesh.graph import face_adjacency
 
     count = 0
@@ -31,15 +31,3 @@ def folded(file: Path, scene: Any) -> int:
         a, b = face_adjacency(one.faces).reshape(-1, 2).T
         count += int(((normal[a] * normal[b]).sum(axis=1) < _OPPOSITE).sum())
     return count
-
-
-def _has_polygons(file: Path, triangles: int) -> bool:
-    """Tell whether a file, read as so many triangles, holds faces of more than three corners."""
-    kind = file.suffix.lower()
-    if kind == ".obj":
-        return _POLYGON.search(file.read_bytes()) is not None
-    if kind != ".ply":
-        return False
-    with file.open("rb") as stream:
-        said = _PLY_FACES.search(stream.read(_HEADER))
-    return said is not None and int(said[1]) < triangles

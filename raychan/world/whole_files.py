@@ -1,42 +1,36 @@
-"""Mesh files that are cut short or damaged in a way that their readers do not tell."""
+"""Mesh files that are cut short, damaged or of a form, in a way that their readers do not tell."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
-from raychan.world.errors import SceneError, shown
+from raychan.world.errors import SceneError
+from raychan.world.gltf_forms import understood
+from raychan.world.text_stl import checked_text, text_of
 
 _STL_HEAD, _STL_FACET = 84, 50  # bytes
-_NUMBER = rb"[ \t]+[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)"
-_REST = rb"(?!(?:" + _NUMBER + rb"){3}(?:\s*$|[ \t]+[a-z])).*"  # of a line, other than three numbers
-_SOLID = re.compile(rb"^[ \t]*(end)?solid\b.*", re.I | re.M)
-_ODD_VERTEX = re.compile(rb"^[ \t]*vertex\b" + _REST, re.I | re.M)
-_ODD_NORMAL = re.compile(rb"^[ \t]*facet\b(?:[ \t]+normal\b)?+" + _REST, re.I | re.M)
-_VERTEX_0 = re.compile(rb"^[ \t]*f[ \t](?:.*[ \t])?[-+]?0+(?=[/\s]|\Z).*", re.M)
 
 
 def checked(file: Path) -> int:
     """Return how many normals of a mesh file are no three numbers (STL of text only).
 
-    Raises: SceneError for a file that is cut short, or that names a vertex that no file has.
+    Raises: SceneError for a file that is cut short, damaged, or of a form that would be misread.
     """
     kind = file.suffix.lower()
-    if kind == ".ply":
-        _whole_ply(file)
-    elif kind == ".obj":
-        _whole_obj(file)
+    if kind in (".glb", ".gltf"):
+        understood(file)
     elif kind == ".stl":
-        with file.open("rb") as stream:
-            head = stream.read(1 << 10)
-        if head.lstrip().lower().startswith(b"solid") and b"facet" in head.lower():
-            return _whole_text_stl(file)
-        _whole_binary_stl(file, head)
+        text = text_of(file)
+        if text is not None:
+            return checked_text(text, file)
+        _whole_binary_stl(file)
     return 0
 
 
-def _whole_binary_stl(file: Path, head: bytes) -> None:
+def _whole_binary_stl(file: Path) -> None:
     """Raise SceneError for a binary STL of another size than its head says: 84 bytes, then 50 a triangle."""
+    with file.open("rb") as stream:
+        head = stream.read(_STL_HEAD)
     there = file.stat().st_size
     count = int.from_bytes(head[80:84], "little") if there >= _STL_HEAD else 0
     expected = _STL_HEAD + _STL_FACET * count
@@ -47,90 +41,3 @@ def _whole_binary_stl(file: Path, head: bytes) -> None:
     if there > expected:
         problem = f"does not end with its {count} triangles: {there} bytes there, {expected} expected"
         raise SceneError(problem, file=file, value=there, allowed="an STL without other bytes at its end")
-
-
-def _whole_text_stl(file: Path) -> int:
-    """Return how many normals of an STL of text are no three numbers.
-
-    Raises: SceneError where it is cut short, and where a facet has no three vertices of three numbers.
-    """
-    data = file.read_bytes()
-    if b"\n" not in data.strip():  # all on one line, which its reader refuses
-        return 0
-    ends = [bool(line[1]) for line in _SOLID.finditer(data)]
-    body = _SOLID.sub(b"", data).lower()  # without names
-    vertices, closed = body.count(b"vertex"), body.count(b"endfacet")
-    facets = body.count(b"facet") - closed
-    if closed < facets or 2 * sum(ends) < len(ends):
-        lost = "endfacet" if closed < facets else "endsolid"
-        problem = f"is cut short: {facets} facets begin, and an '{lost}' is missing"
-        raise SceneError(problem, file=file, value=facets, allowed="a whole STL")
-    if odd := _ODD_VERTEX.search(data):
-        _refuse(file, data, odd, "is no vertex of three numbers", "'vertex' and three numbers")
-    if vertices != 3 * facets:
-        problem = f"is damaged: {vertices} vertices for {facets} facets, {3 * facets} expected"
-        raise SceneError(problem, file=file, value=vertices, allowed="three vertices a facet")
-    return sum(1 for _ in _ODD_NORMAL.finditer(data))
-
-
-def _whole_obj(file: Path) -> None:
-    """Raise SceneError for an OBJ with a face that names vertex 0: they count from 1."""
-    data = file.read_bytes()
-    if face := _VERTEX_0.search(data):
-        _refuse(file, data, face, "names vertex 0", "vertices counted from 1")
-
-
-def _refuse(file: Path, data: bytes, line: re.Match[bytes], problem: str, allowed: str) -> None:
-    """Raise SceneError for a line of a file."""
-    text = line[0].decode("latin-1").strip()
-    number = data.count(b"\n", 0, line.start()) + 1
-    raise SceneError(f"{shown(text)} {problem}", file=file, value=text, allowed=allowed, line=number)
-
-
-def _whole_ply(file: Path) -> None:
-    """Raise SceneError for a PLY whose header has no end, and for one of text that is cut short: as many lines as its
-    header says are expected. A binary one is refused by its reader."""
-    counts: dict[str, int] = {}
-    lists: list[bool] = []  # whether each property of the last element is a list
-    text, there, last = False, 0, b""
-    with file.open("rb") as stream:
-        if stream.readline().strip() != b"ply":
-            return
-        for line in stream:
-            word, *rest = line.decode("latin-1").split() or [""]
-            if word == "format":
-                text = rest[:1] == ["ascii"]
-            elif word == "element" and len(rest) == 2:
-                if not rest[1].isdigit():
-                    problem = f"holds {rest[1]} of '{rest[0]}'"
-                    raise SceneError(problem, file=file, value=rest[1], allowed="a number from 0 on")
-                counts[rest[0]], lists = int(rest[1]), []
-            elif word == "property":
-                lists.append(rest[:1] == ["list"])
-            elif word == "end_header":
-                break
-        else:
-            raise SceneError("is cut short: its header has no 'end_header'", file=file, allowed="a whole PLY")
-        if not text:
-            return
-        for line in stream:
-            if line.strip():
-                there, last = there + 1, line
-    expected, problem = sum(counts.values()), ""
-    if there != expected:
-        elements = ", ".join(f"{name} {n}" for name, n in counts.items())
-        wrong = "is cut short" if there < expected else "does not end with its elements"
-        problem = f"{wrong}: {there} lines after the header, {expected} expected ({elements})"
-    elif missing := _missing(last.split(), lists):
-        problem = f"is cut short: its last line lacks {missing} of its numbers"
-    if problem:
-        raise SceneError(problem, file=file, value=there, allowed="a whole PLY")
-
-
-def _missing(words: list[bytes], lists: list[bool]) -> int:
-    """Return how many numbers a line of a PLY lacks of its properties, lists or not."""
-    needed = 0
-    for listed in lists:
-        count = words[needed] if listed and needed < len(words) else b"0"
-        needed += 1 + (int(count) if count.isdigit() else 0)
-    return max(needed - len(words), 0)

@@ -62,6 +62,13 @@ def test_objects_from_python_are_told_alike():
     assert idle(rc.Scene(radar=rc.Radar(wave, noise=False))) == []
 
 
+def test_settings_of_files_beside_a_mesh_in_metres_are_told():
+    mesh = rc.Body(name="a", shape="box").geometry
+    told = idle(rc.Scene(bodies=[rc.Body(name="b", mesh=mesh, unit="mm", up="y", material="pec")]))
+    assert told == ["bodies.b: unit and up have no effect with a Mesh, which is in metres"]
+    assert idle(rc.Scene(bodies=[rc.Body(name="b", mesh=mesh, material="pec")])) == []
+
+
 @pytest.mark.parametrize("name", ["pec", "concrete", "asphalt", "car_glass"])
 def test_a_material_that_redefines_a_built_in_one_is_told(name):
     said = f"materials.{name}: redefines the built-in material of that name"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import raychan as rc
 from raychan.world.errors import SceneError
 from raychan.world.mesh import make_mesh, smooth_normals
 from raychan.world.mesh_io import from_trimesh, load
@@ -184,3 +185,28 @@ def test_a_mesh_cut_in_its_planes_is_the_same_body(solid):
     assert len(cut.faces) == len(whole.faces)
     assert cut.report.watertight
     assert cut.volume() == pytest.approx(solid.volume, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"unit": "mm"},
+        {"scale": 0.5},
+        {"up": "y"},
+        {"forward": "-y"},
+        {"unit": "cm", "up": "x", "forward": "y", "scale": 2.0},
+    ],
+)
+def test_a_trimesh_is_read_as_its_file_is(keys, tmp_path):
+    box = trimesh.creation.box([10.0, 20.0, 30.0]).apply_translation([1.0, 2.0, 3.0])
+    box.export(tmp_path / "box.ply")
+    of_file = rc.Body(name="b", mesh=tmp_path / "box.ply", **keys).geometry
+    for given in (box, trimesh.Scene(box)):
+        mesh = rc.Body(name="b", mesh=given, **keys).geometry
+        np.testing.assert_allclose(mesh.bounds, of_file.bounds, rtol=1e-6)
+        assert mesh.volume() == pytest.approx(of_file.volume())
+
+
+def test_a_trimesh_in_no_unit_is_refused():
+    with pytest.raises(SceneError, match=r"b\.unit: unknown unit .mmm.; did you mean .mm."):
+        _ = rc.Body(name="b", mesh=trimesh.creation.box(), unit="mmm").geometry

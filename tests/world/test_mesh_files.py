@@ -150,13 +150,46 @@ def test_an_stl_of_text_with_a_damaged_vertex_is_refused(old, new, words, tmp_pa
         ("0\nvertex", "0 vertex"),
         ("solid sheet", "solid facet of a sheet, endfacet"),
         ("vertex 0 1 0", "  VERTEX +.0 1.e0 -0E+00 \r"),
+        ("solid sheet\nfacet", "\ufeffsolid sheet\nfacet"),
+        ("solid sheet\nfacet", "\n\n  solid sheet\nfacet"),
+        ("solid sheet", "solid " + "long " * 500),
+        ("solid sheet", "solid facet vertex 1 2 3 normal"),
+        ("solid sheet", "solid Würfel"),
+        ("\n", "\r"),
+        ("\n", "\r\n"),
     ],
 )
 def test_an_stl_of_text_with_other_lines_and_names_is_read(old, new, tmp_path):
     file = tmp_path / "sheet.stl"
-    file.write_text(STL.replace(old, new))
+    file.write_bytes(STL.replace(old, new).encode())
     mesh = load(file)
     assert (len(mesh.faces), mesh.report.unread_normals) == (2, 0)
+
+
+def test_each_solid_of_an_stl_of_text_is_a_part_of_its_name(tmp_path):
+    file = tmp_path / "sheets.stl"
+    others = [
+        STL.replace(" sheet", name).replace(" 0\n", f" {i}\n") for i, name in enumerate([" Top deck", " vertex", ""])
+    ]
+    file.write_text("".join(others))
+    mesh = load(file)
+    assert mesh.part_names[:2] == ("Top deck", "vertex") and len(mesh.part_names) == 3
+    for i in range(3):
+        assert set(mesh.corners[mesh.part == i][..., 2].ravel()) == {float(i)}
+
+
+@pytest.mark.parametrize("head", [b"solid", b"solid my facet file\nfacet", b"\xef\xbb\xbfsolid facet normal"])
+def test_a_binary_stl_whose_head_begins_as_text_is_binary(head, tmp_path):
+    file = _stl(tmp_path)
+    file.write_bytes(head.ljust(80) + file.read_bytes()[80:])
+    assert len(load(file).faces) == 320
+
+
+def test_an_stl_of_text_on_one_line_is_said_to_be(tmp_path):
+    file = tmp_path / "sheet.stl"
+    file.write_text(STL.replace("\n", " "))
+    with pytest.raises(SceneError, match=r"sheet\.stl: is all on one line"):
+        load(file)
 
 
 @pytest.mark.parametrize("face", ["f 1 2 0", "f 0 1 2", "f 1/1 0/1 2/1", "f 1//1 2//1 0//1", "f 1 2 -0 "])

@@ -52,8 +52,84 @@ def test_parts_of_an_obj_with_materials_have_their_names(tmp_path):
 
 def test_a_vertex_before_the_first(tmp_path):
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nf -1 -2 -3\nv 0 1 0\n")
-    with pytest.raises(rc.SceneError, match=r"m\.obj: 'f -1 -2 -3' names v -3, but 2 'v' lines before it"):
+    with pytest.raises(rc.SceneError, match=r"m\.obj:3: 'f -1 -2 -3' names v -3, but 2 'v' lines before it"):
         load(tmp_path / "m.obj")
+
+
+_FOUR = "".join(f"v {x} {y} 0\n" for x, y in _SQUARE)
+_PAINTED = f"{_FOUR}usemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\n"
+_OBJECTS = f"{_FOUR}usemtl red\no left\nf 1 2 3\no right\nusemtl red\nf 1 3 4\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("mtllib a.mtl\n" + _PAINTED, {"red", "blue"}),
+        ("mtllib none.mtl a.mtl\n" + _PAINTED, {"red", "blue"}),
+        ("mtllib a.mtl b.mtl\n" + _PAINTED, {"red", "blue"}),
+        ("mtllib two words.mtl\n" + _PAINTED, {"red", "blue"}),
+        ("mtllib none.mtl\nmtllib a.mtl\n" + _PAINTED, {"red", "blue"}),
+        ("mtllib\ta.mtl\n" + _PAINTED, {"red", "blue"}),
+        ("mtllib a.mtl\n" + _PAINTED.replace("usemtl ", "usemtl\t"), {"red", "blue"}),
+        ("mtllib a.mtl\n" + _PAINTED.replace("usemtl ", "  usemtl  "), {"red", "blue"}),
+        ("mtllib a.mtl\no left\n" + _PAINTED, {"red", "blue"}),
+        (_PAINTED, {"body"}),
+        ("# mtllib a.mtl\n" + _PAINTED, {"body"}),
+        ("mtllib none.mtl\n" + _PAINTED, {"body"}),
+        ("mtllib a.mtl\n" + _OBJECTS, {"left", "right"}),
+        (_OBJECTS, {"left", "right"}),
+        (_OBJECTS.replace("o ", "o\t"), {"left", "right"}),
+        (f"{_FOUR}usemtl red\nf 1 2 3\n# usemtl blue\nf 1 3 4\n", {"body"}),
+    ],
+)
+def test_parts_are_the_materials_of_a_library_that_is_there_else_the_objects(tmp_path, text, names):
+    for name in ("a.mtl", "two words.mtl"):
+        (tmp_path / name).write_text("newmtl red\nKd 1 0 0\n")
+    (tmp_path / "m.obj").write_text(text)
+    mesh = load(tmp_path / "m.obj")
+    assert set(mesh.part_names) == names and len(mesh.part_names) == len(names)
+    assert mesh.areas.sum() == pytest.approx(1.0)
+    first = mesh.part_names[int(mesh.part[np.argmin(mesh.corners[..., 1].sum(axis=1))])]
+    assert first in ("red", "left", "body")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("v 1 2", "'v 1 2' is no vertex of three numbers; allowed: 'v' and three numbers"),
+        ("v 1 x 2", "'v 1 x 2' is no vertex of three numbers"),
+        ("v 1,0 2,0 3,0", "'v 1,0 2,0 3,0' is no vertex of three numbers"),
+        ("v", "'v' is no vertex of three numbers"),
+        ("vn 0 0 up", "'vn 0 0 up' is no normal of numbers"),
+        ("vt left", "'vt left' is no texture of numbers"),
+        ("f 1 2 3.5", "'f 1 2 3.5' is no face of numbered vertices"),
+        ("f 1 2 x", "'f 1 2 x' is no face of numbered vertices"),
+        ("f 1 2 99999999999999999999", "is no face of numbered vertices"),
+        ("f1 2 3", "'f1 2 3' is no face of numbered vertices"),
+        ("fo 1 2 3", "'fo 1 2 3' is no face of numbered vertices"),
+        ("f", "'f' is no face of numbered vertices"),
+        ("f 1 2 99", "'f 1 2 99' names vertex 99, which the file does not hold; allowed: 1 to 4"),
+        ("f 1 2 -9", "'f 1 2 -9' names v -9, but 4 'v' lines before it"),
+    ],
+)
+@pytest.mark.parametrize("before", ["", "# one\n", "  # one\nvn 0 \\\n 0 1\n", "# C:\\\n"])
+def test_a_line_that_is_no_vertex_or_face_is_refused_by_its_number(tmp_path, line, words, before):
+    (tmp_path / "m.obj").write_text(f"{before}{_FOUR}f 1 2 3\n{line}\nf 1 3 4\n")
+    with pytest.raises(rc.SceneError) as told:
+        load(tmp_path / "m.obj")
+    assert f"m.obj:{before.count(chr(10)) + 6}: " in str(told.value) and words in str(told.value)
+
+
+def test_tabs_between_numbers_are_blanks(tmp_path):
+    (tmp_path / "m.obj").write_text(_FOUR.replace("1 1 0", "1\t1\t 0") + "f 1 2\t3 4\nvn 0 0\t1\n")
+    assert load(tmp_path / "m.obj").areas.sum() == pytest.approx(1.0)
+
+
+def test_vertices_of_other_lengths_keep_their_places(tmp_path):
+    corners = "v 0 0 0 1\nv 1 0 0\nv 1 1 0\nv 0 1 0 0.5 0.5 0.5\n"  # as many numbers as four each
+    (tmp_path / "m.obj").write_text(corners + "f 1 2 3 4\n")
+    mesh = load(tmp_path / "m.obj")
+    assert mesh.areas.sum() == pytest.approx(1.0) and mesh.bounds.tolist() == [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
 
 
 _L = [(2, 1), (1, 1), (1, 2), (0, 2), (0, 0), (2, 0)]  # an L of area 3
@@ -71,6 +147,28 @@ def test_faces_that_a_fan_of_triangles_does_not_fit_are_told(tmp_path, ending, f
         file.write_text(head + "".join(f"{x} {y} 0\n" for x, y in corners) + "6 0 1 2 3 4 5\n")
     told = [line for line in load(file).report.warnings() if "not convex" in line]
     assert bool(told) == folds
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        "  f 1 2 3 4 5 6\n",
+        "f\t1 2 3 4 5 6\n",
+        "f +1 +2 +3 +4 +5 +6\n",
+        "f 1 2 3 \\\n4 5 6\n",
+        "f 1 2 3\\\r\n4 5 6\r\n",
+        "f 1 2 3 \\\n  4 5 6\n",
+        "# a comment\rf 1 2 3 4 5 6\r",
+        "f 1// 2// 3// 4// 5// 6//\n",
+    ],
+)
+def test_faces_that_are_not_convex_are_told_however_their_lines_are_written(tmp_path, lines):
+    corners = "".join(f"v {x} {y} 0\n" for x, y in _L)
+    (tmp_path / "m.obj").write_bytes((corners.replace("\n", "\r") if lines.endswith("6\r") else corners).encode())
+    with (tmp_path / "m.obj").open("ab") as file:
+        file.write(lines.encode())
+    mesh = load(tmp_path / "m.obj")
+    assert len(mesh.faces) == 4 and any("not convex" in line for line in mesh.report.warnings())
 
 
 @pytest.mark.parametrize(

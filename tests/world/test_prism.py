@@ -50,6 +50,21 @@ def test_corners_on_a_straight_line_add_nothing():
     assert prism(comb, 1.0).volume() == pytest.approx(area(comb))
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-13, 1e-10])
+@pytest.mark.parametrize("twice", range(-1, 6))
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_corner_given_twice_in_a_row_counts_once(apart, twice, turned):
+    plan = [*L, L[0]] if twice < 0 else [*L[: twice + 1], *L[twice:]]
+    plan[-1 if twice < 0 else twice] = [x + apart for x in plan[-1 if twice < 0 else twice]]
+    mesh = prism(plan[:: -1 if turned else 1], 2.0)
+    assert mesh.volume() == pytest.approx(2.0 * area(L)) and len(mesh.corners) == len(prism(L).corners)
+
+
+def test_an_outline_thinner_than_rounding_has_no_area():
+    with pytest.raises(ValueError, match="outline has no area"):
+        prism([[0, 0], [1, 0], [1, 1e-10]])
+
+
 def test_a_scene_file_gives_the_outline_as_a_list():
     assert build("prism", {"outline": L, "height": 3.0}).volume() == pytest.approx(18.0)
 

@@ -11,12 +11,14 @@ from raychan.world.shapes.piece import Assembly, Piece, join, polygon
 
 _SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
 _FLAT = 1e-12  # of the outline's size squared: corners that turn by less are none
+_SAME = 1e-9  # of the outline's size: neighbours closer than that are one corner
 
 
 def prism(outline: Sequence[Sequence[float]] = _SQUARE, height: float = 1.0, material: str = "pec") -> Mesh:
     """Return the closed body on z = 0 whose plan is a polygon.
 
-    Args: outline (n, 2) corners [m] in order, either way round, the last joined to the first; height [m].
+    Args: outline (n, 2) corners [m] in order, either way round, the last joined to the first (which may be given
+    again at the end); height [m].
     Raises: ValueError for an outline of no area, that crosses or touches itself, or is no list of points.
     """
     plan = _corners(outline)
@@ -36,7 +38,7 @@ def _cap(points: Floats, faces: Ints, up: float) -> Piece:
 
 
 def _corners(outline: Sequence[Sequence[float]]) -> Floats:
-    """Return the corners (n, 2) counter-clockwise, without those on a straight line between their neighbours."""
+    """Return the corners (n, 2) counter-clockwise, each once, without those on a straight line between neighbours."""
     try:
         plan = np.array(outline, float)
     except (TypeError, ValueError):
@@ -49,8 +51,12 @@ def _corners(outline: Sequence[Sequence[float]]) -> Floats:
         raise ValueError("outline has no area")
     if area < 0.0:
         plan = plan[::-1]
+    # Neither of two equal neighbours turns: both would be taken for corners on a straight line.
+    plan = plan[np.abs(plan - np.roll(plan, 1, axis=0)).max(axis=1) > _SAME * size**0.5]
     turns = _cross(plan - np.roll(plan, 1, axis=0), np.roll(plan, -1, axis=0) - plan)
     plan = plan[np.abs(turns) > _FLAT * size]
+    if len(plan) < 3:
+        raise ValueError("outline has no area")
     if _meets_itself(plan, _FLAT * size):
         raise ValueError("outline crosses or touches itself")
     return plan

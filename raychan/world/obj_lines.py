@@ -1,0 +1,53 @@
+"""Lines of an OBJ that are no vertex or face, of which its reader tells in words of its parser, or not at all."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from raychan.world.errors import SceneError, shown
+
+_NUMBER = rb" +[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)(?![^ \r\n])"
+_INDEX = rb"[-+]?\d{1,18}"
+_CORNER = rb" +" + _INDEX + rb"(?:/(?:" + _INDEX + rb")?){0,2}"
+_ENDS = rb" *\r?$"
+_FACE, _VERTEX = re.compile(rb"^f .*", re.M), re.compile(rb"^v ", re.M)
+_WRONG = tuple(
+    (re.compile(pattern, re.M | re.I), problem, allowed)
+    for pattern, problem, allowed in (
+        (rb"^v(?=[ \r\n]|\Z)(?!(?:" + _NUMBER + rb"){3}).*", "is no vertex of three numbers", "'v' and three numbers"),
+        (rb"^vt(?= )(?!(?:" + _NUMBER + rb"){1,}" + _ENDS + rb").*", "is no texture of numbers", "'vt' and numbers"),
+        (rb"^vn(?= )(?!(?:" + _NUMBER + rb"){1,}" + _ENDS + rb").*", "is no normal of numbers", "'vn' and numbers"),
+        (
+            rb"^f(?!(?:" + _CORNER + rb")+" + _ENDS + rb").*",
+            "is no face of numbered vertices",
+            "'f' and corners such as 7, 7/1, 7//2 or 7/1/2",
+        ),
+        (rb"^f (?:.* )?[-+]?0+(?=[/ \r\n]|\Z).*", "names vertex 0", "vertices counted from 1"),
+    )
+)
+
+
+def checked_lines(text: bytes, file: Path) -> None:
+    """Raise SceneError for the first line of an OBJ, without indents and tabs, that is no vertex or face."""
+    found = [(at.start(), at[0], told, wanted) for pattern, told, wanted in _WRONG if (at := pattern.search(text))]
+    if found:
+        start, line, problem, allowed = min(found)
+        raise refused(line, problem, allowed, text.count(b"\n", 0, start) + 1, file)
+
+
+def missing_vertex(text: bytes, file: Path) -> SceneError | None:
+    """Return the error of the first face of an OBJ that names a vertex which is not there, if any."""
+    count = len(_VERTEX.findall(text))
+    for line in _FACE.finditer(text):
+        most = max(int(corner.split(b"/")[0]) for corner in line[0].split()[1:])
+        if most > count:
+            problem = f"names vertex {most}, which the file does not hold"
+            return refused(line[0], problem, f"1 to {count}", text.count(b"\n", 0, line.start()) + 1, file)
+    return None
+
+
+def refused(line: bytes, problem: str, allowed: str, number: int, file: Path) -> SceneError:
+    """Return the error of a line of a file."""
+    text = line.decode("latin-1").strip()
+    return SceneError(f"{shown(text)} {problem}", file=file, value=text, allowed=allowed, line=number)

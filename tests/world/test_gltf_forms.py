@@ -1,0 +1,194 @@
+"""A glTF file is read as the body that it describes, or refused by the name of what is not read."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+
+from raychan.world.errors import SceneError
+from raychan.world.mesh_io import load
+
+BOX = trimesh.creation.box([1.0, 2.0, 3.0])  # 22 m2, 6 m3
+TYPES = {"f": 5126, "b": 5120, "h": 5122, "H": 5123, "B": 5121}
+
+
+class Gltf:
+    """The header of a glTF of a box, and its bytes."""
+
+    def __init__(self):
+        self.data = b""
+        self.tree = {"asset": {"version": "2.0"}, "bufferViews": [], "accessors": []}
+        corners = self.add(BOX.vertices, "f", "VEC3")
+        self.tree["accessors"][corners] |= {"min": BOX.bounds[0].tolist(), "max": BOX.bounds[1].tolist()}
+        self.primitive = {"attributes": {"POSITION": corners}, "indices": self.add(BOX.faces.ravel(), "H", "SCALAR")}
+        self.node, self.mesh = {"mesh": 0, "name": "crate"}, {"name": "box", "primitives": [self.primitive]}
+        self.tree |= {"nodes": [self.node], "meshes": [self.mesh], "scenes": [{"nodes": [0]}], "scene": 0}
+
+    def add(self, values, kind, shape, **more):
+        raw = np.asarray(values).astype(f"<{kind}")
+        rows = raw.reshape(len(raw), -1)
+        step = -(-rows.itemsize * rows.shape[1] // 4) * 4 if shape == "VEC3" else rows.itemsize * rows.shape[1]
+        packed = b"".join(row.tobytes().ljust(step, b"\0") for row in rows)
+        self.data = self.data.ljust(-(-len(self.data) // 4) * 4, b"\0")
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(packed)}
+        self.tree["bufferViews"].append(view | ({"byteStride": step} if shape == "VEC3" else {}))
+        self.data += packed
+        accessor = {"bufferView": len(self.tree["bufferViews"]) - 1, "componentType": TYPES[kind], "count": len(raw)}
+        self.tree["accessors"].append(accessor | {"type": shape} | more)
+        return len(self.tree["accessors"]) - 1
+
+    def read(self, folder, ending="glb"):
+        file = folder / f"m.{ending}"
+        buffer = {"byteLength": len(self.data)}
+        if ending == "gltf":
+            buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
+        text = json.dumps(self.tree | {"buffers": [buffer]}).encode()
+        text, data = (x + fill * (-len(x) % 4) for x, fill in ((text, b" "), (self.data, b"\0")))
+        if ending == "glb":
+            head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data))
+            text = (
+                head + struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+            )
+        file.write_bytes(text)
+        return load(file)
+
+
+def fans(g):
+    g.primitive["mode"] = 6
+
+
+def sparse_corners(g):
+    g.tree["accessors"][0]["sparse"] = {"count": 1}
+
+
+def sparse_indices(g):
+    g.tree["accessors"][1]["sparse"] = {"count": 1}
+
+
+def normalised(g):
+    g.primitive["attributes"]["POSITION"] = g.add(BOX.vertices / 1.5 * 127, "b", "VEC3", normalized=True)
+    g.node["scale"] = [1.5] * 3
+    g.tree["extensionsRequired"] = ["KHR_mesh_quantization"]
+
+
+def instances(g):
+    places = g.add([[0, 0, 0], [9, 0, 0]], "f", "VEC3")
+    g.node["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}}
+
+
+def morphed(g):
+    g.primitive["targets"], g.mesh["weights"] = [{"POSITION": 0}], [1.0]
+
+
+def morphed_at_the_node(g):
+    g.primitive["targets"], g.node["weights"] = [{"POSITION": 0}], [0.5]
+
+
+def hidden(g):
+    g.node["extensions"] = {"KHR_node_visibility": {"visible": False}}
+
+
+def camera(g):
+    g.node["camera"] = 0
+
+
+def unknown(g):
+    g.tree["extensionsRequired"] = ["EXT_meshopt_compression"]
+
+
+def draco(g):
+    g.primitive["extensions"] = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    del g.tree["accessors"][0]["bufferView"]
+    g.tree["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+@pytest.mark.parametrize(
+    ("form", "words"),
+    [
+        (fans, "mesh 'box' has triangle fans (mode 6), which are not read; allowed: triangles (mode 4)"),
+        (sparse_corners, "mesh 'box' has corners of a sparse accessor"),
+        (sparse_indices, "mesh 'box' has indices of a sparse accessor"),
+        (normalised, "mesh 'box' has normalised integers as corners (KHR_mesh_quantization)"),
+        (instances, "node 'crate' repeats its mesh by EXT_mesh_gpu_instancing"),
+        (morphed, "mesh 'box' has morph targets of weights other than 0"),
+        (morphed_at_the_node, "mesh 'box' has morph targets of weights other than 0"),
+        (hidden, "node 'crate' is hidden by KHR_node_visibility"),
+        (camera, "node 'crate' is a camera with a mesh or children"),
+        (unknown, "needs the glTF extension 'EXT_meshopt_compression', which is not read"),
+        (draco, "mesh 'box' is compressed by Draco"),
+    ],
+)
+def test_a_form_that_would_be_another_body_is_refused_by_name(form, words, ending, tmp_path, monkeypatch):
+    monkeypatch.setattr("raychan.world.gltf_forms.find_spec", lambda name: None)
+    made = Gltf()
+    form(made)
+    with pytest.raises(SceneError) as told:
+        made.read(tmp_path, ending)
+    assert words in str(told.value) and f"m.{ending}" in str(told.value)
+
+
+def quantised(g):
+    g.primitive["attributes"]["POSITION"] = g.add(BOX.vertices * 100, "h", "VEC3")
+    g.node["scale"] = [0.01] * 3
+    g.tree["extensionsRequired"] = ["KHR_mesh_quantization"]
+
+
+def looks(g):
+    g.tree["extensionsRequired"] = ["KHR_materials_unlit", "KHR_texture_transform"]
+
+
+def morphs_of_weight_0(g):
+    g.primitive["targets"], g.mesh["weights"] = [{"POSITION": 0}], [0.0]
+
+
+def fans_out_of_the_scene(g):
+    g.tree["meshes"].append({"primitives": [g.primitive | {"mode": 6}]})
+    g.tree["nodes"].append({"mesh": 1})
+
+
+@pytest.mark.parametrize("form", [lambda g: None, quantised, looks, morphs_of_weight_0, fans_out_of_the_scene])
+def test_a_form_that_is_read_right_is_read(form, tmp_path):
+    made = Gltf()
+    form(made)
+    mesh = made.read(tmp_path)
+    assert mesh.areas.sum() == pytest.approx(22.0) and mesh.volume() == pytest.approx(6.0)
+
+
+def _rigged(g, bind, pose):
+    """Hang the box on a joint under a turned and shifted node; bind is its place as drawn, pose its place now."""
+    turned = {"rotation": [0.0, 0.0, 0.6, 0.8], "translation": [1.0, 2.0, 3.0], "scale": [2.0] * 3, "children": [2]}
+    g.tree["nodes"] += [turned, {"translation": pose}]
+    above = trimesh.transformations.quaternion_matrix([0.8, 0.0, 0.0, 0.6]) * [2.0, 2.0, 2.0, 1.0]
+    above[:3, 3] = turned["translation"]
+    inverse = np.linalg.inv(above @ trimesh.transformations.translation_matrix(bind))
+    g.primitive["attributes"] |= {
+        "JOINTS_0": g.add(np.zeros((8, 4)), "B", "VEC4"),
+        "WEIGHTS_0": g.add(np.tile([1.0, 0, 0, 0], (8, 1)), "f", "VEC4"),
+    }
+    g.tree["skins"] = [{"joints": [2], "inverseBindMatrices": g.add(inverse.T.reshape(1, 16), "f", "MAT4")}]
+    g.node["skin"], g.tree["scenes"][0]["nodes"] = 0, [0, 1]
+
+
+@pytest.mark.parametrize("ending", ["glb", "gltf"])
+def test_a_skin_is_read_in_the_pose_in_which_its_mesh_was_drawn_only(ending, tmp_path):
+    rest = Gltf()
+    _rigged(rest, [0.3, 0.2, 0.1], [0.3, 0.2, 0.1])
+    assert rest.read(tmp_path, ending).volume() == pytest.approx(6.0)
+    bent = Gltf()
+    _rigged(bent, [0.3, 0.2, 0.1], [0.3, 0.2, 0.2])
+    with pytest.raises(SceneError, match="mesh 'box' has a skin in another pose than its mesh was drawn in"):
+        bent.read(tmp_path, ending)
+
+
+def test_a_skin_that_cannot_be_followed_is_refused(tmp_path):
+    lost = Gltf()
+    _rigged(lost, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+    lost.tree["scenes"][0]["nodes"] = [0]
+    with pytest.raises(SceneError, match="has a skin in another pose"):
+        lost.read(tmp_path)
