@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.cli import invoke
 from raychan.run.ship_loop import ShipLoop
 from raychan.run.ship_replay import read_poses
 from raychan.run.ship_scene import ship_scene
@@ -101,3 +102,18 @@ def test_a_log_in_unix_time_counts_from_its_first_row_and_says_when_that_was(tmp
     assert [f.x for f in frames] == pytest.approx([8.0 * f.time for f in frames], abs=1e-9)
     assert loop.scene.poses.start == 1700000000.5
     assert "the log ends after 1 s, before run.duration_s = 60" in loop.scene.ends_early[0]
+
+
+@pytest.mark.parametrize("command", ["ship", "hil"])
+def test_a_log_shorter_than_a_scan_is_told_with_its_file(command, tmp_path, capsys):
+    log, scene = tmp_path / "log.csv", tmp_path / "ship.toml"
+    scene.write_text("[replay]\nfile = 'log.csv'\n[run]\nduration_s = 0.5\n")
+    options = {"ship": ["--out", str(tmp_path / "out"), "--no-pictures"], "hil": ["--no-realtime"]}[command]
+    for last in (0.001, 0.006, 0.0133):
+        log.write_text(f"{HEAD}0,0,0,0,0\n{last},0,0,0,0\n")
+        assert invoke([command, str(scene), *options]) == 2
+        said = capsys.readouterr().err.replace("\n", "")
+        assert f"{log}: the log lasts {last} s" in said and "allowed: at least one scan, 0.01333 s" in said
+    for last in (0.014, 0.02):
+        log.write_text(f"{HEAD}0,0,0,0,0\n{last},0,0,0,0\n")
+        assert invoke([command, str(scene), *options]) == 0
