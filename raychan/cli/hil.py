@@ -39,11 +39,12 @@ def _origin(text: str) -> Origin:
     try:
         latitude, longitude = (float(part) for part in str(text).split(","))
     except ValueError:
-        raise typer.BadParameter(f"'{text}': two numbers, latitude and longitude in degrees, as {_ORIGIN}") from None
+        wanted = f"two numbers, latitude and longitude in degrees, as {_ORIGIN}"
+        raise typer.BadParameter(f"'{text}': {wanted}", param_hint="--origin") from None
     try:
         return Origin(latitude, longitude)
     except ValueError as error:
-        raise typer.BadParameter(f"'{text}': {error}") from None
+        raise typer.BadParameter(f"'{text}': {error}", param_hint="--origin") from None
 
 
 def _baud(value: int) -> int:
@@ -135,6 +136,9 @@ def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: 
 
     made = {}
     for name, device in names.items():
+        if device is not None and not device.strip():
+            allowed = "name a serial port, or leave the option out for a pseudo-terminal"
+            raise typer.BadParameter(f"the name is empty: {allowed}", param_hint=f"--{name}")
         speed = baud if name == "scanner" else nmea_baud
         try:
             port: Port = TerminalPort() if device is None else SerialPort(device, speed)

@@ -69,6 +69,7 @@ SECONDS = Limit(1e-4, 600.0, "s", "a spectrogram of ten minutes is thousands of 
 TRACED = Limit(1.0, 1e5, "1/s", "tracings a second")
 RATE_STEP = Limit(1e-3, 100.0, "m/s", "resolution of a spectrogram in range rate", above=True)
 CELL_RANGE = Limit(0.0, 1e6, "m", "range cells begin at the radar, and a scene is no wider than its horizon")
+LISTED = Limit(0, 1_000_000, "", "rows of a table; 0 lists none")
 INTERVAL = Limit(1e-9, 1e6, "s", "from frame to frame")
 LATER = Limit(-1e11, 1e11, "s", "as far as the last of the most frames at the longest interval")
 SEED = Limit(0, (1 << 63) - 1, "", "seeds are whole numbers of 63 bits")
