@@ -68,10 +68,12 @@ class ScannedShip(ShipLoop):
 
 @dataclass(frozen=True)
 class Instruments:
-    """Satellite receiver, compass and attitude sensor: origin of the scene, and UTC of its 0 s."""
+    """Satellite receiver, compass, attitude sensor and rudder indicator: origin of the scene, UTC of its 0 s, and
+    whether a positive rudder turns the ship to starboard (1) or to port (-1)."""
 
     origin: Origin
     epoch: datetime
+    rudder_sign: int = 1
 
     def place(self, at: Reading) -> tuple[float, float]:
         """Return latitude and longitude [deg]."""
@@ -92,7 +94,8 @@ class Instruments:
         """Return `$PASHR`, `$AGRSA` and `$PTNTHTM`."""
         angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch))
         attitude = nmea.Attitude(self.utc(at).time(), *angles)
-        return nmea.pashr(attitude) + nmea.rsa(math.degrees(at.rudder)) + nmea.ptnthtm(attitude)
+        rudder = self.rudder_sign * math.degrees(at.rudder)
+        return nmea.pashr(attitude) + nmea.rsa(rudder) + nmea.ptnthtm(attitude)
 
     def utc(self, at: Reading) -> datetime:
         """Return the time of a reading, to 10 ms as the sentences say it."""

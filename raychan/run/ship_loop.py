@@ -117,6 +117,11 @@ class ShipLoop:
         return self._steered is not None
 
     @property
+    def rudder_sign(self) -> int:
+        """To which side a positive rudder turns the ship: 1 starboard, -1 port; 1 of logged poses, which have none."""
+        return 1 if self._steered is None or self._steered.bridge.ship.b[2] >= 0.0 else -1
+
+    @property
     def takes_shaft(self) -> bool:
         """Whether the ship takes orders for its shaft; the linear ships keep their speed."""
         return self._steered is not None and self._steered.bridge.takes_shaft

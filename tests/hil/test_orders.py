@@ -1,7 +1,7 @@
 """Orders are found in any stream; what is none is counted; positions lie where the ellipsoid has them."""
 
 import math
-from datetime import UTC
+from datetime import UTC, datetime
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +9,9 @@ import pytest
 from pynmeagps import NMEAReader
 
 from raychan.hil.geodesy import FLATTENING, SEMI_MAJOR_M, Origin, geocentric
-from raychan.hil.instruments import Instruments, reading
+from raychan.hil.instruments import Instruments, ScannedShip, reading
 from raychan.hil.orders import Order, OrderReader, order_sentence
+from raychan.run.ship_scene import ship_scene
 
 
 def test_an_order_comes_back_as_sent():
@@ -115,8 +116,6 @@ def test_a_reading_lies_between_two_frames_and_headings_take_the_shorter_turn():
 
 
 def test_the_sentences_of_a_cycle_say_one_time_and_one_place():
-    from datetime import datetime
-
     instruments = Instruments(Origin(54.0, 8.0), datetime(2026, 12, 31, 23, 59, 59, 950_000, UTC))
     at = reading(frame(0.0), frame(0.2, north=1.0, east=1.0, roll=0.1), 0.1)
     first, second = (NMEAReader.parse(line + b"\r\n") for line in instruments.position(at).split(b"\r\n")[:2])
@@ -125,4 +124,20 @@ def test_the_sentences_of_a_cycle_say_one_time_and_one_place():
     assert first.spd * 1852.0 / 3600.0 == pytest.approx(math.sqrt(50.0), abs=1e-3) and first.cog == 45.0
     lines = instruments.attitude(at).split(b"\r\n")
     assert [line[:6] for line in lines[:3]] == [b"$PASHR", b"$AGRSA", b"$PTNTH"]
+    assert lines[1].startswith(b"$AGRSA,0.00,A,,V*"), "no -0.00"
     assert NMEAReader.parse(lines[0] + b"\r\n").roll == pytest.approx(math.degrees(0.05), abs=1e-3)
+
+
+@pytest.mark.parametrize("model", ["printed", "corrected", "container", "yacht"])
+@pytest.mark.parametrize("order_deg", [-10.0, 10.0])
+def test_the_rudder_sentence_is_negative_where_the_bow_turns_to_port(model, order_deg):
+    """NMEA 0183, RSA: '-' is bow turns to port."""
+    loop = ScannedShip(ship_scene({"ship": {"model": model}, "steering": {"controller": "pd"}}))
+    loop.order(rudder=math.radians(order_deg))
+    frames = [loop.step_scan() for _ in range(300)]
+    at = reading(frames[-2], frames[-1], frames[-1].time)
+    sentence = Instruments(Origin(54.0, 8.0), datetime(2026, 1, 1, tzinfo=UTC), loop.rudder_sign).attitude(at)
+    told = float(sentence.split(b"\r\n")[1].split(b",")[1])
+    assert abs(told) == pytest.approx(10.0, abs=0.3)
+    assert (told < 0.0) == (frames[-1].yaw_rate < 0.0), "yaw rates are to starboard"
+    assert math.degrees(frames[-1].rudder) == pytest.approx(order_deg, abs=0.3), "orders have the ship's own sign"
