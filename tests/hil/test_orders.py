@@ -37,13 +37,34 @@ def test_no_flipped_bit_makes_another_order(flip):
         assert found == [] and reader.bad + reader.ignored >= 1
 
 
-@pytest.mark.parametrize("content", ["PRCHN", "PRCHN,1", "PRCHN,1,2,3", "PRCHN,one,2", "PRCHN,nan,2", "PRCHN,,inf"])
-def test_an_order_with_wrong_fields_is_bad(content):
+def with_check_sum(content):
     check = 0
     for character in content.encode():
         check ^= character
+    return f"${content}*{check:02X}\r\n".encode()
+
+
+NO_NUMBERS = ["1_0,5", " 10 ,5", "1e1,5", "0x10,5", "+,5", "-.,5", ".,5", "1.2.3,5", "1,5\x1f", f"{'9' * 200}e9,"]
+
+
+@pytest.mark.parametrize("content", ["PRCHN", "PRCHN,1", "PRCHN,1,2,3", "PRCHN,one,2", "PRCHN,nan,2", "PRCHN,,inf"])
+def test_an_order_with_wrong_fields_is_bad(content):
     reader = OrderReader()
-    assert reader.feed(f"${content}*{check:02X}\r\n".encode()) == [] and reader.bad == 1
+    assert reader.feed(with_check_sum(content)) == [] and reader.bad == 1
+
+
+@pytest.mark.parametrize("fields", NO_NUMBERS)
+def test_a_field_that_is_no_plain_decimal_number_is_bad(fields):
+    reader = OrderReader()
+    assert reader.feed(with_check_sum(f"PRCHN,{fields}")) == [] and reader.bad == 1
+
+
+def test_decimal_numbers_of_any_form_are_taken_and_small_ones_come_back():
+    for text, value in (("10", 10.0), ("+10.", 10.0), ("-.5", -0.5), ("007.50", 7.5)):
+        (found,) = OrderReader().feed(with_check_sum(f"PRCHN,{text},"))
+        assert math.degrees(found.rudder) == pytest.approx(value)
+    (found,) = OrderReader().feed(order_sentence(2e-5, 1234567.0))
+    assert math.degrees(found.rudder) == pytest.approx(2e-5) and found.shaft * 60.0 == pytest.approx(1234567.0)
 
 
 def test_orders_without_a_check_sum_and_half_ones_are_bad_and_others_are_ignored():
