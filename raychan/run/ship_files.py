@@ -27,6 +27,7 @@ from raychan.world.errors import SceneError
 Floats = NDArray[np.float64]
 
 COLUMNS = ("t_s", "x_m", "y_m", "heading_deg", "roll_deg", "rudder_deg", "speed_mps")
+"""Of ship.csv; logged poses that have pitch and height add `ship_replay.OPTIONAL`, so that it can be replayed."""
 PICTURES = ("scan.png", "track.png", "motion.png", "scene.png")
 CONTENTS = Contents(("ship.csv", "scan.nc", "summary.json", *PICTURES), signs=("scan.nc",))
 _MOST_SCANS = 10_000_000  # a day at 75 Hz has 6.5 million; of 181 beams 14 GB before packing
@@ -73,6 +74,7 @@ class Voyage:
         self._nearest = np.full(len(scene.names) + 2, np.inf)
         self._roll = [np.inf, -np.inf]
         self._last: Frame | None = None
+        self._optional = () if scene.poses is None else scene.poses.optional
 
     def __enter__(self) -> Voyage:
         import h5netcdf
@@ -81,7 +83,7 @@ class Voyage:
         with ExitStack() as opened:
             self._csv = opened.enter_context((self._folder / "ship.csv").open("w", encoding="utf-8", newline=""))
             self._rows = csv.writer(self._csv, lineterminator="\n")
-            self._rows.writerow(COLUMNS)
+            self._rows.writerow([*COLUMNS, *self._optional])
             self._disk = opened.enter_context(closing(ShelteredFile(self._folder / "scan.nc")))
             held = opened.enter_context(h5py.File(self._disk, "w"))
             self._nc = opened.enter_context(h5netcdf.File(held, "w"))
@@ -135,7 +137,8 @@ class Voyage:
         row = [frame.time, frame.x, frame.y, *angles, frame.speed]
         texts = [f"{value:.9g}" for value in row]
         texts[_HEADING] = rounded_heading(row[_HEADING], ".9g")
-        self._rows.writerow(texts)
+        further = {"pitch_deg": np.degrees(frame.pitch), "z_m": frame.z}
+        self._rows.writerow([*texts, *(f"{further[name]:.9g}" for name in self._optional)])
         met = frame.scan
         self._ranges.append(met.range)
         self._bodies.append(met.body)

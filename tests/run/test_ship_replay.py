@@ -41,6 +41,23 @@ def test_pitch_and_height_of_a_log_count(tmp_path):
     assert frame.scan.range[90] == pytest.approx(height / np.sin(np.radians(10.0)), abs=1e-9)
 
 
+@pytest.mark.parametrize("optional", [("pitch_deg", "z_m"), ("z_m",), ()])
+def test_the_csv_of_a_replay_has_the_columns_of_its_log_and_can_be_replayed_as_it_was(optional, tmp_path):
+    log, scene = tmp_path / "log.csv", tmp_path / "ship.toml"
+    names = ["t_s", "x_m", "y_m", "heading_deg", "roll_deg", *optional]
+    rows = [[k / 75.0, 0.1 * k, 0.0, 10.0 + k, 3.0, 4.0 + 0.1 * k, 2.0 + 0.01 * k][: len(names)] for k in range(31)]
+    log.write_text("\n".join(",".join(map(str, row)) for row in [names, *rows]))
+    scene.write_text(f"[replay]\nfile = '{log}'\n[sea]\nreflectivity = 1.0\n")
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert invoke(["ship", str(scene), "--out", str(one), "--no-pictures"]) == 0
+    assert (one / "ship.csv").read_text().splitlines()[0].split(",")[7:] == list(optional)
+    again = ["--set", f"replay.file={one / 'ship.csv'}"]
+    assert invoke(["ship", str(scene), *again, "--out", str(two), "--no-pictures"]) == 0
+    first, second = (read_poses(folder / "ship.csv", 1.0).pose for folder in (one, two))
+    assert first[: len(second)] == pytest.approx(second, abs=1e-7)
+    assert first[:, 2].any() == ("z_m" in optional) and first[:, 4].any() == ("pitch_deg" in optional)
+
+
 def test_the_ship_is_where_the_log_has_it_and_turns_over_north_the_short_way(tmp_path):
     loop = replay(tmp_path, HEAD + "10,0,0,350,0\n11,8,-6,10,4\n12,16,-12,30,0\n")
     frames = [loop.step_scan() for _ in range(loop.scans)]
