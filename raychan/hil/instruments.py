@@ -15,7 +15,7 @@ from raychan.sensors.laser import Scanner
 @dataclass(frozen=True)
 class Reading:
     """The ship at `time` [s]: north, east, height [m]; heading, roll (starboard down is positive), pitch (bow up is
-    positive), rudder [rad]; speed [m/s] and course [rad] over ground."""
+    positive), rudder [rad]; speed [m/s] and course [rad] over ground; rudder_sign as of a frame."""
 
     time: float
     north: float
@@ -27,6 +27,7 @@ class Reading:
     rudder: float
     speed: float
     course: float
+    rudder_sign: int
 
 
 def reading(before: Frame, after: Frame, time: float) -> Reading:
@@ -53,6 +54,7 @@ def reading(before: Frame, after: Frame, time: float) -> Reading:
         rudder=along(before.rudder, after.rudder),
         speed=math.hypot(north, east) / span if span > 0.0 else 0.0,
         course=course % math.tau,
+        rudder_sign=after.rudder_sign,
     )
 
 
@@ -68,12 +70,10 @@ class ScannedShip(ShipLoop):
 
 @dataclass(frozen=True)
 class Instruments:
-    """Satellite receiver, compass, attitude sensor and rudder indicator: origin of the scene, UTC of its 0 s, and
-    whether a positive rudder turns the ship to starboard (1) or to port (-1)."""
+    """Satellite receiver, compass, attitude sensor and rudder indicator: origin of the scene, and UTC of its 0 s."""
 
     origin: Origin
     epoch: datetime
-    rudder_sign: int = 1
 
     def place(self, at: Reading) -> tuple[float, float]:
         """Return latitude and longitude [deg]."""
@@ -94,7 +94,7 @@ class Instruments:
         """Return `$PASHR`, `$AGRSA` and `$PTNTHTM`."""
         angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch))
         attitude = nmea.Attitude(self.utc(at).time(), *angles)
-        rudder = self.rudder_sign * math.degrees(at.rudder)
+        rudder = at.rudder_sign * math.degrees(at.rudder)
         return nmea.pashr(attitude) + nmea.rsa(rudder) + nmea.ptnthtm(attitude)
 
     def utc(self, at: Reading) -> datetime:

@@ -96,7 +96,7 @@ class Session:
         gc.freeze()  # what is there now stays; collections look only at what is new
         scan_time = self.loop.scene.scanner.duration
         start, epoch = _start()
-        self.instruments = Instruments(self.origin, epoch, self.loop.rudder_sign)
+        self.instruments = Instruments(self.origin, epoch)
         self.ticks = Schedule(start + scan_time, scan_time)
         self.cycles = Schedule(start + scan_time, 1.0 / self.rate)
         end = start + scan_time + duration

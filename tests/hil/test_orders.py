@@ -123,6 +123,7 @@ def test_an_origin_off_the_globe_or_at_a_pole_is_refused(place):
 
 def frame(time, **others):
     base = {"north": 0.0, "east": 0.0, "z": 0.0, "heading": 0.0, "roll": 0.0, "pitch": 0.0, "rudder": 0.0}
+    base |= {"rudder_sign": 1}
     return SimpleNamespace(time=time, **base | others)
 
 
@@ -157,7 +158,7 @@ def test_the_rudder_sentence_is_negative_where_the_bow_turns_to_port(model, orde
     loop.order(rudder=math.radians(order_deg))
     frames = [loop.step_scan() for _ in range(300)]
     at = reading(frames[-2], frames[-1], frames[-1].time)
-    sentence = Instruments(Origin(54.0, 8.0), datetime(2026, 1, 1, tzinfo=UTC), loop.rudder_sign).attitude(at)
+    sentence = Instruments(Origin(54.0, 8.0), datetime(2026, 1, 1, tzinfo=UTC)).attitude(at)
     told = float(sentence.split(b"\r\n")[1].split(b",")[1])
     assert abs(told) == pytest.approx(10.0, abs=0.3)
     assert (told < 0.0) == (frames[-1].yaw_rate < 0.0), "yaw rates are to starboard"

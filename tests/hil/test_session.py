@@ -160,9 +160,3 @@ def test_a_run_without_a_host_states_no_drift(session):
     assert isinstance(numbers["scans"]["drift_ms"], float)
     line = one_line(numbers)
     assert "; nothing sent, no drift and jitter measured, " in line and "ms (99 %)" not in line
-
-
-def test_the_instruments_of_a_run_know_to_which_side_its_rudder_turns(session):
-    session.loop.__class__ = type("Turned", (SlowShip,), {"rudder_sign": -1})
-    session.run(0.1, lambda: False)
-    assert session.instruments.rudder_sign == -1
