@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
+from raychan.cli.options import within
+from raychan.world import limits
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,6 +19,14 @@ if TYPE_CHECKING:
 
 _COUNTS = 1e-3  # of the strongest contribution to the cell: weaker paths are not listed
 _OTHERS = 5  # most other detections that are named
+_Paths = Annotated[
+    int,
+    typer.Option(
+        help="Number of paths to list, strongest contribution first.",
+        metavar="N",
+        callback=within(limits.LISTED, True),
+    ),
+]
 
 
 def explain(
@@ -47,9 +57,7 @@ def explain(
             "--cell", help="Explain the map cell at --range and --speed (strongest if not given), not a detection."
         ),
     ] = False,
-    paths: Annotated[
-        int, typer.Option(help="Number of paths to list, strongest contribution first.", metavar="N", min=0)
-    ] = 10,
+    paths: _Paths = 10,
 ) -> None:  # fmt: skip
     """List the paths, with their bodies, that make a detection or a map cell, and the contribution of each.
 

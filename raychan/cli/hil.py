@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import math
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from queue import SimpleQueue
-from threading import Thread
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from raychan.cli import show
+from raychan.cli.hil_files import check_out, track, write_summary
 from raychan.cli.options import ShipChanges, ShipSceneFile, directory, within
 from raychan.world.limits import Limit
 
 if TYPE_CHECKING:
     from raychan.hil.channel import Channel
     from raychan.hil.geodesy import Origin
-    from raychan.hil.instruments import Instruments, Reading
     from raychan.hil.ports import Port
 
 _BAUDS = (9600, 19200, 38400, 500000)
@@ -32,10 +28,6 @@ _DURATION = Limit(0.0, 1e7, "s", "a run of months is a mistake", above=True)
 _ALWAYS = (signal.SIGINT, signal.SIGTERM)
 """Signals that end a run even if they were ignored; nohup ignores that of a closed terminal."""
 _ORIGIN = "54.0,8.0"
-_TRACK = (
-    "utc", "t_s", "north_m", "east_m", "latitude_deg", "longitude_deg", "heading_deg", "roll_deg", "pitch_deg",
-    "rudder_deg", "speed_mps",
-)  # fmt: skip
 
 Device = Annotated[str | None, typer.Option(help="Serial port; if not given, a pseudo-terminal.", metavar="PORT")]
 
@@ -47,11 +39,12 @@ def _origin(text: str) -> Origin:
     try:
         latitude, longitude = (float(part) for part in str(text).split(","))
     except ValueError:
-        raise typer.BadParameter(f"'{text}': two numbers, latitude and longitude in degrees, as {_ORIGIN}") from None
+        wanted = f"two numbers, latitude and longitude in degrees, as {_ORIGIN}"
+        raise typer.BadParameter(f"'{text}': {wanted}", param_hint="--origin") from None
     try:
         return Origin(latitude, longitude)
     except ValueError as error:
-        raise typer.BadParameter(f"'{text}': {error}") from None
+        raise typer.BadParameter(f"'{text}': {error}", param_hint="--origin") from None
 
 
 def _baud(value: int) -> int:
@@ -103,6 +96,8 @@ def hil(
     code 0.
     """
     place = _origin(origin)
+    if out is not None:
+        check_out(out)
     names = {"scanner": scanner, "position": position, "heading": heading, "attitude": attitude}
     with ExitStack() as closing:
         channels = _channels(names, baud, nmea_baud, closing)
@@ -110,9 +105,7 @@ def hil(
     from raychan.hil.summary import one_line, warnings
 
     if out is not None:
-        from raychan.run.output_files import write_together
-
-        write_together({out / "summary.json": json.dumps(numbers, indent=2).encode()})
+        write_summary(out, numbers)
     show.warn(warnings(numbers))
     _say(one_line(numbers))
     if numbers["failed"]:
@@ -143,6 +136,9 @@ def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: 
 
     made = {}
     for name, device in names.items():
+        if device is not None and not device.strip():
+            allowed = "name a serial port, or leave the option out for a pseudo-terminal"
+            raise typer.BadParameter(f"the name is empty: {allowed}", param_hint=f"--{name}")
         speed = baud if name == "scanner" else nmea_baud
         try:
             port: Port = TerminalPort() if device is None else SerialPort(device, speed)
@@ -168,7 +164,7 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
     if wishes.stream:
         session.scanner.mode = STREAM
     # Threads that are started while this one goes first do so too: none waits for the interpreter behind others.
-    with _stops() as stopped, _first(wishes.realtime) as session.first, _track(wishes.out) as session.tell:
+    with _stops() as stopped, _first(wishes.realtime) as session.first, track(wishes.out) as session.tell:
         names = {name: channel.port.name for name, channel in channels.items()}
         _say(json.dumps(names) if wishes.ports else "  ".join(f"{name} {port}" for name, port in names.items()))
         session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)
@@ -204,62 +200,3 @@ def _stops() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextmanager
-def _track(out: Path | None) -> Iterator[Callable[[Instruments, Reading], None]]:
-    """Yield a function that writes each reading into track.csv, where there is a directory. Raises: StoreError."""
-    from raychan.run.output_files import StoreError
-
-    if out is None:
-        yield lambda instruments, at: None
-        return
-    name = out / "track.csv"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        file = name.open("w", newline="")
-    except OSError as error:
-        raise StoreError(f"{out}: cannot write: {error.strerror or error}") from error
-    rows = csv.writer(file)
-    lost: list[str] = []  # why the file ends early: a full disk does not end the run
-    waiting: SimpleQueue[tuple[Instruments, Reading] | None] = SimpleQueue()
-
-    def write() -> None:
-        _try(lambda: rows.writerow(_TRACK), lost)
-        while (one := waiting.get()) is not None:
-            if not lost:
-                _try(lambda one=one: rows.writerow(_row(*one)), lost)  # type: ignore[misc]
-
-    # A disk may keep a writer waiting for longer than a scan takes.
-    writer = Thread(target=write, daemon=True)
-    writer.start()
-    try:
-        yield lambda instruments, at: waiting.put((instruments, at))
-    finally:
-        waiting.put(None)
-        writer.join()
-        _try(file.close, lost)
-        show.warn(f"{name}: not whole: {why}" for why in lost[:1])
-
-
-def _try(write: Callable[[], object], lost: list[str]) -> None:
-    """Write, and note why not where it cannot be."""
-    try:
-        write()
-    except OSError as error:
-        lost.append(error.strerror or str(error))
-
-
-def _row(instruments: Instruments, at: Reading) -> list[str]:
-    """Return a reading as a row of track.csv."""
-    from raychan.run.ship_files import rounded_heading
-
-    heading, *angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
-    where = (at.time, at.north, at.east)
-    return [
-        instruments.utc(at).isoformat(timespec="milliseconds"),
-        *(f"{v:.4f}" for v in where),
-        *(f"{a:.9f}" for a in instruments.place(at)),
-        rounded_heading(heading, ".4f"),
-        *(f"{v:.4f}" for v in (*angles, at.speed)),
-    ]

@@ -127,8 +127,9 @@ def _sequence(
     scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
 ) -> None:
     from raychan.run.messages import findings, marks
-    from raychan.run.sequence import Store, frames
+    from raychan.run.sequence import Store, frames, overlap
 
+    show.warn(overlap(scene, count, interval))
     store, told = Store(out), set()
     start = perf_counter()
 

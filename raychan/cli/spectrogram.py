@@ -105,16 +105,13 @@ def _computed(scene: Scene, seconds: float, options: dict[str, Any]) -> Spectrog
 
 def _written(scene: Scene, out: Path, found: Spectrogram) -> list[Path]:
     from raychan.report.spectrogram_figure import spectrogram_picture
-    from raychan.run.output_files import StoreError, write_together
+    from raychan.run.output_files import folder_for, write_together
     from raychan.run.spectrogram_file import as_netcdf
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"{out}: cannot write: {error.strerror or error}") from error
     files: dict[Path, bytes | memoryview] = {
         out / "spectrogram.nc": as_netcdf(found, scene.text),
         out / "spectrogram.png": spectrogram_picture(found, scene.title or "Spectrogram"),
     }
-    write_together(files)
+    with folder_for(out):
+        write_together(files)
     return list(files)

@@ -15,7 +15,7 @@ from raychan.sensors.laser import Scanner
 @dataclass(frozen=True)
 class Reading:
     """The ship at `time` [s]: north, east, height [m]; heading, roll (starboard down is positive), pitch (bow up is
-    positive), rudder [rad]; speed [m/s] and course [rad] over ground."""
+    positive), rudder [rad]; speed [m/s] and course [rad] over ground; rudder_sign as of a frame."""
 
     time: float
     north: float
@@ -27,6 +27,7 @@ class Reading:
     rudder: float
     speed: float
     course: float
+    rudder_sign: int
 
 
 def reading(before: Frame, after: Frame, time: float) -> Reading:
@@ -53,6 +54,7 @@ def reading(before: Frame, after: Frame, time: float) -> Reading:
         rudder=along(before.rudder, after.rudder),
         speed=math.hypot(north, east) / span if span > 0.0 else 0.0,
         course=course % math.tau,
+        rudder_sign=after.rudder_sign,
     )
 
 
@@ -68,7 +70,7 @@ class ScannedShip(ShipLoop):
 
 @dataclass(frozen=True)
 class Instruments:
-    """Satellite receiver, compass and attitude sensor: origin of the scene, and UTC of its 0 s."""
+    """Satellite receiver, compass, attitude sensor and rudder indicator: origin of the scene, and UTC of its 0 s."""
 
     origin: Origin
     epoch: datetime
@@ -92,7 +94,8 @@ class Instruments:
         """Return `$PASHR`, `$AGRSA` and `$PTNTHTM`."""
         angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch))
         attitude = nmea.Attitude(self.utc(at).time(), *angles)
-        return nmea.pashr(attitude) + nmea.rsa(math.degrees(at.rudder)) + nmea.ptnthtm(attitude)
+        rudder = at.rudder_sign * math.degrees(at.rudder)
+        return nmea.pashr(attitude) + nmea.rsa(rudder) + nmea.ptnthtm(attitude)
 
     def utc(self, at: Reading) -> datetime:
         """Return the time of a reading, to 10 ms as the sentences say it."""

@@ -58,8 +58,9 @@ def rmc(fix: Fix, on: date, speed: float, course_deg: float) -> bytes:
 
 
 def rsa(rudder_deg: float) -> bytes:
-    """Return `$AGRSA`, the angle of a single rudder [deg]."""
-    return _sentence("AG", "RSA", [f"{_finite(rudder_deg):.2f}", "A", "", "V"])
+    """Return `$AGRSA`, the angle of a single rudder [deg]; negative turns the bow to port (NMEA 0183, RSA)."""
+    angle = round(_finite(rudder_deg), 2) + 0.0  # no -0.00
+    return _sentence("AG", "RSA", [f"{angle:.2f}", "A", "", "V"])
 
 
 def hdt(heading_deg: float, talker: str = "GP") -> bytes:

@@ -7,12 +7,15 @@ required, as in all sentences of NMEA 0183: two hexadecimal digits, XOR of the c
 from __future__ import annotations
 
 import math
+import re
 from typing import NamedTuple
 
 NAME = "PRCHN"
 _LONGEST = 256
 """Characters of a line that is waited for: a sentence has up to 82, a host's other sentences may be longer."""
 _FIELDS = 2
+_NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)")
+"""A number as sentences of NMEA 0183 have it: Python's also takes blanks, 1_0 and 1e1."""
 
 
 class Order(NamedTuple):
@@ -24,7 +27,7 @@ class Order(NamedTuple):
 
 def order_sentence(rudder_deg: float | None = None, shaft_rpm: float | None = None) -> bytes:
     """Return the sentence of an order; None leaves a field empty."""
-    fields = ("" if value is None else f"{value:g}" for value in (rudder_deg, shaft_rpm))
+    fields = ("" if value is None else _decimal(value) for value in (rudder_deg, shaft_rpm))
     content = ",".join((NAME, *fields))
     return f"${content}*{_check_sum(content)}\r\n".encode("ascii")
 
@@ -78,11 +81,21 @@ def _order(fields: list[str]) -> Order:
     """Return the order of the fields of a sentence. Raises: ValueError where they are none."""
     if len(fields) != _FIELDS:
         raise ValueError(f"{len(fields)} fields; allowed: {_FIELDS}")
-    rudder, shaft = (float(text) if text else None for text in fields)
-    for value in (rudder, shaft):
-        if value is not None and not math.isfinite(value):
-            raise ValueError(f"value is {value}; allowed: a finite number")
+    rudder, shaft = (_number(text) if text else None for text in fields)
     return Order(None if rudder is None else math.radians(rudder), None if shaft is None else shaft / 60.0)
+
+
+def _number(text: str) -> float:
+    """Return the number of a field. Raises: ValueError where it is no plain decimal one."""
+    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
+        raise ValueError(f"value is {text!r}; allowed: a decimal number, such as -12.5")
+    return float(text)
+
+
+def _decimal(value: float) -> str:
+    """Return a number as a field has it, to 1e-6."""
+    text = f"{value:.6f}"
+    return text.rstrip("0").rstrip(".") if math.isfinite(value) else text
 
 
 def _check_sum(content: str) -> str:

@@ -96,9 +96,11 @@ def _channel(channel: Channel) -> dict[str, Any]:
 
 
 def _timing(timing: Timing) -> dict[str, Any]:
+    """Return a timing; drift and jitter are None where there was nothing to measure."""
+    some = timing.ticks > 0
     return {
         "ticks": timing.ticks,
         "missed": timing.missed,
-        "drift_ms": round(1e3 * timing.drift, 4),
-        "jitter_p99_ms": round(1e3 * timing.jitter_p99, 4),
+        "drift_ms": round(1e3 * timing.drift, 4) if some else None,
+        "jitter_p99_ms": round(1e3 * timing.jitter_p99, 4) if some else None,
     }

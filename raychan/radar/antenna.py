@@ -161,7 +161,8 @@ class ArrayAntenna:
     """A plane of ny by nz equal elements in phase, its gain from the integral of the pattern over the sphere.
 
     Args: ny, nz elements; spacing_y, spacing_z [wavelengths]; taper_y, taper_z names of windows; element, by default
-    isotropic ahead; loss_db [dB]. The pattern is element times array factor, without coupling.
+    isotropic ahead; loss_db [dB], below 0 where a published gain is above this pattern's. The pattern is element times
+    array factor, without coupling.
     Raises: ValueError for an unknown window or a number that is not positive.
     """
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -19,10 +20,11 @@ class Contents:
 
     names: all that it may write; those of an earlier run are replaced. signs: every such folder has at least one of
     these; in a folder without any, files of these names are foreign and stay untouched. A pattern 'a_*/' is a folder
-    with the same contents."""
+    with the same contents. begins: how a sign begins, blanks left out, whose name other commands use too."""
 
     names: tuple[str, ...]
     signs: tuple[str, ...]
+    begins: Mapping[str, bytes] = field(default_factory=dict)
 
     def owns(self, entry: Path) -> bool:
         """Return whether a file, or a folder and all in it, has a name that the command writes."""
@@ -38,7 +40,28 @@ class Contents:
 
     def signed(self, folder: Path) -> bool:
         """Return whether the command wrote this folder."""
-        return any(map(_is_sign, (file for sign in self.signs for file in folder.glob(sign))))
+        return any(self._is_sign(file) for sign in self.signs for file in folder.glob(sign))
+
+    def obstacle_of_each(self, folder: Path) -> str:
+        """Return which file of the command's names is another's, '' where none is, for a command that keeps no folder
+        of its own: each file must begin as the command's does. An empty file holds nothing of anyone."""
+        for entry in (folder / name for name in self.names):
+            if entry.is_dir():
+                return f"{entry}: is a directory in the place of a file; {_ELSEWHERE}"
+            if entry.is_file() and entry.stat().st_size and not self._is_sign(entry):
+                return f"{entry}: exists, and is not a file of this command; {_ELSEWHERE}"
+        return ""
+
+    def _is_sign(self, file: Path) -> bool:
+        """Return whether a file named as a result is of the kind that its name says: a note of one's own is none, nor
+        is another command's result of the same name."""
+        try:
+            with file.open("rb") as opened:
+                begins = opened.read(_BEGINNING).lstrip()
+        except OSError:
+            return False
+        own = b"".join(begins.split()).startswith(self.begins.get(file.name, b""))
+        return own and begins.startswith(_BEGINS.get(file.suffix, b""))
 
     def obstacle(self, folder: Path, signed: bool = False) -> str:
         """Return what of others is in the way in a folder and its inner ones, '' where nothing is.
@@ -57,16 +80,6 @@ class Contents:
                 if not signed:
                     return f"{entry}: exists, and {folder} is not a folder of results; {_ELSEWHERE}"
         return ""
-
-
-def _is_sign(file: Path) -> bool:
-    """Return whether a file named as a result is of the kind that its name says: a note of one's own is none."""
-    try:
-        with file.open("rb") as opened:
-            begins = opened.read(_BEGINNING).lstrip()
-    except OSError:
-        return False
-    return begins.startswith(_BEGINS.get(file.suffix, b""))
 
 
 def _is_folder(entry: Path) -> bool:

@@ -36,8 +36,7 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
     way."""
     with _disk_errors(Path(out)):
         out = Path(out).resolve()
-    made = _make_parents(out.parent)
-    try:
+    with folder_for(out.parent):
         with _disk_errors(out):
             _clear_stale(out, contents)
             _check(out, contents)
@@ -48,15 +47,24 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
             with _disk_errors(out), locked(room):
                 _check(out, contents)
                 _replace(stage, out, contents)
-            made = []
         finally:
             release(lock)
             with locked(room):
                 _remove_stage(stage, out, contents)
+
+
+@contextmanager
+def folder_for(directory: Path) -> Iterator[None]:
+    """Make a directory where it is missing; if it is empty at the end, as after an error, it is removed again.
+
+    Raises: StoreError where it cannot be made."""
+    made = _make_parents(directory)
+    try:
+        yield
     finally:
-        for directory in made:
-            if directory.is_dir() and not any(directory.iterdir()):
-                directory.rmdir()
+        for new in made:
+            if new.is_dir() and not any(new.iterdir()):
+                new.rmdir()
 
 
 def write_whole(path: str | Path, content: bytes | memoryview) -> Path:
@@ -251,8 +259,8 @@ def _remove(entry: Path) -> None:
 
 def _make_parents(directory: Path) -> list[Path]:
     """Make a directory and return those that were missing, innermost first."""
-    missing = [d for d in (directory, *directory.parents) if not d.exists()]
     try:
+        missing = [d for d in (directory, *directory.parents) if not d.exists()]
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StoreError(f"{directory}: cannot be made: {error.strerror or error}") from error

@@ -63,6 +63,17 @@ def frames(
     return _frames(scene, count, step, seed, tolerance_db, max_bounces, progress)
 
 
+def overlap(scene: Scene, count: int, interval: float | None) -> list[str]:
+    """Return a line where frames of an interval [s] begin before the one before has ended, which no radar's do."""
+    frame = scene.radar.waveform.frame_duration
+    # A frame that follows without a pause, given in decimals, is none of these.
+    if interval is None or count < 2 or interval >= frame * (1.0 - 1e-6):
+        return []
+    return [
+        f"frames overlap in time: one lasts {frame:g} s, and the next begins after {interval:g} s (--frame-interval)"
+    ]
+
+
 def _frames(
     scene: Scene,
     count: int,

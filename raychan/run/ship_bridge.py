@@ -42,6 +42,7 @@ from raychan.world.errors import SceneError
 
 _PLACES = list(OF_LINEAR)
 _YACHT_SPEED = 12.0 * KNOT
+_TURNS = "a ship whose rudder turns it (any ship.model but 'printed')"
 _CHOICE = 0.2  # seconds from one choice of heading to the next: each takes some milliseconds
 
 
@@ -76,7 +77,8 @@ def bridge_of(tables: ShipFile, dt: float) -> Bridge:
     noise = _noise(steering)
     watch = None
     if noise is not None and steering.controller == "lqg":
-        watch = _tried("steering.controller", lambda: Watch(kalman_filter(linear, noise, dt), noise))
+        allowed = f"{_TURNS}, or controller = 'pd'"
+        watch = _tried("steering.controller", lambda: Watch(kalman_filter(linear, noise, dt), noise), allowed)
     autopilot, avoid = _autopilot(steering, linear), None
     if tables.avoidance is not None:
         avoid = Prediction.of(linear, autopilot.gain, _gear(steering)), tables.avoidance.distance_m
@@ -92,12 +94,12 @@ def bridge_of(tables: ShipFile, dt: float) -> Bridge:
     )
 
 
-def _tried(key: str, make: Callable[[], Any]) -> Any:
+def _tried(key: str, make: Callable[[], Any], allowed: str = "") -> Any:
     """Return what is made; what does not fit is an error of the scene's key."""
     try:
         return make()
     except ValueError as error:
-        raise SceneError(str(error), key=key) from error
+        raise SceneError(str(error), key=key, allowed=allowed) from error
 
 
 def _plant(ship: ShipTable, steering: SteeringTable, dt: float) -> tuple[Any, Array, LinearShip]:
@@ -157,7 +159,8 @@ def _autopilot(steering: SteeringTable, linear: LinearShip) -> Autopilot:
     elif steering.gain is not None:
         made = StateFeedback(np.array(steering.gain))
     else:
-        made = _tried("steering.controller", lambda: lqr(linear, steering.weights, steering.rudder_weight))
+        allowed = f"{_TURNS} with a weight of the heading above 0, or controller = 'pd', or steering.gain"
+        made = _tried("steering.controller", lambda: lqr(linear, steering.weights, steering.rudder_weight), allowed)
     chosen: Autopilot = made
     return chosen
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from raychan.run.contents import Contents
 from raychan.run.netcdf import CONVENTIONS
 from raychan.run.output_files import write_whole
+from raychan.run.sheltered_file import ShelteredFile
 from raychan.run.ship_loop import Frame, ShipLoop, hit_points
 from raychan.run.ship_scene import ShipScene
 from raychan.run.storage import versions
@@ -25,6 +27,7 @@ from raychan.world.errors import SceneError
 Floats = NDArray[np.float64]
 
 COLUMNS = ("t_s", "x_m", "y_m", "heading_deg", "roll_deg", "rudder_deg", "speed_mps")
+"""Of ship.csv; logged poses that have pitch and height add `ship_replay.OPTIONAL`, so that it can be replayed."""
 PICTURES = ("scan.png", "track.png", "motion.png", "scene.png")
 CONTENTS = Contents(("ship.csv", "scan.nc", "summary.json", *PICTURES), signs=("scan.nc",))
 _MOST_SCANS = 10_000_000  # a day at 75 Hz has 6.5 million; of 181 beams 14 GB before packing
@@ -71,24 +74,28 @@ class Voyage:
         self._nearest = np.full(len(scene.names) + 2, np.inf)
         self._roll = [np.inf, -np.inf]
         self._last: Frame | None = None
+        self._optional = () if scene.poses is None else scene.poses.optional
 
     def __enter__(self) -> Voyage:
         import h5netcdf
+        import h5py
 
-        self._csv = (self._folder / "ship.csv").open("w", encoding="utf-8", newline="")
-        self._rows = csv.writer(self._csv, lineterminator="\n")
-        self._rows.writerow(COLUMNS)
-        self._nc = h5netcdf.File(self._folder / "scan.nc", "w")
-        self._header()
+        with ExitStack() as opened:
+            self._csv = opened.enter_context((self._folder / "ship.csv").open("w", encoding="utf-8", newline=""))
+            self._rows = csv.writer(self._csv, lineterminator="\n")
+            self._rows.writerow([*COLUMNS, *self._optional])
+            self._disk = opened.enter_context(closing(ShelteredFile(self._folder / "scan.nc")))
+            held = opened.enter_context(h5py.File(self._disk, "w"))
+            self._nc = opened.enter_context(h5netcdf.File(held, "w"))
+            self._header()
+            self._disk.check()
+            self._opened = opened.pop_all()
         return self
 
     def __exit__(self, *error: object) -> None:
-        try:
+        with self._opened:
             if error[0] is None:
                 self._flush()
-        finally:
-            self._nc.close()
-            self._csv.close()
 
     def _header(self) -> None:
         scanner, file, n = self._scene.scanner, self._nc, self._scene.scanner.count
@@ -130,7 +137,8 @@ class Voyage:
         row = [frame.time, frame.x, frame.y, *angles, frame.speed]
         texts = [f"{value:.9g}" for value in row]
         texts[_HEADING] = rounded_heading(row[_HEADING], ".9g")
-        self._rows.writerow(texts)
+        further = {"pitch_deg": np.degrees(frame.pitch), "z_m": frame.z}
+        self._rows.writerow([*texts, *(f"{further[name]:.9g}" for name in self._optional)])
         met = frame.scan
         self._ranges.append(met.range)
         self._bodies.append(met.body)
@@ -155,6 +163,7 @@ class Voyage:
         self._nc["range_m"][rows] = np.where(np.isfinite(ranges), ranges, np.nan).astype(np.float32)
         self._nc["body"][rows] = np.array(self._bodies)
         self._ranges, self._bodies = [], []
+        self._disk.check()
 
     @property
     def log(self) -> ShipLog:

@@ -25,8 +25,9 @@ class Frame:
 
     time [s]; x, y, z [m] in the world, x to north, y to west, z up; heading [rad] clockwise from north, 0 to 2 pi; roll
     [rad] positive with starboard down, pitch [rad] positive with the bow down; roll_rate, yaw_rate [rad/s], yaw to
-    starboard; rudder, rudder_order [rad]; shaft [rev/s]; speed [m/s] through the water; heading_wanted [rad]; `beams`
-    the poses of the scanner when each beam left.
+    starboard; rudder, rudder_order [rad]; shaft [rev/s]; speed [m/s] through the water; heading_wanted [rad];
+    rudder_sign, to which side a positive rudder turns the ship: 1 starboard, -1 port; `beams` the poses of the
+    scanner when each beam left.
     """
 
     time: float
@@ -43,6 +44,7 @@ class Frame:
     shaft: float
     speed: float
     heading_wanted: float
+    rudder_sign: int
     scan: LaserScan
     beams: SensorPoses
 
@@ -117,6 +119,11 @@ class ShipLoop:
         return self._steered is not None
 
     @property
+    def rudder_sign(self) -> int:
+        """To which side a positive rudder turns the ship: 1 starboard, -1 port; 1 of logged poses, which have none."""
+        return 1 if self._steered is None or self._steered.bridge.ship.b[2] >= 0.0 else -1
+
+    @property
     def takes_shaft(self) -> bool:
         """Whether the ship takes orders for its shaft; the linear ships keep their speed."""
         return self._steered is not None and self._steered.bridge.takes_shaft
@@ -167,6 +174,7 @@ class ShipLoop:
             speed=float(np.hypot(state[U], state[V])),
             heading_wanted=float((state[PSI] if moving is None else moving.wanted) % _FULL),
             scan=met,
+            rudder_sign=self.rudder_sign,
             beams=beams,
         )
 

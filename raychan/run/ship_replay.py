@@ -21,11 +21,12 @@ _LATEST, _LARGEST = 1e11, 1e9  # s, which Unix times may be; m and deg
 @dataclass(frozen=True)
 class PoseFile:
     """Logged poses: `time` (n,) [s] from 0 on, `pose` (n, 6) x, y, z [m], yaw, pitch, roll [rad] in the world; `start`
-    [s] the log's own time of its first row."""
+    [s] the log's own time of its first row; `optional` which of `OPTIONAL` the log has."""
 
     time: Array
     pose: Array
     start: float = 0.0
+    optional: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -79,7 +80,8 @@ def read_poses(file: Path, max_gap: float) -> PoseFile:
     heading, pitch, roll = (np.radians(table.get(k, none)) for k in ("heading_deg", "pitch_deg", "roll_deg"))
     place = table["x_m"], table["y_m"], table.get("z_m", none)
     pose = np.stack([*place, -np.unwrap(heading), pitch, roll], axis=1)
-    return PoseFile(time=time - time[0], pose=pose, start=float(time[0]))
+    optional = tuple(name for name in OPTIONAL if name in table)
+    return PoseFile(time=time - time[0], pose=pose, start=float(time[0]), optional=optional)
 
 
 def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], dict[str, int], int]:

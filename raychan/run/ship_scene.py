@@ -99,7 +99,7 @@ def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipSc
         elif tables.avoidance is not None:
             raise SceneError("keys do not fit together", key="avoidance", allowed="avoidance without replay")
         else:
-            poses = read_poses(folder / tables.replay.file, tables.replay.max_gap_s)
+            poses = _poses(folder / tables.replay.file, tables.replay.max_gap_s, scanner.duration)
         bodies = Scene(bodies=[_body(t, folder) for t in tables.bodies], path=path, folder=folder)
         given = {t.name: _reflectivity(t) for t in tables.bodies}
     except SceneError as error:
@@ -110,6 +110,16 @@ def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipSc
     reflectivity = np.array([given[body.name.split(".")[0]] for body in bodies.bodies], float)
     title = tables.scene.title
     return ShipScene(title, text, path, tables, scanner, bodies, reflectivity, bridge, poses)
+
+
+def _poses(file: Path, max_gap: float, scan: float) -> PoseFile:
+    """Return the logged poses of a file, which must last a scan [s]. Raises: SceneError."""
+    poses = read_poses(file, max_gap)
+    if poses.duration < scan * (1.0 - 1e-9):  # as `ShipLoop.scans` counts
+        allowed = f"at least one scan, {scan:.4g} s"
+        problem = f"the log lasts {poses.duration:g} s from its first row to its last"
+        raise SceneError(problem, file=file, value=poses.duration, allowed=allowed)
+    return poses
 
 
 def _scanner(t: ScannerTable) -> Scanner:

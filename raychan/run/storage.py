@@ -33,6 +33,7 @@ _FRAMES = tuple("frame_" + digits * "[0-9]" for digits in (4, 5))
 CONTENTS = Contents(
     names=("result.nc", "detections.csv", "summary.json", *PICTURES, *ARRAY_PICTURES, *(f"{x}/" for x in _FRAMES)),
     signs=("result.nc", "summary.json", *(f"{x}/result.nc" for x in _FRAMES)),
+    begins={"summary.json": b'{"scene":'},
 )
 """What `raychan run` writes into its folder; a sequence has a folder of the same for each frame."""
 _CHANGED = "# changed: "  # how a scene notes overridden keys below its text

@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 
 from raychan.columns import Record, column
 from raychan.poses import direction, rotation
+from raychan.radar.declared import check_type
+from raychan.sensors.arguments import number, one_each
 from raychan.sensors.sea import Waves, flat_sea_range, wavy_sea_range
 from raychan.sensors.spot import Spot
+from raychan.world import limits
 from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
@@ -36,6 +39,13 @@ REFLECTIVITY = {
     "reflectors": 20.0,
 }
 """Reflectivity of materials, 1 = a white diffuse surface: Table 2 of the ship paper, the lowest of a span."""
+_LIMITS = {
+    "fan_deg": limits.FAN_DEG,
+    "step_deg": limits.SCAN_STEP_DEG,
+    "mirror_hz": limits.MIRROR_HZ,
+    "max_range": limits.BEAM_RANGE,
+    "dark_range": limits.BEAM_RANGE,
+}
 
 
 @dataclass(frozen=True)
@@ -47,7 +57,7 @@ class Scanner:
     no width; lambert: whether power falls with the cosine of the angle of incidence (Table 2 does not say); moving:
     whether each beam leaves at its own time, or all at the scan's start, as the paper has it.
     A step of 1/m deg takes m turns of the mirror, each shifted by a step against the one before: 13.3, 26.7, 53.3 ms.
-    Raises: ValueError for another step, or figures that are not above 0.
+    Numbers have the limits of scene files. Raises: ValueError with what is allowed.
     """
 
     fan_deg: float = 180.0
@@ -60,12 +70,15 @@ class Scanner:
     moving: bool = True
 
     def __post_init__(self) -> None:
+        for name, limit in _LIMITS.items():
+            object.__setattr__(self, name, float(number(f"Scanner.{name}", getattr(self, name), limit)))
         if self.step_deg not in (1.0, 0.5, 0.25):
             raise ValueError(f"step is {self.step_deg} deg; allowed: 1, 0.5, 0.25")
-        if not (0.0 < self.fan_deg <= 360.0 and (self.fan_deg / self.step_deg).is_integer()):
+        if not (self.fan_deg / self.step_deg).is_integer():
             raise ValueError(f"fan is {self.fan_deg} deg; allowed: whole steps up to 360 deg")
-        if not min(self.mirror_hz, self.max_range, self.dark_range) > 0.0:
-            raise ValueError("mirror_hz, max_range and dark_range; allowed: above 0")
+        check_type("Scanner.spot", self.spot, Spot, or_none=True)
+        check_type("Scanner.lambert", self.lambert, bool)
+        check_type("Scanner.moving", self.moving, bool)
 
     @property
     def count(self) -> int:
@@ -144,12 +157,20 @@ class Targets:
     sea_reflectivity, 0 for no sea; waves of the sea about z = 0, None for a flat one.
     Water mirrors: what comes back from the sea is foam's and ripples'. Its reflectivity is yours to give; with
     `Scanner.lambert` it counts times the sine of the grazing angle.
+    Raises: ValueError unless reflectivity has one number for each body, within the limits of scene files.
     """
 
     caster: RayCaster | Sequence[MovingBodies] | None
     reflectivity: Floats
     sea_reflectivity: float = 0.0
     waves: Waves | None = None
+
+    def __post_init__(self) -> None:
+        count = max((int(group.numbers.max(initial=-1)) for group in self.groups), default=-1) + 1
+        values = one_each("reflectivity", self.reflectivity, count, "body", limits.REFLECTIVITY)
+        object.__setattr__(self, "reflectivity", values)
+        sea = number("sea_reflectivity", self.sea_reflectivity, limits.REFLECTIVITY)
+        object.__setattr__(self, "sea_reflectivity", sea)
 
     @property
     def groups(self) -> Sequence[MovingBodies]:
@@ -169,6 +190,8 @@ def beams(scanner: Scanner, poses: SensorPoses) -> Floats:
 
 def _beams(scanner: Scanner, poses: SensorPoses) -> tuple[Floats, Floats]:
     """Return the unit directions (n, 3) of the beams and of the mirror's axis."""
+    if len(poses.yaw) != scanner.count:
+        raise ValueError(f"poses: {len(poses.yaw)} given; allowed: one for each beam of the scanner, {scanner.count}")
     # `rotation` of arrays (n,) has the beams last: (3, 3, n).
     each: Any = poses.yaw, poses.pitch, poses.roll
     turn = np.moveaxis(rotation(*each), -1, 0)
@@ -196,7 +219,7 @@ def first_hits(
         met = facet[hit]
         distance = np.where(hit, along, distance)
         body[hit] = group.numbers[caster.facets.body[met]]
-        reflects[hit] = np.asarray(targets.reflectivity, float)[body[hit]]
+        reflects[hit] = targets.reflectivity[body[hit]]
         if scanner.lambert:
             reflects[hit] *= np.abs(np.einsum("ij,ij->i", towards[hit], caster.normal[met]))
     if targets.sea_reflectivity > 0.0:
@@ -228,7 +251,7 @@ def scan(
     """Return the nearest hit of each beam.
 
     Args: poses at the scanner's `times`; the rest as in `Targets`, the waves' time 0 being the scan's start
-    (`Waves.at`).
+    (`Waves.at`). Raises: ValueError for poses that are not one for each beam, and as `Targets`.
     A nearer surface hides what is behind it even where it is too dark to be seen itself.
     """
     targets, (towards, axis) = Targets(caster, reflectivity, sea_reflectivity, waves), _beams(scanner, poses)
@@ -248,6 +271,9 @@ def scan(
 
 
 def noisy(ideal: LaserScan, deviation: float, rng: np.random.Generator) -> LaserScan:
-    """Return the scan with Gaussian noise of a standard deviation [m] on each range that was met, never below 0."""
+    """Return the scan with Gaussian noise of a standard deviation [m] on each range that was met, never below 0.
+
+    Raises: ValueError for a deviation that cannot be."""
+    deviation = number("deviation", deviation, limits.DEVIATION)
     noise = rng.normal(0.0, deviation, len(ideal.range))
     return LaserScan(range=np.maximum(ideal.range + noise, 0.0), body=ideal.body)

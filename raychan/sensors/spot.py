@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
+from raychan.scalars import shown
+from raychan.sensors.arguments import number
+from raychan.world import limits
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -32,6 +35,12 @@ class Echo(IntEnum):
 
 
 _FIRST, _MEAN = int(Echo.FIRST), int(Echo.MEAN)
+_LIMITS = {
+    "divergence": limits.DIVERGENCE_MRAD.times(1e-3, "rad"),
+    "exit_diameter": limits.SPOT_MM.times(1e-3, "m"),
+    "rings": limits.RINGS,
+    "merge": limits.MERGE_M,
+}
 
 
 @dataclass(frozen=True)
@@ -45,7 +54,7 @@ class Spot:
     reported; merge [m]: echoes nearer than this flow into one, whose range is the mean by energy: half the length of a
     pulse of 3 ns (assumed).
     FIRST is the default: scanners of this family report one range a beam, of the pulse's leading edge.
-    Raises: ValueError.
+    Numbers have the limits of scene files. Raises: ValueError with what is allowed.
     """
 
     divergence: float = 4.6e-3
@@ -55,10 +64,12 @@ class Spot:
     merge: float = 0.45
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.divergence < 0.5 and 0.0 <= self.exit_diameter < 1.0 and 0.0 <= self.merge < math.inf):
-            raise ValueError("divergence, exit_diameter, merge; allowed: below 0.5 rad, below 1 m, at least 0 m")
-        if self.rings < 1:
-            raise ValueError(f"{self.rings} rings; allowed: at least 1")
+        for name, limit in _LIMITS.items():
+            value = number(f"Spot.{name}", getattr(self, name), limit, whole=name == "rings")
+            object.__setattr__(self, name, value)
+        if not isinstance(self.echo, Echo):
+            allowed = ", ".join(f"Echo.{name}" for name in Echo.__members__)
+            raise ValueError(f"Spot.echo = {shown(self.echo)}; allowed: {allowed}")
 
     @property
     def pattern(self) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
@@ -18,6 +18,8 @@ from raychan.world.schema_materials import MaterialTable
 _FORM = ("shape", "params", "mesh", "unit", "up", "forward", "scale", "crease_deg")
 
 
+SHIP_TABLES = ("ship", "steering", "programme", "avoidance", "scanner", "sea", "run", "replay")
+"""Tables that scenes of ships have and those of radars have not."""
 _LARGEST = 16 << 20  # bytes of a scene file; 10,000 bodies take 2 MB
 
 
@@ -60,6 +62,13 @@ def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
     except (OSError, UnicodeDecodeError) as e:
         reason = getattr(e, "strerror", None) or e
         raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e
+
+
+def refuse_ship(data: object, file: Path | None) -> None:
+    """Raise SceneError for the tables of a ship's scene; it may leave [ship] itself out."""
+    if isinstance(data, Mapping) and ("ship" in data or "radar" not in data):
+        for key in (name for name in SHIP_TABLES if name in data):
+            raise SceneError("is a scene of a ship, not of a radar", file=file, key=key, allowed="raychan ship")
 
 
 def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = None) -> Body:

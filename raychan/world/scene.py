@@ -18,7 +18,7 @@ from raychan.reprs import Described
 from raychan.scalars import plain
 from raychan.world import checks, overlaps, overrides
 from raychan.world.body import Body
-from raychan.world.build import body_of, material_of, scene_text
+from raychan.world.build import body_of, material_of, refuse_ship, scene_text
 from raychan.world.errors import SceneError, shown
 from raychan.world.fixed import Fixed
 from raychan.world.idle_keys import idle_keys
@@ -129,8 +129,7 @@ class Scene(Fixed, Described):
     def _of(cls, data: Mapping[str, object], path: str | Path | None, text: str, like: Scene | None = None) -> Scene:
         """Return the scene of tables; bodies equal to those of the scene `like` are shared, with their meshes."""
         file = None if path is None else Path(path)
-        if isinstance(data, Mapping) and "ship" in data:
-            raise SceneError("is a scene of a ship, not of a radar", file=file, key="ship", allowed="raychan ship")
+        refuse_ship(data, file)
         tables: SceneFile = checked(SceneFile, data, file)
         folder = Path.cwd() if file is None else file.parent
         ghz = tables.scene.frequency_ghz

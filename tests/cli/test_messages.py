@@ -42,6 +42,11 @@ def test_a_file_in_the_place_of_a_directory_is_told_before_the_start(command, tm
         (["explain", "x", "--detection", "1.5"], "'--detection': '1.5': a whole number is wanted"),
         (["ship", "urban", "--out", "o"], "radar: is a scene of a radar, not of a ship; allowed: raychan run"),
         (["hil", "urban"], "radar: is a scene of a radar, not of a ship; allowed: raychan run"),
+        (["explain", "x", "--paths", "-1"], "'--paths': -1: must lie between 0 and 1e+06"),
+        (["explain", "x", "--paths", "a"], "'--paths': 'a': a whole number is wanted; must lie between 0 and"),
+        (["hil", "--scanner", " "], "--scanner: the name is empty: name a serial port, or leave the option out"),
+        (["hil", "--origin", "91,0"], "--origin: '91,0': latitude is 91.0 deg; allowed: -89.9 to 89.9"),
+        (["hil", "--origin", "5"], "--origin: '5': two numbers, latitude and longitude in degrees, as 54.0,8.0"),
         (["run", "", "--out", "o"], "no scene file is named; allowed: a scene file that exists, or one of clutter"),
         (["view", "urban", "--html", "s.png"], "--html s.png: the name must end in .html"),
         (["view", "urban", "--screenshot", "s.html"], "--screenshot s.html: the name must end in .png"),
@@ -56,6 +61,16 @@ def test_only_names_that_are_near_are_proposed(tmp_path, capsys, monkeypatch):
     (tmp_path / "bin.toml").write_text(PLATE)
     assert "bin" not in told(["run", "nosuch.toml", "--out", "o"], capsys)
     assert "did you mean 'bin.toml'?" in told(["run", "bim.toml", "--out", "o"], capsys)
+
+
+@pytest.mark.parametrize("table", ["[run]\nduration_s = 3\n", "[sea]\n", "[scanner]\n[[bodies]]\nname = 'b'\n"])
+@pytest.mark.parametrize("command", [["info"], ["run", "--out", "o"]])
+def test_a_scene_of_a_ship_without_its_own_table_is_told_as_one(command, table, tmp_path, capsys):
+    file = tmp_path / "s.toml"
+    file.write_text(table)
+    assert "is a scene of a ship, not of a radar; allowed: raychan ship" in told([*command, str(file)], capsys)
+    file.write_text(PLATE + table)
+    assert "unknown key" in told([*command, str(file)], capsys)
 
 
 def test_a_mesh_is_told_once(tmp_path, capsys):

@@ -1,7 +1,7 @@
 """Orders are found in any stream; what is none is counted; positions lie where the ellipsoid has them."""
 
 import math
-from datetime import UTC
+from datetime import UTC, datetime
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +9,9 @@ import pytest
 from pynmeagps import NMEAReader
 
 from raychan.hil.geodesy import FLATTENING, SEMI_MAJOR_M, Origin, geocentric
-from raychan.hil.instruments import Instruments, reading
+from raychan.hil.instruments import Instruments, ScannedShip, reading
 from raychan.hil.orders import Order, OrderReader, order_sentence
+from raychan.run.ship_scene import ship_scene
 
 
 def test_an_order_comes_back_as_sent():
@@ -36,13 +37,34 @@ def test_no_flipped_bit_makes_another_order(flip):
         assert found == [] and reader.bad + reader.ignored >= 1
 
 
-@pytest.mark.parametrize("content", ["PRCHN", "PRCHN,1", "PRCHN,1,2,3", "PRCHN,one,2", "PRCHN,nan,2", "PRCHN,,inf"])
-def test_an_order_with_wrong_fields_is_bad(content):
+def with_check_sum(content):
     check = 0
     for character in content.encode():
         check ^= character
+    return f"${content}*{check:02X}\r\n".encode()
+
+
+NO_NUMBERS = ["1_0,5", " 10 ,5", "1e1,5", "0x10,5", "+,5", "-.,5", ".,5", "1.2.3,5", "1,5\x1f", f"{'9' * 200}e9,"]
+
+
+@pytest.mark.parametrize("content", ["PRCHN", "PRCHN,1", "PRCHN,1,2,3", "PRCHN,one,2", "PRCHN,nan,2", "PRCHN,,inf"])
+def test_an_order_with_wrong_fields_is_bad(content):
     reader = OrderReader()
-    assert reader.feed(f"${content}*{check:02X}\r\n".encode()) == [] and reader.bad == 1
+    assert reader.feed(with_check_sum(content)) == [] and reader.bad == 1
+
+
+@pytest.mark.parametrize("fields", NO_NUMBERS)
+def test_a_field_that_is_no_plain_decimal_number_is_bad(fields):
+    reader = OrderReader()
+    assert reader.feed(with_check_sum(f"PRCHN,{fields}")) == [] and reader.bad == 1
+
+
+def test_decimal_numbers_of_any_form_are_taken_and_small_ones_come_back():
+    for text, value in (("10", 10.0), ("+10.", 10.0), ("-.5", -0.5), ("007.50", 7.5)):
+        (found,) = OrderReader().feed(with_check_sum(f"PRCHN,{text},"))
+        assert math.degrees(found.rudder) == pytest.approx(value)
+    (found,) = OrderReader().feed(order_sentence(2e-5, 1234567.0))
+    assert math.degrees(found.rudder) == pytest.approx(2e-5) and found.shaft * 60.0 == pytest.approx(1234567.0)
 
 
 def test_orders_without_a_check_sum_and_half_ones_are_bad_and_others_are_ignored():
@@ -101,6 +123,7 @@ def test_an_origin_off_the_globe_or_at_a_pole_is_refused(place):
 
 def frame(time, **others):
     base = {"north": 0.0, "east": 0.0, "z": 0.0, "heading": 0.0, "roll": 0.0, "pitch": 0.0, "rudder": 0.0}
+    base |= {"rudder_sign": 1}
     return SimpleNamespace(time=time, **base | others)
 
 
@@ -115,8 +138,6 @@ def test_a_reading_lies_between_two_frames_and_headings_take_the_shorter_turn():
 
 
 def test_the_sentences_of_a_cycle_say_one_time_and_one_place():
-    from datetime import datetime
-
     instruments = Instruments(Origin(54.0, 8.0), datetime(2026, 12, 31, 23, 59, 59, 950_000, UTC))
     at = reading(frame(0.0), frame(0.2, north=1.0, east=1.0, roll=0.1), 0.1)
     first, second = (NMEAReader.parse(line + b"\r\n") for line in instruments.position(at).split(b"\r\n")[:2])
@@ -125,4 +146,20 @@ def test_the_sentences_of_a_cycle_say_one_time_and_one_place():
     assert first.spd * 1852.0 / 3600.0 == pytest.approx(math.sqrt(50.0), abs=1e-3) and first.cog == 45.0
     lines = instruments.attitude(at).split(b"\r\n")
     assert [line[:6] for line in lines[:3]] == [b"$PASHR", b"$AGRSA", b"$PTNTH"]
+    assert lines[1].startswith(b"$AGRSA,0.00,A,,V*"), "no -0.00"
     assert NMEAReader.parse(lines[0] + b"\r\n").roll == pytest.approx(math.degrees(0.05), abs=1e-3)
+
+
+@pytest.mark.parametrize("model", ["printed", "corrected", "container", "yacht"])
+@pytest.mark.parametrize("order_deg", [-10.0, 10.0])
+def test_the_rudder_sentence_is_negative_where_the_bow_turns_to_port(model, order_deg):
+    """NMEA 0183, RSA: '-' is bow turns to port."""
+    loop = ScannedShip(ship_scene({"ship": {"model": model}, "steering": {"controller": "pd"}}))
+    loop.order(rudder=math.radians(order_deg))
+    frames = [loop.step_scan() for _ in range(300)]
+    at = reading(frames[-2], frames[-1], frames[-1].time)
+    sentence = Instruments(Origin(54.0, 8.0), datetime(2026, 1, 1, tzinfo=UTC)).attitude(at)
+    told = float(sentence.split(b"\r\n")[1].split(b",")[1])
+    assert abs(told) == pytest.approx(10.0, abs=0.3)
+    assert (told < 0.0) == (frames[-1].yaw_rate < 0.0), "yaw rates are to starboard"
+    assert math.degrees(frames[-1].rudder) == pytest.approx(order_deg, abs=0.3), "orders have the ship's own sign"

@@ -156,5 +156,7 @@ def test_a_run_without_a_host_states_no_drift(session):
     session.run(0.3, lambda: False)
     numbers = summary(session)
     assert {c["sent"] for c in numbers["channels"].values()} == {0}
+    assert {c[k] for c in numbers["channels"].values() for k in ("drift_ms", "jitter_p99_ms")} == {None}
+    assert isinstance(numbers["scans"]["drift_ms"], float)
     line = one_line(numbers)
     assert "; nothing sent, no drift and jitter measured, " in line and "ms (99 %)" not in line

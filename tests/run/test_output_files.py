@@ -17,7 +17,7 @@ from support.scene_texts import PLATE, but_compiling
 from raychan.cli import invoke
 from raychan.run import atomic_swap, output_files
 from raychan.run.contents import Contents
-from raychan.run.output_files import StoreError, staging, write_together, write_whole
+from raychan.run.output_files import StoreError, folder_for, staging, write_together, write_whole
 from raychan.run.storage import CONTENTS, write_result
 
 FOLDERS = [str(TESTS), str(TESTS / "run")]
@@ -269,6 +269,22 @@ def test_of_a_table_and_a_picture_none_is_written_where_there_is_room_for_one_on
     done = subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, cwd=tmp_path)
     assert (done.returncode, list(tmp_path.iterdir())) == (2, []), done.stderr
     assert "a.png: cannot write: File too large" in done.stderr and done.stdout == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs resource limits")
+def test_a_spectrogram_that_cannot_be_written_leaves_no_folder(tmp_path):
+    (tmp_path / "plate.toml").write_text(PLATE)
+    argv = ["spectrogram", "plate.toml", "--seconds", "0.01", "--resolution", "0.5", "--out", "new/out"]
+    code = "import resource, raychan.cli\nresource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))\n"
+    code += f"raychan.cli.main({argv!r})"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, cwd=tmp_path)
+    assert done.returncode == 2 and "cannot write: File too large" in done.stderr, done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["plate.toml"]
+    with pytest.raises(OSError, match="mine"), folder_for(tmp_path / "a" / "b"):
+        (tmp_path / "a" / "mine").touch()
+        raise OSError("mine")
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["mine"]
 
 
 def test_pictures_of_an_earlier_run_do_not_stay_beside_new_data(tmp_path):

@@ -13,7 +13,7 @@ from support.scene_texts import PLATE
 
 import raychan as rc
 from raychan.cli import invoke
-from raychan.run.sequence import Store, frames, moves_as_one
+from raychan.run.sequence import Store, frames, moves_as_one, overlap
 from raychan.run.storage import load_result
 
 SCENE = f"""{PLATE}
@@ -40,6 +40,17 @@ def test_frame_0_is_the_single_run_and_frame_k_the_run_of_the_scene_at_its_time(
     assert [(f.number, f.time) for f in made] == [(0, 0.0), (1, 0.1), (2, 0.2)]
     assert_same(made[0].result, rc.simulate(scene, seed=7))
     assert_same(made[2].result, rc.simulate(scene.at(0.2), seed=9))
+
+
+def test_frames_that_overlap_in_time_are_told_once(file, tmp_path, capsys):
+    lasts = rc.Scene.load(file).radar.waveform.frame_duration
+    command = ["run", str(file), "--no-pictures", "--out", str(tmp_path / "o"), "--max-bounces", "1"]
+    for count, interval, lines in ((2, 0.5 * lasts, 1), (1, 0.5 * lasts, 0), (2, lasts, 0), (2, 2.0 * lasts, 0)):
+        assert invoke([*command, "--frames", str(count), "--frame-interval", str(interval)]) == 0
+        said = " ".join(capsys.readouterr().err.split())
+        told = f"frames overlap in time: one lasts {lasts:g} s, and the next begins after {interval:g} s"
+        assert said.count(told) == said.count("overlap in time") == lines, (count, interval, said)
+    assert overlap(rc.Scene.load(file), 2, None) == []
 
 
 def test_a_scene_moved_in_python_is_the_scene_written_there(file):

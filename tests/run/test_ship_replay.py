@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.cli import invoke
 from raychan.run.ship_loop import ShipLoop
 from raychan.run.ship_replay import read_poses
 from raychan.run.ship_scene import ship_scene
@@ -38,6 +39,23 @@ def test_pitch_and_height_of_a_log_count(tmp_path):
     height = 1.0 + 5.0 * np.cos(np.radians(10.0))
     assert frame.pitch == pytest.approx(np.radians(10.0)) and frame.z == 1.0
     assert frame.scan.range[90] == pytest.approx(height / np.sin(np.radians(10.0)), abs=1e-9)
+
+
+@pytest.mark.parametrize("optional", [("pitch_deg", "z_m"), ("z_m",), ()])
+def test_the_csv_of_a_replay_has_the_columns_of_its_log_and_can_be_replayed_as_it_was(optional, tmp_path):
+    log, scene = tmp_path / "log.csv", tmp_path / "ship.toml"
+    names = ["t_s", "x_m", "y_m", "heading_deg", "roll_deg", *optional]
+    rows = [[k / 75.0, 0.1 * k, 0.0, 10.0 + k, 3.0, 4.0 + 0.1 * k, 2.0 + 0.01 * k][: len(names)] for k in range(31)]
+    log.write_text("\n".join(",".join(map(str, row)) for row in [names, *rows]))
+    scene.write_text(f"[replay]\nfile = '{log}'\n[sea]\nreflectivity = 1.0\n")
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert invoke(["ship", str(scene), "--out", str(one), "--no-pictures"]) == 0
+    assert (one / "ship.csv").read_text().splitlines()[0].split(",")[7:] == list(optional)
+    again = ["--set", f"replay.file={one / 'ship.csv'}"]
+    assert invoke(["ship", str(scene), *again, "--out", str(two), "--no-pictures"]) == 0
+    first, second = (read_poses(folder / "ship.csv", 1.0).pose for folder in (one, two))
+    assert first[: len(second)] == pytest.approx(second, abs=1e-7)
+    assert first[:, 2].any() == ("z_m" in optional) and first[:, 4].any() == ("pitch_deg" in optional)
 
 
 def test_the_ship_is_where_the_log_has_it_and_turns_over_north_the_short_way(tmp_path):
@@ -101,3 +119,18 @@ def test_a_log_in_unix_time_counts_from_its_first_row_and_says_when_that_was(tmp
     assert [f.x for f in frames] == pytest.approx([8.0 * f.time for f in frames], abs=1e-9)
     assert loop.scene.poses.start == 1700000000.5
     assert "the log ends after 1 s, before run.duration_s = 60" in loop.scene.ends_early[0]
+
+
+@pytest.mark.parametrize("command", ["ship", "hil"])
+def test_a_log_shorter_than_a_scan_is_told_with_its_file(command, tmp_path, capsys):
+    log, scene = tmp_path / "log.csv", tmp_path / "ship.toml"
+    scene.write_text("[replay]\nfile = 'log.csv'\n[run]\nduration_s = 0.5\n")
+    options = {"ship": ["--out", str(tmp_path / "out"), "--no-pictures"], "hil": ["--no-realtime"]}[command]
+    for last in (0.001, 0.006, 0.0133):
+        log.write_text(f"{HEAD}0,0,0,0,0\n{last},0,0,0,0\n")
+        assert invoke([command, str(scene), *options]) == 2
+        said = capsys.readouterr().err.replace("\n", "")
+        assert f"{log}: the log lasts {last} s" in said and "allowed: at least one scan, 0.01333 s" in said
+    for last in (0.014, 0.02):
+        log.write_text(f"{HEAD}0,0,0,0,0\n{last},0,0,0,0\n")
+        assert invoke([command, str(scene), *options]) == 0

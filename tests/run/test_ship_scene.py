@@ -8,7 +8,10 @@ from raychan.dynamics.ship import KNOT, PHI, PSI, U
 from raychan.run.ship_bridge import Steered
 from raychan.run.ship_loop import ShipLoop
 from raychan.run.ship_scene import read_ship_scene, ship_scene
+from raychan.run.ship_schema import ShipFile
+from raychan.world.build import SHIP_TABLES
 from raychan.world.bundled import ship_names
+from raychan.world.schema import SceneFile
 
 WRONG = {
     "[shipp]\nmodel = 'yacht'": "unknown key 'shipp'; did you mean 'ship'?",
@@ -59,13 +62,17 @@ def test_a_scene_that_is_nowhere_and_one_of_a_radar_are_told():
         rc.Scene.load("ship_turn")
 
 
+def test_the_tables_by_which_a_scene_of_a_ship_is_known_are_those_that_only_it_has():
+    assert set(SHIP_TABLES) == set(ShipFile.model_fields) - set(SceneFile.model_fields)
+
+
 @pytest.mark.parametrize("name", ship_names())
 @pytest.mark.parametrize("model", ["printed", "corrected", "container", "yacht"])
 @pytest.mark.parametrize("controller", ["pd", "lqr", "lqg"])
 def test_every_model_sails_under_every_autopilot_that_it_has(name, model, controller):
     changes = [f"ship.model={model}", f"steering.controller={controller}", "ship.speed_mps=6", "run.duration_s=1"]
     if model == "printed" and controller != "pd":
-        with pytest.raises(rc.SceneError, match=r"steering\.controller: "):
+        with pytest.raises(rc.SceneError, match=r"steering\.controller: .*; allowed: .*any ship.model but 'printed'"):
             read_ship_scene(name, changes)
         return
     loop = ShipLoop(read_ship_scene(name, changes))

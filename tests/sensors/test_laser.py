@@ -10,6 +10,7 @@ from raychan.sensors.laser import (
     REFLECTIVITY,
     SEA,
     LaserScan,
+    MovingBodies,
     Scanner,
     SensorPoses,
     beams,
@@ -152,3 +153,48 @@ def test_below_the_sea_or_along_it_no_sea_is_met():
 def test_a_scanner_that_cannot_be_is_refused(wrong):
     with pytest.raises(ValueError, match="allowed"):
         Scanner(**wrong)
+
+
+@pytest.mark.parametrize("name", ["max_range", "dark_range", "mirror_hz", "fan_deg", "step_deg"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0, 1e9, "80", True, None])
+def test_a_number_of_a_scanner_that_no_scene_file_takes_is_refused_with_name_and_limits(name, value):
+    with pytest.raises(ValueError, match=f"Scanner.{name} = .*; allowed: "):
+        Scanner(**{name: value})
+
+
+def test_a_scanner_takes_numbers_of_numpy_and_refuses_texts_for_switches():
+    assert Scanner(max_range=np.float32(40.0), fan_deg=np.int64(90)) == Scanner(max_range=40.0, fan_deg=90.0)
+    for wrong in ({"lambert": "no"}, {"moving": 2.0}, {"spot": True}):
+        with pytest.raises(ValueError, match=f"Scanner.{next(iter(wrong))} = "):
+            Scanner(**wrong)
+
+
+BOX = RayCaster(facets([box((10, -5, 0), (11, 5, 9))]))
+
+
+@pytest.mark.parametrize(
+    "caster, reflectivity, said",
+    [
+        (BOX, [0.5, 0.1], "reflectivity: 2 values; allowed: one for each body, here 1"),
+        (BOX, [], "reflectivity: 0 values; allowed: one for each body, here 1"),
+        (BOX, 0.5, "reflectivity: 0.5; allowed: one for each body, here 1"),
+        (BOX, [[0.5]], "here 1"),
+        (BOX, [np.nan], r"reflectivity\[0\] = nan; allowed: between 0 and 100"),
+        (BOX, [-0.1], r"reflectivity\[0\] = -0.1; allowed"),
+        (BOX, ["0.5"], "reflectivity = .*: numbers are wanted"),
+        (None, [0.5], "reflectivity: 1 values; allowed: one for each body, here 0"),
+        ((MovingBodies(BOX, np.zeros(3), np.array([1], np.int32)),), [0.5], "here 2"),
+    ],
+)
+def test_a_reflectivity_that_is_not_one_for_each_body_is_refused(caster, reflectivity, said):
+    with pytest.raises(ValueError, match=said):
+        scan(Scanner(), still(Scanner()), caster, reflectivity)
+
+
+def test_poses_of_another_number_than_the_beams_a_sea_and_a_noise_that_cannot_be_are_refused():
+    with pytest.raises(ValueError, match="poses: 181 given; allowed: one for each beam of the scanner, 361"):
+        scan(Scanner(step_deg=0.5), still(Scanner()), BOX, [0.5])
+    with pytest.raises(ValueError, match="sea_reflectivity = nan; allowed: between 0 and 100"):
+        scan(Scanner(), still(Scanner()), BOX, [0.5], np.nan)
+    with pytest.raises(ValueError, match="deviation = -1; allowed"):
+        noisy(scan(Scanner(), still(Scanner()), BOX, [0.5]), -1, np.random.default_rng(0))

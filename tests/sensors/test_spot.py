@@ -136,7 +136,10 @@ def test_all_beams_leave_at_the_scans_start_where_motion_is_switched_off():
     assert not Scanner(moving=False).times.any() and Scanner().times.any()
 
 
-@pytest.mark.parametrize("wrong", [{"divergence": -1.0}, {"exit_diameter": np.nan}, {"rings": 0}, {"merge": np.inf}])
+WRONG = [{"divergence": -1.0}, {"exit_diameter": np.nan}, {"rings": 0}, {"merge": np.inf}]
+
+
+@pytest.mark.parametrize("wrong", [*WRONG, {"rings": 10**6}, {"rings": 1.5}, {"divergence": 0.6}, {"echo": "first"}])
 def test_a_footprint_that_cannot_be_is_refused(wrong):
-    with pytest.raises(ValueError, match="allowed"):
+    with pytest.raises(ValueError, match=f"Spot.{next(iter(wrong))} = .*; allowed: "):
         Spot(**wrong)
