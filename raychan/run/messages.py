@@ -20,6 +20,7 @@ from raychan.world.geometry import Geometry
 
 _NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: rounds to 1 dB or more
+_LOST_DB = 0.5  # by what a receiver makes of an echo: less is as much as levels are asked for, by default
 
 
 def counts(found: ExplainedDetections, tolerance_db: float | None) -> dict[str, float]:
@@ -78,7 +79,7 @@ def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
     cells."""
     said = []
     loss = near_field_losses(found, radar)
-    if (near := loss > _LEAST_DB).any():
+    if (near := loss > _LOST_DB).any():
         limit = far_field_distance(radar)
         said.append(
             f"{_of(near)} {_verb(near)} in the near field of the array ({_numbers(near)}), nearer than 2 D^2 / "
@@ -86,7 +87,7 @@ def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
             "spherical one"
         )
     moved, loss = migration(found.true_rate, radar)
-    if (fast := loss > _LEAST_DB).any():
+    if (fast := loss > _LOST_DB).any():
         said.append(
             f"{_of(fast)} {'moves' if fast.sum() == 1 else 'move'} over range cells during the frame "
             f"({_numbers(fast)}), up to {moved.max():.1f}: peaks read up to {loss.max():.1f} dB less"

@@ -85,7 +85,7 @@ class Voyage:
             self._rows = csv.writer(self._csv, lineterminator="\n")
             self._rows.writerow([*COLUMNS, *self._optional])
             self._disk = opened.enter_context(closing(ShelteredFile(self._folder / "scan.nc")))
-            held = opened.enter_context(h5py.File(self._disk, "w"))
+            held = opened.enter_context(h5py.File(self._disk, "w", track_order=True))
             self._nc = opened.enter_context(h5netcdf.File(held, "w"))
             self._header()
             self._disk.check()

@@ -70,3 +70,24 @@ def test_a_peak_loses_what_is_told_of_an_echo_that_migrates(window):
         said = [x for x in found.warnings if "over range cells" in x]
         assert len(said) == (loss[0] > 0.5)
         assert all(f"up to {moved[0]:.1f}: peaks read up to {loss[0]:.1f} dB less" in x for x in said)
+
+
+@pytest.mark.parametrize(("receivers", "place"), [(64, 0.6), (128, 2.0)])
+def test_where_a_beams_peak_splits_what_is_told_is_the_loss_of_the_best_beam(receivers, place):
+    near, radar = run(place, elements=uniform_array(receivers, STEP))
+    found, y = near.detections, radar.elements[:, 1]
+    assert len(found.range) == 2
+    for away, azimuth, told in zip(found.range, found.azimuth, near_field_losses(found, radar), strict=True):
+        wave = np.hypot(away * np.cos(azimuth), away * np.sin(azimuth) - y)
+        beams = np.exp(1j * np.pi / STEP * (wave + np.linspace(-1.0, 1.0, 4001)[:, None] * y))
+        assert told == pytest.approx(-20.0 * np.log10(np.abs(beams.mean(axis=1)).max()), abs=0.1)
+        # Its parts are seen in beams with nulls towards each other, which read more.
+        assert told > level(run(place)[0]) - 10.0 * np.log10(found.power.max())
+
+
+def test_an_echo_that_folds_to_the_near_field_loses_nothing():
+    wave = rc.Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 256)
+    target = {"shape": "box", "rcs_dbsm": 40.0, "rcs_point": (0.0, 0.0, 0.0), "position": (40.0, 0.0, 0.0)}
+    radar = rc.Radar(wave, noise=False, elements=uniform_array(64, STEP))
+    found = rc.simulate(rc.Scene([rc.Body("target", **target)], radar=radar))
+    assert found.detections.range[0] < 5.0 and not any("near field" in x for x in found.warnings)
