@@ -130,8 +130,8 @@ class Converter:
 
     @property
     def snr_db(self) -> float:
-        """Power of a full-scale sine over the noise of rounding [dB], 6.02 bits + 1.76 (Bennett, Bell Syst. Tech. J. 27,
-        1948). That its upper crests clip, by up to a step, takes 1.5 dB more at 6 bits, 0.4 dB at 10."""
+        """Power of a full-scale sine over the noise of rounding [dB], 6.02 bits + 1.76 (Bennett, Bell Syst. Tech. J.
+        27, 1948). That its upper crests clip, by up to a step, takes 1.5 dB more at 6 bits, 0.4 dB at 10."""
         return 20.0 * float(np.log10(2.0)) * self.bits + 10.0 * float(np.log10(1.5))
 
     def noise_power(self, complex_sampling: bool = True) -> float:
