@@ -174,19 +174,19 @@ def _straddled(taper: NDArray[np.float64], pad: int) -> float:
 
 def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:
     """Return detections with the true rates, speeds and ranges that the folds of a ResolvedMap give, ambiguous where
-    another fold explains their cell as well; of other maps the same. A folded rate leaves part of its Doppler shift in
-    the beat frequency, which is taken off the range."""
-    if not isinstance(map, ResolvedMap) or not len(found.rate):
+    another fold explains their cell as well. A folded rate leaves part of its Doppler shift in the beat frequency,
+    which is taken off the range; of any map that is so of a peak beyond the last row, whose cell is the first."""
+    if not len(found.rate):
         return found
     span, (rows, columns) = 2.0 * map.unambiguous_rate, found.cell.T
     # A peak between two cells may lie beyond the end of the axis that its own cell is on; that cell's shift is undone.
     beyond = np.rint((map.rate[rows] - found.rate) / span)
-    folds = map.fold[rows, columns] + beyond
+    folds = beyond + (map.fold[rows, columns] if isinstance(map, ResolvedMap) else 0)
     # Folds as many as are tested apart look alike.
-    tested = hypotheses(radar)
+    tested = hypotheses(radar) if isinstance(map, ResolvedMap) else 1
     folds -= tested * np.rint((found.rate + span * folds) / (span * tested))
     more, left, waveform = span * folds, span * (folds - beyond), radar.waveform
     shift = 0.0 if isinstance(waveform, OwnWaveform) else left * waveform.middle / waveform.slope
-    ambiguous = found.ambiguous | map.open[rows, columns]
+    ambiguous = found.ambiguous | (map.open[rows, columns] if isinstance(map, ResolvedMap) else False)
     moved = {"rate": found.rate + more, "speed": found.speed + more, "range": found.range - shift}
     return found.replace(**moved, ambiguous=ambiguous)
