@@ -106,8 +106,9 @@ class PeakShape:
 
     def refine(self, power: Floats, cells: Ints) -> tuple[Floats, Floats]:
         """Return the offsets (c, 2) in cells and the power (c,) of the peaks at map cells (c, 2)."""
-        steps = [(step * (axis == 0), step * (axis == 1)) for axis in (0, 1) for step in (-1, 1)]
-        around = [power[self.cells_at(*(cells + step).T, power.shape)] for step in steps]
+        rows, columns = cells.T
+        steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
+        around = [power[self.cells_at(rows + down, columns + along, power.shape)] for down, along in steps]
         return self.between(power[tuple(cells.T)], np.array(around).reshape(2, 2, -1), cells, power.shape)
 
     def cells_at(self, rows: Ints, columns: Ints, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
