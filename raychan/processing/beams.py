@@ -51,8 +51,8 @@ class BeamBank:
 
     @cached_property
     def directions(self) -> Floats:
-        """Cosines (b, 2) along y and z of the beams."""
-        return self.aperture.grid(PER_BEAM).points
+        """Cosines (b, 2) along y and z of the beams; of a deep array at equal angles."""
+        return self.aperture.spread(PER_BEAM) if self.aperture.deep else self.aperture.grid(PER_BEAM).points
 
     @cached_property
     def rows(self) -> NDArray[np.complex64]:
@@ -107,6 +107,8 @@ class BeamBank:
     @cached_property
     def _pairs(self) -> Floats:
         """Correlations (b - 1,) of the noise of neighbours, along a tree over all beams."""
+        if self.aperture.deep:
+            return self._alike(np.array(list(pairwise(range(len(self.directions))))))
         grid = self.aperture.grid(PER_BEAM)
         place = np.full(grid.visible.shape, -1)
         place[grid.visible] = np.arange(len(self.directions))
@@ -116,9 +118,13 @@ class BeamBank:
             found += list(pairwise(along))
         across = place[len(grid.u) // 2]
         found += [(across[k], across[k + 1]) for k in range(len(grid.w) - 1) if min(across[k : k + 2]) >= 0]
-        if not found:
+        return self._alike(np.array(found).reshape(-1, 2))
+
+    def _alike(self, pairs: Ints) -> Floats:
+        """Return the correlations (p,) of the noise of pairs (p, 2) of beams."""
+        if not len(pairs):
             return np.zeros(0)
-        one, other = np.array(found).T
+        one, other = pairs.T
         return np.asarray(np.abs((self.rows[one] * self.rows[other].conj()).sum(axis=1)) / self.noise_gain)
 
 

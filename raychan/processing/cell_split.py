@@ -159,14 +159,15 @@ class Splitter:
         cells show there: else it is the foot of an echo that has a peak of its own.
         """
         pad, shape = np.array(self.grid.pad), self.map.power.shape
-        v, r = ((c + np.arange(-p, p + 1)) % n for c, p, n in zip(peaks.cells[i], pad, shape, strict=True))
-        level = np.abs(np.tensordot(held.weights[k], self.map.spectrum[:, v[:, None], r[None, :]], 1)) ** 2
+        near = np.meshgrid(*(c + np.arange(-p, p + 1) for c, p in zip(peaks.cells[i], pad, strict=True)), indexing="ij")
+        v, r = self.shape.cells_at(near[0], near[1], shape)
+        level = np.abs(np.tensordot(held.weights[k], self.map.spectrum[:, v, r], 1)) ** 2
         at = pad if k == 0 else np.array(np.unravel_index(int(level.argmax()), level.shape))
         # Along an axis of two cells there is nothing to compare with.
         at = np.where(np.array(shape) <= 2, pad, at)
         if not (np.abs(at - pad) < pad).all():
             return None
-        cell = np.array([v[at[0]], r[at[1]]])
+        cell = np.array([v[tuple(at)], r[tuple(at)]])
         beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
         shift, power = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])

@@ -106,8 +106,20 @@ class PeakShape:
 
     def refine(self, power: Floats, cells: Ints) -> tuple[Floats, Floats]:
         """Return the offsets (c, 2) in cells and the power (c,) of the peaks at map cells (c, 2)."""
-        around = [[power[_beside(power, cells, axis, step)] for step in (-1, 1)] for axis in (0, 1)]
+        rows, columns = cells.T
+        steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
+        around = [power[self.cells_at(rows + down, columns + along, power.shape)] for down, along in steps]
         return self.between(power[tuple(cells.T)], np.array(around).reshape(2, 2, -1), cells, power.shape)
+
+    def cells_at(self, rows: Ints, columns: Ints, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
+        """Return rows and columns of a map of those that may lie beyond its ends: rows go on at the other end, in range
+        cells as far away as the Doppler shifts of both ends are, of which rows are freed."""
+        turns = np.floor_divide(rows, shape[0])
+        return rows - turns * shape[0], (columns + turns * round(self._turn(shape))) % shape[1]
+
+    def _turn(self, shape: tuple[int, ...]) -> float:
+        """Return by how many range cells of a map an echo lies higher in a row than in the next span of rates."""
+        return self._skew * shape[0]
 
     def between(self, top: Floats, around: Floats, cells: Ints, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
         """Return what `refine` does, from the powers (c,) of cells and of those below and above (axis, 2, c)."""
@@ -116,10 +128,12 @@ class PeakShape:
         inner = ((cells[:, 1] > 0) & (cells[:, 1] < shape[1] - 1) | self._wraps) & (shape[1] > 2)
         shift[inner, 1], gain[inner] = self.lobes[1].between(reach[0, inner], top[inner], reach[1, inner])
         if shape[0] > 2:
-            here = self.lobes[1](shift[:, 1])
+            here, rest = self.lobes[1](shift[:, 1]), self._turn(shape) - round(self._turn(shape))
             below, above = (
-                x - np.maximum(self.lobes[1](shift[:, 1] - step * self._skew) - here, -_STEEP) * inner
-                for x, step in zip(rate, (-1.0, 1.0), strict=True)
+                x - np.maximum(self.lobes[1](shift[:, 1] + step * (rest * ends - self._skew)) - here, -_STEEP) * inner
+                for x, step, ends in zip(
+                    rate, (-1.0, 1.0), (cells[:, 0] == 0, cells[:, 0] == shape[0] - 1), strict=True
+                )
             )
             shift[:, 0], more = self.lobes[0].between(below, top, above)
             gain += more
@@ -131,9 +145,3 @@ class PeakShape:
 def _main_lobe(name: str, n: int, pad: int) -> MainLobe:
     """Return a main lobe, kept for the next frame of a sequence."""
     return MainLobe(name, n, pad)
-
-
-def _beside(power: Floats, cells: Ints, axis: int, step: int) -> tuple[Ints, ...]:
-    at = cells.copy()
-    at[:, axis] = (at[:, axis] + step) % power.shape[axis]
-    return tuple(at.T)

@@ -4,8 +4,7 @@ phases over the virtual array.
 By time division transmitter i sends i repetitions later than transmitter 0, and an echo of Doppler shift f meets it
 turned by f i T_r; the turn is undone cell by cell. By Doppler division its echoes stand i / (slots T_r) aside. Either
 way a channel repeats `slots` times more slowly than the radar, so that f is known but for h / (slots T_r): the wrong h
-leaves phase steps between the transmitters. Per cell h is the hypothesis under which the virtual array forms the
-strongest beam.
+leaves phase steps between the transmitters (see processing.folds).
 
 Source: Schmid, Feger, Pfeffer, Stelzer, EuCAP 2012 (phase of moving targets under time division); Bechter, Roos,
 Waldschmidt, IEEE Microw. Wirel. Compon. Lett. 27(12), 2017 (the same with folded rates).
@@ -19,20 +18,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.processing.folds import folds, under
 from raychan.processing.own_waveform import map_by_waveform
 from raychan.processing.range_doppler import mean_power
-from raychan.processing.staggered import doppler, fold_range, hypotheses, least_power, resolved, staggered_map
+from raychan.processing.staggered import doppler, hypotheses, resolved, staggered_map
 from raychan.radar.radar import Radar
 from raychan.records import Cube, RangeDoppler
-from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex64]
-
-# Single values not measured.
-_SURE = 1.05  # by which the beam of a folded hypothesis must be stronger than that of the unfolded one
-_PER_BEAM = 4  # beams tested per aperture's beam width: at most 0.2 dB are lost between two
-_BATCH = 1 << 22  # cells times beams at once: bounds the memory
 
 
 def virtual_range_doppler(
@@ -59,11 +53,13 @@ def virtual_range_doppler(
     many = len(radar.tx_elements)
     if not resolve:
         return replace(plain, spectrum=channels[:many].reshape(-1, *channels.shape[2:]))
-    fold = _folds(channels, radar, plain) if hypotheses(radar) > 1 else np.zeros(plain.power.shape, np.int8)
+    fold, open_ = np.zeros(plain.power.shape, np.int8), None
+    if hypotheses(radar) > 1:
+        fold, open_ = folds(channels, radar, plain)
     spectrum = channels[:many].copy()
     for cells, h in _groups(fold):
-        spectrum[:, :, *cells] = _under(channels[:, :, *cells], h, radar)
-    return resolved(plain, spectrum.reshape(-1, *spectrum.shape[2:]), fold, plain.noise, hypotheses(radar))
+        spectrum[:, :, *cells] = under(channels[:, :, *cells], h, radar)
+    return resolved(plain, spectrum.reshape(-1, *spectrum.shape[2:]), fold, plain.noise, hypotheses(radar), open_)
 
 
 def _by_time(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Complexes]:
@@ -100,47 +96,6 @@ def _by_doppler(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Com
     power = mean_power(flat)
     limit = whole.unambiguous_rate / slots
     return replace(whole, rate=whole.rate[rows], spectrum=flat, power=power, unambiguous_rate=limit), channels
-
-
-def _under(channels: Complexes, h: int, radar: Radar) -> Complexes:
-    """Return channels (t, a, ...) if the echo is folded h times, from what the cells hold (t or slots, a, ...)."""
-    many, slots = len(radar.tx_elements), radar.slots
-    if radar.multiplexing == "ddm":
-        return np.asarray(channels[(np.arange(many) - h) % slots])
-    turn = np.exp(2j * np.pi * (h * np.arange(many) % slots) / slots).astype(np.complex64)
-    return np.asarray(channels * turn.reshape(-1, *[1] * (channels.ndim - 1)))
-
-
-def _folds(channels: Complexes, radar: Radar, map: RangeDoppler) -> NDArray[np.int8]:
-    """Return by how many spans the strongest echo of each cell is folded (v, r)."""
-    fold = np.zeros(map.power.shape, np.int8)
-    level = least_power(map, len(radar.virtual_elements))
-    at = np.argwhere((np.abs(channels) ** 2).mean(axis=(0, 1)) > level)
-    steering = _steering(radar)
-    for some in np.array_split(at, max(1, len(at) * len(steering) // _BATCH)):
-        held = channels[:, :, some[:, 0], some[:, 1]]
-        best, power = np.zeros(len(some), np.int8), np.zeros(len(some))
-        for h in fold_range(radar.slots):
-            beams = steering @ _under(held, h, radar).reshape(steering.shape[1], -1)
-            strongest = (np.abs(beams) ** 2).max(axis=0)
-            better = strongest > (_SURE if h else 1.0) * power
-            best[better], power[better] = h, strongest[better]
-        fold[some[:, 0], some[:, 1]] = best
-    return fold
-
-
-def _steering(radar: Radar) -> Complexes:
-    """Return weights (beams, t * a) of beams over the half space ahead."""
-    places, wave = radar.virtual_elements, C0 / radar.waveform.middle
-    sines = []
-    for axis in (1, 2):
-        extent = float(np.ptp(places[:, axis])) / wave
-        count = int(np.ceil(_PER_BEAM * extent)) if extent > 0.0 else 0
-        sines.append(np.linspace(-1.0, 1.0, 2 * count + 1) if count else np.zeros(1))
-    y, z = (x.ravel() for x in np.meshgrid(*sines))
-    ahead = y * y + z * z <= 1.0
-    look = np.stack([np.sqrt(np.maximum(1.0 - y * y - z * z, 0.0)), y, z], axis=1)[ahead]
-    return np.exp(-2j * np.pi / wave * (look @ places.T)).astype(np.complex64)
 
 
 def _groups(fold: NDArray[np.int8]) -> list[tuple[tuple[Any, Any], int]]:

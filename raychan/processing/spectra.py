@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
+from scipy.spatial import cKDTree
 
 from raychan.processing.covariance import Covariance
 from raychan.radar.aperture import Aperture, Grid
@@ -28,6 +29,7 @@ BEAMS_PER_BEAM = 4
 _LOADING = 1e-9  # of the mean eigenvalue: keeps the inverse of a covariance without noise
 _FEW_LOADING = 1e-2  # the same for fewer than 2 p snapshots (Reed, Mallett and Brennan 1974), whose least eigenvalues
 # are chance: echoes 20 dB weaker than the strongest are lost (not measured)
+_BATCH = 1 << 21  # steering values at once, 32 MB
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
 
 
@@ -70,6 +72,8 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     """Return the cosines (k, 2) along y and z of at most `count` greatest maxima of a form, greatest first.
 
     Args: per_beam, grid points to a beam width."""
+    if aperture.deep:
+        return _deep_peaks(form, aperture, count, per_beam)
     grid, batches = aperture.scanned(per_beam)
     values = np.full(grid.visible.shape, -np.inf)
     values[grid.visible] = np.concatenate([form(steering) for steering in batches])
@@ -83,6 +87,19 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     return aperture.canonical(found[order])
 
 
+def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Floats:
+    """Return what `peaks` does of an array so deep that near the edge a grid in the cosines is too coarse."""
+    at = aperture.spread(per_beam)
+    batch = max(1, _BATCH // len(aperture.elements))
+    values = np.concatenate([form(aperture.steering(at[i : i + batch])) for i in range(0, len(at), batch)])
+    look = np.column_stack([np.sqrt(np.maximum(1.0 - (at**2).sum(axis=1), 0.0)), at])
+    _, beside = cKDTree(look).query(look, min(len(at), 3**2 if all(aperture.scans) else 3))
+    top = np.flatnonzero(values >= values[beside].max(axis=1))
+    start = at[top[np.argsort(-values[top], kind="stable")[: 2 * count]]]
+    found, heights = climb(form, aperture, start, aperture.grid(per_beam))
+    return found[np.argsort(-heights, kind="stable")[:count]]
+
+
 def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Floats, Floats]:
     """Return the maxima (k, 2) next to grid points (k, 2), and the form's values (k,) there."""
     at = np.array(start)
@@ -90,13 +107,12 @@ def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Fl
     step = grid.step
     for _ in range(_SHRINKS):
         for axis in np.flatnonzero(step):
-            aside = np.zeros(2)
-            aside[axis] = step[axis]
             # Beyond the visible edge the form goes on as smoothly, or as it does at the other edge.
-            below, above = (form(aperture.steering(aperture.canonical(at + sign * aside))) for sign in (-1.0, 1.0))
+            beside = (aperture.moved(at, int(axis), sign * step[axis]) for sign in (-1.0, 1.0))
+            below, above = (form(aperture.steering(aperture.canonical(x))) for x in beside)
             bend = below - 2.0 * best + above
             offset = np.divide(0.5 * (below - above), bend, out=np.sign(above - below), where=bend < 0.0)
-            tried = aperture.visible(at + np.clip(offset, -1.0, 1.0)[:, None] * aside)
+            tried = aperture.visible(aperture.moved(at, int(axis), np.clip(offset, -1.0, 1.0) * step[axis]))
             value = form(aperture.steering(tried))
             better = value > best
             at, best = np.where(better[:, None], tried, at), np.where(better, value, best)

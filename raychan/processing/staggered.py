@@ -38,17 +38,28 @@ class ResolvedMap(RangeDoppler):
     """A map whose cells know by how many spans of unambiguous rates their echo is folded."""
 
     fold: NDArray[np.int8] = column("v r", np.int8, doc="true rate = rate + 2 unambiguous_rate fold")
+    open: NDArray[np.bool_] = column(
+        "v r", np.bool_, doc="several transmitters: whether another fold explains the cell as well; staggered: False"
+    )
     resolved_rate: float
     """Range rates between plus and minus this are told apart by the folds [m/s]."""
 
 
-def resolved(map: RangeDoppler, spectrum: Complexes, fold: NDArray[np.int8], noise: float, tested: int) -> ResolvedMap:
-    """Return a map with another spectrum (channels, v, r), its folds (v, r) of so many tested, and its noise [W] a
-    cell."""
+def resolved(
+    map: RangeDoppler,
+    spectrum: Complexes,
+    fold: NDArray[np.int8],
+    noise: float,
+    tested: int,
+    alike: NDArray[np.bool_] | None = None,
+) -> ResolvedMap:
+    """Return a map with another spectrum (channels, v, r), its folds (v, r) of so many tested, its noise [W] a cell,
+    and where another fold is alike (v, r), nowhere if None."""
     held = {name: getattr(map, name) for name in RangeDoppler.__dataclass_fields__}
     power = (spectrum.real.astype(np.float64) ** 2 + spectrum.imag.astype(np.float64) ** 2).mean(axis=0)
     held |= {"spectrum": spectrum, "power": power, "noise": noise}
-    return ResolvedMap(**held, fold=fold, resolved_rate=tested * map.unambiguous_rate)
+    alike = np.zeros(fold.shape, bool) if alike is None else alike
+    return ResolvedMap(**held, fold=fold, open=alike, resolved_rate=tested * map.unambiguous_rate)
 
 
 def fold_range(count: int) -> list[int]:
@@ -66,10 +77,14 @@ def hypotheses(radar: Radar) -> int:
 def least_power(map: RangeDoppler, channels: int) -> float:
     """Return the mean power [W] over the channels of a cell from which its folds are tested.
 
-    A beam sees an echo `channels` times stronger over the noise than one channel does. Without noise its place is taken
-    by the median cell.
+    A beam sees an echo `channels` times stronger over the noise than one channel does.
     """
-    return (1.0 + _STRONG / channels) * (map.noise or float(np.median(map.power)))
+    return (1.0 + _STRONG / channels) * noise_of(map)
+
+
+def noise_of(map: RangeDoppler) -> float:
+    """Return the noise of a cell [W]; where it is unknown that of the median cell."""
+    return map.noise or float(np.median(map.power))
 
 
 def doppler(map: RangeDoppler, radar: Radar) -> NDArray[np.float64]:
@@ -158,17 +173,20 @@ def _straddled(taper: NDArray[np.float64], pad: int) -> float:
 
 
 def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:
-    """Return detections with the true rates, speeds and ranges that the folds of a ResolvedMap give; of other maps the
-    same. A folded rate leaves part of its Doppler shift in the beat frequency, which is taken off the range."""
-    if not isinstance(map, ResolvedMap) or not len(found.rate):
+    """Return detections with the true rates, speeds and ranges that the folds of a ResolvedMap give, ambiguous where
+    another fold explains their cell as well. A folded rate leaves part of its Doppler shift in the beat frequency,
+    which is taken off the range; of any map that is so of a peak beyond the last row, whose cell is the first."""
+    if not len(found.rate):
         return found
     span, (rows, columns) = 2.0 * map.unambiguous_rate, found.cell.T
     # A peak between two cells may lie beyond the end of the axis that its own cell is on; that cell's shift is undone.
     beyond = np.rint((map.rate[rows] - found.rate) / span)
-    folds = map.fold[rows, columns] + beyond
+    folds = beyond + (map.fold[rows, columns] if isinstance(map, ResolvedMap) else 0)
     # Folds as many as are tested apart look alike.
-    tested = hypotheses(radar)
+    tested = hypotheses(radar) if isinstance(map, ResolvedMap) else 1
     folds -= tested * np.rint((found.rate + span * folds) / (span * tested))
     more, left, waveform = span * folds, span * (folds - beyond), radar.waveform
     shift = 0.0 if isinstance(waveform, OwnWaveform) else left * waveform.middle / waveform.slope
-    return found.replace(rate=found.rate + more, speed=found.speed + more, range=found.range - shift)
+    ambiguous = found.ambiguous | (map.open[rows, columns] if isinstance(map, ResolvedMap) else False)
+    moved = {"rate": found.rate + more, "speed": found.speed + more, "range": found.range - shift}
+    return found.replace(**moved, ambiguous=ambiguous)

@@ -96,11 +96,25 @@ class Aperture:
 
     @cached_property
     def wraps(self) -> tuple[bool, bool]:
-        """Whether directions repeat by grating lobes within what is visible, or at its edges, along y and z."""
+        """Whether directions repeat by grating lobes within what is visible, or at its edges, along y and z; where
+        the array is deep none is quite like another."""
         y, z = (
-            scanned and period <= 2.0 * (1.0 + _EDGE) for scanned, period in zip(self.scans, self.period, strict=True)
+            scanned and period <= 2.0 * (1.0 + _EDGE) and not self.deep
+            for scanned, period in zip(self.scans, self.period, strict=True)
         )
         return bool(y), bool(z)
+
+    @cached_property
+    def depth(self) -> float:
+        """Extent along x, ahead [wavelengths]."""
+        return float(np.ptp(self.elements[:, 0])) / self.wavelength
+
+    @cached_property
+    def deep(self) -> bool:
+        """Whether beams near the edge of what is visible are narrow in the cosines: the cosine ahead falls by sqrt(2 s)
+        over the last s of them, which turns the phase between front and back elements by more than a quarter of a
+        turn where s is a quarter of a beam width."""
+        return any(self.scans) and self.depth * float(np.sqrt(8.0 * self.beamwidth.min())) > 1.0
 
     @cached_property
     def beamwidth(self) -> Floats:
@@ -146,6 +160,40 @@ class Aperture:
                 axes.append(np.linspace(-1.0, 1.0, int(np.ceil(2.0 * per_beam / width)) + 1))
         inside = axes[0][:, None] ** 2 + axes[1][None, :] ** 2 <= 1.0 + _EDGE
         return Grid(axes[0], axes[1], inside, self.wraps)
+
+    def spread(self, per_beam: int) -> Floats:
+        """Return directions (g, 2) at equal angles of `per_beam` to a beam of the whole extent, deep or wide, over what
+        is visible."""
+        inverse = np.divide(1.0, self.beamwidth, out=np.zeros(2), where=np.array(self.scans))
+        step = 1.0 / (per_beam * float(np.linalg.norm([self.depth, *inverse])))
+        off = np.linspace(0.0, 0.5 * np.pi, int(np.ceil(0.5 * np.pi / step)) + 1)
+        if not all(self.scans):
+            sines = np.sin(np.concatenate([-off[:0:-1], off]))
+            return np.outer(sines, self.scans)
+        rings = []
+        for sine in np.sin(off):
+            count = max(1, int(np.ceil(2.0 * np.pi * sine / step)))
+            turn = 2.0 * np.pi / count * np.arange(count)
+            rings.append(sine * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+        return np.concatenate(rings)
+
+    def moved(self, cosines: Floats, axis: int, by: Any) -> Floats:
+        """Return cosines (n, 2) moved along an axis by distances (n,) or one for all: of a deep array by angles, in the
+        plane that it scans, or, of both axes, from boresight (0) and round it (1)."""
+        if not self.deep:
+            out = np.array(cosines)
+            out[:, axis] += by
+            return out
+        both, by = all(self.scans), np.asarray(by, float).reshape(-1, 1)
+        size = np.linalg.norm(cosines, axis=1, keepdims=True) if both else cosines[:, axis, None]
+        along = np.tile([1.0, 0.0] if both else np.eye(2)[axis], (len(cosines), 1))
+        along = np.divide(cosines, size, out=along, where=size > 0.0) if both else along
+        if both and axis == 1:
+            aside = np.stack([-along[:, 1], along[:, 0]], axis=1)
+            return np.asarray(cosines * np.cos(by) + aside * np.sin(by))
+        # What would lead behind the antenna ends at its side.
+        turned = np.clip(np.arcsin(np.clip(size, -1.0, 1.0)) + by, -0.5 * np.pi, 0.5 * np.pi)
+        return np.asarray(along * np.sin(turned))
 
     def scanned(self, per_beam: int) -> tuple[Grid, Iterable[Complexes]]:
         """Return a grid of directions and the steering vectors (n, a) of its points, in batches that memory holds."""

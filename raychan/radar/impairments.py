@@ -109,8 +109,10 @@ class ChirpError:
 class Converter:
     """The analogue-to-digital converter, one each for I and Q.
 
-    Args: bits; full_scale_dbm [dBm] of the strongest sine that is not clipped, referred to the antenna as the samples
-    are. Raises: ValueError for bits beyond 1 to 24 or a full scale that is not finite.
+    Args: bits; full_scale_dbm [dBm] of the sine as wide as all 2^bits steps, its amplitude A, referred to the antenna
+    as the samples are. Zero is a level (mid-tread): levels run from -A to A - step, and A - step / 2 is the amplitude
+    of the strongest sine that is not clipped. With 1 bit they are -A and 0: no comparator, whose levels are opposite.
+    Raises: ValueError for bits beyond 1 to 24 or a full scale that is not finite.
     """
 
     bits: int
@@ -128,7 +130,8 @@ class Converter:
 
     @property
     def snr_db(self) -> float:
-        """Signal-to-noise ratio of a full-scale sine [dB], 6.02 bits + 1.76 (Bennett, Bell Syst. Tech. J. 27, 1948)."""
+        """Power of a full-scale sine over the noise of rounding [dB], 6.02 bits + 1.76 (Bennett, Bell Syst. Tech. J.
+        27, 1948). That its upper crests clip, by up to a step, takes 1.5 dB more at 6 bits, 0.4 dB at 10."""
         return 20.0 * float(np.log10(2.0)) * self.bits + 10.0 * float(np.log10(1.5))
 
     def noise_power(self, complex_sampling: bool = True) -> float:

@@ -207,7 +207,8 @@ class Radar:
     @property
     def resolved_rate(self) -> float:
         """Range rates between plus and minus this are told apart [m/s], nominal: those of the waveform, or of one
-        channel where a single receiver leaves the folds of several transmitters open."""
+        channel where a single receiver leaves the folds of several transmitters open. Of several transmitters a wrong
+        fold may look like another direction: such detections are `ambiguous`."""
         apart = bool(self.waveform.stagger) or len(self.elements) > 1
         return self.waveform.resolved_rate / (1 if apart else self.slots)
 

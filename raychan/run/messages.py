@@ -39,8 +39,8 @@ def counts(found: ExplainedDetections, tolerance_db: float | None) -> dict[str, 
 def warned(
     found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, radar: Radar | None = None
 ) -> list[str]:
-    """Return a line if detections are not converged, and one if some are folded, or ambiguous in direction, or lose by
-    what the receiver of a radar makes of them."""
+    """Return a line if detections are not converged, and one if some are folded, or ambiguous, or lose by what the
+    receiver of a radar makes of them."""
     said = []
     if (~found.converged).any():
         verb = _verb(~found.converged)
@@ -65,13 +65,28 @@ def warned(
             f"{rdmap.unambiguous_range:.4g} m or {limit:.4g} m/s an echo shows elsewhere{open_}; "
             f"number {first + 1} is at {true}, shown at {shown}"
         )
-    if found.ambiguous.any():
+    said += unsure(found, rdmap)
+    return said if radar is None else said + lost(found, radar)
+
+
+def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
+    """Return a line if detections are ambiguous in rate and direction together, and one if some are in direction."""
+    said, rows = [], np.zeros(len(found.range), bool)
+    if isinstance(rdmap, ResolvedMap):
+        rows = found.ambiguous & rdmap.open[tuple(found.cell.T)]
+    if rows.any():
         said.append(
-            f"{_of(found.ambiguous)} {_verb(found.ambiguous)} ambiguous in direction ({_numbers(found.ambiguous)}): "
+            f"{_of(rows)} {_verb(rows)} ambiguous in rate and direction ({_numbers(rows)}): another rate, a multiple "
+            f"of {2.0 * rdmap.unambiguous_rate:.4g} m/s away, explains what the receivers see as well, from another or "
+            "the same direction; the slowest rate is given"
+        )
+    if (rows := found.ambiguous & ~rows).any():
+        said.append(
+            f"{_of(rows)} {_verb(rows)} ambiguous in direction ({_numbers(rows)}): "
             "elements stand more than half a wavelength apart, so a grating lobe shows another direction alike; the "
             "one nearest boresight is given"
         )
-    return said if radar is None else said + lost(found, radar)
+    return said
 
 
 def lost(found: ExplainedDetections, radar: Radar) -> list[str]:

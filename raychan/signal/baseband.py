@@ -129,13 +129,14 @@ def _fill(
 
 
 def noisy(quiet: Cube, radar: Radar, rng: np.random.Generator) -> Cube:
-    """Return the samples with thermal noise added, if the radar has noise."""
+    """Return the samples with thermal noise added, if the radar has noise; with real sampling their real parts."""
+    real = not radar.waveform.complex_sampling
     if not radar.noise:
-        return quiet
+        return Cube(samples=quiet.samples.real.astype(np.complex64), noise_power=0.0) if real else quiet
     scale = np.float32(np.sqrt(0.5 * radar.noise_power))
     samples = scale * rng.standard_normal((*quiet.samples.shape, 2), np.float32).view(np.complex64)[..., 0]
     samples += quiet.samples
-    if not radar.waveform.complex_sampling:
+    if real:
         samples.imag = 0.0
     return Cube(samples=samples, noise_power=radar.noise_power)
 

@@ -37,7 +37,7 @@ class ImpairmentsTable(BaseModel):
     """[offset, dBc/Hz] pairs of the oscillator's mask; linear in dB over log offset, level beyond the ends."""
     adc_bits: Bits | None = None
     adc_full_scale_dbm: Power | None = None
-    """Strongest sine that is not clipped, referred to the antenna."""
+    """Sine as wide as all steps, referred to the antenna; half a step less is not clipped."""
     iq_gain_db: Decibel = 0.0
     """Of Q over I."""
     iq_phase_deg: Angle = 0.0

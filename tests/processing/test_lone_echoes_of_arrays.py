@@ -103,6 +103,20 @@ def test_ranges_are_right_at_the_end_of_a_span_of_rates(array):
         assert seen.range == pytest.approx([9.12], abs=0.02 * radar.waveform.range_resolution)
 
 
+@pytest.mark.parametrize("complex_sampling", [True, False])
+@pytest.mark.parametrize("array", ARRAYS)
+def test_rates_and_ranges_are_right_all_round_the_end_of_the_rates(array, complex_sampling):
+    """Neighbours beyond the end stand 0.9 range cells away, or that by the number of transmitters or slots."""
+    wave = Waveform(77e9, 5e8, 20e-6, 22e-6, 48, 128, complex_sampling=complex_sampling)
+    radar = make_radar(wave, **ARRAYS[array])
+    span = C0 / (4.0 * wave.middle * wave.repetition * radar.slots)
+    for share in (-0.995, -0.98, -0.97, 0.96, 0.975, 0.985, 0.99, 0.998):
+        seen = found(radar, [9.12], [share * span], [3e-5], 0.3)
+        assert seen.rate == pytest.approx([share * span], abs=0.05 * wave.rate_resolution)
+        assert seen.range == pytest.approx([9.12], abs=0.02 * wave.range_resolution)
+        assert 10.0 * np.log10(seen.power / 9e-10) == pytest.approx([0.0], abs=0.1)
+
+
 @pytest.mark.parametrize("pad", [1, 2])
 @pytest.mark.parametrize("place", [0.2, 0.4, 1.4, 126.4, 127.4])
 def test_peaks_at_the_ends_of_the_ranges_are_interpolated(place, pad):

@@ -33,3 +33,18 @@ def test_a_mover_at_20_m_per_s_has_its_azimuth_its_rate_and_its_body(multiplexin
     assert result.provenance[0].bodies == "ball" and not result.detections.folded[0]
     again = rc.Scene.from_text(scene.to_toml()).radar
     np.testing.assert_allclose(again.virtual_elements, scene.radar.virtual_elements, atol=1e-12)
+
+
+def test_a_rate_that_another_direction_explains_as_well_is_told_to_be_ambiguous():
+    """By time division, transmitters above each other: half a turn between them is a fold or an elevation."""
+    wave = rc.Waveform(77e9, 200e6, 20e-6, n_chirps=48, n_samples=64)
+    above = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]) * wave.wavelength
+    ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.01}, position=(25.0, 0.0, 2.0),
+                   velocity=(30.0, 0.0, 0.0), rcs_dbsm=10.0)  # fmt: skip
+    radar = rc.Radar(
+        wave, power=1.0, tx_elements=above, elements=rc.uniform_array(8, 0.5 * wave.wavelength), multiplexing="tdm"
+    )
+    result = rc.simulate(rc.Scene([ball], radar=radar, model={"max_bounces": 1}))
+    assert result.detections.ambiguous.all()
+    assert any("ambiguous in rate and direction (number 1)" in line for line in result.warnings)
+    assert not any("ambiguous in direction" in line for line in result.warnings)

@@ -42,6 +42,16 @@ def test_a_mover_between_two_rates_reads_less_by_what_is_told():
     assert min(lost) > -0.45 and max(lost) < 0.05
 
 
+def test_a_mover_under_real_sampling_without_noise_reads_what_it_does_with_iq_sampling():
+    """Carried on from tracing to tracing, samples are complex: the receiver and its converter see real parts."""
+    for impairments in (rc.Impairments(), rc.Impairments(converter=rc.Converter(12, -40.0))):
+        iq, real = (
+            rc.spectrogram(scene(2.0, sampling, impairments=impairments), 0.1, ranges=(8.0, 12.0)).power.max(axis=1)
+            for sampling in (True, False)
+        )
+        assert db(real / iq) == pytest.approx(np.zeros(len(iq)), abs=0.1)
+
+
 def test_the_receiver_imbalance_offset_and_converter_are_in_the_spectrogram():
     plain = rc.spectrogram(scene(), 0.1)
     unequal = rc.spectrogram(scene(impairments=rc.Impairments(iq_gain_db=3.0)), 0.1)

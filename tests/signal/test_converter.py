@@ -30,6 +30,26 @@ def test_full_scale_sine_has_the_quantisation_snr_of_6_02_bits_plus_1_76_db(bits
     assert dbm(np.mean(np.abs(y - x) ** 2)) == pytest.approx(dbm(adc.noise_power()), abs=0.2)
 
 
+@pytest.mark.parametrize("bits", [2, 6, 10])
+def test_the_strongest_sine_that_is_not_clipped_is_half_a_step_short_of_full_scale(bits):
+    adc, full = Converter(bits, 0.0), np.sqrt(watt(0.0))
+    assert quantized(sine(1 << 17, full - 0.501 * adc.step), adc)[1] == 0
+    assert quantized(sine(1 << 17, full - 0.48 * adc.step), adc)[1] > 0
+
+
+@pytest.mark.parametrize(("bits", "lost_db"), [(6, 1.5), (10, 0.4)])
+def test_clipped_crests_of_a_full_scale_sine_take_what_the_theory_page_says(bits, lost_db):
+    adc, full = Converter(bits, 0.0), np.sqrt(watt(0.0))
+    x = sine(1 << 17, full)
+    y, _ = quantized(x, adc)
+    found = db(np.mean(np.abs(x) ** 2) / np.mean(np.abs(y - x) ** 2))
+    # Where the sine is beyond the last level by half a step or more it errs by all that it is beyond.
+    beyond = full * np.cos(2.0 * np.pi * (np.arange(1 << 16) + 0.5) / (1 << 16)) - (full - adc.step)
+    noise = 2.0 * np.mean(np.where(beyond > 0.5 * adc.step, beyond**2, adc.step**2 / 12.0))
+    assert found == pytest.approx(db(full**2 / noise), abs=0.15)
+    assert adc.snr_db - db(full**2 / noise) == pytest.approx(lost_db, abs=0.05)
+
+
 @pytest.mark.parametrize("over", [1.5, 2.0, 10.0])
 def test_overdriven_sine_is_clipped_in_the_share_of_time_that_it_is_over(over):
     adc = Converter(12, -10.0)

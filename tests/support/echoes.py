@@ -20,11 +20,12 @@ def make_radar(waveform: Waveform, **changes) -> Radar:
     return Radar(antenna=IsotropicAntenna(), waveform=waveform, **given)
 
 
-def echoes(ranges, rates=0.0, amplitudes=1.0, azimuth=0.0) -> Paths:
-    """Paths of given range [m] and rate [m/s] at the start of the frame, amplitude with its phase, azimuth [rad]."""
-    r, v, a, az = np.broadcast_arrays(np.atleast_1d(ranges), rates, amplitudes, azimuth)
+def echoes(ranges, rates=0.0, amplitudes=1.0, azimuth=0.0, elevation=0.0) -> Paths:
+    """Paths of given range [m] and rate [m/s] at the start of the frame, amplitude with its phase, azimuth and
+    elevation [rad]."""
+    r, v, a, az, el = np.broadcast_arrays(np.atleast_1d(ranges), rates, amplitudes, azimuth, elevation)
     n = len(r)
-    look = np.stack([np.cos(az), np.sin(az), np.zeros(n)], axis=1)
+    look = np.stack([np.cos(el) * np.cos(az), np.cos(el) * np.sin(az), np.sin(el)], axis=1)
     none = np.full((n, 1), -1)
     return Paths.of(
         length=2.0 * r, amplitude=a.astype(complex), length_rate=2.0 * v, departure=look, arrival=look,
