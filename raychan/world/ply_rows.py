@@ -73,9 +73,11 @@ def binary_rows(data: bytes, elements: list[Element], wanted: Wanted, lines: int
 def _binary(data: bytes, at: int, element: Element, wanted: Iterable[str], file: Path) -> tuple[dict[str, Column], int]:
     """Return the wanted properties of one element that begins at a byte, and where it ends."""
     rows, types = element.rows, element.types
+    if not rows:
+        return {}, at
     least = sum((kind if count is None else count).itemsize for count, kind in types)
-    starts, lengths, end = _walk(data, at, element, 1) if rows and at + least * rows <= len(data) else _none(types)
-    if rows and not len(starts):
+    starts, lengths, end = _walk(data, at, element, 1) if at + least * rows <= len(data) else _none(types)
+    if not len(starts):
         raise _cut(data, element, file)
     size = max(end - at, 0)
     alike = at + size * rows <= len(data) and all(
@@ -86,11 +88,11 @@ def _binary(data: bytes, at: int, element: Element, wanted: Iterable[str], file:
         starts, lengths, end = _walk(data, at, element, rows)
         if end > len(data):
             raise _cut(data, element, file)
-    elif rows:
+    else:
         end = at + size * rows
     found = {}
     for j, (part, (_, kind)) in enumerate(zip(element.properties, types, strict=True)):
-        if part.name not in wanted or not rows:
+        if part.name not in wanted:
             continue
         if alike:
             n = int(lengths[0, j])
@@ -98,7 +100,7 @@ def _binary(data: bytes, at: int, element: Element, wanted: Iterable[str], file:
             found[part.name] = Column(grid.ravel(), np.full(rows, n))
         else:
             found[part.name] = Column(_gathered(data, starts[:, j], lengths[:, j], kind), lengths[:, j])
-    return found, end if rows else at
+    return found, end
 
 
 def _none(types: list[Any]) -> tuple[Ints, Ints, int]:

@@ -68,6 +68,14 @@ def test_faces_of_several_sizes_close_the_body(form, first, options, tmp_path):
     assert mesh.areas.sum() == pytest.approx(AREA) and mesh.volume() == pytest.approx(VOLUME)
 
 
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("where", ["element vertex", "element face 8", "element edge", "end_header"])
+def test_an_element_without_rows_changes_nothing(form, where, tmp_path):
+    empty = b"element tristrips 0\nproperty list int int i\nproperty float x\n"
+    (tmp_path / "m.ply").write_bytes(ply(form).replace(where.encode(), empty + where.encode(), 1))
+    assert load(tmp_path / "m.ply").volume() == pytest.approx(VOLUME)
+
+
 @pytest.mark.parametrize("form", ["binary", "ascii"])
 def test_a_mesh_that_was_written_is_read_again(form, tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3)
