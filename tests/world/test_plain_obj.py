@@ -94,6 +94,25 @@ def test_parts_are_the_materials_of_a_library_that_is_there_else_the_objects(tmp
 
 
 @pytest.mark.parametrize(
+    ("before", "names"),
+    [
+        ("o left\n", {"left", "red", "blue"}),
+        ("g left\n", {"left", "red", "blue"}),
+        ("o left\ng wheel\n", {"left", "red", "blue"}),
+        ("g wheel\no\tleft\n", {"left", "red", "blue"}),
+        ("o none\no left\n", {"left", "red", "blue"}),
+        ("", {"m.obj", "red", "blue"}),
+        ("o near\nf 1 2 4\no far\n", {"near", "far", "red", "blue"}),
+    ],
+)
+def test_faces_before_the_first_material_have_the_name_of_their_object_or_group(tmp_path, before, names):
+    (tmp_path / "a.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl blue\n")
+    painted = "usemtl red\nf 1 2 3\no x\nusemtl blue\nf 1 3 4\no y\nf 1 2 4\n"
+    (tmp_path / "m.obj").write_text(f"mtllib a.mtl\n{_FOUR}{before}f 2 3 4\n{painted}")
+    assert set(load(tmp_path / "m.obj").part_names) == names
+
+
+@pytest.mark.parametrize(
     ("line", "words"),
     [
         ("v 1 2", "'v 1 2' is no vertex of three numbers; allowed: 'v' and three numbers"),
