@@ -9,7 +9,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from raychan.scalars import as_text, is_text
+from raychan.scalars import is_text
+from raychan.world.beside import files_beside
 from raychan.world.obj_lines import checked_lines, refused
 
 _ODD = re.compile(rb"^ +(?:f|v|vn|vt|o|g|usemtl|mtllib) |\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M)
@@ -26,14 +27,11 @@ def read_by(file: Path) -> dict[str, Any]:
 
     Raises: SceneError for a line of an OBJ that is no vertex or face, or names a vertex before the first.
     """
-    from trimesh.resolvers import FilePathResolver
-
-    # The reader calls parts by the file, whose name must be a text.
-    beside = FilePathResolver(str(file.with_name(as_text(file.name))))
+    beside = files_beside(file)
     kind = file.suffix.lower().removeprefix(".")
     if kind != "obj":
         if is_text(file.name):
-            return {"file_obj": str(file)}
+            return {"file_obj": str(file), "resolver": beside}
         return {"file_obj": io.BytesIO(file.read_bytes()), "file_type": kind, "resolver": beside}
     text = plain_text(file)
     checked_lines(text, file)

@@ -42,10 +42,12 @@ class Gltf:
         self.tree["accessors"].append(accessor | {"type": shape} | more)
         return len(self.tree["accessors"]) - 1
 
-    def read(self, folder, ending="glb"):
+    def read(self, folder, ending="glb", uri=None):
         file = folder / f"m.{ending}"
         buffer = {"byteLength": len(self.data)}
-        if ending == "gltf":
+        if uri is not None:
+            buffer["uri"] = uri
+        elif ending == "gltf":
             buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
         text = json.dumps(self.tree | {"buffers": [buffer]}).encode()
         text, data = (x + fill * (-len(x) % 4) for x, fill in ((text, b" "), (self.data, b"\0")))
@@ -184,6 +186,32 @@ def test_a_skin_is_read_in_the_pose_in_which_its_mesh_was_drawn_only(ending, tmp
     _rigged(bent, [0.3, 0.2, 0.1], [0.3, 0.2, 0.2])
     with pytest.raises(SceneError, match="mesh 'box' has a skin in another pose than its mesh was drawn in"):
         bent.read(tmp_path, ending)
+
+
+@pytest.mark.parametrize(
+    ("uri", "there"),
+    [("x.bin", "x.bin"), ("./sub/x.bin", "sub/x.bin"), ("a%20b.bin", "a b.bin"), ("a%20b.bin", "a%20b.bin"),
+     ("sub/%C3%A4.bin", "sub/\u00e4.bin"), ("gone/x.bin", "x.bin")],
+)  # fmt: skip
+def test_a_skin_and_its_mesh_are_read_from_a_buffer_in_a_folder_or_of_an_encoded_name(uri, there, tmp_path):
+    (tmp_path / "sub").mkdir()
+    for pose in (0.1, 0.2):
+        made = Gltf()
+        _rigged(made, [0.3, 0.2, 0.1], [0.3, 0.2, pose])
+        (tmp_path / there).write_bytes(made.data)
+        if pose == 0.1:
+            assert made.read(tmp_path, "gltf", uri).volume() == pytest.approx(6.0)
+        else:
+            with pytest.raises(SceneError, match="has a skin in another pose"):
+                made.read(tmp_path, "gltf", uri)
+
+
+@pytest.mark.parametrize("uri", ["x.bin", "../x.bin"])
+def test_a_skin_whose_buffer_is_not_there_is_not_said_to_be_in_another_pose(uri, tmp_path):
+    made = Gltf()
+    _rigged(made, [0.3, 0.2, 0.1], [0.3, 0.2, 0.1])
+    with pytest.raises(SceneError, match=r"m\.gltf: cannot be read as a mesh \(.*x\.bin"):
+        made.read(tmp_path, "gltf", uri)
 
 
 def test_a_skin_that_cannot_be_followed_is_refused(tmp_path):
