@@ -7,7 +7,9 @@ from pathlib import Path
 
 from raychan.world.errors import SceneError, shown
 
-_NUMBER = rb" +[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)(?![^ \r\n])"
+MARK = b"\xef\xbb\xbf"  # of byte order
+_NUMBER = rb" +[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan(?:\([^ )\r\n]*\))?|inf(?:inity)?)(?![^ \r\n])"
+_NAN, _KIND = re.compile(rb"^v[nt]? .*nan\(.*", re.M | re.I), re.compile(rb"(nan)\([^ )]*\)", re.I)
 _INDEX = rb"[-+]?\d{1,18}"
 _CORNER = rb" +" + _INDEX + rb"(?:/(?:" + _INDEX + rb")?){0,2}"
 _ENDS = rb" *\r?$"
@@ -34,6 +36,12 @@ def checked_lines(text: bytes, file: Path) -> None:
     if found:
         start, line, problem, allowed = min(found)
         raise refused(line, problem, allowed, text.count(b"\n", 0, start) + 1, file)
+
+
+def usual_numbers(text: bytes) -> bytes:
+    """Return the text of an OBJ with plain `nan` for what C prints, as `-nan(ind)` (C11, 7.21.6.1), which its reader
+    knows in some files only; it stands in normals and textures, which are not used."""
+    return _NAN.sub(lambda line: _KIND.sub(rb"\1", line[0]), text)
 
 
 def missing_vertex(text: bytes, file: Path) -> SceneError | None:

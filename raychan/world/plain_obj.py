@@ -11,10 +11,9 @@ from typing import Any
 
 from raychan.scalars import is_text
 from raychan.world.beside import files_beside
-from raychan.world.obj_lines import checked_lines, refused
+from raychan.world.obj_lines import MARK, checked_lines, refused, usual_numbers
 
 _ODD = re.compile(rb"^ +(?:f|v|vn|vt|o|g|usemtl|mtllib) |\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M)
-_MARK = b"\xef\xbb\xbf"  # of byte order
 _OBJECT, _GROUP, _PAINT = (re.compile(rb"^" + word + rb" +(.*)", re.M) for word in (b"o", b"g", b"usemtl"))
 _LIBRARY, _NAMES = re.compile(rb"^mtllib +(.*)", re.M), re.compile(rb"^(?:#|usemtl\b|mtllib\b).*", re.M)
 _MORE = re.compile(rb"^(v(?: +[^\s]+){3})[ \t].*", re.M)  # weight or colour behind a vertex
@@ -35,6 +34,7 @@ def read_by(file: Path) -> dict[str, Any]:
         return {"file_obj": io.BytesIO(file.read_bytes()), "file_type": kind, "resolver": beside}
     text = plain_text(file)
     checked_lines(text, file)
+    text = usual_numbers(text)
     text = _MORE.sub(rb"\1", _parts(text, file))
     split = len(_OBJECT.findall(text)) > 1
     return {"file_obj": io.BytesIO(text), "file_type": kind, "resolver": beside, "split_objects": split}
@@ -62,7 +62,7 @@ def plain_text(file: Path) -> bytes:
 
     Raises: SceneError for a face that names a vertex before the first.
     """
-    data = file.read_bytes().removeprefix(_MARK)
+    data = file.read_bytes().removeprefix(MARK)
     if not _ODD.search(data):
         return data
     lines = data.splitlines()

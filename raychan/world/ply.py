@@ -12,6 +12,7 @@ import numpy as np
 
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.mesh import Floats, Ints
+from raychan.world.obj_lines import MARK
 from raychan.world.ply_rows import Column, Element, Property, binary_rows, text_rows
 
 _KINDS = {
@@ -39,7 +40,7 @@ def read_ply(file: Path) -> tuple[Floats, Ints, bool]:
 
     Raises: SceneError for a file that is cut short, damaged or no PLY.
     """
-    data = file.read_bytes()
+    data = file.read_bytes().removeprefix(MARK)
     order, elements, lines, start = _head(data, file)
     corners = _list_of_corners(elements, file)
     for name in "xyz":

@@ -99,6 +99,11 @@ def camera(g):
     g.node["camera"] = 0
 
 
+def mesh_below_a_camera(g):
+    g.tree["nodes"] += [{"camera": 0, "children": [2], "name": "crate"}, {"children": [0]}]
+    g.node["name"], g.tree["scenes"] = "box", [{"nodes": [1]}]
+
+
 def unknown(g):
     g.tree["extensionsRequired"] = ["EXT_meshopt_compression"]
 
@@ -122,6 +127,7 @@ def draco(g):
         (morphed_at_the_node, "mesh 'box' has morph targets of weights other than 0"),
         (hidden, "node 'crate' is hidden by KHR_node_visibility"),
         (camera, "node 'crate' is a camera with a mesh or children"),
+        (mesh_below_a_camera, "node 'crate' is a camera with a mesh or children"),
         (unknown, "needs the glTF extension 'EXT_meshopt_compression', which is not read"),
         (draco, "mesh 'box' is compressed by Draco"),
     ],
@@ -154,7 +160,16 @@ def fans_out_of_the_scene(g):
     g.tree["nodes"].append({"mesh": 1})
 
 
-@pytest.mark.parametrize("form", [lambda g: None, quantised, looks, morphs_of_weight_0, fans_out_of_the_scene])
+def light_below_a_camera(g):
+    g.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}]
+    g.tree["nodes"] += [{"camera": 0, "children": [2]}, {"name": "light", "children": [3]}, {"name": "empty"}]
+    g.tree["scenes"] = [{"nodes": [0, 1]}]
+
+
+READ = [lambda g: None, quantised, looks, morphs_of_weight_0, fans_out_of_the_scene, light_below_a_camera]
+
+
+@pytest.mark.parametrize("form", READ)
 def test_a_form_that_is_read_right_is_read(form, tmp_path):
     made = Gltf()
     form(made)

@@ -139,6 +139,23 @@ def test_a_line_that_is_no_vertex_or_face_is_refused_by_its_number(tmp_path, lin
     assert f"m.obj:{before.count(chr(10)) + 6}: " in str(told.value) and words in str(told.value)
 
 
+@pytest.mark.parametrize("more", ["", "vn 0 0 1 1\nvt 0 0 0\n"])
+@pytest.mark.parametrize("nan", ["nan", "-nan", "-nan(ind)", "nan(snan)", "-NaN(IND)", "nan()"])
+@pytest.mark.parametrize("corner", ["{0}/1/1", "{0}//2", "{0}/2", "{0}"])
+def test_normals_and_textures_that_are_no_numbers_change_nothing(tmp_path, corner, nan, more):
+    face = " ".join(corner.format(i) for i in (1, 2, 3, 4))
+    lines = f"vn {nan} {nan} {nan}\nvn 0 0 1\nvt {nan} 0\nvt 0 0\n{more}f {face}\n"
+    (tmp_path / "m.obj").write_text(_FOUR + lines)
+    assert load(tmp_path / "m.obj").areas.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("nan", ["nan", "-nan(ind)"])
+def test_vertices_of_faces_that_are_no_numbers_are_refused(tmp_path, nan):
+    (tmp_path / "m.obj").write_text(_FOUR + f"v {nan} 0 0\nf 1 2 5\n")
+    with pytest.raises(rc.SceneError, match="1 vertices hold NaN or infinity"):
+        load(tmp_path / "m.obj")
+
+
 def test_tabs_between_numbers_are_blanks(tmp_path):
     (tmp_path / "m.obj").write_text(_FOUR.replace("1 1 0", "1\t1\t 0") + "f 1 2\t3 4\nvn 0 0\t1\n")
     assert load(tmp_path / "m.obj").areas.sum() == pytest.approx(1.0)

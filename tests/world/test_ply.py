@@ -76,6 +76,12 @@ def test_an_element_without_rows_changes_nothing(form, where, tmp_path):
     assert load(tmp_path / "m.ply").volume() == pytest.approx(VOLUME)
 
 
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_mark_of_byte_order_before_a_ply_changes_nothing(form, tmp_path):
+    (tmp_path / "m.ply").write_bytes(b"\xef\xbb\xbf" + ply(form))
+    assert load(tmp_path / "m.ply").volume() == pytest.approx(VOLUME)
+
+
 @pytest.mark.parametrize("form", ["binary", "ascii"])
 def test_a_mesh_that_was_written_is_read_again(form, tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3)
