@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 
 from raychan.world.errors import SceneError, shown
 from raychan.world.mesh import Ints
+
+_COUNT = re.compile(rb"\+?[0-9]{1,18}")  # as many digits as an integer of 64 bits holds
 
 
 @dataclass(frozen=True)
@@ -206,17 +209,18 @@ def _count(word: list[bytes], number: int, line: bytes, file: Path) -> int:
     """Return how many entries a list says to have; none where the line has ended."""
     if not word:
         return 0
-    if word[0].isdigit():
+    if _COUNT.fullmatch(word[0]):
         return int(word[0])
     text = line.decode("latin-1").strip()
-    problem = f"{shown(text)} has a list of '{word[0].decode('latin-1')}' entries"
-    raise SceneError(problem, file=file, value=text, allowed="a number from 0 on", line=number)
+    problem = f"{shown(text)} has a list of {shown(word[0].decode('latin-1'))} entries"
+    raise SceneError(problem, file=file, value=text, allowed="a number from 0 on, of 18 digits at most", line=number)
 
 
 def _floats(words: list[bytes], lengths: list[int], lines: list[int], file: Path) -> NDArray[np.float64]:
     """Return words as numbers; raise SceneError for the first that is none."""
     try:
-        return np.array(list(map(float, words)), float)
+        if b"_" not in b" ".join(words):  # which Python takes as a mark between digits
+            return np.array(list(map(float, words)), float)
     except ValueError:
         pass
     wrong = next(i for i, word in enumerate(words) if not _is_number(word))
@@ -230,4 +234,4 @@ def _is_number(word: bytes) -> bool:
         float(word)
     except ValueError:
         return False
-    return True
+    return b"_" not in word
