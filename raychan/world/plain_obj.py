@@ -15,7 +15,7 @@ from raychan.world.obj_lines import MARK, checked_lines, refused, usual_numbers
 
 _ODD = re.compile(rb"^ +(?:f|v|vn|vt|o|g|usemtl|mtllib) |\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M)
 _OBJECT, _GROUP, _PAINT = (re.compile(rb"^" + word + rb" +(.*)", re.M) for word in (b"o", b"g", b"usemtl"))
-_LIBRARY, _NAMES = re.compile(rb"^mtllib +(.*)", re.M), re.compile(rb"^(?:#|usemtl\b|mtllib\b).*", re.M)
+_LIBRARY, _NAMES = re.compile(rb"^mtllib +(.*)", re.M), re.compile(rb"^(?:#|usemtl\b|mtllib\b|f[^ \r\n]).*", re.M)
 _MORE = re.compile(rb"^(v(?: +[^\s]+){3})[ \t].*", re.M)  # weight or colour behind a vertex
 _KINDS = (b"v", b"vt", b"vn")  # what the numbers of one corner of a face, v/vt/vn, count
 
@@ -48,7 +48,7 @@ def _parts(text: bytes, file: Path) -> bytes:
         bare, painted = text[: paints[0].start()], text[paints[0].start() :]
         bare = bare if _OBJECT.search(bare) else _GROUP.sub(rb"o \1", bare)
         text = bare + _PAINT.sub(rb"o \1", _OBJECT.sub(b"", painted))
-    return _NAMES.sub(b"", text)
+    return _NAMES.sub(b"", text)  # and words that the reader takes for faces, as `free`
 
 
 def _is_there(said: bytes, file: Path) -> bool:

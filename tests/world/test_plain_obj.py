@@ -125,6 +125,8 @@ def test_faces_before_the_first_material_have_the_name_of_their_object_or_group(
         ("f 1 2 x", "'f 1 2 x' is no face of numbered vertices"),
         ("f 1 2 99999999999999999999", "is no face of numbered vertices"),
         ("f1 2 3", "'f1 2 3' is no face of numbered vertices"),
+        ("f-1 -2 -3", "'f-1 -2 -3' is no face of numbered vertices"),
+        ("f1/1 2/2 3/3", "'f1/1 2/2 3/3' is no face of numbered vertices"),
         ("fo 1 2 3", "'fo 1 2 3' is no face of numbered vertices"),
         ("f", "'f' is no face of numbered vertices"),
         ("f 1 2 99", "'f 1 2 99' names vertex 99, which the file does not hold; allowed: 1 to 4"),
@@ -154,6 +156,17 @@ def test_vertices_of_faces_that_are_no_numbers_are_refused(tmp_path, nan):
     (tmp_path / "m.obj").write_text(_FOUR + f"v {nan} 0 0\nf 1 2 5\n")
     with pytest.raises(rc.SceneError, match="1 vertices hold NaN or infinity"):
         load(tmp_path / "m.obj")
+
+
+_JUNK = ["free form", "foo 1 2 3", "f_1 2 3", "fx", "f2", "From 1 to 2", "V for value", "VN x", "vertex 1", "fo", "f1 of 2"]
+
+
+@pytest.mark.parametrize("line", _JUNK)
+@pytest.mark.parametrize("before", ["", "  ", "# one\n\t"])
+def test_lines_that_begin_with_no_keyword_are_ignored(tmp_path, line, before):
+    (tmp_path / "m.obj").write_text(f"{_FOUR}f 1 2 3\n{before}{line}\nf 1 3 4\n{line}")
+    mesh = load(tmp_path / "m.obj")
+    assert len(mesh.faces) == 2 and mesh.areas.sum() == pytest.approx(1.0)
 
 
 def test_tabs_between_numbers_are_blanks(tmp_path):
