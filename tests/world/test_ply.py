@@ -127,7 +127,7 @@ def test_a_binary_ply_with_bytes_at_its_end_is_refused(tmp_path):
         ("\n1 1 0\n", "\n1 1_0 0\n", "m.ply:15: '1_0' is no number"),
         ("\n4 0 1 5 4\n", "\n4 0 0_1 5 4\n", "m.ply:23: '0_1' is no number"),
         ("\n4 0 1 5 4\n", "\n4_0 0 1 5 4\n", "m.ply:23: '4_0 0 1 5 4' has a list of '4_0' entries"),
-        ("\n4 0 1 5 4\n", "\n" + "4" * 5000 + " 0 1 5 4\n", "entries; allowed: a number from 0 on, of 18 digits at most"),
+        ("\n4 0 1 5 4\n", "\n" + "4" * 5000 + " 0 1 5 4\n", "allowed: a number from 0 on, of 18 digits at most"),
         ("element vertex 10", "element vertex -1", "m.ply:4: holds -1 of 'vertex'; allowed: a number from 0 on"),
         ("element vertex 10", "element vertex " + "1" * 5000, "m.ply:4: holds '1111"),
         ("float z", "float128 z", "m.ply:7: unknown type 'float128'; did you mean 'float32'?"),
