@@ -144,7 +144,7 @@ def _candidates(geometry: Geometry, end: Floats, point: Floats, body: int, gap: 
 
 
 def _over(geometry: Geometry, w: int, end: Floats, point: Floats, body: int) -> WedgeLeg | None:
-    """Return the leg over wedge w, None where its edge is missed, hidden or too far off."""
+    """Return the leg over wedge w, None where its edge is missed, hidden, too far off or at an end."""
     start, stop = geometry.wedge[w]
     size = float(np.linalg.norm(stop - start))
     edge = (stop - start) / size
@@ -153,7 +153,8 @@ def _over(geometry: Geometry, w: int, end: Floats, point: Floats, body: int) -> 
         return None
     spot = start + at * edge
     near, far = float(np.linalg.norm(spot - end)), float(np.linalg.norm(point - spot))
-    if near + far - np.linalg.norm(point - end) > _LONGEST_DETOUR:
+    # To or from an end on the edge itself a ray has no direction, and no detour over the straight leg.
+    if not near or not far or near + far - np.linalg.norm(point - end) > _LONGEST_DETOUR:
         return None
     face, other = (int(f) for f in geometry.wedge_facet[w])
     # Both ends see the edge from the open side of one of its faces; the rays themselves graze those faces.

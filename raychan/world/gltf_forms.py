@@ -54,6 +54,9 @@ def _misread(tree: Mapping[str, Any], binary: bytes, file: Path) -> Found:
     for i in places:
         node = tree["nodes"][i]
         yield from _of_node(node, f"node '{node.get('name', i)}'")
+        if "camera" in node and _has_mesh(tree, i):
+            problem = f"node '{node.get('name', i)}' is a camera with a mesh or children that have one"
+            yield f"{problem}, which are not read", "cameras at nodes of their own"
         if "mesh" not in node:
             continue
         mesh = tree["meshes"][node["mesh"]]
@@ -71,14 +74,24 @@ def _misread(tree: Mapping[str, Any], binary: bytes, file: Path) -> Found:
             yield from _of_primitive(tree, primitive, where)
 
 
+def _has_mesh(tree: Mapping[str, Any], node: int) -> bool:
+    """Return whether a node or one below it has a mesh."""
+    left, seen = [node], set[int]()
+    while left:
+        i = left.pop()
+        if "mesh" in tree["nodes"][i]:
+            return True
+        seen.add(i)
+        left += [child for child in tree["nodes"][i].get("children", ()) if child not in seen]
+    return False
+
+
 def _of_node(node: Mapping[str, Any], where: str) -> Found:
     extensions = node.get("extensions", {})
     if "mesh" in node and "EXT_mesh_gpu_instancing" in extensions:
         yield f"{where} repeats its mesh by EXT_mesh_gpu_instancing, which is not read", "a node for each instance"
     if not extensions.get("KHR_node_visibility", {}).get("visible", True):
         yield f"{where} is hidden by KHR_node_visibility, which is not read", "a file without hidden nodes"
-    if "camera" in node and ("mesh" in node or node.get("children")):
-        yield f"{where} is a camera with a mesh or children, which are not read", "cameras at nodes of their own"
 
 
 def _of_primitive(tree: Mapping[str, Any], primitive: Mapping[str, Any], where: str) -> Found:

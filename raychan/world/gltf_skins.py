@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from raychan.world.beside import read_beside
 from raychan.world.mesh import Floats
 
 _SAME = 1e-5  # of the mesh's size: files round matrices to float32, and joints multiply a few
@@ -47,7 +48,8 @@ def _matrix(node: Mapping[str, Any]) -> Floats:
 
 
 def at_rest(tree: Mapping[str, Any], node: int, places: Mapping[int, Floats], binary: bytes, file: Path) -> bool:
-    """Return whether the skin of a node leaves its mesh where the node puts it, as a reader without skins does."""
+    """Return whether the skin of a node leaves its mesh where the node puts it, as a reader without skins does; True
+    where the file with its matrices cannot be read, of which the reader tells."""
     try:
         skin, mesh = tree["skins"][tree["nodes"][node]["skin"]], tree["meshes"][tree["nodes"][node]["mesh"]]
         joints = np.array([places[joint] for joint in skin["joints"]])
@@ -60,7 +62,9 @@ def at_rest(tree: Mapping[str, Any], node: int, places: Mapping[int, Floats], bi
             off = np.abs(corners @ joints.swapaxes(1, 2) - plain).max()
             if not off <= _SAME * np.ptp(plain, axis=0).max():
                 return False
-    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError, OSError):
+    except OSError:
+        return True
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError):
         return False
     return True
 
@@ -74,7 +78,7 @@ def _matrices(tree: Mapping[str, Any], index: int, binary: bytes, file: Path) ->
     view = tree["bufferViews"][accessor["bufferView"]]
     uri = tree["buffers"][view["buffer"]].get("uri")
     if uri is not None:
-        binary = b64decode(uri.partition("base64,")[2]) if "base64," in uri else file.with_name(uri).read_bytes()
+        binary = b64decode(uri.partition("base64,")[2]) if "base64," in uri else read_beside(file, uri)
     start, step = view.get("byteOffset", 0) + accessor.get("byteOffset", 0), view.get("byteStride", 64)
     rows = [np.frombuffer(binary, "<f4", 16, start + k * step) for k in range(accessor["count"])]
     return np.array(rows, float).reshape(-1, 4, 4).swapaxes(1, 2)

@@ -7,19 +7,22 @@ from pathlib import Path
 
 from raychan.world.errors import SceneError, shown
 
-_NUMBER = rb" +[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)(?![^ \r\n])"
+MARK = b"\xef\xbb\xbf"  # of byte order
+_NUMBER = rb"(?i: +[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan(?:\([^ )\r\n]*\))?|inf(?:inity)?)(?![^ \r\n]))"
+_NAN, _KIND = re.compile(rb"^v[nt]? .*nan\(.*", re.M | re.I), re.compile(rb"(nan)\([^ )]*\)", re.I)
 _INDEX = rb"[-+]?\d{1,18}"
 _CORNER = rb" +" + _INDEX + rb"(?:/(?:" + _INDEX + rb")?){0,2}"
 _ENDS = rb" *\r?$"
+_MEANT = rb"^(?:fo *|f)[-+\d/]+(?: +[-+\d/]+){2,}" + _ENDS  # as 'f1 2 3'; other words that begin with f are no keywords
 _FACE, _VERTEX = re.compile(rb"^f .*", re.M), re.compile(rb"^v ", re.M)
 _WRONG = tuple(
-    (re.compile(pattern, re.M | re.I), problem, allowed)
+    (re.compile(pattern, re.M), problem, allowed)
     for pattern, problem, allowed in (
         (rb"^v(?=[ \r\n]|\Z)(?!(?:" + _NUMBER + rb"){3}).*", "is no vertex of three numbers", "'v' and three numbers"),
         (rb"^vt(?= )(?!(?:" + _NUMBER + rb"){1,}" + _ENDS + rb").*", "is no texture of numbers", "'vt' and numbers"),
         (rb"^vn(?= )(?!(?:" + _NUMBER + rb"){1,}" + _ENDS + rb").*", "is no normal of numbers", "'vn' and numbers"),
         (
-            rb"^f(?!(?:" + _CORNER + rb")+" + _ENDS + rb").*",
+            rb"^f(?=[ \r\n]|\Z)(?!(?:" + _CORNER + rb")+" + _ENDS + rb").*|" + _MEANT,
             "is no face of numbered vertices",
             "'f' and corners such as 7, 7/1, 7//2 or 7/1/2",
         ),
@@ -34,6 +37,12 @@ def checked_lines(text: bytes, file: Path) -> None:
     if found:
         start, line, problem, allowed = min(found)
         raise refused(line, problem, allowed, text.count(b"\n", 0, start) + 1, file)
+
+
+def usual_numbers(text: bytes) -> bytes:
+    """Return the text of an OBJ with plain `nan` for what C prints, as `-nan(ind)` (C11, 7.21.6.1), which its reader
+    knows in some files only; it stands in normals and textures, which are not used."""
+    return _NAN.sub(lambda line: _KIND.sub(rb"\1", line[0]), text) if b"(" in text else text
 
 
 def missing_vertex(text: bytes, file: Path) -> SceneError | None:

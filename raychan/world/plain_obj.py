@@ -9,34 +9,32 @@ import re
 from pathlib import Path
 from typing import Any
 
-from raychan.scalars import as_text, is_text
-from raychan.world.obj_lines import checked_lines, refused
+from raychan.scalars import is_text
+from raychan.world.beside import files_beside
+from raychan.world.obj_lines import MARK, checked_lines, refused, usual_numbers
 
 _ODD = re.compile(rb"^ +(?:f|v|vn|vt|o|g|usemtl|mtllib) |\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M)
-_MARK = b"\xef\xbb\xbf"  # of byte order
-_OBJECT, _PAINT = re.compile(rb"^o +(.*)", re.M), re.compile(rb"^usemtl +(.*)", re.M)
-_LIBRARY, _NAMES = re.compile(rb"^mtllib +(.*)", re.M), re.compile(rb"^(?:#|usemtl\b|mtllib\b).*", re.M)
+_OBJECT, _GROUP, _PAINT = (re.compile(rb"^" + word + rb" +(.*)", re.M) for word in (b"o", b"g", b"usemtl"))
+_LIBRARY, _NAMES = re.compile(rb"^mtllib +(.*)", re.M), re.compile(rb"^(?:#|usemtl\b|mtllib\b|f[^ \r\n]).*", re.M)
 _MORE = re.compile(rb"^(v(?: +[^\s]+){3})[ \t].*", re.M)  # weight or colour behind a vertex
 _KINDS = (b"v", b"vt", b"vn")  # what the numbers of one corner of a face, v/vt/vn, count
 
 
 def read_by(file: Path) -> dict[str, Any]:
     """Return the arguments of `trimesh.load_scene` for a file. Parts of an OBJ are its materials where it has several
-    and its library is there, else its objects.
+    and its library is there, else, and of faces before the first material, its objects.
 
     Raises: SceneError for a line of an OBJ that is no vertex or face, or names a vertex before the first.
     """
-    from trimesh.resolvers import FilePathResolver
-
-    # The reader calls parts by the file, whose name must be a text.
-    beside = FilePathResolver(str(file.with_name(as_text(file.name))))
+    beside = files_beside(file)
     kind = file.suffix.lower().removeprefix(".")
     if kind != "obj":
         if is_text(file.name):
-            return {"file_obj": str(file)}
+            return {"file_obj": str(file), "resolver": beside}
         return {"file_obj": io.BytesIO(file.read_bytes()), "file_type": kind, "resolver": beside}
     text = plain_text(file)
     checked_lines(text, file)
+    text = usual_numbers(text)
     text = _MORE.sub(rb"\1", _parts(text, file))
     split = len(_OBJECT.findall(text)) > 1
     return {"file_obj": io.BytesIO(text), "file_type": kind, "resolver": beside, "split_objects": split}
@@ -44,10 +42,13 @@ def read_by(file: Path) -> dict[str, Any]:
 
 def _parts(text: bytes, file: Path) -> bytes:
     """Return the text of an OBJ whose objects are its parts: the reader takes names of these as they are."""
-    paints = {name.strip() for name in _PAINT.findall(text)}
-    if len(paints) > 1 and any(_is_there(said, file) for said in _LIBRARY.findall(text)):
-        text = _PAINT.sub(rb"o \1", _OBJECT.sub(b"", text))
-    return _NAMES.sub(b"", text)
+    paints = list(_PAINT.finditer(text))
+    if len({x[1].strip() for x in paints}) > 1 and any(_is_there(said, file) for said in _LIBRARY.findall(text)):
+        # Faces before the first material have but the names of their objects, or of their groups.
+        bare, painted = text[: paints[0].start()], text[paints[0].start() :]
+        bare = bare if _OBJECT.search(bare) else _GROUP.sub(rb"o \1", bare)
+        text = bare + _PAINT.sub(rb"o \1", _OBJECT.sub(b"", painted))
+    return _NAMES.sub(b"", text)  # and words that the reader takes for faces, as `free`
 
 
 def _is_there(said: bytes, file: Path) -> bool:
@@ -61,7 +62,7 @@ def plain_text(file: Path) -> bytes:
 
     Raises: SceneError for a face that names a vertex before the first.
     """
-    data = file.read_bytes().removeprefix(_MARK)
+    data = file.read_bytes().removeprefix(MARK)
     if not _ODD.search(data):
         return data
     lines = data.splitlines()

@@ -12,6 +12,7 @@ import numpy as np
 
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.mesh import Floats, Ints
+from raychan.world.obj_lines import MARK
 from raychan.world.ply_rows import Column, Element, Property, binary_rows, text_rows
 
 _KINDS = {
@@ -31,6 +32,7 @@ _KINDS = {
 }
 _FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS = "vertex_indices", "vertex_index"  # names of the list of a face's corners
+_COUNT = re.compile(r"\+?[0-9]{1,18}")
 _END = re.compile(rb"^[ \t]*end_header[ \t]*\r?\n", re.M)
 
 
@@ -39,7 +41,7 @@ def read_ply(file: Path) -> tuple[Floats, Ints, bool]:
 
     Raises: SceneError for a file that is cut short, damaged or no PLY.
     """
-    data = file.read_bytes()
+    data = file.read_bytes().removeprefix(MARK)
     order, elements, lines, start = _head(data, file)
     corners = _list_of_corners(elements, file)
     for name in "xyz":
@@ -74,8 +76,10 @@ def _head(data: bytes, file: Path) -> tuple[str, list[Element], int, int]:
         elif word == "element":
             if len(rest) != 2 or rest[0] in [e.name for e in elements]:
                 raise _wrong(file, number, line, f"{shown(line)} is no element", "'element NAME NUMBER', a name once")
-            if not (rest[1].isascii() and rest[1].isdigit()):
-                raise _wrong(file, number, rest[1], f"holds {rest[1]} of '{rest[0]}'", "a number from 0 on")
+            if not _COUNT.fullmatch(rest[1]):
+                held = rest[1] if len(rest[1]) < 20 else shown(rest[1])
+                problem = f"holds {held} of '{rest[0]}'"
+                raise _wrong(file, number, rest[1], problem, "a number from 0 on, of 18 digits at most")
             elements.append(Element(rest[0], int(rest[1]), []))
         elif word == "property":
             if not elements:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 
 from raychan.world.errors import SceneError, shown
 from raychan.world.mesh import Ints
+
+_COUNT = re.compile(rb"\+?[0-9]{1,18}")  # as many digits as an integer of 64 bits holds
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,11 @@ def binary_rows(data: bytes, elements: list[Element], wanted: Wanted, lines: int
 def _binary(data: bytes, at: int, element: Element, wanted: Iterable[str], file: Path) -> tuple[dict[str, Column], int]:
     """Return the wanted properties of one element that begins at a byte, and where it ends."""
     rows, types = element.rows, element.types
+    if not rows:
+        return {}, at
     least = sum((kind if count is None else count).itemsize for count, kind in types)
-    starts, lengths, end = _walk(data, at, element, 1) if rows and at + least * rows <= len(data) else _none(types)
-    if rows and not len(starts):
+    starts, lengths, end = _walk(data, at, element, 1) if at + least * rows <= len(data) else _none(types)
+    if not len(starts):
         raise _cut(data, element, file)
     size = max(end - at, 0)
     alike = at + size * rows <= len(data) and all(
@@ -86,11 +91,11 @@ def _binary(data: bytes, at: int, element: Element, wanted: Iterable[str], file:
         starts, lengths, end = _walk(data, at, element, rows)
         if end > len(data):
             raise _cut(data, element, file)
-    elif rows:
+    else:
         end = at + size * rows
     found = {}
     for j, (part, (_, kind)) in enumerate(zip(element.properties, types, strict=True)):
-        if part.name not in wanted or not rows:
+        if part.name not in wanted:
             continue
         if alike:
             n = int(lengths[0, j])
@@ -98,7 +103,7 @@ def _binary(data: bytes, at: int, element: Element, wanted: Iterable[str], file:
             found[part.name] = Column(grid.ravel(), np.full(rows, n))
         else:
             found[part.name] = Column(_gathered(data, starts[:, j], lengths[:, j], kind), lengths[:, j])
-    return found, end if rows else at
+    return found, end
 
 
 def _none(types: list[Any]) -> tuple[Ints, Ints, int]:
@@ -204,17 +209,18 @@ def _count(word: list[bytes], number: int, line: bytes, file: Path) -> int:
     """Return how many entries a list says to have; none where the line has ended."""
     if not word:
         return 0
-    if word[0].isdigit():
+    if _COUNT.fullmatch(word[0]):
         return int(word[0])
     text = line.decode("latin-1").strip()
-    problem = f"{shown(text)} has a list of '{word[0].decode('latin-1')}' entries"
-    raise SceneError(problem, file=file, value=text, allowed="a number from 0 on", line=number)
+    problem = f"{shown(text)} has a list of {shown(word[0].decode('latin-1'))} entries"
+    raise SceneError(problem, file=file, value=text, allowed="a number from 0 on, of 18 digits at most", line=number)
 
 
 def _floats(words: list[bytes], lengths: list[int], lines: list[int], file: Path) -> NDArray[np.float64]:
     """Return words as numbers; raise SceneError for the first that is none."""
     try:
-        return np.array(list(map(float, words)), float)
+        if b"_" not in b" ".join(words):  # which Python takes as a mark between digits
+            return np.array(list(map(float, words)), float)
     except ValueError:
         pass
     wrong = next(i for i, word in enumerate(words) if not _is_number(word))
@@ -228,4 +234,4 @@ def _is_number(word: bytes) -> bool:
         float(word)
     except ValueError:
         return False
-    return True
+    return b"_" not in word

@@ -7,6 +7,7 @@ import pytest
 from support.facets import box, facets, quad
 from support.points import point, radar
 
+import raychan as rc
 from raychan.channel.edge_diffraction import leg_field
 from raychan.poses import theta_phi
 from raychan.records import DIFFRACT
@@ -83,3 +84,23 @@ def test_a_hidden_target_returns_over_the_edge_with_the_same_way_both_ways():
     assert over.any()
     free = C0 / F / (4 * np.pi) ** 1.5 / (20.0**2 + 0.5**2)
     assert 0.0 < np.abs(lit.amplitude[over]).max() < 0.1 * free
+
+
+@pytest.mark.parametrize("on", [0, 1])
+def test_ends_on_an_edge_have_finite_legs(screen, on):
+    ends = [np.array([0.0, 0.0, 0.0]), np.array([20.0, 0.0, 0.0])]
+    ends[on] = np.array([10.0, 0.0, 0.0])
+    legs = wedge_legs(screen, *ends, -1, K)
+    assert all(np.isfinite([*leg.leaves, *leg.arrives]).all() and not leg.over for leg in legs)
+
+
+def test_point_targets_on_edges_of_each_others_boxes_are_simulated():
+    boxes = [
+        rc.Body(
+            name, shape="box", rcs_dbsm=level, rcs_point=(0.0, 0.0, 0.0), position=(x, 0.0, 0.0), velocity=(v, 0, 0)
+        )
+        for name, x, v, level in (("a", 2.0, 5.0, 20.0), ("b", 1.5, -5.0, -20.0))
+    ]
+    waveform = rc.Waveform(77e9, 1e9, 20e-6, 40e-6, 128, 256)
+    run = rc.simulate(rc.Scene(boxes, radar=rc.Radar(waveform, position=(0.0, 0.0, 0.0))))
+    assert run.detections.range.tolist() == pytest.approx([1.5], abs=0.05)

@@ -42,10 +42,12 @@ class Gltf:
         self.tree["accessors"].append(accessor | {"type": shape} | more)
         return len(self.tree["accessors"]) - 1
 
-    def read(self, folder, ending="glb"):
+    def read(self, folder, ending="glb", uri=None):
         file = folder / f"m.{ending}"
         buffer = {"byteLength": len(self.data)}
-        if ending == "gltf":
+        if uri is not None:
+            buffer["uri"] = uri
+        elif ending == "gltf":
             buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
         text = json.dumps(self.tree | {"buffers": [buffer]}).encode()
         text, data = (x + fill * (-len(x) % 4) for x, fill in ((text, b" "), (self.data, b"\0")))
@@ -97,6 +99,11 @@ def camera(g):
     g.node["camera"] = 0
 
 
+def mesh_below_a_camera(g):
+    g.tree["nodes"] += [{"camera": 0, "children": [2], "name": "crate"}, {"children": [0]}]
+    g.node["name"], g.tree["scenes"] = "box", [{"nodes": [1]}]
+
+
 def unknown(g):
     g.tree["extensionsRequired"] = ["EXT_meshopt_compression"]
 
@@ -120,6 +127,7 @@ def draco(g):
         (morphed_at_the_node, "mesh 'box' has morph targets of weights other than 0"),
         (hidden, "node 'crate' is hidden by KHR_node_visibility"),
         (camera, "node 'crate' is a camera with a mesh or children"),
+        (mesh_below_a_camera, "node 'crate' is a camera with a mesh or children"),
         (unknown, "needs the glTF extension 'EXT_meshopt_compression', which is not read"),
         (draco, "mesh 'box' is compressed by Draco"),
     ],
@@ -152,7 +160,16 @@ def fans_out_of_the_scene(g):
     g.tree["nodes"].append({"mesh": 1})
 
 
-@pytest.mark.parametrize("form", [lambda g: None, quantised, looks, morphs_of_weight_0, fans_out_of_the_scene])
+def light_below_a_camera(g):
+    g.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}]
+    g.tree["nodes"] += [{"camera": 0, "children": [2]}, {"name": "light", "children": [3]}, {"name": "empty"}]
+    g.tree["scenes"] = [{"nodes": [0, 1]}]
+
+
+READ = [lambda g: None, quantised, looks, morphs_of_weight_0, fans_out_of_the_scene, light_below_a_camera]
+
+
+@pytest.mark.parametrize("form", READ)
 def test_a_form_that_is_read_right_is_read(form, tmp_path):
     made = Gltf()
     form(made)
@@ -184,6 +201,32 @@ def test_a_skin_is_read_in_the_pose_in_which_its_mesh_was_drawn_only(ending, tmp
     _rigged(bent, [0.3, 0.2, 0.1], [0.3, 0.2, 0.2])
     with pytest.raises(SceneError, match="mesh 'box' has a skin in another pose than its mesh was drawn in"):
         bent.read(tmp_path, ending)
+
+
+@pytest.mark.parametrize(
+    ("uri", "there"),
+    [("x.bin", "x.bin"), ("./sub/x.bin", "sub/x.bin"), ("a%20b.bin", "a b.bin"), ("a%20b.bin", "a%20b.bin"),
+     ("sub/%C3%A4.bin", "sub/\u00e4.bin"), ("gone/x.bin", "x.bin")],
+)  # fmt: skip
+def test_a_skin_and_its_mesh_are_read_from_a_buffer_in_a_folder_or_of_an_encoded_name(uri, there, tmp_path):
+    (tmp_path / "sub").mkdir()
+    for pose in (0.1, 0.2):
+        made = Gltf()
+        _rigged(made, [0.3, 0.2, 0.1], [0.3, 0.2, pose])
+        (tmp_path / there).write_bytes(made.data)
+        if pose == 0.1:
+            assert made.read(tmp_path, "gltf", uri).volume() == pytest.approx(6.0)
+        else:
+            with pytest.raises(SceneError, match="has a skin in another pose"):
+                made.read(tmp_path, "gltf", uri)
+
+
+@pytest.mark.parametrize("uri", ["x.bin", "../x.bin"])
+def test_a_skin_whose_buffer_is_not_there_is_not_said_to_be_in_another_pose(uri, tmp_path):
+    made = Gltf()
+    _rigged(made, [0.3, 0.2, 0.1], [0.3, 0.2, 0.1])
+    with pytest.raises(SceneError, match=r"m\.gltf: cannot be read as a mesh \(.*x\.bin"):
+        made.read(tmp_path, "gltf", uri)
 
 
 def test_a_skin_that_cannot_be_followed_is_refused(tmp_path):

@@ -94,6 +94,25 @@ def test_parts_are_the_materials_of_a_library_that_is_there_else_the_objects(tmp
 
 
 @pytest.mark.parametrize(
+    ("before", "names"),
+    [
+        ("o left\n", {"left", "red", "blue"}),
+        ("g left\n", {"left", "red", "blue"}),
+        ("o left\ng wheel\n", {"left", "red", "blue"}),
+        ("g wheel\no\tleft\n", {"left", "red", "blue"}),
+        ("o none\no left\n", {"left", "red", "blue"}),
+        ("", {"m.obj", "red", "blue"}),
+        ("o near\nf 1 2 4\no far\n", {"near", "far", "red", "blue"}),
+    ],
+)
+def test_faces_before_the_first_material_have_the_name_of_their_object_or_group(tmp_path, before, names):
+    (tmp_path / "a.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl blue\n")
+    painted = "usemtl red\nf 1 2 3\no x\nusemtl blue\nf 1 3 4\no y\nf 1 2 4\n"
+    (tmp_path / "m.obj").write_text(f"mtllib a.mtl\n{_FOUR}{before}f 2 3 4\n{painted}")
+    assert set(load(tmp_path / "m.obj").part_names) == names
+
+
+@pytest.mark.parametrize(
     ("line", "words"),
     [
         ("v 1 2", "'v 1 2' is no vertex of three numbers; allowed: 'v' and three numbers"),
@@ -106,6 +125,8 @@ def test_parts_are_the_materials_of_a_library_that_is_there_else_the_objects(tmp
         ("f 1 2 x", "'f 1 2 x' is no face of numbered vertices"),
         ("f 1 2 99999999999999999999", "is no face of numbered vertices"),
         ("f1 2 3", "'f1 2 3' is no face of numbered vertices"),
+        ("f-1 -2 -3", "'f-1 -2 -3' is no face of numbered vertices"),
+        ("f1/1 2/2 3/3", "'f1/1 2/2 3/3' is no face of numbered vertices"),
         ("fo 1 2 3", "'fo 1 2 3' is no face of numbered vertices"),
         ("f", "'f' is no face of numbered vertices"),
         ("f 1 2 99", "'f 1 2 99' names vertex 99, which the file does not hold; allowed: 1 to 4"),
@@ -118,6 +139,34 @@ def test_a_line_that_is_no_vertex_or_face_is_refused_by_its_number(tmp_path, lin
     with pytest.raises(rc.SceneError) as told:
         load(tmp_path / "m.obj")
     assert f"m.obj:{before.count(chr(10)) + 6}: " in str(told.value) and words in str(told.value)
+
+
+@pytest.mark.parametrize("more", ["", "vn 0 0 1 1\nvt 0 0 0\n"])
+@pytest.mark.parametrize("nan", ["nan", "-nan", "-nan(ind)", "nan(snan)", "-NaN(IND)", "nan()"])
+@pytest.mark.parametrize("corner", ["{0}/1/1", "{0}//2", "{0}/2", "{0}"])
+def test_normals_and_textures_that_are_no_numbers_change_nothing(tmp_path, corner, nan, more):
+    face = " ".join(corner.format(i) for i in (1, 2, 3, 4))
+    lines = f"vn {nan} {nan} {nan}\nvn 0 0 1\nvt {nan} 0\nvt 0 0\n{more}f {face}\n"
+    (tmp_path / "m.obj").write_text(_FOUR + lines)
+    assert load(tmp_path / "m.obj").areas.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("nan", ["nan", "-nan(ind)"])
+def test_vertices_of_faces_that_are_no_numbers_are_refused(tmp_path, nan):
+    (tmp_path / "m.obj").write_text(_FOUR + f"v {nan} 0 0\nf 1 2 5\n")
+    with pytest.raises(rc.SceneError, match="1 vertices hold NaN or infinity"):
+        load(tmp_path / "m.obj")
+
+
+_JUNK = ["free form", "foo 1 2 3", "fx", "f2", "From 1 to 2", "V for value", "VN x", "vertex 1", "fo", "f1 of 2"]
+
+
+@pytest.mark.parametrize("line", _JUNK)
+@pytest.mark.parametrize("before", ["", "  ", "# one\n\t"])
+def test_lines_that_begin_with_no_keyword_are_ignored(tmp_path, line, before):
+    (tmp_path / "m.obj").write_text(f"{_FOUR}f 1 2 3\n{before}{line}\nf 1 3 4\n{line}")
+    mesh = load(tmp_path / "m.obj")
+    assert len(mesh.faces) == 2 and mesh.areas.sum() == pytest.approx(1.0)
 
 
 def test_tabs_between_numbers_are_blanks(tmp_path):

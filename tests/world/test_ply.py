@@ -68,6 +68,26 @@ def test_faces_of_several_sizes_close_the_body(form, first, options, tmp_path):
     assert mesh.areas.sum() == pytest.approx(AREA) and mesh.volume() == pytest.approx(VOLUME)
 
 
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("where", ["element vertex", "element face 8", "element edge", "end_header"])
+def test_an_element_without_rows_changes_nothing(form, where, tmp_path):
+    empty = b"element tristrips 0\nproperty list int int i\nproperty float x\n"
+    (tmp_path / "m.ply").write_bytes(ply(form).replace(where.encode(), empty + where.encode(), 1))
+    assert load(tmp_path / "m.ply").volume() == pytest.approx(VOLUME)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_mark_of_byte_order_before_a_ply_changes_nothing(form, tmp_path):
+    (tmp_path / "m.ply").write_bytes(b"\xef\xbb\xbf" + ply(form))
+    assert load(tmp_path / "m.ply").volume() == pytest.approx(VOLUME)
+
+
+def test_numbers_with_a_plus_are_read(tmp_path):
+    text = ply("ascii").decode().replace("\n4 0 1 5 4\n", "\n+4 +0 +1 5 +4e0\n").replace("vertex 10", "vertex +10")
+    (tmp_path / "m.ply").write_text(text)
+    assert load(tmp_path / "m.ply").volume() == pytest.approx(VOLUME)
+
+
 @pytest.mark.parametrize("form", ["binary", "ascii"])
 def test_a_mesh_that_was_written_is_read_again(form, tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3)
@@ -104,6 +124,12 @@ def test_a_binary_ply_with_bytes_at_its_end_is_refused(tmp_path):
         ("\n1 1 0\n", "\n1 1 0 9\n", "m.ply:15: '1 1 0 9', row 3 of 'vertex', has 1 numbers too many"),
         ("\n1 1 0\n", "\n1 1\n", "m.ply:15: '1 1', row 3 of 'vertex', lacks 1 of its numbers"),
         ("\n1 1 0\n", "\n1 1,0 0\n", "m.ply:15: '1,0' is no number"),
+        ("\n1 1 0\n", "\n1 1_0 0\n", "m.ply:15: '1_0' is no number"),
+        ("\n4 0 1 5 4\n", "\n4 0 0_1 5 4\n", "m.ply:23: '0_1' is no number"),
+        ("\n4 0 1 5 4\n", "\n4_0 0 1 5 4\n", "m.ply:23: '4_0 0 1 5 4' has a list of '4_0' entries"),
+        ("\n4 0 1 5 4\n", "\n" + "4" * 5000 + " 0 1 5 4\n", "allowed: a number from 0 on, of 18 digits at most"),
+        ("element vertex 10", "element vertex -1", "m.ply:4: holds -1 of 'vertex'; allowed: a number from 0 on"),
+        ("element vertex 10", "element vertex " + "1" * 5000, "m.ply:4: holds '1111"),
         ("float z", "float128 z", "m.ply:7: unknown type 'float128'; did you mean 'float32'?"),
         ("format ascii 1.0\n", "", "its header has no 'format'"),
         ("element edge 1", "element face 1", "m.ply:10: 'element face 1' is no element"),
@@ -117,7 +143,7 @@ def test_a_damaged_line_of_a_ply_is_refused_by_its_number(old, new, problem, tmp
     (tmp_path / "m.ply").write_text(text.replace(old, new, 1))
     with pytest.raises(SceneError) as told:
         load(tmp_path / "m.ply")
-    assert problem in str(told.value)
+    assert problem in str(told.value) and len(str(told.value).replace(str(tmp_path), "")) < 300
 
 
 def test_faces_without_area_are_told(tmp_path):
