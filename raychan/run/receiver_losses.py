@@ -17,6 +17,7 @@ from raychan.units import C0, db
 Floats = NDArray[np.float64]
 
 _BEAMS = 33  # along each axis, over the directions from which an array sees a near echo (not measured)
+_ROUND = 0.9  # of a power: a peak that keeps more (0.46 dB, below what is told) is round, and not split
 _TURN = 0.02  # rad: step of the table of what ramps keep, whose error is below 2e-5 of an amplitude
 
 
@@ -32,7 +33,7 @@ def near_field_losses(found: ExplainedDetections, radar: Radar) -> Floats:
     away = np.where(np.isfinite(found.true_range), found.true_range, found.range)
     source = away[:, None] * look
     held = _through(radar, source, np.zeros((1, 3)))[:, 0]
-    for i in np.flatnonzero(held < 0.9):
+    for i in np.flatnonzero(held < _ROUND):
         # Near an array a beam's peak splits: beams beside the echo's direction read more.
         spread = 0.5 * np.ptp(aperture.elements, axis=0) / max(away[i], 1e-9)
         steps = [np.linspace(-x, x, _BEAMS) if x > 0.0 else np.zeros(1) for x in spread[1:]]
