@@ -76,7 +76,7 @@ SEED = Limit(0, (1 << 63) - 1, "", "seeds are whole numbers of 63 bits")
 
 EPS_R = Limit(1.0, 1e4, "", "of passive materials: 1 is vacuum, 80 water")
 SIGMA = Limit(0.0, 1e9, "S/m", "of passive materials: silver has 6e7")
-THICKNESS_MM = Limit(1e-3, 1e4, "mm", "thinner has no effect, thicker is opaque: leave the key out", above=True)
+THICKNESS_MM = Limit(1e-7, 1e4, "mm", "no atom is thinner; thicker is opaque: leave the key out")
 ROUGHNESS_MM = Limit(0.0, 1e3, "mm", "rms height of a surface, not of a landscape")
 DIFFUSE_DB = Limit(-120.0, 30.0, "dB", "sigma-nought of natural surfaces lies between")
 EXPONENT = Limit(1, 50, "", "of a lobe: 1 is nearly Lambert's, 50 a few degrees wide")

@@ -27,12 +27,19 @@ _WRONG = tuple(
             "'f' and corners such as 7, 7/1, 7//2 or 7/1/2",
         ),
         (rb"^f (?:.* )?[-+]?0+(?=[/ \r\n]|\Z).*", "names vertex 0", "vertices counted from 1"),
+        (
+            rb"^ *(?:surf|bzp|bsp)(?= ).*",
+            "is a free-form surface, which is not read",
+            "faces in its place: an export of the surface as a mesh",
+        ),
+        (rb"^ *call(?= ).*", "calls another file, which is not read", "an OBJ that holds all faces"),
     )
 )
 
 
 def checked_lines(text: bytes, file: Path) -> None:
-    """Raise SceneError for the first line of an OBJ, without indents and tabs, that is no vertex or face."""
+    """Raise SceneError for the first line of an OBJ, without indents and tabs, that is no vertex or face, or a
+    surface of another kind."""
     found = [(at.start(), at[0], told, wanted) for pattern, told, wanted in _WRONG if (at := pattern.search(text))]
     if found:
         start, line, problem, allowed = min(found)

@@ -9,14 +9,21 @@ from raychan.world.gltf_forms import understood
 from raychan.world.text_stl import checked_text, text_of
 
 _STL_HEAD, _STL_FACET = 84, 50  # bytes
+_PACKED = {b"\x1f\x8b\x08": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xfd7zXZ\0": "xz"}
+"""First bytes of files packed by a program. Source: file formats of RFC 1952, APPNOTE 4.3.7, bzip2, xz."""
 
 
 def checked(file: Path) -> int:
     """Return how many normals of a mesh file are no three numbers (STL of text only).
 
-    Raises: SceneError for a file that is cut short, damaged, or of a form that would be misread.
+    Raises: SceneError for a file that is packed, cut short, damaged, or of a form that would be misread.
     """
     kind = file.suffix.lower()
+    with file.open("rb") as stream:
+        start = stream.read(max(map(len, _PACKED)))
+    for mark, packer in _PACKED.items():
+        if start.startswith(mark):
+            raise SceneError(f"is packed by {packer}", file=file, allowed=f"the {kind} file that is in it, unpacked")
     if kind in (".glb", ".gltf"):
         understood(file)
     elif kind == ".stl":

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from raychan.em.fresnel import coefficients
 from raychan.records import HALF_SPACE, LAYER
 from raychan.records import PEC as KIND_PEC
-from raychan.units import EPS0
+from raychan.units import C0, EPS0
 from raychan.world.errors import SceneError
 from raychan.world.material import PEC, Material, material, names, resolve, validity
 
@@ -57,6 +58,26 @@ def test_impossible_materials_are_errors(bad):
     with pytest.raises(SceneError) as caught:
         Material(**bad)
     assert caught.value.key in bad
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.3])
+@pytest.mark.parametrize("frequency", [0.3e9, 77e9])
+@pytest.mark.parametrize("thickness", [1e-10, 1e-9, 1e-8, 1e-7])
+def test_a_metal_film_reflects_as_a_sheet_of_its_resistance(thickness, frequency, cosine):
+    # A shunt sheet of Rs = 1 / (sigma t) ohm: r = -1 / (1 + 2 Rs cos / eta0) for s, and what it leaves, 1 + r, passes,
+    # as long as the film is thin beside its skin (0.24 um at 77 GHz). The slab is of (t / skin)^2 off.
+    copper = 5.8e7
+    film = resolve([Material(sigma=copper, thickness=thickness)], frequency)
+    c = coefficients(LAYER, film.eps[0], thickness, 0.0, cosine, 2.0 * np.pi * frequency / C0)
+    sheet = -1.0 / (1.0 + 2.0 * cosine * EPS0 * C0 / (copper * thickness))
+    skins = thickness * np.sqrt(np.pi * frequency * copper / (EPS0 * C0**2))
+    assert abs(c[0] - sheet) < 1e-6 + 0.01 * skins**2
+    assert abs(c[2] - (1.0 + sheet)) < 1e-6 + skins**2 * (1.0 + sheet)
+
+
+def test_a_layer_thinner_than_an_atom_is_none():
+    with pytest.raises(SceneError, match="no atom is thinner"):
+        Material(sigma=5.8e7, thickness=9e-11)
 
 
 def test_extrapolation_is_told():

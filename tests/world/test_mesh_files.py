@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import subprocess
 import sys
 
@@ -216,3 +217,10 @@ def test_a_ply_with_other_counts_or_without_z_is_refused(old, new, problem, tmp_
     file.write_text(PLY.replace(old, new))
     with pytest.raises(SceneError, match=problem):
         load(file)
+
+
+@pytest.mark.parametrize("ending", [".obj", ".ply", ".stl", ".glb", ".gltf"])
+def test_a_packed_file_is_said_to_be(ending, tmp_path):
+    (tmp_path / f"m{ending}").write_bytes(gzip.compress(b"v 0 0 0\n"))
+    with pytest.raises(SceneError, match=rf"is packed by gzip; allowed: the {ending} file that is in it, unpacked"):
+        load(tmp_path / f"m{ending}")

@@ -131,6 +131,9 @@ def test_faces_before_the_first_material_have_the_name_of_their_object_or_group(
         ("f", "'f' is no face of numbered vertices"),
         ("f 1 2 99", "'f 1 2 99' names vertex 99, which the file does not hold; allowed: 1 to 4"),
         ("f 1 2 -9", "'f 1 2 -9' names v -9, but 4 'v' lines before it"),
+        (" surf 0 1 0 1 1 2 3 4", "'surf 0 1 0 1 1 2 3 4' is a free-form surface, which is not read"),
+        ("bzp 1 2 3 4", "'bzp 1 2 3 4' is a free-form surface, which is not read"),
+        ("call other.obj", "'call other.obj' calls another file, which is not read"),
     ],
 )
 @pytest.mark.parametrize("before", ["", "# one\n", "  # one\nvn 0 \\\n 0 1\n", "# C:\\\n"])

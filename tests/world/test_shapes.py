@@ -176,12 +176,27 @@ def test_corners_open_to_plus_x():
         ("sphere", {"radius": float("nan")}, "radius"),
         ("car", {"length": 0.5}, "shape"),
         ("trihedral", {"square": "yes"}, "square"),
+        ("lamp_post", {"height": 0.5, "radius": 2.0}, "height"),
+        ("lamp_post", {"height": 0.36, "arm": 0.0}, "height"),
+        ("truck", {"front_axle": 20.0}, "front_axle"),
+        ("truck", {"front_axle": 2.7}, "front_axle"),
     ],
 )
 def test_bad_parameters_are_named(name, params, key):
     with pytest.raises(SceneError) as caught:
         build(name, params)
     assert caught.value.key == key
+
+
+@pytest.mark.parametrize(
+    ("name", "params"),
+    [("lamp_post", {"height": 0.52}), ("truck", {"front_axle": 2.73}), ("truck", {"front_axle": 7.51})],
+)
+def test_shapes_at_the_ends_of_what_is_allowed_stand_on_the_ground(name, params):
+    mesh = build(name, params)
+    assert abs(mesh.bounds[0][2]) < 1e-9
+    if name == "truck":
+        assert np.ptp(mesh.bounds[:, 0]) == pytest.approx(8.0)
 
 
 def test_a_switch_is_true_or_false():

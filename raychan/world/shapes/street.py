@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats, Mesh
 from raychan.world.shapes.curve import Curve
 from raychan.world.shapes.piece import SAG, Assembly, Piece, grid, join, polygon
@@ -16,14 +17,20 @@ def lamp_post(
     """Return a street lamp: pole of `radius`, arm of length `arm` towards +x (0: none), luminaire; height overall [m].
 
     Origin: foot of the pole on the ground, on its axis. Parts: pole, base, arm, luminaire.
+    Raises: SceneError where the luminaire, or the arm, does not begin above the base.
     """
     made = Assembly()
-    top = height - 0.12
+    top, foot, thick, below = height - 0.12, 0.25, 0.6 * radius, 0.1
+    least = foot + height - top + (below + thick if arm > 0.0 else 0.0)
+    if not height > least:
+        what = f"with an arm and a radius of {radius:g} m: the arm" if arm > 0.0 else "without an arm: the luminaire"
+        allowed = f"above {least:.4g} m {what} begins above the base"
+        raise SceneError(f"{height:g} is not possible", key="height", value=height, allowed=allowed)
     made.add("pole", material, pillar(radius, top, 0.01, max_sag))
-    made.add("base", material, pillar(1.9 * radius, 0.25, 0.01, max_sag))
+    made.add("base", material, pillar(1.9 * radius, foot, 0.01, max_sag))
     if arm > 0.0:
-        start, stop = np.array([0.0, 0.0, top - 0.1]), np.array([arm, 0.0, height - 0.05])
-        made.add("arm", material, capsule(start, stop, 0.6 * radius, 0.035, max_sag))
+        start, stop = np.array([0.0, 0.0, top - below]), np.array([arm, 0.0, height - 0.05])
+        made.add("arm", material, capsule(start, stop, thick, 0.035, max_sag))
     head = rounded_block(0.55, 0.24, 0.12, 0.03, max_sag)
     made.add("luminaire", material, head.moved(offset=(arm, 0.0, height - 0.12)))
     return made.mesh()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from raychan.world.errors import SceneError
 from raychan.world.mesh import Mesh
 from raychan.world.shapes.piece import BODY_SAG, Assembly
 from raychan.world.shapes.solid import block, capsule, ellipsoid, rounded_block
@@ -25,13 +26,19 @@ def truck(
     Args: tail_bottom height to which the flat tail reaches down; front_axle its distance from the tail (default 0.66 of
     the length); lock_bars four upright bars on the tail. Origin: centre of the footprint; front = +x.
     Parts: tail, lock_bars, box, frame, cab, windscreen, window_*, mirror_*, tyre_front_*, tyre_rear_*, rim_*, plate.
+    Raises: SceneError for a front axle of which the wheels stand ahead of the body or run into the rear ones.
     """
     made = Assembly()
     cab = min(2.2, 0.28 * length)
     bar = 0.034 if lock_bars else 0.0
     box_end = length - cab - 0.25
     half, floor, edge = 0.5 * width, 1.0, 0.01
-    radius = 0.48
+    radius, rear = 0.48, 0.22 * length
+    if front_axle is not None and not rear + 2.0 * radius <= front_axle <= length - radius:
+        least, most = rear + 2.0 * radius, length - radius
+        span = f"between {least:.4g} and {most:.4g} m with a length of {length:g} m"
+        allowed = f"{span}: wheels under the body, none in another"
+        raise SceneError(f"{front_axle:g} is not possible", key="front_axle", value=front_axle, allowed=allowed)
     shell = rounded_block(box_end - bar - 0.06, width, height - floor, edge, max_sag)
     made.add("box", metal, shell.moved(offset=(0.5 * (box_end + bar + 0.06), 0.0, floor)))
     plate = rounded_block(0.08, width, height - tail_bottom - 0.02, edge, max_sag)
@@ -54,7 +61,7 @@ def truck(
     arm = capsule(np.array([length - 0.3, side - 0.05, 2.0]), np.array([length - 0.25, half + 0.1, 2.1]), 0.02, 0.02)
     made.pair("mirror", metal, mirror, arm)
     front = 0.66 * length if front_axle is None else front_axle
-    for end, x in (("rear", 0.22 * length), ("front", front)):
+    for end, x in (("rear", rear), ("front", front)):
         tyre, rim = wheel(radius, 0.3, half - 0.01, 2.5 * max_sag)
         made.pair(f"tyre_{end}", "rubber", tyre.moved(offset=(x, 0.0, 0.0)))
         made.pair(f"rim_{end}", metal, rim.moved(offset=(x, 0.0, 0.0)))
