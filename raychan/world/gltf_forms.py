@@ -6,43 +6,33 @@ Source: Khronos Group, glTF 2.0 Specification (2021), sections 3.6.2 (accessors)
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from raychan.world.errors import SceneError
+from raychan.world.gltf_damage import Found, damaged, header_of
 from raychan.world.gltf_skins import at_rest, placed
 
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_xmp", "KHR_animation_")
 _READ = ("KHR_mesh_quantization", "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_node_visibility")
-_FAN, _FIRST = 6, 20  # mode of a primitive; bytes before the header of a GLB
-
-Found = Iterator[tuple[str, str]]
-"""What was found in a file, and what can be done."""
+_FAN, _CHUNK = 6, 8  # mode of a primitive; bytes of the head of a chunk of a GLB
 
 
 def understood(file: Path) -> None:
-    """Raise SceneError for a glTF of a form that its reader takes for another body."""
+    """Raise SceneError for a glTF that is damaged, or of a form that its reader takes for another body."""
+    tree, rest = header_of(file.read_bytes(), file)
     try:
-        tree, binary = _parts(file.read_bytes())
         with np.errstate(all="ignore"):  # places at infinity are told by the reader
-            found = next(_misread(tree, binary, file), None)
+            found = next(chain(damaged(tree, rest, file), _misread(tree, rest[_CHUNK:], file)), None)
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError):
         return  # it is damaged, of which its reader tells
     if found is not None:
         raise SceneError(found[0], file=file, allowed=found[1])
-
-
-def _parts(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Return the header of a glTF, and the bytes beside it in a GLB."""
-    if not data.startswith(b"glTF"):
-        return json.loads(data), b""
-    end = _FIRST + int.from_bytes(data[12:16], "little")
-    return json.loads(data[_FIRST:end]), data[end + 8 :]
 
 
 def _misread(tree: Mapping[str, Any], binary: bytes, file: Path) -> Found:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from raychan.world.beside import read_beside
+from raychan.world.gltf_damage import roots
 from raychan.world.mesh import Floats
 
 _SAME = 1e-5  # of the mesh's size: files round matrices to float32, and joints multiply a few
@@ -21,8 +22,7 @@ _SAME = 1e-5  # of the mesh's size: files round matrices to float32, and joints 
 
 def placed(tree: Mapping[str, Any]) -> dict[int, Floats]:
     """Return the nodes of the scene that is read, each with its matrix (4, 4) to the scene."""
-    scenes = tree.get("scenes", [])
-    left = [(i, np.eye(4)) for i in (scenes[tree.get("scene", 0)].get("nodes", ()) if scenes else ())]
+    left = [(i, np.eye(4)) for i in roots(tree)]
     found: dict[int, Floats] = {}
     while left:
         i, above = left.pop()

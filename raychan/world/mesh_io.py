@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -162,7 +163,8 @@ def oddities(mesh: Mesh, path: str | Path, unit: str = "m", up: str | None = Non
 
 
 def from_trimesh(source: Any, crease_deg: float = CREASE_DEG, matrix: Floats | None = None) -> Mesh:
-    """Return the Mesh of a trimesh.Trimesh or trimesh.Scene; each geometry of a scene is a part.
+    """Return the Mesh of a trimesh.Trimesh or trimesh.Scene; each geometry of a scene is a part, by the name of its
+    node where several nodes share it.
 
     Args: matrix (3, 3) applied to all vertices; a reflection turns the faces with it.
     """
@@ -209,6 +211,7 @@ def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
         kind = type(source).__name__
         raise SceneError(f"{kind} is no mesh", value=kind, allowed="a file, Mesh, trimesh.Trimesh or trimesh.Scene")
     found: list[tuple[str, Floats, Any]] = []
+    places = Counter(source.graph[node][1] for node in source.graph.nodes_geometry)
     for node in source.graph.nodes_geometry:
         transform, key = source.graph[node]
         geometry = source.geometry[key]
@@ -217,7 +220,8 @@ def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
             _possible(own)
             v = own @ transform[:3, :3].T + transform[:3, 3]
             f = np.asarray(geometry.faces)
-            found.append((str(key), v, f if np.linalg.det(transform[:3, :3]) > 0.0 else f[:, ::-1]))
+            name = str(node if places[key] > 1 else key)
+            found.append((name, v, f if np.linalg.det(transform[:3, :3]) > 0.0 else f[:, ::-1]))
     if len(found) == 1:
         found = [("body", *found[0][1:])]
     return found

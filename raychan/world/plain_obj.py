@@ -11,6 +11,7 @@ from typing import Any
 
 from raychan.scalars import is_text
 from raychan.world.beside import files_beside
+from raychan.world.gltf_parts import with_parts
 from raychan.world.obj_lines import MARK, checked_lines, refused, usual_numbers
 
 _ODD = re.compile(rb"^ +(?:f|v|vn|vt|o|g|usemtl|mtllib) |\t|^f .*[-#]|^v.*#|\r(?!\n)|\\\r?$", re.M)
@@ -28,6 +29,8 @@ def read_by(file: Path) -> dict[str, Any]:
     """
     beside = files_beside(file)
     kind = file.suffix.lower().removeprefix(".")
+    if kind in ("glb", "gltf"):
+        return {"file_obj": io.BytesIO(with_parts(file)), "file_type": kind, "resolver": beside}
     if kind != "obj":
         if is_text(file.name):
             return {"file_obj": str(file), "resolver": beside}
