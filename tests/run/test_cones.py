@@ -1,11 +1,13 @@
-"""Tubes on a cone's side, where normals meet in one point, are cut to an end."""
+"""Tubes on a cone's side are cut to an end; seen nose-on, a cone is as physical optics has it."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
 import raychan as rc
+from raychan.units import C0
 
 
 def test_cuts_of_a_cone_end_long_before_their_budget():
@@ -18,3 +20,16 @@ def test_cuts_of_a_cone_end_long_before_their_budget():
     result = rc.simulate(rc.Scene([cone], radar=radar, model={"max_bounces": 2, "tolerance_db": 1.0}))
     assert not [w for w in result.warnings if "coarser than the tolerance" in w]
     assert result.stats["tubes"] < 100_000 and np.isfinite(result.detections.error_db).all()
+
+
+@pytest.mark.parametrize(("radius", "height", "sections"), [(0.05, 0.5, 100), (0.05, 0.5, 20), (0.1, 0.1, 40)])
+def test_a_cone_seen_nose_on_is_that_of_physical_optics(radius, height, sections):
+    """Test against S = k t^2 times the integral of z exp(-2j k z) along the axis, t = radius / height."""
+    k, slope = 2.0 * np.pi * 24e9 / C0, radius / height
+    end = np.exp(-2j * k * height)
+    along = end * (0.5j * height / k + 0.25 / k**2) - 0.25 / k**2
+    true = 4.0 * np.pi * abs(k * slope**2 * along) ** 2
+    got = rc.rcs(trimesh.creation.cone(radius=radius, height=height, sections=sections), 24e9, 0.0, 90.0)
+    off = abs(10.0 * np.log10(got.sigma.item() / true))
+    assert off < min(got.error_db.item(), 100.0 / sections**2)  # facets lie off a cone by the square of their width
+    assert got.error_db < 0.6
