@@ -46,6 +46,8 @@ def header_of(data: bytes, file: Path) -> tuple[dict[str, Any], bytes]:
     except json.JSONDecodeError as e:
         problem = f"is cut short or damaged: its header is no JSON from character {e.pos} on ({e.msg})"
         raise SceneError(problem, file=file, allowed="a whole " + file.suffix) from e
+    except (ValueError, RecursionError) as e:  # numbers of thousands of digits, tables thousands deep
+        raise SceneError(f"has a header that cannot be read ({e})", file=file, allowed="a valid " + file.suffix) from e
     if not isinstance(tree, dict):
         raise SceneError("its header is no table", file=file, allowed="a valid " + file.suffix)
     return tree, rest

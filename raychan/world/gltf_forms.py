@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from raychan.world.errors import SceneError
+from raychan.world.errors import SceneError, shown
 from raychan.world.gltf_damage import Found, damaged, header_of
 from raychan.world.gltf_skins import at_rest, placed
 
 _LOOKS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_xmp", "KHR_animation_")
 _READ = ("KHR_mesh_quantization", "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_node_visibility")
-_FAN, _CHUNK = 6, 8  # mode of a primitive; bytes of the head of a chunk of a GLB
+_TRIANGLES, _FAN, _CHUNK = 4, 6, 8  # modes of a primitive; bytes of the head of a chunk of a GLB
 
 
 def understood(file: Path) -> None:
@@ -86,13 +86,18 @@ def _of_node(node: Mapping[str, Any], where: str) -> Found:
 
 def _of_primitive(tree: Mapping[str, Any], primitive: Mapping[str, Any], where: str) -> Found:
     """Yield what is misread of one primitive of a mesh; lines and points are no surfaces."""
-    mode, position = primitive.get("mode", 4), primitive["attributes"].get("POSITION")
-    if mode < 4 or position is None:
+    mode, position = primitive.get("mode", _TRIANGLES), primitive["attributes"].get("POSITION")
+    if mode < _TRIANGLES or position is None:
         return
     if mode == _FAN:
         yield f"{where} has triangle fans (mode 6), which are not read", "triangles (mode 4)"
     corners = tree["accessors"][position]
     indices = tree["accessors"][primitive["indices"]] if "indices" in primitive else {}
+    count = indices.get("count", corners["count"])
+    if mode == _TRIANGLES and count % 3:
+        yield f"{where} has {count} corners of triangles (mode {_TRIANGLES})", "three corners a triangle"
+    if corners["type"] != "VEC3":
+        yield f"{where} has corners of type {shown(corners['type'])}", "VEC3"
     for what, accessor in (("corners", corners), ("indices", indices)):
         if "sparse" in accessor:
             yield f"{where} has {what} of a sparse accessor, which is not read", "accessors that are not sparse"

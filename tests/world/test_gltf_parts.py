@@ -129,6 +129,8 @@ def put(where, key, value):
         (put(lambda g: g.tree["accessors"][0], "bufferView", 9), "accessor 0 names bufferView 9, which is not there"),
         (put(lambda g: g.tree["accessors"][0], "componentType", 5130), "accessor 0 has componentType 5130"),
         (put(lambda g: g.tree["accessors"][0], "count", 9), "accessor 0 of 9 rows is bytes 0 to 108 of bufferView 0"),
+        (put(lambda g: g.tree["accessors"][1], "count", 35), "mesh 'box' has 35 corners of triangles (mode 4)"),
+        (put(lambda g: g.tree["accessors"][0], "type", "VEC2"), "mesh 'box' has corners of type 'VEC2'"),
         (put(lambda g: g.tree["bufferViews"][1], "buffer", 1), "bufferView 1 names buffer 1, which is not there"),
         (put(lambda g: g.tree["bufferViews"][1], "byteOffset", 99), "bufferView 1 is bytes 99 to 171 of buffer 0"),
     ],
@@ -163,6 +165,10 @@ def test_headers_that_are_none_are_told(tmp_path):
     file.write_text("[]")
     with pytest.raises(SceneError, match="its header is no table"):
         Body("b", file).geometry  # noqa: B018
+    for header in ("[" * 100_000, '{"asset": 1' + "0" * 5000 + "}"):
+        file.write_text(header)
+        with pytest.raises(SceneError, match=r"m\.gltf: .*header"):
+            Body("b", file).geometry  # noqa: B018
     text = json.dumps(Gltf().tree).encode()
     (tmp_path / "m.glb").write_bytes(struct.pack("<4sII", b"glTX", 2, 20) + text)
     with pytest.raises(SceneError, match="does not begin with glTF"):
