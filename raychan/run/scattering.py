@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -70,14 +71,17 @@ class BodyLaunch:
         leg, out = ends
         self._ways = [(leg, out)] if leg == out else [(leg, out), (out, leg)]
         self._found: dict[int, Contributions] = {}
+        self._sum = np.inf  # 1/m, by the last launch
 
     def whole(self, rule: Refinement) -> BySource:
         """Return the amplitudes of all tubes."""
         parts = []
         for i in range(len(self._ways)):
-            self._found[i] = Contributions(rule.for_depth(self.bounces))
+            self._found[i] = Contributions(rule.for_depth(self.bounces), whole=self._sum)
             parts += self._over(i, self._found[i])
-        return BySource.join(parts)
+        found = BySource.join(parts)
+        self._sum = float(np.abs(found.amplitude.sum(axis=0)).max()) / _reach(*self._ways[0])
+        return found
 
     def again(self, rule: Refinement, source: Sources) -> BySource:
         """Return the amplitudes of some sources (s,), whose tubes are cut by another rule; what is too weak to be cut
@@ -128,9 +132,7 @@ def _gains(
     way, wanted = which
     every = np.ones(len(geometry.piece_role), bool)
     bistatic, shallow = out != leg, wanted is None or wanted.depth == 1
-    reach = 1.0 if leg.far else float(np.linalg.norm(leg.end))
-    reach *= 1.0 if out.far else float(np.linalg.norm(out.end))
-    scale = 4.0 * np.pi * frequency / C0 * reach
+    scale = 4.0 * np.pi * frequency / C0 * _reach(leg, out)
     firsts: list[tuple[Sources, Complexes]] = []
 
     def first(tubes: Tubes, found: Contributions) -> None:
@@ -148,6 +150,11 @@ def _gains(
         firsts.clear()
         yield one
     yield from firsts
+
+
+def _reach(leg: Leg, out: Leg) -> float:
+    """Return the product of the distances [m] of both ends from the origin, without those that are far."""
+    return math.prod(float(np.linalg.norm(x.end)) for x in (leg, out) if not x.far)
 
 
 def _basis(look: Floats) -> Complexes:

@@ -69,12 +69,14 @@ class TubesToSee(NamedTuple):
 
 
 class FlatFacets(NamedTuple):
-    """Facets: vertices (f, 3, 3) [m]; a point on each (f, 3) [m] and its normal (f, 3); which are curved (f,)."""
+    """Facets: vertices (f, 3, 3) [m]; a point on each (f, 3) [m] and its normal (f, 3); which are curved (f,), and the
+    curvatures (f, 3, 3) [m] of their edges."""
 
     vertices: Floats
     first: Floats
     normal: Floats
     curved: Bools
+    bend: Floats
 
 
 class Tested(NamedTuple):
@@ -110,7 +112,8 @@ def cast_shadow_rays(
         # Where nothing is, nothing hides.
         rays.seen[:], rays.passed[:], rays.blocker[:] = True, -1, -1
         return
-    facets = FlatFacets(geometry.facets.vertices, geometry.first, geometry.normal, geometry.curved)
+    vertices, bend = geometry.facets.vertices, geometry.edge_curvature
+    facets = FlatFacets(vertices, geometry.first, geometry.normal, geometry.curved, bend)
     fixed = tubes, facets, inside, chain, 2.0 * geometry.extent + 1.0, geometry.met_by_rays
     projects, counts = len(tubes.facet) > 0 and tubes.flat is not tubes.points, []
 
@@ -168,11 +171,29 @@ def _slack(curved_points, first, normal, image, far):  # type: ignore[no-untyped
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _move_across(bend, image, far, points):  # type: ignore[no-untyped-def]
+    """Move points (4, 3) [m] on a flat facet, across the ray to the last one, by as much as its curved surface lies
+    beside it on average: what hides a part of the facet then hides as large a part of the surface."""
+    along, size = 0.0, 0.0
+    for c in range(3):
+        k = image[c] if far else points[3, c] - image[c]
+        # Of a patch's products l_i l_j the mean is a twelfth.
+        along -= k * (bend[0, c] + bend[1, c] + bend[2, c]) / 12.0
+        size += k * k
+    for c in range(3):
+        k = image[c] if far else points[3, c] - image[c]
+        moved = -(bend[0, c] + bend[1, c] + bend[2, c]) / 12.0 - along * k / size
+        for q in range(4):
+            points[q, c] += moved
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _draw(i, rays, tubes, facets, image, far, projects):  # type: ignore[no-untyped-def]
     """Write where the rays to tube i end, and the tube moved to flat facets where it `projects` to these."""
     f, flat = tubes.facet[i], tubes.flat[i]
     if projects and facets.curved[f]:
         project_to_facet(tubes.bary[i], facets.vertices[f], flat)
+        _move_across(facets.bend[f], image, far, flat)
     elif projects:
         for q in range(4):
             copy_to(flat[q], tubes.points[i, q])
