@@ -6,6 +6,9 @@ import pytest
 from support.moving_frames import energy_db
 
 import raychan as rc
+from raychan.run import between_chirps
+from raychan.run.micro_doppler import stretches
+from raychan.run.rules import fine_rule
 from raychan.units import C0, db
 
 WAVE = {"carrier_ghz": 76.85, "bandwidth_mhz": 300.0, "chirp_us": 40.0, "repetition_us": 50.0, "samples": 64}
@@ -80,3 +83,17 @@ def test_no_echo_of_a_turning_body_seen_at_half_its_height_is_faster_than_its_fa
     beyond = np.abs(found.rate) > fastest + given.radar.waveform.rate_resolution
     level = db(found.power / found.power.max())
     assert level.max() == 0.0 and (level[beyond] < -65.0).all()
+
+
+@pytest.mark.parametrize("spin", [90.0, 720.0])
+def test_poses_between_chirps_carry_large_footprints_that_turn_fast(spin, monkeypatch):
+    """A box of 1 m at 720 degrees a second was -10 dB off between poses 0.6 ms apart."""
+    given = scene(spin, 80.0, chirps=500)
+    rule = fine_rule(given.radar, given.processing, given.model)
+
+    def samples(drift: float) -> np.ndarray:
+        monkeypatch.setattr(between_chirps, "_DRIFT", drift)
+        return np.concatenate([part for part, _ in stretches(given, rule, given.model, 3)], axis=1)
+
+    usual, exact = samples(between_chirps._DRIFT), samples(-1.0)
+    assert energy_db(usual - exact, exact) < -60.0
