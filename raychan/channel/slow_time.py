@@ -193,8 +193,8 @@ def _each_rate(  # type: ignore[no-untyped-def]
 APART = 3e-4
 """m of path: a footprint whose corners and centre differ by more gives each corner its own delay (cost not measured).
 Over slow time the centre counts, too: of a tall one seen at half its height the corners are alike, and the middle is
-nearer. In `channel.paths`, at one instant, the corners decide: plates of 1 and 2 m at 10 m, so seen over 1 to 4 GHz, are
-as far from their sums over points with the centre as without (within 0.1 dB of -34 to -60 dB)."""
+nearer. In `channel.paths`, at one instant, the corners decide: plates of 1 and 2 m at 10 m, so seen over 1 to 4 GHz,
+are as far from their sums over points with the centre as without (within 0.1 dB, at -33 to -60 dB)."""
 
 
 @njit(cache=True, nogil=True)
