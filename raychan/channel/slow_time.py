@@ -96,7 +96,8 @@ def strengths(routes: Routes, facets: Facets, radar: Any, frequency: float) -> C
 def extrapolated(routes: Routes, strength: Complexes, poses: Poses, frequency: float) -> tuple[Floats, Complexes]:
     """Return lengths [m] and amplitudes (t, n, 3) of routes at later instants, a part for each corner of the footprint.
 
-    Routes without a footprint, or with one that is short in range, have a single part: the others have amplitude 0.
+    Routes without a footprint, or with one that is short in range at all instants, have a single part: the others have
+    amplitude 0. A route's parts are the same at all instants, so that its lengths have no jumps: these would be rates.
     Args: strength (n, 3) from `strengths`; poses of bodies and radar at the instants; frequency [Hz].
     """
     shape = (len(poses.radar), len(routes.kind), 3)
@@ -189,7 +190,11 @@ def _each_rate(  # type: ignore[no-untyped-def]
             out[r, c] = 0.5 * (now[c] - then[c]) / _SOON
 
 
-APART = 3e-4  # m of path: footprints longer than this in range give each corner its own delay (cost not measured)
+APART = 3e-4
+"""m of path: a footprint whose corners and centre differ by more gives each corner its own delay (cost not measured).
+Over slow time the centre counts, too: of a tall one seen at half its height the corners are alike, and the middle is
+nearer. In `channel.paths`, at one instant, the corners decide: plates of 1 and 2 m at 10 m, so seen over 1 to 4 GHz,
+are as far from their sums over points with the centre as without (within 0.1 dB, at -33 to -60 dB)."""
 
 
 @njit(cache=True, nogil=True)
@@ -203,6 +208,7 @@ def _carry(  # type: ignore[no-untyped-def]
         still[0, b, 0, 0] = still[0, b, 1, 1] = still[0, b, 2, 2] = 1.0
     here, end = origin.reshape((1, *origin.shape)), tx.reshape((1, 3))
     now, then, phases, terms = np.empty(7), np.empty(7), np.empty(6), np.empty(3, np.complex128)
+    centres = np.empty(radar.shape[0])
     for i in range(n):
         used = 0
         while used < d and kind[i, used] > 0:
@@ -211,26 +217,34 @@ def _carry(  # type: ignore[no-untyped-def]
         _part_lengths(
             vertices, normals, kind, body, points, i, at, used, 0, origin, still, here, end, end, then
         )  # fmt: skip
+        wide = at < used and kind[i, at] == SCATTER
+        split = False
         for t in range(radar.shape[0]):
             _part_lengths(
                 vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, radar, radar, now
             )  # fmt: skip
             centre = length[i] + now[6] - then[6]
-            out_lengths[t, i, :] = centre
-            out[t, i, :] = 0.0
-            if at == used or kind[i, at] != SCATTER:
-                out[t, i, 0] = strength[i, 0] * np.exp(-1j * k * centre)
+            centres[t] = centre
+            if not wide:
                 continue
-            low, high = np.inf, -np.inf
+            low, high = centre, centre
             for c in range(6):
                 total = lengths[i, c] + now[c] - then[c]
                 phases[c] = k * total
                 if c < 3:
                     out_lengths[t, i, c] = total
                     low, high = min(low, total), max(high, total)
+            split = split or high - low > APART
             triangle_terms(phases, _LINEAR, terms)
-            split = high - low > APART
-            if not split:
-                out_lengths[t, i, :] = centre
             for c in range(3):
-                out[t, i, c if split else 0] += 3.0 * strength[i, c] * taper[i, c] * terms[c]
+                out[t, i, c] = 3.0 * strength[i, c] * taper[i, c] * terms[c]
+        if split:
+            continue
+        for t in range(radar.shape[0]):
+            if wide:
+                whole = out[t, i, 0] + out[t, i, 1] + out[t, i, 2]
+            else:
+                whole = strength[i, 0] * np.exp(-1j * k * centres[t])
+            out_lengths[t, i, :] = centres[t]
+            out[t, i, :] = 0.0
+            out[t, i, 0] = whole

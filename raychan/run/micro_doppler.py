@@ -43,8 +43,9 @@ _AT_ONCE = 64  # chirps whose routes are held in memory at once
 _FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
 _HELPS = 0.5  # of the error power before: a keyframe that leaves more is the last one in its segment
 _BETWEEN = 0.6e-3
-"""From one computed pose to the next in a spectrogram [s]: a walker's samples are then off by -44 dB (0.3 ms: -47,
-1.2 ms: -37), in 0.75 of the time (`pytest tests/run/test_walker_frames.py -k poses`)."""
+"""From one computed pose to the next in a spectrogram [s]: a walker's samples are then off by -117 dB (0.3 ms:
+-119, 1.2 ms: -111; the scene of `pytest tests/run/test_walker_frames.py -k poses`), in 1.1 to 1.2 of the time at ramps
+0.1 ms apart. Footprints that drift apart between poses are computed at every chirp (run.between_chirps)."""
 
 
 def retraced(
