@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.processing import twins
 from raychan.processing.angles import Scan
 from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
@@ -149,7 +150,7 @@ def detect(
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
-    return _reported(map, grid, shape, echoes.take(loud), ego_speed, aperture)
+    return _reported(map, grid, shape, echoes.take(loud), ego_speed, aperture, seen.looks)
 
 
 def least_power(
@@ -216,15 +217,17 @@ def _reported(
     found: Found,
     ego_speed: float,
     aperture: Aperture | None = None,
+    looks: int = 1,
 ) -> Detections:
-    """Return what is found as detections; with an aperture, of echoes with their directions."""
+    """Return what is found as detections; with an aperture, of echoes with their directions, and SNR that is that in a
+    beam over `looks`."""
     place = shape.within(found.place, map.power.shape)
     rate = _rate(map, grid, place)
     angles = np.full((2, len(rate)), np.nan)
     ambiguous = np.zeros(len(rate), bool)
     if aperture is not None and isinstance(found, Echoes):
         angles = np.array(aperture.angles(found.direction))
-        ambiguous = aperture.ambiguous(found.direction)
+        ambiguous = twins.ambiguous(aperture, found.direction, looks * found.power / np.maximum(found.noise, _TINY))
     return Detections(
         range=map.range[0] + place[:, 1] * (map.range_resolution / grid.pad[1]),
         rate=rate,

@@ -14,6 +14,7 @@ from raychan.processing.esprit import esprit
 from raychan.processing.monopulse import monopulse
 from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, capon, climb, music, peaks
+from raychan.processing.twins import ambiguous
 from raychan.radar.aperture import Aperture
 from raychan.radar.declared import check_type, reals
 from raychan.scalars import is_one_of, meant, shown
@@ -36,7 +37,7 @@ class Directions(Record):
     azimuth: Floats = column("n", unit="rad", doc="NaN where the array does not measure it", finite=False)
     elevation: Floats = column("n", unit="rad", doc="NaN where the array does not measure it", finite=False)
     power: Floats = column("n", unit="W", doc="mean over the snapshots, at one receiver")
-    ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="a grating lobe shows another direction alike")
+    ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="another direction shows alike")
 
 
 def doa(
@@ -54,7 +55,7 @@ def doa(
     method: bartlett (each echo is subtracted before the next is sought), capon, music, esprit (uniform lines) or
     monopulse (one echo, uniform lines); sources, how many, or None: by criterion mdl or aic, which are asymptotic:
     of one snapshot they tell too many in about a third of cases; smoothing: see `covariance`. A direction whose power
-    is below the rounding of the snapshots is left out.
+    is below the rounding of the snapshots is left out. The noise is not known: `ambiguous` tells of equal ones only.
     Raises: ValueError on bad arguments, or an array that measures no angle or is unfit for the method.
     """
     check_type("wavelength", wavelength, float)
@@ -90,7 +91,7 @@ def doa(
     eps = float(np.finfo(given.dtype if given.dtype.kind in "fc" else np.float64).eps)
     order = order[share[order] > (_ROUNDING * eps) ** 2 * share.max(initial=0.0)]
     azimuth, elevation = aperture.angles(found[order])
-    return Directions(azimuth, elevation, power[order], aperture.ambiguous(found[order]))
+    return Directions(azimuth, elevation, power[order], ambiguous(aperture, found[order]))
 
 
 def _counted(data: Complexes, aperture: Aperture, criterion: str, smoothing: float | None) -> int:

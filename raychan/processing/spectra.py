@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
-from scipy.spatial import cKDTree
 
 from raychan.processing.covariance import Covariance
+from raychan.processing.twins import neighbours
 from raychan.radar.aperture import Aperture, Grid
 
 Floats = NDArray[np.float64]
@@ -29,6 +29,7 @@ BEAMS_PER_BEAM = 4
 _LOADING = 1e-9  # of the mean eigenvalue: keeps the inverse of a covariance without noise
 _FEW_LOADING = 1e-2  # the same for fewer than 2 p snapshots (Reed, Mallett and Brennan 1974), whose least eigenvalues
 # are chance: echoes 20 dB weaker than the strongest are lost (not measured)
+_ONE = 0.02  # beam widths: twins, refined each by itself, are nearer (1/128 of a step, then a parabola)
 _BATCH = 1 << 21  # steering values at once, 32 MB
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
 
@@ -80,11 +81,18 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     modes = ["wrap" if wrap else "constant" for wrap in grid.wraps]
     top = (values >= maximum_filter(values, size=3, mode=modes, cval=-np.inf)) & np.isfinite(values)
     m, n = np.nonzero(top)
-    order = np.argsort(-values[m, n], kind="stable")[: 2 * count]  # a maximum between points may be the greater one
+    # A maximum between points may be the greater one; each shows as often as its twins are visible.
+    order = np.argsort(-values[m, n], kind="stable")[: 2 * count * (1 + len(aperture.skewed))]
     start = np.stack([grid.u[m[order]], grid.w[n[order]]], axis=1)
     found, heights = climb(form, aperture, start, grid)
-    order = np.argsort(-heights, kind="stable")[:count]
-    return aperture.canonical(found[order])
+    found = aperture.canonical(found[np.argsort(-heights, kind="stable")])
+    return (_once(found, aperture) if len(aperture.skewed) else found)[:count]
+
+
+def _once(found: Floats, aperture: Aperture) -> Floats:
+    """Return directions (k, 2) without those that an earlier one is the twin of."""
+    near = np.tril(aperture.apart(found[:, None], found[None]) < _ONE, -1)
+    return found[~near.any(axis=1)]
 
 
 def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Floats:
@@ -92,9 +100,7 @@ def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Fl
     at = aperture.spread(per_beam)
     batch = max(1, _BATCH // len(aperture.elements))
     values = np.concatenate([form(aperture.steering(at[i : i + batch])) for i in range(0, len(at), batch)])
-    look = np.column_stack([np.sqrt(np.maximum(1.0 - (at**2).sum(axis=1), 0.0)), at])
-    _, beside = cKDTree(look).query(look, min(len(at), 3**2 if all(aperture.scans) else 3))
-    top = np.flatnonzero(values >= values[beside].max(axis=1))
+    top = np.flatnonzero(values >= values[neighbours(aperture, at)].max(axis=1))
     start = at[top[np.argsort(-values[top], kind="stable")[: 2 * count]]]
     found, heights = climb(form, aperture, start, aperture.grid(per_beam))
     return found[np.argsort(-heights, kind="stable")[:count]]

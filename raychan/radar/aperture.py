@@ -14,13 +14,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.radar.lobes import Lobes, of_places, on_rectangle
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _SAME = 1e-3  # wavelengths: elements nearer than this along an axis share a coordinate; 6 mrad of phase
 _EDGE = 1e-9
-_SAME_EDGE = 1e-6  # of a squared cosine: +90 and -90 deg are one to elements half a wavelength apart
+ALIKE = 1e-4
+"""Of a beam's power: lobes that lose less are as strong, however weak the noise; places within _SAME lose 4e-5."""
+SAME_EDGE = 1e-6
+"""Of a squared cosine: +90 and -90 deg are one to elements half a wavelength apart."""
 _KEPT = 1 << 21  # steering values kept between searches, 32 MB; more are made anew each time
 
 
@@ -54,7 +59,8 @@ class Aperture:
     """Elements (a, 3) [m] in the antenna's frame, at a wavelength [m].
 
     A line along y measures azimuth (elevation 0 is assumed), a line along z elevation; elements that spread along y and
-    z, not on one line, measure both; others measure nothing. Directions are taken ahead of the antenna.
+    z, not on one line, measure both; others measure nothing. Directions are taken ahead of the antenna. With depth
+    (along x) and one angle all beams are of elevation, or azimuth, 0, and fit no wave from elsewhere.
     """
 
     elements: Floats
@@ -136,6 +142,27 @@ class Aperture:
         return out
 
     @property
+    def flat(self) -> bool:
+        """Whether all elements stand in one plane across the look ahead."""
+        return self.depth <= _SAME
+
+    @cached_property
+    def lobes(self) -> Lobes:
+        """Grating lobes of the elements, as if they were flat."""
+        if self.table is not None:
+            return on_rectangle(self.period, self.beamwidth)
+        width = np.where(self.scans, self.beamwidth, np.inf)
+        return of_places(self.elements[:, 1:] / self.wavelength, width)
+
+    @cached_property
+    def skewed(self) -> Floats:
+        """Grating lobes (l, 2) quite like the main lobe and not a period along y or z away; none unless flat."""
+        if not self.flat or self.table is not None or not any(self.scans):
+            return np.zeros((0, 2))
+        cell = np.where(self.wraps, self.period, np.inf) * (1.0 - SAME_EDGE)
+        return self.lobes.at[(self.lobes.lost <= ALIKE) & (np.abs(self.lobes.at) < cell).all(axis=1)]
+
+    @property
     def uniform(self) -> bool:
         """Whether the elements are a uniform line along y or z."""
         return self.table is not None and sum(self.scans) == 1
@@ -214,7 +241,14 @@ class Aperture:
         """Return the aliases of cosines (n, 2) that are nearest to boresight."""
         period = np.where(self.wraps, self.period, 1.0)
         turns = np.where(self.wraps & (np.abs(cosines) > 0.5 * period), np.rint(cosines / period), 0.0)
-        return np.asarray(cosines - turns * period)
+        out = np.asarray(cosines - turns * period)
+        if not len(self.skewed):
+            return out
+        tried = out[..., None, :] - np.concatenate([np.zeros((1, 2)), self.skewed])
+        size = (tried**2).sum(axis=-1)
+        size[..., 0] -= SAME_EDGE  # of equal ones that which was given
+        chosen = size.argmin(axis=-1)[..., None, None]
+        return np.asarray(np.take_along_axis(tried, chosen, axis=-2)[..., 0, :])
 
     def visible(self, cosines: Floats) -> Floats:
         """Return the directions of real waves that look like cosines (n, 2), or else the nearest at the edge.
@@ -229,16 +263,6 @@ class Aperture:
         """Return how far directions (..., 2) look apart, in beam widths: past +90 deg may lie -90 deg."""
         width = np.where(np.isfinite(self.beamwidth), self.beamwidth, 1.0)
         return np.asarray(np.linalg.norm(self.canonical(one - other) / width, axis=-1))
-
-    def ambiguous(self, cosines: Floats) -> NDArray[np.bool_]:
-        """Return whether a grating lobe of each direction (n, 2) is a visible direction too."""
-        out = np.zeros(len(cosines), bool)
-        for axis in np.flatnonzero(np.isfinite(self.period) & np.array(self.scans)):
-            for turn in (-self.period[axis], self.period[axis]):
-                other = np.array(cosines)
-                other[:, axis] += turn
-                out |= (other**2).sum(axis=1) < 1.0 + _SAME_EDGE
-        return out
 
     def angles(self, cosines: Floats) -> tuple[Floats, Floats]:
         """Return azimuth and elevation (n,) [rad] of cosines (n, 2); NaN where the array does not measure them."""

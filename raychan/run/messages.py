@@ -13,7 +13,7 @@ from raychan.processing.staggered import ResolvedMap
 from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import Entry
-from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses
+from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses, range_spread
 from raychan.run.result import ExplainedDetections, Result
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry
@@ -83,15 +83,15 @@ def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
     if (rows := found.ambiguous & ~rows).any():
         said.append(
             f"{_of(rows)} {_verb(rows)} ambiguous in direction ({_numbers(rows)}): "
-            "elements stand more than half a wavelength apart, so a grating lobe shows another direction alike; the "
-            "one nearest boresight is given"
+            "a grating lobe of the elements, or the other end of their view, shows another direction alike, or too "
+            "nearly so for the noise; of equal ones that nearest boresight is given"
         )
     return said
 
 
 def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
-    """Return a line if detections lose by spherical waves in a beam, and one if some do by migration over range
-    cells."""
+    """Return a line each if detections lose by spherical waves in a beam, by ranges that differ over the elements, or
+    by migration over range cells."""
     said = []
     loss = near_field_losses(found, radar)
     if (near := loss > _LOST_DB).any():
@@ -100,6 +100,13 @@ def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
             f"{_of(near)} {_verb(near)} in the near field of the array ({_numbers(near)}), nearer than 2 D^2 / "
             f"wavelength = {limit:.3g} m: beams are those of plane waves and read up to {loss.max():.1f} dB less of a "
             "spherical one"
+        )
+    differ, loss = range_spread(found, radar)
+    if (wide := loss > _LOST_DB).any():
+        said.append(
+            f"{_of(wide)} {'has' if wide.sum() == 1 else 'have'} ranges that differ over the elements "
+            f"({_numbers(wide)}), by up to {differ.max():.1f} cells: beams add one cell of all and read up to "
+            f"{loss.max():.1f} dB less"
         )
     moved, loss = migration(found.true_rate, radar)
     if (fast := loss > _LOST_DB).any():

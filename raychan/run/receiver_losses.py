@@ -1,5 +1,5 @@
 """What the receiver's processing loses of an echo and no error states: the wave is spherical where a beam takes it for
-plane, and the echo moves over range cells while the frame lasts."""
+plane, its ranges differ over the elements, and the echo moves over range cells while the frame lasts."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 _BEAMS = 33  # along each axis, over the directions from which an array sees a near echo (not measured)
 _ROUND = 0.9  # of a power: a peak that keeps more (0.46 dB, below what is told) is round, and not split
+_OFF = 0.05  # range cells between the places where the peak is sought: 0.01 dB of a Hann window's main lobe
+_CELL = 0.02  # range cells: step of the table of the window's response, whose error is below 1e-3 of an amplitude
 _TURN = 0.02  # rad: step of the table of what ramps keep, whose error is below 2e-5 of an amplitude
 
 
@@ -27,8 +29,7 @@ def near_field_losses(found: ExplainedDetections, radar: Radar) -> Floats:
     aperture = aperture_of(radar)
     if not any(aperture.scans) or radar.rx_position is not None:
         return np.zeros(len(found.range))
-    u, w = cosines(np.nan_to_num(found.azimuth), np.nan_to_num(found.elevation)).T
-    look = np.stack([np.sqrt(np.maximum(1.0 - u**2 - w**2, 0.0)), u, w], axis=1)
+    look = _look(found)
     # A folded echo comes from where it stands.
     away = np.where(np.isfinite(found.true_range), found.true_range, found.range)
     source = away[:, None] * look
@@ -54,6 +55,32 @@ def _through(radar: Radar, source: Floats, beside: Floats) -> Floats:
         longer = np.linalg.norm((source - middle)[:, None] - places, axis=2) - away[:, None] + along
         held *= np.abs(np.exp(1j * turn * longer) @ np.exp(1j * turn * places @ beside.T) / len(places)) ** 2
     return held
+
+
+def _look(found: ExplainedDetections) -> Floats:
+    """Return the directions (n, 3) of detections in the antenna's frame; what is not measured is 0."""
+    u, w = cosines(np.nan_to_num(found.azimuth), np.nan_to_num(found.elevation)).T
+    return np.stack([np.sqrt(np.maximum(1.0 - u**2 - w**2, 0.0)), u, w], axis=1)
+
+
+def range_spread(found: ExplainedDetections, radar: Radar) -> tuple[Floats, Floats]:
+    """Return by how many range cells the range of each detection (n,) differs over the virtual elements, and what a
+    beam loses by it (n,) [dB]: the mean over the elements of the range window's response in one cell, of the best."""
+    aperture, wave = aperture_of(radar), radar.channel_waveform
+    none = np.zeros(len(found.range))
+    if not any(aperture.scans) or radar.rx_position is not None or isinstance(wave, OwnWaveform):
+        return none, none
+    # An element nearer to the echo by x sees it x / 2 nearer, as only one of both ways is shorter.
+    ahead = 0.5 * _look(found) @ (aperture.elements - aperture.elements.mean(axis=0)).T / wave.range_resolution
+    taper = window(radar.processing.range_window, wave.n_samples)
+    turn = 2.0 * np.pi * (np.arange(wave.n_samples) - 0.5 * (wave.n_samples - 1)) / wave.n_samples
+    table = np.arange(0.0, np.ptp(ahead, axis=1).max(initial=0.0) + _CELL, _CELL)
+    response = np.cos(np.outer(table, turn)) @ taper / taper.sum()
+    held = np.zeros(len(ahead))
+    for i, x in enumerate(ahead):
+        away = np.abs(x - np.arange(x.min(), x.max() + _OFF, _OFF)[:, None])
+        held[i] = np.interp(away, table, response).mean(axis=1).max() ** 2
+    return np.ptp(ahead, axis=1), -db(np.maximum(held, 1e-30))
 
 
 def far_field_distance(radar: Radar) -> float:

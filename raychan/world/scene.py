@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from raychan.records import LAYER, Facets, Points
 from raychan.reprs import Described
 from raychan.scalars import plain
-from raychan.world import checks, overlaps, overrides
+from raychan.world import array_checks, checks, overlaps, overrides
 from raychan.world.body import Body
 from raychan.world.build import body_of, material_of, refuse_ship, scene_text
 from raychan.world.errors import SceneError, shown
@@ -250,7 +250,7 @@ class Scene(Fixed, Described):
         if self.radar_table is None:
             return said
         said += checks.edge_on(self.bodies, self.radar_table) + overlaps.unseen(self.bodies, self.radar)
-        return said + checks.aliases(self.bodies, self.radar)
+        return said + array_checks.distrusted(self.bodies, self.radar) + checks.aliases(self.bodies, self.radar)
 
     @cached_property
     def _own_materials(self) -> list[list[Material]]:

@@ -7,16 +7,16 @@ import pytest
 
 import raychan as rc
 from raychan.radar.array import mimo_array, uniform_array
-from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses
+from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses, range_spread
 from raychan.units import C0
 
 STEP = 0.5 * C0 / 77e9
 
 
-def run(place, rate=0.0, window="hann", chirps=16, pad=2, **radar):
+def run(place, rate=0.0, window="hann", chirps=16, pad=2, azimuth=0.2, bandwidth=1e9, samples=128, **radar):
     """Return a run of a point target of 10 dBsm on a direction of 0.2 rad, and its radar."""
-    wave = rc.Waveform(77e9, 1e9, 20e-6, 40e-6, chirps, 128)
-    look = np.array([np.cos(0.2), np.sin(0.2), 0.0])
+    wave = rc.Waveform(77e9, bandwidth, 20e-6, 40e-6, chirps, samples)
+    look = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     settings = rc.Processing(range_window=window, rate_window=window, pad=(pad, pad))
     made = rc.Radar(wave, noise=False, position=(0.0, 0.0, 0.0), processing=settings, **radar)
     target = {"shape": "box", "rcs_dbsm": 10.0, "rcs_point": (0.0, 0.0, 0.0)}
@@ -91,3 +91,26 @@ def test_an_echo_that_folds_to_the_near_field_loses_nothing():
     radar = rc.Radar(wave, noise=False, elements=uniform_array(64, STEP))
     found = rc.simulate(rc.Scene([rc.Body("target", **target)], radar=radar))
     assert found.detections.range[0] < 5.0 and not any("near field" in x for x in found.warnings)
+
+
+@pytest.mark.parametrize("window", ["rect", "hann"])
+@pytest.mark.parametrize(("senders", "receivers", "azimuth"), [(8, 8, 0.0), (8, 8, 1.0), (1, 64, 1.0), (4, 32, 0.8)])
+def test_a_beam_loses_what_is_told_of_ranges_that_differ_over_the_elements(senders, receivers, azimuth, window):
+    wide = {"azimuth": azimuth, "bandwidth": 4e9, "samples": 512, "window": window, "chirps": 2 * senders}
+    given = mimo_array(senders, receivers, 0.5 * C0 / 79e9) if senders > 1 else {"elements": rc.uniform_array(64, STEP)}
+    division = {"multiplexing": "tdm"} if senders > 1 else {}
+    found, radar = run(16.0, **wide, **given, **division)
+    one, _ = run(16.0, **(wide | {"chirps": 2}))
+    differ, loss = range_spread(found.detections, radar)
+    near = near_field_losses(found.detections, radar)
+    assert loss[0] + near[0] == pytest.approx(level(one) - found_level(found), abs=0.25)
+    across = np.ptp(radar.virtual_elements[:, 1]) * np.sin(azimuth)
+    assert differ[0] == pytest.approx(across * 4e9 / C0, rel=2e-3, abs=1e-2)
+    said = [x for x in found.warnings if "over the elements" in x]
+    assert len(said) == (loss[0] > 0.5)
+    assert all(f"by up to {differ[0]:.1f} cells" in x and f"{loss.max():.1f} dB less" in x for x in said)
+
+
+def found_level(result):
+    """Return the level [dB] of the strongest detection."""
+    return 10.0 * np.log10(result.detections.power.max())

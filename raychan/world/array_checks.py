@@ -1,0 +1,59 @@
+"""What a run says beforehand of its array: that directions of several echoes, or of bodies beside the plane in which it
+measures, are not to be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from raychan.radar.aperture import Aperture
+from raychan.radar.radar import Radar
+from raychan.records import MIRROR
+from raychan.units import C0, db
+from raychan.world.body import Body
+from raychan.world.checks import nearest_point
+
+_LOST_DB = 0.5  # what the best beam loses of an echo: less is as much as levels are asked for, by default
+_PER_BEAM = 8  # beams tried per beam width: one between two loses at most 0.06 dB (sinc(1/16))
+
+
+def distrusted(bodies: Iterable[Body], radar: Radar) -> list[str]:
+    """Return the warnings of `unsmoothed` and of `beside_plane`."""
+    aperture = Aperture(radar.virtual_elements, C0 / radar.waveform.middle)
+    return unsmoothed(aperture, radar) + beside_plane(aperture, bodies, radar)
+
+
+def unsmoothed(aperture: Aperture, radar: Radar) -> list[str]:
+    """Return a warning where directions are sought by a method for which one snapshot of the array is too little."""
+    asked = radar.processing.doa
+    if asked not in ("capon", "music") or not any(aperture.scans) or aperture.table is not None:
+        return []
+    return [
+        f"processing.doa = '{asked}': a cell is one snapshot, and the elements fill no uniform line or rectangle over "
+        "whose parts it could be averaged (spatial smoothing): directions and levels of two echoes in a cell are not "
+        "to be trusted; 'bartlett' tells those a beam width apart"
+    ]
+
+
+def beside_plane(aperture: Aperture, bodies: Iterable[Body], radar: Radar) -> list[str]:
+    """Return a warning for each body, ahead, of which an array with depth that measures one angle has no beam: such an
+    array takes all waves for those of its plane."""
+    if aperture.flat or sum(aperture.scans) != 1 or radar.rx_position is not None:
+        return []
+    other = "elevation" if aperture.scans[0] else "azimuth"
+    beams, said = aperture.steering(aperture.spread(_PER_BEAM)).conj() / len(aperture.elements), []
+    for body in bodies:
+        if body.resolved_role == MIRROR:
+            continue
+        at = radar.position
+        way = (nearest_point(body, at) if body.rcs_dbsm is None else body.motion.to_world(body.target_point())) - at
+        look = way @ radar.axes / max(float(np.linalg.norm(way)), 1e-9)
+        wave = np.exp(2j * np.pi / aperture.wavelength * (aperture.elements @ look))
+        lost = -float(db(max(float((np.abs(beams @ wave) ** 2).max()), 1e-30)))
+        if look[0] > 0.0 and lost > _LOST_DB:
+            said.append(
+                f"body '{body.name}' stands off {other} 0, which the receivers, with depth and of one angle, take all "
+                f"waves for: the best beam reads {lost:.1f} dB less of it, and it may show in several wrong directions"
+            )
+    return said
