@@ -87,3 +87,41 @@ def twice_area_across(points, k):  # type: ignore[no-untyped-def]
     ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
     return (ay * bz - az * by) * k[0] + (az * bx - ax * bz) * k[1] + (ax * by - ay * bx) * k[2]
+
+
+@njit(cache=True, forceinline=True, uncounted=True)
+def twice_area(p):  # type: ignore[no-untyped-def]
+    """Return twice the area [m^2] of the triangle of corners p (3, 3) or more [m]."""
+    x, y, z = _twice_vector_area(p)
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@njit(cache=True, forceinline=True, uncounted=True)
+def _twice_vector_area(p):  # type: ignore[no-untyped-def]
+    """Return the normal of the triangle of corners p (3, 3) or more [m], as long as twice its area [m^2]."""
+    a, b, c = p[0], p[1], p[2]
+    return (
+        (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1]),
+        (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]),
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]),
+    )
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def distance_to_triangle(p, x):  # type: ignore[no-untyped-def]
+    """Return the distance [m] of x (3,) [m] from the nearest point of the triangle of corners p (3, 3) or more [m]."""
+    n0, n1, n2 = _twice_vector_area(p)
+    least, within = np.inf, True
+    for q in range(3):
+        a, b = p[q], p[(q + 1) % 3]
+        e0, e1, e2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        d0, d1, d2 = x[0] - a[0], x[1] - a[1], x[2] - a[2]
+        along = (d0 * e0 + d1 * e1 + d2 * e2) / max(e0 * e0 + e1 * e1 + e2 * e2, 1e-300)
+        along = min(max(along, 0.0), 1.0)
+        least = min(least, (d0 - along * e0) ** 2 + (d1 - along * e1) ** 2 + (d2 - along * e2) ** 2)
+        # The edge's line has the third corner and the foot of x on one side.
+        within &= (n1 * e2 - n2 * e1) * d0 + (n2 * e0 - n0 * e2) * d1 + (n0 * e1 - n1 * e0) * d2 > 0.0
+    if within:
+        height = n0 * (x[0] - p[0, 0]) + n1 * (x[1] - p[0, 1]) + n2 * (x[2] - p[0, 2])
+        return abs(height) / math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+    return math.sqrt(least)

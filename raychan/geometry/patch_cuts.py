@@ -8,7 +8,7 @@ import numpy as np
 
 from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import copy_corners, middle, normal_on, place_on
-from raychan.vectors import distance, largest, length_to, twice_area_across
+from raychan.vectors import distance, distance_to_triangle, largest, length_to, twice_area, twice_area_across
 
 # Bisections from which on the longest edge is cut: between two bends of the phase that cancel at its middle an edge
 # tells no bend, and cuts of the other two leave ever narrower patches along it, without end. Not measured.
@@ -32,7 +32,7 @@ def _length_across(p, q, image, far):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, error_model="numpy")
 def edge_to_cut(  # type: ignore[no-untyped-def]
     facet, bary, v, n, b, image, far, out_image, out_far, wavenumber, phase, turn, max_edge, most_bend,
-    widest, across, least,
+    widest, across, least, near,
 ):  # fmt: skip
     """Return at which edge (n,) to bisect each patch so that its two-way phase comes nearer to a quadratic; -1: none.
 
@@ -41,7 +41,7 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
     Args: phase [rad] by which the quadratic through corners and edge middles may miss the centre; turn [rad] of the
     normal; max_edge [m], across the rays of the first leg if `across`, of patches that may scatter `least` [1/m] or
     more, all in phase under a unit field at 1 m; most_bend [rad] of the phase along an edge; widest [rad] under which
-    an end may see an edge.
+    an end may see an edge; near the share of its distance from an end that a patch which may scatter `least` may reach.
     """
     out = np.empty(len(facet), np.int8)
     p, normal, total = np.empty((7, 3)), np.empty((4, 3)), np.empty(7)
@@ -86,29 +86,55 @@ def edge_to_cut(  # type: ignore[no-untyped-def]
         elif max(e0, e1, e2) > max_edge and _may_bring(p, image, far, out_image, out_far, wavenumber) >= least:
             out[i] = largest(e0, e1, e2)
         else:
-            out[i] = _widest_edge(p, image, far, widest)
-            if out[i] < 0:
-                out[i] = _widest_edge(p, out_image, out_far, widest)
+            out[i] = _edge_by_distance(p, image, far, out_image, out_far, wavenumber, widest, least, near)
     return out
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _edge_by_distance(p, image, far, out_image, out_far, wavenumber, widest, least, near):  # type: ignore[no-untyped-def]
+    """Return at which edge to bisect a patch of corners p (7, 3) [m], the last its centre, that is too large for its
+    distance from an end; -1: none. Else as for `edge_to_cut`."""
+    nearest = 1.0 / wavenumber
+    large = _reaches_far(p, image, far, near, nearest) or _reaches_far(p, out_image, out_far, near, nearest)
+    if large and _may_bring(p, image, far, out_image, out_far, wavenumber) >= least:
+        # Its reach lessens by cuts of the longest edge, not of that across the rays.
+        return largest(distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0]))
+    edge = _widest_edge(p, image, far, widest)
+    return edge if edge >= 0 else _widest_edge(p, out_image, out_far, widest)
+
+
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _reaches_far(p, image, far, near, nearest):  # type: ignore[no-untyped-def]
+    """Tell whether a patch of corners p (7, 3) [m], the last its centre, reaches beyond a share `near` of its distance
+    from an end, taken to be `nearest` [m] or more: neither a quadratic phase nor one amplitude follows the waves."""
+    if far:
+        return False
+    size = _size(p)
+    # No point is nearer than the centre by more than the size.
+    if size <= near * max(length_to(p[6], image, False) - size, nearest):
+        return False
+    return size > near * max(distance_to_triangle(p, image), nearest)
+
+
+@njit(cache=True, forceinline=True, uncounted=True)
+def _size(p):  # type: ignore[no-untyped-def]
+    """Return how far the corners of a patch p (7, 3) [m] lie from the last, its centre, at most [m]."""
+    return max(distance(p[0], p[6]), distance(p[1], p[6]), distance(p[2], p[6]))
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _may_bring(p, image, far, out_image, out_far, wavenumber):  # type: ignore[no-untyped-def]
     """Return what a patch may scatter [1/m], as `_in_phase`; where it reaches far beyond its distance from an end, a
     bound: the distances of its centre tell nothing of what lies nearest."""
-    size = max(distance(p[0], p[6]), distance(p[1], p[6]), distance(p[2], p[6]))
+    size = _size(p)
     there = np.inf if far else length_to(p[6], image, False)
     back = np.inf if out_far else length_to(p[6], out_image, False)
     if size <= _FAR * min(there, back):
         return _in_phase(p, image, far, out_image, out_far, wavenumber)
-    a, b, c = p[0], p[1], p[2]
-    x = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
-    y = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
-    z = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    most = wavenumber / (4.0 * math.pi) * math.sqrt(x * x + y * y + z * z)
+    most = wavenumber / (4.0 * math.pi) * twice_area(p)
     if not far:
-        most /= max(there - size, 0.0)
-    return most if out_far else most / max(back - size, 0.0)
+        most /= distance_to_triangle(p, image)
+    return most if out_far else most / distance_to_triangle(p, out_image)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)

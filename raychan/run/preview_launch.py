@@ -228,7 +228,7 @@ def _cut(geometry: Geometry, leg: Leg, out: Leg, facet: Ints, rule: Refinement) 
     """Return facets (n,) and corners (n, 3, 3) of tubes over facets, cut until their phase is quadratic."""
     f = geometry.facets
     shape = f.vertices, f.normals, geometry.edge_curvature
-    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, True, 0.0
+    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, True, 0.0, rule.near
     done: list[tuple[Ints, Floats]] = []
     bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
     for level in range(_CUTS + 1):

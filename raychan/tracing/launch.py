@@ -113,7 +113,7 @@ def _bisect_for_phase(
     rule = found.rule
     # What hides in tubes that bring less than deep ones are cut for, all in phase, is not looked for.
     least = rule.coarse * rule.floor
-    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, across, least
+    limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, across, least, rule.near
     left = [(facet, np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy(), 0)]
     done: list[tuple[Ints, Floats]] = []
     held = 0

@@ -39,7 +39,8 @@ class Refinement:
     stationary; `turn` [rad] by which its normal may; `floor` [1/m] scattered amplitude (unit field at 1 m) under which
     a tube is not subdivided, `specular` the same for what a curved surface reflects at a specular point; `relative` the
     same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
-    [m] of first tubes, and the `widest` angle [rad] under which an end may see their edges; `levels` of subdivision for
+    [m] of first tubes, the share `near` of their distance from an end that they may reach, and the `widest` angle [rad]
+    under which an end may see their edges; `levels` of subdivision for
     visibility and bounces;
     `slots` of history; `layers` that a stretch may pass; `batch` of tubes launched at once, which bounds the memory
     (few scenes have more on one leg; not measured); budgets of a launch: `max_tubes` that subdivision for phase
@@ -62,6 +63,7 @@ class Refinement:
     relative: float = 0.01
     cell: float = np.inf
     max_edge: float = 0.3
+    near: float = 0.15
     widest: float = np.inf
     levels: int = 12
     slots: int = 8

@@ -1,5 +1,5 @@
-"""Checks of a whole scene: a radar inside a body or in the plane of a facet, an array unfit for its processing, targets
-beyond the unambiguous range or range rate."""
+"""Checks of a whole scene: a radar inside a body, in the plane of a facet or within a wavelength of one, an array unfit
+for its processing, targets beyond the unambiguous range or range rate."""
 
 from __future__ import annotations
 
@@ -90,6 +90,26 @@ def edge_on(bodies: Iterable[Body], radar: RadarTable) -> list[str]:
         count = in_plane_of(body.geometry.planes_near(at), at)
         if count:
             said.append(f"radar lies in the plane of {count} facets of '{body.name}': edge-on, they return nothing")
+    return said
+
+
+def too_near(bodies: Iterable[Body], radar: Radar) -> list[str]:
+    """Return a warning for each body within a wavelength of an end of the radar: rays carry no near fields."""
+    said, wavelength = [], C0 / radar.waveform.middle
+    ends = {"radar": radar.position} | ({} if radar.rx_position is None else {"receiver": radar.rx_position})
+    for body in bodies:
+        if body.resolved_role == MIRROR or body.rcs_dbsm is not None:
+            continue
+        for what, at in ends.items():
+            local = body.motion.to_body(np.asarray(at, float))
+            if not within(body.geometry.bounds + np.array([[-wavelength], [wavelength]]), local):
+                continue
+            away = float(np.linalg.norm(nearest_point(body, np.asarray(at, float)) - at))
+            if away < wavelength:
+                said.append(
+                    f"{what} is {1e3 * away:.2g} mm from '{body.name}', less than a wavelength "
+                    f"({1e3 * wavelength:.2g} mm): its level leaves out near fields, and errs beyond what is stated"
+                )
     return said
 
 

@@ -110,7 +110,7 @@ def test_long_patches_are_cut_while_they_may_bring_more_all_in_phase(share):
     may = phases_of(geometry, leg, leg, launch_tubes(geometry, leg, facet, bary), RULE).in_phase
     least = np.quantile(may, share) * (share > 0.0)
     # Nothing is cut but for its length.
-    limits = RULE.wavenumber, 1e9, 1e9, 1e-4, 1e9, np.inf, False, least
+    limits = RULE.wavenumber, 1e9, 1e9, 1e-4, 1e9, np.inf, False, least, np.inf
     edge = edge_to_cut(facet, bary, *shape, *ends, *limits)
     assert (edge[may > 1.001 * least] >= 0).all()
     assert (edge[may < 0.999 * least] < 0).all()

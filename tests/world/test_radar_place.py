@@ -102,6 +102,23 @@ def test_a_scene_tells_of_facets_that_the_radar_sees_edge_on(tmp_path):
     assert any("in the plane of 2 facets of 'plate'" in w for w in rc.Scene.load(file).warnings)
 
 
+WAVE = rc.Waveform(carrier=77e9, bandwidth=600e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
+
+
+@pytest.mark.parametrize(("away", "told"), [(0.001, True), (0.0038, True), (0.0041, False), (0.5, False)])
+def test_a_scene_tells_of_a_radar_within_a_wavelength_of_a_body(away, told):
+    ball = rc.Body("ball", shape="sphere", params={"radius": 0.5}, position=(0.5 + away, 0.0, 1.0))
+    radar = rc.Radar(waveform=WAVE, position=(0.0, 0.0, 1.0))
+    said = [w for w in rc.Scene(bodies=[ball], radar=radar).warnings if "less than a wavelength (3.9 mm)" in w]
+    assert len(said) == told
+
+
+def test_a_scene_tells_of_a_receiver_within_a_wavelength_of_a_body():
+    plate = rc.Body("plate", shape="plate", params={"width": 1.0, "height": 1.0}, position=(2.0, 0.0, 1.0))
+    radar = rc.Radar(waveform=WAVE, position=(0.0, 0.0, 1.0), rx_position=(1.998, 0.2, 1.1))
+    assert any("receiver is 2 mm from 'plate', less" in w for w in rc.Scene(bodies=[plate], radar=radar).warnings)
+
+
 def test_a_radar_on_a_plate_is_an_error_of_the_scene(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(SCENE.format(at="[4.0, 0.1, 0.1]"))
