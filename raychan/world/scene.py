@@ -250,11 +250,8 @@ class Scene(Fixed, Described):
         if self.radar_table is None:
             return said
         said += checks.edge_on(self.bodies, self.radar_table) + overlaps.unseen(self.bodies, self.radar)
-<<<<<<< HEAD
-        return said + array_checks.distrusted(self.bodies, self.radar) + checks.aliases(self.bodies, self.radar)
-=======
-        return said + checks.too_near(self.bodies, self.radar) + checks.aliases(self.bodies, self.radar)
->>>>>>> a2bdc29eb6224233eb57b9ed979ff4573c676a88
+        said += array_checks.distrusted(self.bodies, self.radar) + checks.too_near(self.bodies, self.radar)
+        return said + checks.aliases(self.bodies, self.radar)
 
     @cached_property
     def _own_materials(self) -> list[list[Material]]:
