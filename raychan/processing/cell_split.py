@@ -110,7 +110,7 @@ class Splitter:
         kept: list[Row] = []
         for i in range(len(peaks.cells)):
             beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
-            clear = self._clear(float(peaks.shown[i]), peaks.place[i], kept, peaks, beams)
+            clear = self._clear(float(peaks.shown[i]), peaks.cells[i], peaks.shift[i], kept, peaks, beams)
             if not (clear and self.lines.own(peaks.cells[i])):
                 continue
             v, r = peaks.cells[i]
@@ -124,20 +124,22 @@ class Splitter:
             return Echoes(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
         return Echoes(*(np.array([getattr(row, name) for row in kept]) for name in names))
 
-    def _clear(self, power: float, place: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:
-        """Return whether a power at a place in map cells exceeds what the side lobes of echoes may show there.
+    def _clear(self, power: float, cell: Ints, shift: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:
+        """Return whether a power in a cell (2,) that peaks beside it exceeds what the side lobes of echoes may show.
 
-        Args: beams, None or a function that gives the weights (s, a) of those in which the place is seen."""
+        Args: shift (2,) [map cells] of the peak; beams, None or a function that gives the weights (s, a) of those in
+        which the place is seen."""
         if not kept:
             return True
         pad = np.array(self.grid.pad)
+        place = (cell + shift) / pad
         at = np.array([row.cell + row.shift for row in kept]) / pad
         smear = peaks.smear[[row.peak for row in kept]]
         powers = np.array([row.power for row in kept])
-        shown, rest = MARGIN * self.lobes.at(place / pad, at, powers, smear), 0.0
+        shown, rest = MARGIN * self.lobes.at(place, at, powers, smear), 0.0
         if self.lobes.mirrors:
             # A mirror image is no plane wave to several transmitters: it counts as if all beams let it through.
-            rest = MARGIN * float(self.lobes.of_images(place / pad, at, powers, smear).sum())
+            rest = MARGIN * float(self.lobes.of_images(place, at, powers, smear).sum())
         if beams is None or power > rest + shown.sum():
             return bool(power > rest + shown.sum())
         # Echoes that all beams let through would matter little: they count as if they did.
@@ -146,11 +148,18 @@ class Splitter:
         distances = self.map.range[[row.cell[1] for row in some]]
         through = self.scan.through(beams(), np.array([row.direction for row in some]).reshape(-1, 2), distances)
         through = np.maximum(through, [row.misfit for row in some])
-        if isinstance(self.map, ResolvedMap):
-            # Under another fold an echo is no plane wave.
-            fold, cell = self.map.fold, np.rint(place).astype(np.int64) % self.map.power.shape
-            through[[fold[tuple(row.cell)] != fold[tuple(cell)] for row in some]] = 1.0
+        # Under another fold an echo is no plane wave.
+        through[[self._folded_otherwise(row.cell, cell) for row in some]] = 1.0
         return bool(power > rest + float(shown[shown > _LITTLE * power] @ through))
+
+    def _folded_otherwise(self, one: Ints, other: Ints) -> bool:
+        """Return whether two map cells (2,) are held to be folded differently; over the end of the rates by one more or
+        less, as true rates go on there."""
+        if not isinstance(self.map, ResolvedMap):
+            return False
+        tested = round(self.map.resolved_rate / self.map.unambiguous_rate)
+        turned = round(float(one[0] - other[0]) / len(self.map.rate))
+        return bool((int(self.map.fold[tuple(one)]) - int(self.map.fold[tuple(other)]) + turned) % tested)
 
     def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int, kept: list[Row]) -> Row | None:
         """Return echo k in the cell of peak i where its own beam peaks; None for what is none.
@@ -175,7 +184,7 @@ class Splitter:
         row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)
         beams = partial(held.weights.__getitem__, slice(k, k + 1))
         shown = float(level[at[0], at[1]])
-        return row if k == 0 or self._clear(shown, cell + shift[0], kept, peaks, beams) else None
+        return row if k == 0 or self._clear(shown, cell, shift[0], kept, peaks, beams) else None
 
     def _same(self, one: Row, other: Row) -> bool:
         """Return whether echoes of neighbouring peaks are one."""

@@ -5,21 +5,22 @@ phase between the transmitters, which take a share L of the power from any beam,
 another direction, both beams are equally strong, and rate and direction are ambiguous together. In white noise, with
 S the SNR in the beam, the powers under two hypotheses differ by S L on average, with the deviation sqrt(2 S L), in
 units of the noise: what they differ by tells them apart from the same number of times the noise on, at any S.
+
+Of two like echoes in a cell the strongest beam says little: under the wrong fold the lobes of both may add to more than
+either has under the true one. Where one beam leaves more than noise, hypotheses are judged by what a few explain. Cells
+on the slope of an echo have its fold wherever that is as likely as any other.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.processing.fold_beams import WEAK, Beams, squared
+from raychan.processing.peaks import AROUND
 from raychan.processing.staggered import CLEAR, fold_range, least_power, noise_of
-from raychan.radar.aperture import Aperture
 from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
-from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,10 +30,10 @@ _SURE = 0.05  # of the strongest beam: no more is asked of a fold to beat the sl
 _ALIKE = 1e-3
 """Of the strongest beam: powers nearer than this are equal, however weak the noise. Rounding, and the Doppler shift
 that differs within a row of the map, change less (not measured)."""
-_PER_BEAM = 4  # beams tested per aperture's beam width, before the strongest are refined
-_LEFT = 0.5  # of a power that at least one beam sees: at the edge of the half space beams of few rows stand far apart
-_WEAK = 0.25  # of the strongest beam: where CLEAR asks for more, cells are too weak for detections, and are not refined
-_SHRINKS = 3  # rounds of refining, each over half the distance: by parabolas, to 1e-5 of the power
+_MOST = 3
+"""Beams that explain a cell: more are rarely needed, and explain anything of few receivers (not measured)."""
+_SPREAD = 4.0  # deviations of the noise in all channels by which a cell is more than noise (not measured)
+_UPHILL = 12  # map cells along a slope: main lobes padded four times are hardly wider (not measured)
 _BATCH = 1 << 22  # cells times beams at once: bounds the memory
 
 
@@ -47,93 +48,75 @@ def under(channels: Complexes, h: int, radar: Radar) -> Complexes:
 
 def folds(channels: Complexes, radar: Radar, map: RangeDoppler) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
     """Return by how many spans the strongest echo of each cell is folded, and whether another fold explains the cell as
-    well (v, r): of equal ones the slowest is taken."""
+    well (v, r): of equal ones that of the echo on whose slope the cell is, or the slowest."""
+    level, power = least_power(map, len(radar.virtual_elements)), squared(channels).mean(axis=(0, 1))
+    at = np.argwhere(power > level)
+    beams, tried = Beams.of(radar), np.array(fold_range(radar.slots))
+    chosen, alike = np.zeros(len(at), np.int64), np.zeros((len(tried), len(at)), bool)
+    noise = noise_of(map) * len(beams.places)
+    for some in np.array_split(np.arange(len(at)), max(1, len(at) * len(beams.at) // _BATCH)):
+        cells = channels[:, :, *at[some].T]
+        held = [under(cells, h, radar).reshape(len(beams.places), -1) for h in tried]
+        total = len(beams.places) * squared(cells).sum(axis=(0, 1))
+        explained, clear = _explained(beams, held, total, noise, channels.shape[0] * channels.shape[1])
+        chosen[some], alike[:, some] = _judged(explained, clear)
     fold, open_ = np.zeros(map.power.shape, np.int8), np.zeros(map.power.shape, bool)
-    level = least_power(map, len(radar.virtual_elements))
-    at = np.argwhere((np.abs(channels) ** 2).mean(axis=(0, 1)) > level)
-    beams, tried = _Beams.of(radar), fold_range(radar.slots)
-    clear = CLEAR * noise_of(map) * len(beams.places)
-    for some in np.array_split(at, max(1, len(at) * len(beams.at) // _BATCH)):
-        held = channels[:, :, some[:, 0], some[:, 1]]
-        power = beams.strongest([under(held, h, radar).reshape(len(beams.places), -1) for h in tried], clear)
-        top, chosen = power[0], np.zeros(len(some), np.int64)
-        for k in range(1, len(tried)):
-            # Folds are tried from the slowest rate on.
-            better = power[k] > top + np.clip(clear, _ALIKE * power[k], _SURE * power[k])
-            top, chosen = np.where(better, power[k], top), np.where(better, k, chosen)
-        alike = power >= top - np.maximum(clear, _ALIKE * top)
-        rows, columns = some.T
-        fold[rows, columns], open_[rows, columns] = np.array(tried)[chosen], alike.sum(axis=0) > 1
+    rows, columns = at.T
+    fold[rows, columns] = tried[_uphill(power, at, chosen, alike)]
+    open_[rows, columns] = alike.sum(axis=0) > 1
     return fold, open_
 
 
-@dataclass(frozen=True, eq=False)
-class _Beams:
-    """Beams of the virtual array over the half space ahead."""
+def _uphill(power: Floats, at: Ints, chosen: Ints, alike: NDArray[np.bool_]) -> Ints:
+    """Return the hypotheses (c,) of cells (c, 2) of a map of power (v, r) after those on a slope take that of the
+    strongest cell next to them, where it is as likely (h, c) as the one chosen for them: the slopes of an echo are its
+    own, and do not peak under another fold. Over the end of the rates nothing is taken."""
+    index = np.full((power.shape[0] + 2, power.shape[1]), -1)
+    index[at[:, 0] + 1, at[:, 1]] = np.arange(len(at))
+    top, above = power[tuple(at.T)], np.arange(len(at))
+    for down, along in AROUND:
+        near = index[at[:, 0] + 1 + down, (at[:, 1] + along) % power.shape[1]]
+        level = np.where(near >= 0, power[tuple(at[near].T)], 0.0)
+        above, top = np.where(level > top, near, above), np.maximum(level, top)
+    several = alike.sum(axis=0) > 1
+    for _ in range(_UPHILL):
+        taken = several & alike[chosen[above], np.arange(len(at))]
+        chosen = np.where(taken, chosen[above], chosen)
+    return chosen
 
-    array: Aperture
-    """All virtual elements."""
-    places: Floats
-    """(t * a, 3) [wavelengths] of the same."""
-    at: Floats
-    """Cosines (b, 2) of the beams along y and z."""
-    step: Floats
-    """Distance (2,) of neighbours; 0 along an axis of one."""
 
-    @classmethod
-    def of(cls, radar: Radar) -> _Beams:
-        """Return the beams of a radar."""
-        array = Aperture(radar.virtual_elements, C0 / radar.waveform.middle)
-        places = array.elements / array.wavelength
-        counts = np.ceil(_PER_BEAM * np.ptp(places[:, 1:], axis=0)).astype(int)
-        y, z = (np.linspace(-1.0, 1.0, 2 * n + 1) if n else np.zeros(1) for n in counts)
-        at = np.stack([x.ravel() for x in np.meshgrid(y, z)], axis=1)
-        return cls(array, places, at[(at**2).sum(axis=1) <= 1.0], np.where(counts, 1.0 / np.maximum(counts, 1), 0.0))
+def _judged(power: Floats, clear: Floats) -> tuple[Ints, NDArray[np.bool_]]:
+    """Return which hypothesis (c,) is taken, and which (h, c) are as likely, by the powers (h, c) that they explain.
 
-    def weights(self, at: Floats) -> Complexes:
-        """Return the weights (..., t * a) of beams towards cosines (..., 2)."""
-        ahead = np.sqrt(np.maximum(1.0 - (at**2).sum(axis=-1, keepdims=True), 0.0))
-        turns = np.concatenate([ahead, at], axis=-1) @ self.places.T
-        return np.exp(-2j * np.pi * turns).astype(np.complex64)
+    Args: clear (c,) [same unit], powers nearer than this are alike. Hypotheses are in order of the rate."""
+    top, chosen = power[0], np.zeros(power.shape[1], np.int64)
+    for k in range(1, len(power)):
+        # Folds are tried from the slowest rate on.
+        better = power[k] > top + np.clip(clear, _ALIKE * power[k], _SURE * power[k])
+        top, chosen = np.where(better, power[k], top), np.where(better, k, chosen)
+    return chosen, power >= top - np.maximum(clear, _ALIKE * top)
 
-    def strongest(self, held: list[Complexes], clear: float) -> Floats:
-        """Return the power (h, c) of the strongest beam under each hypothesis, from what cells hold under it
-        (t * a, c). Refined are those that may be the strongest or as strong as it, of cells that are not weak."""
-        weights, cells = self.weights(self.at), np.arange(held[0].shape[1])
-        best, power = np.zeros((2, len(held), len(cells)))
-        beam = best.astype(np.int64)
-        for k, values in enumerate(held):
-            level = _squared(weights @ values)
-            beam[k] = level.argmax(axis=0)
-            power[k] = level[beam[k], cells]
+
+def _explained(beams: Beams, held: list[Complexes], total: Floats, noise: float, many: int) -> tuple[Floats, Floats]:
+    """Return the power (h, c) that beams explain under each hypothesis, and what powers differ by that are alike (c,).
+
+    One beam, or in cells where it leaves more than noise, up to _MOST. Where these do under all hypotheses, echoes are
+    folded differently: the strongest beam decides, and where several together favour another fold, both are alike.
+    Args: held, values (t * a, c) under each; total (c,), power of so many channels, on the scale of a beam; noise of a
+    beam."""
+    clear, cells = CLEAR * noise, np.arange(len(total))
+    power, at = beams.strongest(held, clear)
+    one, places = power.copy(), [x[:, None] for x in at]
+    usual = np.maximum(noise * (many + _SPREAD * np.sqrt(many)), _ALIKE * total)
+    for _ in range(1, min(_MOST, len(beams.places) // 2)):
         top = power.max(axis=0)
-        near = power >= _LEFT * top
-        near &= (near.sum(axis=0) > 1) & (clear < _WEAK * top)
+        more = np.flatnonzero((total - top > usual) & (clear < WEAK * top))
+        if not len(more):
+            break
         for k, values in enumerate(held):
-            some = np.flatnonzero(near[k])
-            power[k, some] = self._refined(values[:, some].T, self.at[beam[k, some]], power[k, some])
-        return np.asarray(power)
-
-    def _refined(self, values: Complexes, at: Floats, power: Floats) -> Floats:
-        """Return the power (c,) of the peaks next to beams towards cosines (c, 2), in cells that hold (c, t * a)."""
-
-        def of(towards: Floats) -> Floats:
-            return _squared((self.weights(towards) * values).sum(axis=1))
-
-        step = self.step
-        for _ in range(_SHRINKS if len(at) else 0):
-            for axis in np.flatnonzero(step):
-                aside = step * (np.arange(2) == axis)
-                below, above = of(at - aside), of(at + aside)
-                bend = below - 2.0 * power + above
-                shift = np.divide(0.5 * (below - above), bend, out=np.sign(above - below), where=bend < 0.0)
-                tried = self.array.visible(at + np.clip(shift, -1.0, 1.0)[:, None] * aside)
-                value = of(tried)
-                better = value > power
-                at, power = np.where(better[:, None], tried, at), np.where(better, value, power)
-            step = 0.5 * step
-        return power
-
-
-def _squared(wave: Any) -> Floats:
-    return np.asarray(wave.real.astype(np.float64) ** 2 + wave.imag.astype(np.float64) ** 2)
+            before, places[k] = places[k], np.concatenate([places[k], places[k][:, -1:]], axis=1)
+            together, places[k][more] = beams.together(values[:, more].T, before[more])
+            power[k, more] = np.maximum(power[k, more], together)
+    unlike = total - power.max(axis=0) > usual
+    doubt = one.max(axis=0) - one[power.argmax(axis=0), cells]
+    return np.where(unlike, one, power), np.where(unlike, np.maximum(doubt, clear), clear)
