@@ -13,7 +13,7 @@ from raychan.processing.angles import CellEchoes, Scan, echoes_in
 from raychan.processing.cfar import Grid
 from raychan.processing.line_lobes import LineLobes
 from raychan.processing.main_lobe import PeakShape
-from raychan.processing.peaks import MARGIN, SideLobes
+from raychan.processing.peaks import MARGIN, SideLobes, together
 from raychan.processing.staggered import ResolvedMap
 from raychan.records import RangeDoppler
 
@@ -136,21 +136,22 @@ class Splitter:
         at = np.array([row.cell + row.shift for row in kept]) / pad
         smear = peaks.smear[[row.peak for row in kept]]
         powers = np.array([row.power for row in kept])
-        shown, rest = MARGIN * self.lobes.at(place, at, powers, smear), 0.0
+        shown, rest = self.lobes.at(place, at, powers, smear), 0.0
         if self.lobes.mirrors:
             # A mirror image is no plane wave to several transmitters: it counts as if all beams let it through.
             rest = MARGIN * float(self.lobes.of_images(place, at, powers, smear).sum())
-        if beams is None or power > rest + shown.sum():
-            return bool(power > rest + shown.sum())
+        most = rest + float(together(np.sort(shown)[::-1]))
+        if beams is None or power > most:
+            return bool(power > most)
         # Echoes that all beams let through would matter little: they count as if they did.
-        some = [kept[k] for k in np.flatnonzero(shown > _LITTLE * power)]
-        rest += float(shown[shown <= _LITTLE * power].sum())
+        much = shown > _LITTLE * power
+        some, rest = [kept[k] for k in np.flatnonzero(much)], rest + MARGIN * float(shown[~much].sum())
         distances = self.map.range[[row.cell[1] for row in some]]
         through = self.scan.through(beams(), np.array([row.direction for row in some]).reshape(-1, 2), distances)
         through = np.maximum(through, [row.misfit for row in some])
         # Under another fold an echo is no plane wave.
         through[[self._folded_otherwise(row.cell, cell) for row in some]] = 1.0
-        return bool(power > rest + float(shown[shown > _LITTLE * power] @ through))
+        return bool(power > rest + float(together(np.sort(shown[much] * through)[::-1])))
 
     def _folded_otherwise(self, one: Ints, other: Ints) -> bool:
         """Return whether two map cells (2,) are held to be folded differently; over the end of the rates by one more or

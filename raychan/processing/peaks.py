@@ -17,6 +17,10 @@ Ints = NDArray[np.int64]
 
 MARGIN = 2.0
 """Side lobes of two equal echoes add in voltage: twice the sum of their powers."""
+SUMMED = 3
+"""Side lobes that may all be in phase, the strongest. Windows hamming and taylor(45), echoes of 60 dB within 1 dB in a
+range cell: of 240 scenes each of three, four and six 28, 47 and 34 show a sum as a detection with 2, none, 8 and none
+with 3, none at all with 4; of 240 echoes 25 to 40 dB below four others 5, 7 and 18 are lost."""
 _FLOOR = 1e-12  # of a peak: rounding errors of single precision and of the fast sum are below
 _SLACK = 0.25  # resolution cells by which side lobes of other echoes may shift a peak (not measured)
 AROUND = [(v, r) for v in (-1, 0, 1) for r in (-1, 0, 1) if v or r]
@@ -30,6 +34,12 @@ def maxima(power: Floats, least: float) -> Ints:
         near = (cells + step) % power.shape
         cells = cells[power[tuple(cells.T)] >= power[tuple(near.T)]]
     return cells
+
+
+def together(lobes: Floats) -> Any:
+    """Return the power that side lobes of powers (k, ...), strongest first, are at most held to show together."""
+    loud, rest = np.sqrt(lobes[:SUMMED]).sum(axis=0) ** 2, MARGIN * lobes[SUMMED:].sum(axis=0)
+    return np.maximum(MARGIN * lobes.sum(axis=0), loud + rest)
 
 
 class SideLobes:
@@ -96,14 +106,18 @@ class SideLobes:
         Args: place (n, 2) and smear (n,) in resolution cells; power (n,) [W] between the cells of the map; shown (n,)
         [W] in them, if that is another: a side lobe between cells is not stronger by what a main lobe would be;
         besides, what else a peak must meet to count, by its row."""
-        lobes, shown = np.zeros(len(power)), power if shown is None else shown
+        # The strongest side lobes, and all others.
+        lobes, shown = np.zeros((SUMMED + 1, len(power))), power if shown is None else shown
         kept = np.zeros(len(power), bool)
         for i in range(len(power)):
-            kept[i] = shown[i] > MARGIN * lobes[i] and besides(i)
-            if kept[i]:
-                lobes[i:] += self.at(place[i:], place[i], power[i], smear[i])
-                if self.mirrors:
-                    lobes[i:] += self.of_images(place[i:], place[i], power[i], smear[i])
+            kept[i] = shown[i] > together(lobes[:, i]) and besides(i)
+            for f in (self.at, self.of_images)[: 1 + self.mirrors] if kept[i] else ():
+                more = f(place[i:], place[i], power[i], smear[i])
+                for level in lobes[:SUMMED, i:]:
+                    less = np.minimum(level, more)
+                    np.maximum(level, more, out=level)
+                    more = less
+                lobes[SUMMED, i:] += more
         return kept
 
     def shoulders(self, power: Floats, pad: tuple[int, int], peaks: Ints, cells: Ints) -> tuple[Ints, Floats]:
