@@ -180,6 +180,7 @@ def test_any_radar_sees_a_car_over_the_ground_as_in_a_fine_run_or_nothing(key):
     ground = rc.Body("ground", shape="ground")
     seen = rc.simulate(rc.Scene(bodies=[ground, car], radar=radar, model={"mode": "preview"}))
     assert len(seen.paths.length) > 500 and "car" in seen.provenance[0].bodies + seen.provenance[-1].bodies
-    check(rc.simulate(rc.Scene(bodies=[ground, car], radar=radar, model={"max_bounces": 3, "tolerance_db": 3.0})), seen)
+    # At 3 dB an echo 50 dB below the strongest is taken for a direct one of a door; at 1 dB it is none.
+    check(rc.simulate(rc.Scene(bodies=[ground, car], radar=radar, model={"max_bounces": 3, "tolerance_db": 1.0})), seen)
     empty = rc.simulate(rc.Scene(bodies=[], radar=radar, model={"mode": "preview"}))
     assert len(empty.paths.length) == ("rx_position" in key)
