@@ -71,7 +71,7 @@ class Beams:
             power[k, some], at[k, some] = self._refined(values[:, some].T, at[k, some], power[k, some])
         return power, at
 
-    def together(self, values: Complexes, at: Floats) -> tuple[Floats, Floats]:
+    def fitted_together(self, values: Complexes, at: Floats) -> tuple[Floats, Floats]:
         """Return the power (c,) that beams towards cosines (c, k, 2) and one more explain together, by the scale of
         one beam, and the cosines (c, k + 1, 2): each is by turns refined on what the others leave.
 

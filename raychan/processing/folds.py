@@ -115,8 +115,8 @@ def _explained(beams: Beams, held: list[Complexes], total: Floats, noise: float,
             break
         for k, values in enumerate(held):
             before, places[k] = places[k], np.concatenate([places[k], places[k][:, -1:]], axis=1)
-            together, places[k][more] = beams.together(values[:, more].T, before[more])
-            power[k, more] = np.maximum(power[k, more], together)
+            both, places[k][more] = beams.fitted_together(values[:, more].T, before[more])
+            power[k, more] = np.maximum(power[k, more], both)
     unlike = total - power.max(axis=0) > usual
     doubt = one.max(axis=0) - one[power.argmax(axis=0), cells]
     return np.where(unlike, one, power), np.where(unlike, np.maximum(doubt, clear), clear)

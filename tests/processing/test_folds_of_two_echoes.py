@@ -67,7 +67,7 @@ def test_two_beams_explain_two_plane_waves_and_one_does_not():
     cosines = np.array([[-0.1, 0.0], [0.1, 0.0]])
     values = np.array([[1.0, 0.8j], [1.0, -0.5]]) @ beams.weights(cosines).conj()
     one, at = beams.strongest([values.T.astype(np.complex64)] * 2, 0.0)
-    two, directions = beams.together(values, at[0][:, None])
+    two, directions = beams.fitted_together(values, at[0][:, None])
     total = len(beams.places) * squared(values).sum(axis=1)
     assert (one[0] < 0.9 * total).all()
     assert two == pytest.approx(total, rel=1e-3)
