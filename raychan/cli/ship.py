@@ -94,8 +94,10 @@ def _pictures(scene: ShipScene, log: ShipLog, stage: Path, tell: Any) -> list[st
 
 def _tell(found: dict[str, Any]) -> None:
     from raychan.run.ship_files import rounded_heading
+    from raychan.run.ship_places import lost_lines
 
     screen = show.console()
+    show.warn(lost_lines(found["lost_in"], found["scans"]))
     rows = [
         (name, f"{count:,}", f"{found['nearest_m'].get(name, float('nan')):.2f}".replace("nan", ""))
         for name, count in found["echoes"].items()

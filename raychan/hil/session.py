@@ -25,6 +25,7 @@ from raychan.hil.pacing import Schedule, run_first
 from raychan.hil.scans import ScanValues
 from raychan.hil.telegrams import Telegram, TelegramReader
 from raychan.run.ship_loop import Frame
+from raychan.run.ship_places import LostScans
 
 SCANNER, POSITION, HEADING, ATTITUDE = "scanner", "position", "heading", "attitude"
 CHANNELS = (SCANNER, POSITION, HEADING, ATTITUDE)
@@ -79,6 +80,7 @@ class Session:
 
     def __post_init__(self) -> None:
         self.commands = TelegramReader(LONGEST_COMMAND)
+        self.lost = LostScans()
         self.orders = {name: OrderReader() for name in CHANNELS if name != SCANNER}
         self._whole = self._older = self._newer = self.loop.step_scan()
         fan, baud = self.loop.scene.scanner, self.channels[SCANNER].line.baud
@@ -145,6 +147,7 @@ class Session:
         began = time.monotonic()
         try:
             self._older, self._newer = self._newer, self.loop.step_scan()
+            self.lost.add(self._newer.lost_in, self._newer.time)
         except (ValueError, OverflowError) as error:
             self._give_back(error)
             return

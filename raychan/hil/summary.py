@@ -7,6 +7,7 @@ from typing import Any
 from raychan.hil.channel import Channel
 from raychan.hil.pacing import Timing
 from raychan.hil.session import SCANNER, Session
+from raychan.run.ship_places import lost_lines
 
 _KEPT_UP = 10
 """Scans that a loop may owe at the end without a warning; a pause of the machine takes some."""
@@ -32,6 +33,7 @@ def summary(session: Session) -> dict[str, Any]:
             "behind_at_end": max(0, session.behind - 1),
             "longest_step_ms": round(1e3 * session.longest_step, 3),
             "realtime": session.first,
+            "lost_in": session.lost.summary,
         },
         "sentences": _timing(session.cycles.timing()),
         "channels": {name: _channel(channel) for name, channel in session.channels.items()},
@@ -76,10 +78,11 @@ def _kept(channels: dict[str, Any]) -> str:
 
 def warnings(numbers: dict[str, Any]) -> list[str]:
     """Return what is wrong with a run as a whole."""
-    behind = numbers["scans"]["behind_at_end"]
-    if behind < _KEPT_UP:
-        return []
-    return [f"the ship is {behind} scans behind its clock at the end: the scene is too slow for real time here"]
+    scans = numbers["scans"]
+    said, behind = lost_lines(scans["lost_in"], scans["ticks"]), scans["behind_at_end"]
+    if behind >= _KEPT_UP:
+        said.append(f"the ship is {behind} scans behind its clock at the end: the scene is too slow for real time here")
+    return said
 
 
 def _channel(channel: Channel) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from raychan.run.netcdf import CONVENTIONS
 from raychan.run.output_files import write_whole
 from raychan.run.sheltered_file import ShelteredFile
 from raychan.run.ship_loop import Frame, ShipLoop, hit_points
+from raychan.run.ship_places import LostScans
 from raychan.run.ship_scene import ShipScene
 from raychan.run.storage import versions
 from raychan.sensors.laser import NO_BODY, SEA, Ints
@@ -73,6 +74,7 @@ class Voyage:
         self._echoes = np.zeros(len(scene.names) + 2, int)  # SEA and NO_BODY count from the end
         self._nearest = np.full(len(scene.names) + 2, np.inf)
         self._roll = [np.inf, -np.inf]
+        self._lost = LostScans()
         self._last: Frame | None = None
         self._optional = () if scene.poses is None else scene.poses.optional
 
@@ -147,6 +149,7 @@ class Voyage:
             np.add.at(self._echoes, met.body[echo], 1)
             np.minimum.at(self._nearest, met.body[echo], met.range[echo])
         self._roll = [min(self._roll[0], angles[1]), max(self._roll[1], angles[1])]
+        self._lost.add(frame.lost_in, frame.time)
         if self._k % self._stride == 0:
             hits = hit_points(self._scene.scanner, frame.beams, met)
             self._log.append((row, float(np.degrees(frame.heading_wanted)), met.range, met.body, hits, met.body[echo]))
@@ -191,6 +194,7 @@ class Voyage:
             "beams": self._scene.scanner.count,
             "echoes": {name: int(self._echoes[i]) for i, name in names.items()},
             "nearest_m": {name: float(self._nearest[i]) for i, name in names.items() if self._echoes[i]},
+            "lost_in": self._lost.summary,
             "roll_deg": {"least": self._roll[0], "most": self._roll[1]},
             "end": {"x_m": last.x, "y_m": last.y, "heading_deg": float(np.degrees(last.heading))},
             "seconds": took,

@@ -10,6 +10,7 @@ from raychan.dynamics.ship import DELTA, PHI, PSI, Array, N, P, R, U, V
 from raychan.poses import rotation
 from raychan.run.ship_bodies import ShipBodies
 from raychan.run.ship_bridge import Steered, hermite, pose_and_rates
+from raychan.run.ship_places import lost_in
 from raychan.run.ship_scene import ShipScene
 from raychan.run.ship_schema import WavesTable
 from raychan.sensors.laser import NO_BODY, LaserScan, Scanner, SensorPoses, noisy, scan
@@ -27,7 +28,7 @@ class Frame:
     [rad] positive with starboard down, pitch [rad] positive with the bow down; roll_rate, yaw_rate [rad/s], yaw to
     starboard; rudder, rudder_order [rad]; shaft [rev/s]; speed [m/s] through the water; heading_wanted [rad];
     rudder_sign, to which side a positive rudder turns the ship: 1 starboard, -1 port; `beams` the poses of the
-    scanner when each beam left.
+    scanner when each beam left; `lost_in`, where the scanner is if it cannot be there (see `ship_places.lost_in`).
     """
 
     time: float
@@ -47,6 +48,7 @@ class Frame:
     rudder_sign: int
     scan: LaserScan
     beams: SensorPoses
+    lost_in: str
 
     @property
     def north(self) -> float:
@@ -176,6 +178,7 @@ class ShipLoop:
             scan=met,
             rudder_sign=self.rudder_sign,
             beams=beams,
+            lost_in=lost_in(beams.position[0], start, self.scene.bodies.bodies, swell),
         )
 
     def _sailed(self, ship: Steered) -> Array:

@@ -71,7 +71,40 @@ def test_settings_of_files_beside_a_mesh_in_metres_are_told():
 
 @pytest.mark.parametrize("name", ["pec", "concrete", "asphalt", "car_glass"])
 def test_a_material_that_redefines_a_built_in_one_is_told(name):
-    said = f"materials.{name}: redefines the built-in material of that name"
+    said = f"materials.{name}: redefines the built-in material of that name, of which nothing is kept"
     assert said in rc.Scene.from_text(PLATE.replace("[radar]", f"[materials.{name}]\neps_r = 3\n[radar]")).warnings
     own = rc.Scene.from_text(PLATE.replace("[radar]", "[materials.my_pec]\neps_r = 3\n[radar]"))
     assert not any("redefines" in line for line in own.warnings)
+
+
+@pytest.mark.parametrize("keys", ["thickness_mm = 4.0", "roughness_mm = 1.0", "eps_r = 1.0"])
+def test_a_material_of_air_is_told(keys):
+    told = rc.Scene.from_text(PLATE.replace("[radar]", f"[materials.glass]\n{keys}\n[radar]")).warnings
+    assert "materials.glass: eps_r = 1 and sigma = 0 are those of air, which reflects nothing" in told
+
+
+@pytest.mark.parametrize("keys", ["pec = true", "sigma = 1.0", "diffuse = { law = 'gamma', level_db = -20.0 }"])
+def test_a_material_that_returns_waves_is_not_told_as_air(keys):
+    told = rc.Scene.from_text(PLATE.replace("[radar]", f"[materials.own]\n{keys}\n[radar]")).warnings
+    assert not any("air" in line for line in told)
+
+
+def panes(material, shape="plate", **keys):
+    body = rc.Body(name="g", shape=shape, position=(5.0, 0.0, 0.5), material=material, **keys)
+    return [line for line in rc.Scene(bodies=[body]).warnings if "half space" in line]
+
+
+def test_a_plate_of_a_dielectric_without_thickness_is_told():
+    assert panes("glass") == [
+        "bodies.g: of glass, which has no thickness: a half space, through which nothing passes (a pane is of "
+        "car_glass or windscreen, or of a material with thickness_mm)"
+    ]
+    assert len(panes(rc.Material(eps_r=4.0))) == 1
+
+
+@pytest.mark.parametrize(
+    "material", [None, "pec", "metal", "car_glass", "windscreen", rc.Material(2.3, thickness=2e-3)]
+)
+def test_plates_of_metal_and_panes_are_silent(material):
+    assert panes(material) == []
+    assert panes("glass", "box") == panes("glass", rcs_dbsm=10.0) == []
