@@ -84,7 +84,7 @@ def _drawing(source: Path, range: float | None, speed: float | None, detection: 
     if source.is_dir() or source.suffix == ".nc":
         result = load_result(source)
         if result.scene is None:
-            why = "a mesh or antenna file has moved, or the scene was made in Python"
+            why = "a mesh or antenna file has moved, or the scene holds a mesh or an antenna that only Python has"
             raise StoreError(f"{source}: its scene cannot be read again ({why})")
         try:
             cell = explain(result, range, speed, detection=detection) if wanted else None

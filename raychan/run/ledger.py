@@ -10,12 +10,15 @@ from typing import Any
 UNKNOWN = "unknown"
 NOTHING = "none"
 """Level of an effect that the scene does not have, or that is modelled."""
+SEEN = "seen"
+"""Kind of an effect that is there, of unknown level."""
 
 
 @dataclass(frozen=True)
 class Entry:
     """One effect: `level_db` [dB] against the weakest detection, 'unknown' where there is no estimate, 'none' where
-    there is no effect; `kind` 'estimate', 'bound', 'exact' or 'none'; `how` it was found."""
+    there is no effect; `kind` 'estimate', 'bound', 'exact', 'seen' where the effect is there, of unknown level, or
+    'none'; `how` it was found."""
 
     level_db: float | str
     kind: str

@@ -12,7 +12,7 @@ import numpy as np
 from raychan.processing.staggered import ResolvedMap
 from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
-from raychan.run.ledger import Entry
+from raychan.run.ledger import SEEN, Entry
 from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses, range_spread
 from raychan.run.result import ExplainedDetections, Result
 from raychan.tracing.stats import Stats
@@ -129,6 +129,7 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
         said.append(f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{worst}")
     if above := _listed(ledger, _LEAST_DB, math.inf):
         said.append(f"left out, above the weakest detection: {above} (see left_out in summary.json of raychan run)")
+    said += [f"left out, of unknown level: {name}: {e.how}" for name, e in ledger.items() if e.kind == SEEN]
     # What adds in phase to the weakest detection moves it by so much.
     moves_db = 20.0 * math.log10(10.0 ** (tolerance_db / 20.0) - 1.0) if tolerance_db < math.inf else math.inf
     if n and (below := _listed(ledger, moves_db, _LEAST_DB)):

@@ -207,11 +207,19 @@ def _attrs(result: Result) -> dict[str, Any]:
         "source": f"raychan {versions()['raychan']}, ray-traced radar channel simulation",
         "comment": "SI; x forward, y left, z up; exp(+jwt); range rate positive = receding; NAME_re + j NAME_im",
         "seed": result.seed,
-        "scene": result.text,
+        "scene": result.text or _written(result.scene),
         "scene_path": result.path,
         "versions": json.dumps(versions()),
     }
     return attrs | {name: json.dumps(_plain(getattr(result, name))) for name in _JSON}
+
+
+def _written(scene: Any) -> str:
+    """Return a scene made in Python as the text of a file; empty where no file can hold it."""
+    try:
+        return "" if scene is None else str(scene.to_toml())
+    except ValueError:
+        return ""
 
 
 def _plain(value: Any) -> Any:

@@ -14,7 +14,8 @@ from raychan.parallel import parallel_map
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
 from raychan.run.clutter import laws_of, scatters_diffusely
-from raychan.run.ledger import NOTHING, UNKNOWN, Entry
+from raychan.run.coming_back import coming_back
+from raychan.run.ledger import NOTHING, SEEN, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, layers_at_once, peak
 from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import coarsest, strongest_bend
@@ -46,7 +47,7 @@ def ledger(
         return {name: Entry(UNKNOWN, "none", why) for name in _NAMES}
     # Those that take longest first: at the end threads wait for the last one.
     entries: dict[str, Callable[[], Entry]] = {
-        "further bounces": lambda: _further(paths, radar, settings, model.max_bounces, weakest),
+        "further bounces": lambda: _further(paths, geometry, radar, settings, model.max_bounces, weakest),
         "transmission": lambda: _transmission(paths, geometry.facets, radar, settings, model, weakest),
         "diffraction to point targets": lambda: _around(geometry, points, radar, settings, model, weakest),
         "diffuse scattering": lambda: _diffuse(geometry, radar, model, weakest),
@@ -92,12 +93,23 @@ _MONOSTATIC = (
 """Effects whose estimates take the way back to be the way out."""
 
 
-def _further(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
-    """Return the entry of further bounces, extrapolated by the ratio of the last two orders."""
+def _further(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
+    """Return the entry of further bounces, extrapolated by the ratio of the last two orders; where that tells of
+    nothing above the weakest detection, but waves come back just then, of unknown level."""
+    found = _by_ratio(paths, radar, settings, bounces, weakest)
+    if isinstance(found.level_db, float) and found.level_db > 0.0:
+        return found
+    over = coming_back(paths, geometry, bounces)
+    how = f"waves over {' > '.join(over)} come back by {bounces + 1} interactions (model.max_bounces)"
+    return Entry(UNKNOWN, SEEN, how) if over else found
+
+
+def _by_ratio(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
     met = interactions(paths)
     last, before = (peak(paths, met == n, radar, settings) for n in (bounces, bounces - 1))
     if last == 0.0 or before == 0.0:
-        return Entry(UNKNOWN, "none", f"no path has {bounces} interactions: nothing to extrapolate from")
+        few = f"no path has {bounces} interactions" if bounces > 1 else "one bounce is modelled"
+        return Entry(UNKNOWN, "none", f"{few}: nothing to extrapolate from")
     ratio = min(last / before, 1.0)
     how = f"strongest cell of {bounces} interactions ({db(last / weakest):.0f} dB) times its ratio to {bounces - 1}"
     return Entry(float(db(last * ratio / weakest)), "estimate", how)

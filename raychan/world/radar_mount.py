@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -128,8 +129,8 @@ def antenna_table(given: str | AntennaTable, folder: Path, key: str, file: Any =
     """
     if isinstance(given, AntennaTable):
         return given, file
-    if "\0" in given:
-        allowed = "a name without a zero byte"
+    if "\0" in given or not given:
+        allowed = "a name without a zero byte" if given else "a table, or the name of a TOML file"
         raise SceneError(f"{shown(given)} is not possible", file=file, key=key, value=given, allowed=allowed)
     path = bundled.found(given, folder)
     try:
@@ -137,7 +138,7 @@ def antenna_table(given: str | AntennaTable, folder: Path, key: str, file: Any =
     except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
         # Beside a scene lie scenes; by custom the antennas have a folder of their own.
         beside = (folder / "antennas" if path.parent == folder else path.parent).glob("*.toml")
-        found = [p.relative_to(folder).as_posix() for p in beside] + bundled.antenna_names()
+        found = [Path(os.path.relpath(p, folder)).as_posix() for p in beside] + bundled.antenna_names()
         named = [name for name in found if Path(name).stem == Path(given).stem]
         allowed = (
             nearest(named[0] if named else given, found)

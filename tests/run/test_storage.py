@@ -43,6 +43,19 @@ def test_what_is_stored_comes_back_bit_for_bit(made, tmp_path):
         assert getattr(back, name) == getattr(made, name), name
 
 
+def test_a_scene_made_in_python_comes_back_where_a_file_can_hold_it(made, tmp_path):
+    ball = rc.Body(name="ball", shape="sphere", position=(5.0, 0.0, 0.5))
+    wave = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
+    scene = rc.Scene(bodies=[ball], radar=rc.Radar(waveform=wave))
+    save_result(dataclasses.replace(made, scene=scene, text=""), tmp_path / "file")
+    back = load_result(tmp_path / "file")
+    assert [b.name for b in back.scene.bodies] == ["ball"] and list(back.scene.bodies[0].position) == [5.0, 0.0, 0.5]
+    own = rc.Body(name="own", mesh=ball.geometry, position=(5.0, 0.0, 0.5), material="pec")
+    scene = rc.Scene(bodies=[own], radar=rc.Radar(waveform=wave))
+    save_result(dataclasses.replace(made, scene=scene, text=""), tmp_path / "memory")
+    assert load_result(tmp_path / "memory").scene is None
+
+
 def test_a_result_without_paths_or_detections_is_stored_too(tmp_path):
     save_result(result(paths([], [], [], []), []), tmp_path)
     back = load_result(tmp_path / "result.nc")

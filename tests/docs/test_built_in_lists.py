@@ -1,11 +1,12 @@
-"""The list of built-in shapes in docs/scene_files.md is the one that the shapes' signatures make.
+"""The lists of built-in shapes and materials in docs/scene_files.md are those that the program makes.
 
-`python tests/docs/test_shape_parameters.py` prints it.
+`python tests/docs/test_built_in_lists.py` prints them.
 """
 
 import inspect
 from pathlib import Path
 
+from raychan.world.material import material, names
 from raychan.world.shapes import SHAPES
 
 TEXT = Path(__file__).parents[2] / "docs" / "scene_files.md"
@@ -35,9 +36,24 @@ def parameters():
     return "\n".join(rows) + "\n"
 
 
+def materials():
+    """Return the list, a line a material."""
+    rows = ["| material | eps_r | sigma [S/m] | thickness | source |", "| --- | --- | --- | --- | --- |"]
+    for made in (material(name, 77e9) for name in names()):
+        thick = "" if made.thickness is None else f"{1e3 * made.thickness:g} mm"
+        eps, sigma = ("", "") if made.pec else (f"{made.eps_r:.3g}", f"{made.sigma:.3g}")
+        rough = f"; roughness {1e3 * made.roughness:g} mm" if made.roughness else ""
+        rows.append(f"| `{made.name}` | {eps} | {sigma} | {thick} | {made.source}{rough} |")
+    return "\n".join(rows) + "\n"
+
+
+def test_the_list_of_materials_is_that_of_the_program():
+    assert materials() in TEXT.read_text(encoding="utf-8")
+
+
 def test_the_list_of_shapes_and_their_parameters_is_that_of_the_program():
     assert parameters() in TEXT.read_text(encoding="utf-8")
 
 
 if __name__ == "__main__":
-    print(parameters(), end="")
+    print(parameters(), materials(), sep="\n", end="")

@@ -1,0 +1,41 @@
+"""Waves that a limit on bounces ends just before they come back are told, as no ratio of what was traced tells them."""
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.run.ledger import SEEN
+
+
+def run(shape, bounces, yaw=0.0, height=0.4, **params):
+    corner = rc.Body(name="corner", shape=shape, params=params, position=(8.0, 0.3, height), yaw_deg=180.0 + yaw)
+    ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.3}, position=(4.0, -0.3, 0.4))
+    wave = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
+    model = {"max_bounces": bounces, "tolerance_db": 1.0}
+    return rc.simulate(rc.Scene(bodies=[corner, ball], radar=rc.Radar(waveform=wave), model=model))
+
+
+def told(result):
+    return [line for line in result.warnings if "of unknown level" in line]
+
+
+@pytest.mark.parametrize("yaw", [-15.0, 0.0, 20.0])
+def test_a_trihedral_with_two_bounces_is_told_as_it_comes_back_by_three(yaw):
+    short, whole = run("trihedral", 2, yaw, size=0.12), run("trihedral", 3, yaw, size=0.12)
+    assert whole.detections.snr.max() > 35.0 and np.abs(whole.detections.range - 8.0).min() < 0.1
+    assert np.abs(short.detections.range - 8.0).min() > 1.0
+    assert short.ledger["further bounces"].kind == SEEN
+    assert told(short) == [
+        "left out, of unknown level: further bounces: waves over corner come back by 3 interactions (model.max_bounces)"
+    ]
+    assert told(whole) == []
+
+
+@pytest.mark.parametrize("bounces", [2, 3])
+def test_bodies_that_send_nothing_back_are_not_told(bounces):
+    assert told(run("box", bounces, 30.0)) == told(run("dihedral", bounces, size=0.2)) == []
+
+
+def test_a_dihedral_with_one_bounce_is_told_as_it_comes_back_by_two():
+    assert "over corner come back by 2 interactions" in told(run("dihedral", 1, height=0.5, size=0.2))[0]
+    assert told(run("plate", 1)) == told(run("sphere", 1)) == []
