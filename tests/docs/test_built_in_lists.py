@@ -27,12 +27,19 @@ def told(parameter):
     return f"`{name}` (by the other sizes)" if default is None else f"`{name} = {shown(default)}`"
 
 
+def standing(make):
+    """Return what a shape is and where its origin lies, as its docstring says."""
+    first, *rest = " ".join(inspect.getdoc(make).split()).split(". ")
+    origin = [f"; {text[0].lower()}{text[1:]}" for text in rest if text.startswith("Origin")]
+    return (first.removeprefix("Return ").rstrip(".") + "".join(origin)).rstrip(".")
+
+
 def parameters():
-    """Return the list, a line a shape: each parameter with its default."""
-    rows = ["| shape | `params` and their defaults |", "| --- | --- |"]
+    """Return the list, a line a shape: each parameter with its default, and how the shape stands."""
+    rows = ["| shape | `params` and their defaults | is |", "| --- | --- | --- |"]
     for name, make in SHAPES.items():
         known = inspect.signature(make).parameters.values()
-        rows.append(f"| `{name}` | {', '.join(map(told, known))} |")
+        rows.append(f"| `{name}` | {', '.join(map(told, known))} | {standing(make)} |")
     return "\n".join(rows) + "\n"
 
 
