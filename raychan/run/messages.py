@@ -124,9 +124,9 @@ def beside_echoes(reasons: Sequence[Explanation]) -> list[str]:
     rows = np.array([why.label == SIDELOBE for why in reasons], bool)
     if not rows.any():
         return []
-    plural = "s" if rows.sum() > 1 else ""
+    are = "are side lobes" if rows.sum() > 1 else "is a side lobe"
     return [
-        f"{_of(rows)} {_verb(rows)} side lobe{plural} of stronger echoes ({_numbers(rows)}), and nothing stands where "
+        f"{_of(rows)} {are} of stronger echoes ({_numbers(rows)}), and nothing stands where "
         "shown: noise covers most of them (radar.noise), windows of lower side lobes have fewer (processing)"
     ]
 
