@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing.cfar import Grid
-from raychan.radar.side_lobes import SideLobeEnvelope
+from raychan.radar.side_lobes import SideLobeEnvelope, migrating
 from raychan.radar.waveform import OwnWaveform, Waveform
 
 Floats = NDArray[np.float64]
@@ -23,6 +23,7 @@ range cell: of 240 scenes each of three, four and six 28, 47 and 34 show a sum a
 with 3, none at all with 4; of 240 echoes 25 to 40 dB below four others 5, 7 and 18 are lost."""
 _FLOOR = 1e-12  # of a peak: rounding errors of single precision and of the fast sum are below
 _SLACK = 0.25  # resolution cells by which side lobes of other echoes may shift a peak (not measured)
+_STEP = 0.5  # range cells of migration between envelopes: fewer of them, against a quarter as much of slack at most
 AROUND = [(v, r) for v in (-1, 0, 1) for r in (-1, 0, 1) if v or r]
 """Steps from a cell to the eight around it."""
 
@@ -52,17 +53,21 @@ class SideLobes:
         chirps: int | None = None,
         mirrors: bool = False,
         skew: float = 0.0,
+        migrating: bool = False,
     ) -> None:
         """Args: chirps that the window along rate weighs, where they are not the map's resolution cells but a multiple
         of them: by Doppler division a map has a share of the rates; mirrors, whether echoes have images at minus their
         range and minus their rate, as with real sampling, of which a map has half the ranges; skew, range cells by
-        which an echo lies lower in the next rate cell, as rows are freed of their own Doppler shifts."""
+        which an echo lies lower in the next rate cell, as rows are freed of their own Doppler shifts; migrating,
+        whether echoes that migrate have side lobes of their own, not those of standing ones moved apart."""
         rates, ranges = grid.count
         weighed = chirps if chirps and chirps % rates == 0 else rates
         samples = ranges * (2 if mirrors else 1)
         self.mirrors, self._period, self._skew = mirrors, (rates, samples), skew
         self._standing = (rates * grid.pad[0] // 2) / grid.pad[0]
         self._envelopes = SideLobeEnvelope(windows[0], weighed, weighed // rates), SideLobeEnvelope(windows[1], samples)
+        self._migrating = migrating
+        self._sizes = windows, (weighed, samples), weighed // rates
 
     @classmethod
     def of(cls, grid: Grid, windows: tuple[str, str], waveform: Waveform | None, chirps: int | None) -> SideLobes:
@@ -70,7 +75,7 @@ class SideLobes:
         if waveform is None or isinstance(waveform, OwnWaveform):
             return cls(grid, windows, chirps)
         skew = waveform.chirp_duration / waveform.frame_duration
-        return cls(grid, windows, chirps, not waveform.complex_sampling, skew)
+        return cls(grid, windows, chirps, not waveform.complex_sampling, skew, migrating=True)
 
     def at(self, places: Floats, place: Floats, power: Any, smear: Any) -> Floats:
         """Return what peaks at `place` show at `places`, (n, 2) or (2,) each, all in resolution cells, but for what
@@ -80,13 +85,25 @@ class SideLobes:
         cells."""
         off = places - place
         # Round the end of the rates, too, a row is freed of the shift of its own rate.
-        both = off[..., 0], off[..., 1] + self._skew * off[..., 0]
-        response = power
-        for away, envelope, period in zip(both, self._envelopes, self._period, strict=True):
-            away = np.abs(away) % period
-            away = np.minimum(away, period - away)
-            response = response * envelope(np.maximum(away - 0.5 * smear - _SLACK, 0.0))
-        return np.maximum(response, _FLOOR * power)
+        away = np.abs(np.stack([off[..., 0], off[..., 1] + self._skew * off[..., 0]], axis=-1)) % self._period
+        away = np.minimum(away, self._period - away)
+        smears = np.broadcast_to(smear, away.shape[:-1])
+        steps = np.rint(smears / _STEP) * self._migrating
+        away -= (0.5 * np.abs(smears - _STEP * steps) + _SLACK)[..., None]
+        response = np.zeros(steps.shape)
+        for step in np.unique(steps):
+            rows = steps == step
+            response[rows] = self._envelope(float(step) * _STEP, away[rows])
+        return np.maximum(power * response, _FLOOR * power)
+
+    def _envelope(self, moved: float, away: Floats) -> Floats:
+        """Return the side lobes (n,) at offsets (n, 2) of an echo that migrates over so many range cells."""
+        if not moved:
+            standing = [f(np.maximum(x, 0.0)) for f, x in zip(self._envelopes, away.T, strict=True)]
+            return np.asarray(standing[0] * standing[1])
+        windows, count, slots = self._sizes
+        envelope = migrating(windows, count, moved, slots)
+        return envelope(*np.maximum(away - envelope.off, 0.0).T)
 
     def of_images(self, places: Floats, place: Floats, power: Any, smear: Any) -> Floats:
         """Return what the mirror images of peaks show; args as for `at`."""

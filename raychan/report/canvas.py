@@ -26,7 +26,12 @@ STYLE: dict[Any, Any] = {
     "figure.facecolor": "white",
 }
 
-MARKS = {"direct": ("o", "#ffffff"), "multipath": ("^", "#ffd54a"), "clutter": ("X", "#ff8a80")}
+MARKS = {
+    "direct": ("o", "#ffffff"),
+    "multipath": ("^", "#ffd54a"),
+    "clutter": ("X", "#ff8a80"),
+    "sidelobe": ("v", "#80d8ff"),
+}
 """Marker and colour of a detection by its label, chosen to stand out on the map."""
 
 PALETTE = (

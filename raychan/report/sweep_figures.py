@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.report.canvas import PALETTE, figure, save, style
-from raychan.run.result import DIRECT, MULTIPATH
+from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, SIDELOBE
 from raychan.study.sweep import Sweep
 from raychan.study.visibility import DIFFRACTED, WAYS
 
 Floats = NDArray[np.float64]
 
 _LOOK = {DIRECT: ("o", PALETTE[0]), MULTIPATH: ("^", PALETTE[2]), DIFFRACTED: ("s", PALETTE[5])}
-_CLUTTER = ("X", PALETTE[7])
+_ELSE = {CLUTTER: ("X", PALETTE[7]), SIDELOBE: ("v", PALETTE[3])}
 _DEEPEST_DB = 40.0  # levels this far below the threshold are not drawn
 _GREY = "#d9d9d9"
 
@@ -62,10 +62,9 @@ def _levels(axes: Any, done: Sweep, x: Floats, order: NDArray[np.int64]) -> None
             axes.plot(
                 x[order], shown[order], color=colour, lw=1.2, marker=mark, ms=2.5, label=f"{way} return, no noise"
             )
-    for label in (*_LOOK, "clutter"):
+    for label, (mark, colour) in (_LOOK | _ELSE).items():
         rows = [i for i in order if (seen := done.steps[i].seen) is not None and seen.label == label]
         if rows:
-            mark, colour = _LOOK.get(label, _CLUTTER)
             snr = np.array([done.steps[i].seen.snr_db for i in rows])  # type: ignore[union-attr]
             error = np.array([done.steps[i].seen.error_db for i in rows])  # type: ignore[union-attr]
             axes.errorbar(x[rows], snr, error, ls="none", color=colour, lw=4.0, alpha=0.35)
@@ -146,10 +145,9 @@ def _map(made: Any, axes: Any, done: Sweep, values: Floats, label: str, colours:
 
 def _marks(axes: Any, done: Sweep) -> None:
     """Mark the label of each detection."""
-    for label in (*_LOOK, "clutter"):
+    for label, (mark, _) in (_LOOK | _ELSE).items():
         at = np.array([s.values for s in done.steps if s.seen is not None and s.seen.label == label])
         if len(at):
-            mark = _LOOK.get(label, _CLUTTER)[0]
             y, x = at.T
             axes.plot(x, y, mark, ms=4, mfc="white", mec="black", mew=0.7, ls="none", label=label)
     if any(s.seen is not None for s in done.steps):

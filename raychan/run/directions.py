@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,11 @@ from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
 from raychan.run.receiver import aperture_of, check_cube, check_map, map_of, receivers
+from raychan.run.receiver_losses import range_spread
 from raychan.run.result import Result
 from raychan.units import C0
 
+Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 
@@ -49,8 +52,18 @@ def angles_in(result: Result) -> RangeAzimuth | None:
     return found
 
 
-def beam_to(radar: Radar, found: Detections, paths: Paths) -> Callable[[int], Complexes] | None:
-    """Return a function of a detection's row: what its beam passes of each path's wave (n,); None without an array."""
+@dataclass(frozen=True)
+class Beams:
+    """The beams of an array towards its detections."""
+
+    passed: Callable[[int], Complexes]
+    """What the beam towards a detection (row) passes of each path (n,), as a factor of its wave."""
+    spread: Floats
+    """Range cells (d,) by which the range of each detection differs over the array."""
+
+
+def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
+    """Return the beams towards detections; None without an array."""
     aperture = aperture_of(radar)
     if not any(aperture.scans):
         return None
@@ -68,4 +81,4 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Callable[[int], Co
         )
         return np.asarray(((sent @ rows.reshape(sent.shape[1], -1)) * seen).sum(axis=1))
 
-    return passed
+    return Beams(passed, range_spread(found, radar)[0])

@@ -109,7 +109,7 @@ def _of_detection(result: Result, near: list[int]) -> CellExplanation:
     # A result whose scene cannot be read again does not know where its receivers stand.
     towards = beam_to(result.scene.radar, result.detections, result.paths) if beam and result.scene else None
     if towards is not None:
-        paths = _paths_in(result, row, column, passed=towards(at))
+        paths = _paths_in(result, row, column, passed=towards.passed(at))
     others = tuple(i + 1 for i in near[1:])
     return CellExplanation(**held, paths=paths, detection=at + 1, others=others, beam=beam)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown
     """
     found: list[tuple[float, Truth]] = []
     for mirrored in (False, True) if response.mirrors and shown.rate is not None else (False,):
-        folds, near = _folds(paths, rows, response, shown, mirrored)
+        folds, near = ambiguities(paths, rows, response, shown, mirrored)
         taken = rows[near]
         side_lobe = not near.any()
         if side_lobe:  # of the strongest path; it reaches round the ends of the map without being folded
@@ -99,11 +100,11 @@ def _moving(paths: Paths, rows: Ints) -> tuple[Floats, Floats]:
     return paths.length[rows] / C0, 0.5 * paths.length_rate[rows]
 
 
-def _folds(
-    paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool
+def ambiguities(
+    paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool, reach: Any = _NEAR
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """Return the ambiguity numbers (n, 2) of range and rate between paths and the place shown, and whether the paths
-    lie within the main lobe about it once these are removed."""
+    lie within the main lobe about it, `reach` resolution cells, once these are removed."""
     at, rate = response.stands(*_moving(paths, rows), shown.rate is not None)
     sign = -1.0 if mirrored else 1.0
     away, smear = np.zeros((len(rows), 2)), np.zeros(len(rows))
@@ -116,16 +117,20 @@ def _folds(
         smear = 0.5 * np.abs(rate) * response.waveform.frame_duration / response.resolutions[0]
     whole = np.rint(away / response.periods)
     rest = np.abs(away - whole * response.periods) / response.resolutions
-    return whole.astype(np.int64), np.asarray((rest <= _NEAR + smear[:, None]).all(axis=1))
+    return whole.astype(np.int64), np.asarray((rest <= reach + smear[:, None]).all(axis=1))
 
 
 def _powers(paths: Paths, rows: Ints, response: PointSpread, shown: Shown, mirrored: bool) -> Floats:
     """Return the powers (n,) that paths, or their mirror images, contribute to the cell shown."""
+    return np.abs(waves_shown(paths, rows, paths.amplitude[rows], response, shown, mirrored)) ** 2
+
+
+def waves_shown(
+    paths: Paths, rows: Ints, amplitude: Complexes, response: PointSpread, shown: Shown, mirrored: bool
+) -> Complexes:
+    """Return what paths of such amplitudes (n,) contribute to the cell shown; of mirror images the conjugate."""
     delay, rate = _moving(paths, rows)
     if shown.rate is None:
-        wave: Complexes = paths.amplitude[rows] * response.in_profile(delay, shown.range)[0]
-    else:
-        sign = -1.0 if mirrored else 1.0
-        cell = sign * shown.range, sign * shown.rate
-        wave = response.image_in_cell(paths.amplitude[rows], delay, rate, *cell)[0]
-    return np.abs(wave) ** 2
+        return amplitude * response.in_profile(delay, shown.range)[0]
+    sign = -1.0 if mirrored else 1.0
+    return response.image_in_cell(amplitude, delay, rate, sign * shown.range, sign * shown.rate)[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any
@@ -16,9 +15,11 @@ from raychan.radar.waveform import Waveform
 from raychan.records import TRANSMIT, Detections, InteractionType, Paths, RangeDoppler
 from raychan.run.cell_sums import cell_sums
 from raychan.run.convergence import figure
+from raychan.run.directions import Beams
 from raychan.run.folding import Shown, truth
 from raychan.run.point_spread import PointSpread
-from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, Contribution, Explanation, Receiver
+from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, SIDELOBE, Contribution, Explanation, Receiver
+from raychan.run.side_lobes import Cell, is_side_lobe
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -83,21 +84,12 @@ def explain_cell(
     """
     wave, at = waves_in(paths, response, range, rate)
     sums = cell_sums(known.part, len(known.names), wave, at, paths.range_rate)
-    cell = _Cell(Shown(range, rate, range, rate or 0.0), power, error)
+    cell = Cell(Shown(range, rate, range, rate or 0.0), power, error, paths.amplitude)
     return _explained(paths, known, response, tuple(x[0] for x in sums), cell, receiver)
 
 
-@dataclass(frozen=True)
-class _Cell:
-    """A cell to explain: its power, and the difference of two launches there, both [W]."""
-
-    shown: Shown
-    power: float
-    error: float
-
-
 def _explained(
-    paths: Paths, known: Chains, response: PointSpread, sums: Any, cell: _Cell, receiver: Receiver
+    paths: Paths, known: Chains, response: PointSpread, sums: Any, cell: Cell, receiver: Receiver
 ) -> Explanation:
     """Return the explanation of a cell from the sums over chains of `cell_sums`, at its reported place."""
     summed, sizes, strongest = sums
@@ -131,7 +123,10 @@ def _explained(
     )
     leader = int(strongest[first])
     label = label_of(paths, leader, known.bodies[first], receiver)
-    true = truth(paths, np.flatnonzero(known.part == first), leader, response, cell.shown)
+    rows = np.flatnonzero(known.part == first)
+    if is_side_lobe(paths, rows, response, cell, abs(whole) ** 2):
+        label = SIDELOBE
+    true = truth(paths, rows, leader, response, cell.shown)
     if not math.isnan(true.range):
         parts = replace(parts[0], range=true.range, rate=true.rate), *parts[1:]
     error_db = figure(predicted, cell.error)
@@ -158,13 +153,13 @@ def provenance(
     detections: Detections,
     receiver: Receiver,
     error: Floats,
-    beam: Callable[[int], NDArray[np.complexfloating[Any, Any]]] | None = None,
+    beam: Beams | None = None,
     known: Chains | None = None,
 ) -> tuple[Explanation, ...]:
     """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate.
 
-    Args: beam, what the beam towards a detection (row) passes of each path (n,) as a factor of its wave, for those that
-    are `by_beam`; known the paths' chains, if they are known already.
+    Args: beam, those of an array towards detections, for those that are `by_beam`; known the paths' chains, if they are
+    known already.
     """
     known, response = known or chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
@@ -178,11 +173,12 @@ def provenance(
         folds = np.rint((detections.rate[i] - at[i, 1]) / response.periods[1])
         stands = detections.range[i] + folds * response.periods[1] * response.drift
         shown = Shown(*map(float, (at[i, 0], at[i, 1], stands, detections.rate[i])))
-        cell, own = _Cell(shown, float(powers[i]), float(errors[i])), tuple(x[i] for x in sums)
+        spread = 0.0 if beam is None else float(beam.spread[i])
+        cell, own = Cell(shown, float(powers[i]), float(errors[i]), paths.amplitude, spread), tuple(x[i] for x in sums)
         if beam is not None and by_beam(detections.cell, i, float(powers[i]), own[0].sum(), receiver):
-            wave = paths.amplitude * beam(i)
+            wave = paths.amplitude * beam.passed(i)
             one = response.in_cells(known.part, len(known.names), wave, paths.delay, paths.range_rate, at[i : i + 1])
-            cell, own = replace(cell, power=float(detections.power[i])), tuple(x[0] for x in one)
+            cell, own = replace(cell, power=float(detections.power[i]), amplitude=wave), tuple(x[0] for x in one)
         why = _explained(paths, known, response, own, cell, receiver)
         at_range, at_rate, speed, level = (float(x[i]) for x in places)
         found.append(replace(why, range=at_range, rate=at_rate, speed=speed, power=level))

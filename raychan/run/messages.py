@@ -4,7 +4,7 @@ unmodelled effects that matter to the weakest detection."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,8 @@ from raychan.processing.staggered import ResolvedMap
 from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
-from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses, range_spread
-from raychan.run.result import ExplainedDetections, Result
+from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
+from raychan.run.result import SIDELOBE, ExplainedDetections, Explanation, Result
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry
 
@@ -110,11 +110,25 @@ def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
         )
     moved, loss = migration(found.true_rate, radar)
     if (fast := loss > _LOST_DB).any():
+        off = beside(moved[fast], radar)
+        stand = f", and may stand up to {off[1]:g} range cells and {off[0]:g} rate cells off" if off.any() else ""
         said.append(
             f"{_of(fast)} {'moves' if fast.sum() == 1 else 'move'} over range cells during the frame "
-            f"({_numbers(fast)}), up to {moved.max():.1f}: peaks read up to {loss.max():.1f} dB less"
+            f"({_numbers(fast)}), up to {moved.max():.1f}: peaks read up to {loss.max():.1f} dB less{stand}"
         )
     return said
+
+
+def beside_echoes(reasons: Sequence[Explanation]) -> list[str]:
+    """Return a line if detections are side lobes of echoes elsewhere."""
+    rows = np.array([why.label == SIDELOBE for why in reasons], bool)
+    if not rows.any():
+        return []
+    are = "are side lobes" if rows.sum() > 1 else "is a side lobe"
+    return [
+        f"{_of(rows)} {are} of stronger echoes ({_numbers(rows)}), and nothing stands where "
+        "shown: noise covers most of them (radar.noise), windows of lower side lobes have fewer (processing)"
+    ]
 
 
 def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Entry]) -> list[str]:
@@ -139,13 +153,18 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
 
 def told(
     found: ExplainedDetections,
+    reasons: Sequence[Explanation],
     tolerance_db: float,
     rdmap: RangeDoppler,
     ledger: Mapping[str, Entry],
     radar: Radar | None,
 ) -> list[str]:
-    """Return all lines on detections."""
-    return [*warned(found, tolerance_db, rdmap, radar), *noted(found, tolerance_db, ledger)]
+    """Return all lines on detections, of which each has a reason."""
+    return [
+        *beside_echoes(reasons),
+        *warned(found, tolerance_db, rdmap, radar),
+        *noted(found, tolerance_db, ledger),
+    ]
 
 
 def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
@@ -179,7 +198,7 @@ def findings(result: Result) -> list[str]:
     """Return all lines on a result's detections."""
     tolerance = float(result.stats.get("tolerance_db", math.inf))
     radar = result.scene.radar if result.scene is not None else None
-    return told(result.detections, tolerance, result.rdmap, result.ledger, radar)
+    return told(result.detections, result.provenance, tolerance, result.rdmap, result.ledger, radar)
 
 
 def marks(found: ExplainedDetections) -> str:

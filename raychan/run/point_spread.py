@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.parallel import parallel_for
+from raychan.radar.side_lobes import main_lobe
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
 from raychan.run.cell_sums import cell_waves, periodic, sums_in_cells
@@ -68,6 +69,7 @@ class PointSpread:
         self.waveform = waveform
         self._range = window(range_window, waveform.n_samples)
         self._rate = window(rate_window, waveform.n_chirps)
+        self._windows = range_window, rate_window
         self._by_parts: dict[int, tuple[Complexes, Floats]] = {}
         self._beyond: dict[int, tuple[Floats, Floats]] = {}
 
@@ -193,6 +195,11 @@ class PointSpread:
     def resolutions(self) -> tuple[float, float]:
         """Resolution of range [m] and rate [m/s]."""
         return self.waveform.range_resolution, self.periods[1] / self.waveform.n_chirps
+
+    @cached_property
+    def main_lobes(self) -> tuple[float, float]:
+        """Resolution cells of range and rate from a peak to the first null of its window."""
+        return main_lobe(self._windows[0], len(self._range)), main_lobe(self._windows[1], len(self._rate))
 
     @property
     def drift(self) -> float:

@@ -15,7 +15,7 @@ from raychan.run.convergence import figure
 from raychan.run.folding import aliased
 from raychan.run.labels import Chains, chains, label_of, response_of
 from raychan.run.ledger import Entry
-from raychan.run.result import Contribution, Explanation, Receiver
+from raychan.run.result import SIDELOBE, Contribution, Explanation, Receiver
 from raychan.run.segments import Retraced
 from raychan.signal.baseband import synthesize
 from raychan.units import db
@@ -74,7 +74,8 @@ def claimed(
             continue
         off = figure(brought, float(error[tuple(detections.cell[i])]))
         why = replace(why, predicted=brought, error_db=off)
-        if not why.contributions:
+        # Paths at the frame's start bring side lobes to what the body fills later.
+        if not why.contributions or why.label == SIDELOBE:
             why = _given(why, paths, rows, known, receiver)
         found.append(why)
     return tuple(found)

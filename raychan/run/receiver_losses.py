@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from raychan.radar.aperture import cosines
 from raychan.radar.radar import Radar
+from raychan.radar.side_lobes import migrating
 from raychan.radar.waveform import OwnWaveform
 from raychan.radar.windows import window
+from raychan.records import Detections
 from raychan.run.receiver import aperture_of
 from raychan.run.result import ExplainedDetections
 from raychan.units import C0, db
@@ -20,6 +22,7 @@ _BEAMS = 33  # along each axis, over the directions from which an array sees a n
 _ROUND = 0.9  # of a power: a peak that keeps more (0.46 dB, below what is told) is round, and not split
 _OFF = 0.05  # range cells between the places where the peak is sought: 0.01 dB of a Hann window's main lobe
 _CELL = 0.02  # range cells: step of the table of the window's response, whose error is below 1e-3 of an amplitude
+_STEP = 0.5  # range cells of migration between tables of peaks: fewer, against an eighth of a cell of where peaks stand
 _TURN = 0.02  # rad: step of the table of what ramps keep, whose error is below 2e-5 of an amplitude
 
 
@@ -57,13 +60,13 @@ def _through(radar: Radar, source: Floats, beside: Floats) -> Floats:
     return held
 
 
-def _look(found: ExplainedDetections) -> Floats:
+def _look(found: Detections) -> Floats:
     """Return the directions (n, 3) of detections in the antenna's frame; what is not measured is 0."""
     u, w = cosines(np.nan_to_num(found.azimuth), np.nan_to_num(found.elevation)).T
     return np.stack([np.sqrt(np.maximum(1.0 - u**2 - w**2, 0.0)), u, w], axis=1)
 
 
-def range_spread(found: ExplainedDetections, radar: Radar) -> tuple[Floats, Floats]:
+def range_spread(found: Detections, radar: Radar) -> tuple[Floats, Floats]:
     """Return by how many range cells the range of each detection (n,) differs over the virtual elements, and what a
     beam loses by it (n,) [dB]: the mean over the elements of the range window's response in one cell, of the best."""
     aperture, wave = aperture_of(radar), radar.channel_waveform
@@ -106,3 +109,13 @@ def migration(rate: Floats, radar: Radar) -> tuple[Floats, Floats]:
     kept = np.array([np.cos(x * mid) @ weight for x in turns]) / weight.sum()
     held = [(np.interp(np.abs(turn) * cells, turns, kept) @ taper / taper.sum()) ** 2 for cells in moved]
     return moved, -db(np.maximum(np.array(held), 1e-30))
+
+
+def beside(moved: Floats, radar: Radar) -> Floats:
+    """Return how many cells (2,) of rate and of range peaks of echoes that migrate over so many range cells (n,) may
+    stand off the places that these have at mid frame: of abrupt windows an echo's power is even over many cells."""
+    wave, settings = radar.channel_waveform, radar.processing
+    names, count = (settings.rate_window, settings.range_window), (wave.n_chirps, wave.n_samples)
+    steps = np.unique(np.rint(moved / _STEP)) * _STEP
+    off = [migrating(names, count, float(step), 1).off for step in steps]
+    return np.asarray(np.max(off, axis=0, initial=0.0)) if off else np.zeros(2)

@@ -19,7 +19,8 @@ from raychan.run.ledger import Entry
 if TYPE_CHECKING:
     from raychan.world.scene import Scene
 
-DIRECT, MULTIPATH, CLUTTER = "direct", "multipath", "clutter"
+LABELS = DIRECT, MULTIPATH, CLUTTER, SIDELOBE = "direct", "multipath", "clutter", "sidelobe"
+"""Of detections: what their leading chain of bodies is."""
 LINE_OF_SIGHT = "line of sight"
 """Names the way straight from a transmitter to a receiver elsewhere, which meets no body."""
 

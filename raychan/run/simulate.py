@@ -102,7 +102,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *channel.warnings,
             *_remaining(channel, known, radar),
             *heard,
-            *told(known, tolerance, rdmap, left_out, radar),
+            *told(known, reasons, tolerance, rdmap, left_out, radar),
         ),
         scene=scene.without_caches(),
         text=scene.text,

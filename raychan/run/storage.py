@@ -20,7 +20,7 @@ from raychan.run.ledger import entry_of
 from raychan.run.netcdf import GROUPS, as_netcdf, read_record
 from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.receiver import aperture_of
-from raychan.run.result import Contribution, Explanation, Receiver, Result
+from raychan.run.result import LABELS, Contribution, Explanation, Receiver, Result
 from raychan.scalars import shown
 from raychan.units import dbm
 
@@ -180,7 +180,7 @@ def summary(result: Result) -> dict[str, Any]:
         "seed": result.seed,
         "paths": len(result.paths.delay),
         "detections": len(result.detections.range),
-        "labels": {x: sum(e.label == x for e in result.provenance) for x in ("direct", "multipath", "clutter")},
+        "labels": {x: sum(e.label == x for e in result.provenance) for x in LABELS},
         **_plain(result.stats),
         "timings_s": {k: round(v, 4) for k, v in result.timings.items()},
         "warnings": list(result.warnings),
