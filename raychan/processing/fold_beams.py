@@ -51,7 +51,12 @@ class Beams:
         """Return the weights (..., t * a) of beams towards cosines (..., 2)."""
         ahead = np.sqrt(np.maximum(1.0 - (at**2).sum(axis=-1, keepdims=True), 0.0))
         turns = np.concatenate([ahead, at], axis=-1) @ self.places.T
-        return np.exp(-2j * np.pi * turns).astype(np.complex64)
+        # Sines of single precision, of less than a turn, take a fifth of the time of exp of complex numbers.
+        phase = (-2.0 * np.pi * (turns - np.rint(turns))).astype(np.float32)
+        out = np.empty(phase.shape, np.complex64)
+        np.cos(phase, out=out.real)
+        np.sin(phase, out=out.imag)
+        return out
 
     def strongest(self, held: list[Complexes], clear: float) -> tuple[Floats, Floats]:
         """Return the power (h, c) of the strongest beam under each hypothesis, from what cells hold under it
