@@ -109,9 +109,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
             if bent and curved[f]:
                 _place_of(bary[i], j, at)
                 element_of(vertices[f], edge_curvature[f], at, element)
-                strength = _mean_cosine(element, k[i, j], back_k[j]) * (0.5 * abs(share) / least)
-                if side < 0.0:
-                    strength = -strength
+                strength = _mean_cosine(element, k[i, j], back_k[j]) * math.copysign(0.5 * share / least, side)
             else:
                 # Where the curved surface turns away from the flat footprint it has more area.
                 turned = 0.0
