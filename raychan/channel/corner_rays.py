@@ -22,11 +22,11 @@ _INSIDE = 1e-6  # of the way to the centre: beyond the rounding of cuts, below w
 
 
 class CornerRays(NamedTuple):
-    """Rays of routes, one each or three for the corners of a footprint.
+    """Rays of routes: one each, or those to the three corners of a footprint, or to these and its centre.
 
     Fields: first (n + 1,) rows of each route, with the end of the last; away, look (m, 3) unit directions in which the
     transmitter radiates and to which the receiver looks; cos_in, cos_out (m, d) cosines of incidence on the surfaces in
-    each slot, of rays from either end, known for three rays only.
+    each slot, of rays from either end, known where there are several.
     """
 
     first: NDArray[np.int64]
@@ -43,11 +43,11 @@ def departures(routes: Routes) -> tuple[Floats, Floats]:
     return away, look
 
 
-def corner_rays(routes: Routes, facets: Facets, apart: bool) -> CornerRays:
-    """Return the rays to the corners of footprints that are reached over layers and plane mirrors only; of all other
-    routes, and where all are `apart`, that of the centre."""
+def corner_rays(routes: Routes, facets: Facets, several: int) -> CornerRays:
+    """Return so many rays, 3 or 4, to footprints that are reached over layers and plane mirrors only: to the corners,
+    then to the centre; of all other routes, and where `several` is 1, that to the centre."""
     normals, kind, scatter = routes.normals, routes.kind, routes.scatter
-    first = _rows(kind, routes.facet, scatter, facets.normals, apart)
+    first = _rows(kind, routes.facet, scatter, facets.normals, several)
     away, look = np.empty((2, first[-1], 3))
     cosines = np.empty((2, first[-1], kind.shape[1]))
     _write(
@@ -86,14 +86,14 @@ def used_of(kind, i):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _rows(kind, facet, scatter, normals, apart):  # type: ignore[no-untyped-def]
-    """Return the first of the rows of each route, with the end of the last: three where each corner has a ray."""
+def _rows(kind, facet, scatter, normals, several):  # type: ignore[no-untyped-def]
+    """Return the first of the rows of each route, with the end of the last: several where each corner has a ray."""
     first = np.zeros(len(kind) + 1, np.int64)
     for i in range(len(kind)):
-        plane = not apart and scatter[i] >= 0 and kind[i, scatter[i]] == SCATTER
+        plane = several > 1 and scatter[i] >= 0 and kind[i, scatter[i]] == SCATTER
         for j in range(used_of(kind, i) if plane else 0):
             plane &= kind[i, j] != REFLECT or facet[i, j] < 0 or not curved(normals, facet[i, j])
-        first[i + 1] = first[i] + (3 if plane else 1)
+        first[i + 1] = first[i] + (several if plane else 1)
     return first
 
 
@@ -104,10 +104,10 @@ def _write(  # type: ignore[no-untyped-def]
     """Write directions (m, 3) and cosines (m, d) of the rows of routes, from those of their centres (n, 3)."""
     for i in range(len(kind)):
         begin, ways = first[i], first[i + 1] - first[i]
-        if ways == 3:
+        if ways > 1:
             last = used_of(kind, i) - 1
-            _incidences(points, tx, i, 0, scatter[i], 1, vertices, normals, kind, begin, cos_in, out)
-            _incidences(points, rx, i, last, scatter[i], -1, vertices, normals, kind, begin, cos_out, back)
+            _incidences(points, ways, tx, i, 0, scatter[i], 1, vertices, normals, kind, begin, cos_in, out)
+            _incidences(points, ways, rx, i, last, scatter[i], -1, vertices, normals, kind, begin, cos_out, back)
         for w in range(begin, begin + ways):
             # Footprints are cut where an antenna's gain ends: corners there lie on the centre's side of that line.
             for c in range(3):
@@ -117,17 +117,17 @@ def _write(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", uncounted=True)
 def _incidences(  # type: ignore[no-untyped-def]
-    points, end, i, first, stop, step, vertices, normals, kind, begin, cosines, starts
+    points, ways, end, i, first, stop, step, vertices, normals, kind, begin, cosines, starts
 ):
     """Write, in rows from `begin` on, the cosines of incidence (m, d) on the surfaces first, first + step, ... up to
-    the footprint in slot `stop` of route i for the rays that come from `end` over the same planes to its corners,
-    points (n, 6, 3), and the unit directions (m, 3) in which they leave that end."""
+    the footprint in slot `stop` of route i for so many rays that come from `end` over the same planes, three to its
+    corners, points (n, 6, 3), a fourth to its centre, and the unit directions (m, 3) in which they leave that end."""
     image = vec(end)
     for j in range(first, stop, step):
         if kind[i, j] != TRANSMIT:
             image = mirrored(image, slot(vertices, i, j), slot(normals, i, j))
-    for c in range(3):
-        ahead = heading(image, slot(points, i, c))
+    for c in range(ways):
+        ahead = heading(image, slot(points, i, c) if c < 3 else slot(vertices, i, stop))
         cosines[begin + c, stop] = cosine(ahead, slot(normals, i, stop))
         for j in range(stop - step, first - step, -step):
             n = slot(normals, i, j)

@@ -43,20 +43,20 @@ def slot(a, i, j):  # type: ignore[no-untyped-def]
 def over_mirrors(  # type: ignore[no-untyped-def]
     e, ways, ahead, i, first, stop, step, vertices, normals, kind, facet, material, used, end, table, k, cosines, begun
 ):
-    """Send fields e (p, 3) of route i that travel along `ahead` over mirrors and layers first, first + step, ... short
-    of stop, in place; return the direction in which they leave the last.
+    """Send fields e (4 p, 3) of route i that travel along `ahead` over mirrors and layers first, first + step, ...
+    short of stop, in place; return the direction in which they leave the last.
 
-    Their coefficients are those of the way itself; of three ways, an equal part of the fields for each, those at
-    cosines of incidence (n, d), rows from `begun` on.
+    Their coefficients are those of the way itself; of several ways, p fields of each, those at cosines of incidence
+    (n, d), rows from `begun` on.
     """
     kinds, eps, thickness, roughness = table
-    part = len(e) // 3
+    part = len(e) // 4
     for j in range(first, stop, step):
         normal, m, through = slot(normals, i, j), material[facet[i, j]], kind[i, j] == TRANSMIT
         s, p_in, p_out, _ = incident(ahead, normal)
         p = p_in if through else p_out
         for c in range(ways):
-            at = cosines[begun + c, j] if ways == 3 else cosine(ahead, normal)
+            at = cosines[begun + c, j] if ways > 1 else cosine(ahead, normal)
             r_s, r_p, t_s, t_p = coefficients(kinds[m], eps[m], thickness[m], roughness[m], at, k)
             by_s, by_p = (t_s, t_p) if through else (r_s, r_p)
             for f in range(c * part, (c + 1) * part):

@@ -49,9 +49,9 @@ def transfer(
 
     Args: tx_field, rx_field vector fields of p and q polarisations; corners: return (n, q, p, 3), the parts that belong
     to the three footprint corners and sum to the gain; wave which currents radiate; unless it is HUYGENS, elements
-    (n, 3, 3) [m^2] are the vector area elements at the corners, in place of taper and area.
+    (n, 4, 3) [m^2] are the vector area elements at corners and centre, in place of taper and area.
     """
-    rays = corner_rays(routes, facets, routes.far or wave != HUYGENS)
+    rays = corner_rays(routes, facets, 1 if routes.far else 3 if wave == HUYGENS else 4)
     e_tx = np.ascontiguousarray(tx_field(rays.away), dtype=np.complex128)
     e_rx = np.ascontiguousarray(rx_field(rays.look), dtype=np.complex128)
     m: Materials = facets.materials
@@ -93,9 +93,9 @@ def _transfer(  # type: ignore[no-untyped-def]
     ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length, taper,
     area, spread_in, spread_out, caustics, sigma, elements, out,
 ):  # fmt: skip
-    # The fields of the centre, or of the three corners one after the other.
-    arriving = np.empty((3 * e_tx.shape[1], 3), np.complex128)
-    leaving = np.empty((3 * e_rx.shape[1], 3), np.complex128)
+    # The fields of the centre, or of the three corners and then the centre one after the other.
+    arriving = np.empty((4 * e_tx.shape[1], 3), np.complex128)
+    leaving = np.empty((4 * e_rx.shape[1], 3), np.complex128)
     _each_route(
         ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length,
         taper, area, spread_in, spread_out, caustics, sigma, elements, out, np.empty(3, np.complex128), np.empty(6),
@@ -108,7 +108,7 @@ def _each_route(  # type: ignore[no-untyped-def]
     ends, material, table, k, wave, e_tx, e_rx, rays, vertices, normals, kind, facet, scatter, lengths, length, taper,
     area, spread_in, spread_out, caustics, sigma, elements, out, terms, phases, arriving, leaving,
 ):  # fmt: skip
-    """Do what `_transfer` does, with room for terms (3,), phases (6,) and fields (3 p, 3) and (3 q, 3)."""
+    """Do what `_transfer` does, with room for terms (3,), phases (6,) and fields (4 p, 3) and (4 q, 3)."""
     (tx, rx, far), (first, away, look, cos_in, cos_out) = ends, rays
     for i in range(len(kind)):
         used, wavelength_4pi = used_of(kind, i), 0.5 / k
@@ -151,13 +151,16 @@ def _each_route(  # type: ignore[no-untyped-def]
                 i, out, terms, ways, arriving, leaving, k_in, k_out, normal, table, m, k, at, cos_in, cos_out, begun
             )  # fmt: skip
         else:
-            _scatter_elements(i, out, terms, wave, arriving, leaving, k_in, k_out, normal, table, m, k, elements)
+            _scatter_elements(
+                i, out, terms, ways, wave, arriving, leaving, k_in, k_out, normal, table, m, k, elements, away, look,
+                begun,
+            )  # fmt: skip
 
 
 @njit(cache=True, forceinline=True, uncounted=True)
 def _begin(held, fields, directions, centre, first, ways):  # type: ignore[no-untyped-def]
     """Write the fields (p, 3) that an end has of so many ways, rows from the first on, one after the other; those of
-    three ways as turned with their rays into that of the centre."""
+    three ways as turned with their rays into that of the centre. Four keep their own."""
     count = fields.shape[1]
     for w in range(ways):
         k = row(directions, first + w)
@@ -208,24 +211,38 @@ def _scatter(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, uncounted=True)
 def _scatter_elements(  # type: ignore[no-untyped-def]
-    i, out, terms, wave, arriving, leaving, k_in, k_out, normal, table, m, k, elements
+    i, out, terms, ways, wave, arriving, leaving, k_in, k_out, normal, table, m, k, elements, away, look, begun
 ):
     """Add to gains (n, q, p, 1 or 3) what one of the two waves of physical optics scatters, its three phase-integral
     terms weighted by the currents on the vector elements of area at the corners.
 
+    Of four ways each corner, and the centre, has its own fields and directions, rows from `begun` on. Currents vary
+    over the footprint as a quadratic: its mean is 3/4 of the centre's value and 1/12 of each corner's.
     Source: physical optics, Knott, Shaeffer, Tuley, Radar Cross Section, 2004, ch. 5; Ufimtsev 2014, ch. 1 (the two
     waves of which its currents are the sum).
     """
+    apart, ins, outs = out.shape[3] == 3, out.shape[2], out.shape[1]
+    for p in range(ins):
+        for q in range(outs):
+            bend = 0j
+            for c in range(4):
+                w = c if ways == 4 else 0
+                to_here, back = (row(away, begun + c), row(look, begun + c)) if ways == 4 else (k_in, k_out)
+                e, g, element = row(arriving, w * ins + p), row(leaving, w * outs + q), slot(elements, i, c)
+                couple = _currents(e, to_here, g, back, wave, element, normal, table, m, k)
+                bend += 0.75 * couple if c == 3 else -0.25 * couple
+                if c < 3:
+                    out[i, q, p, c if apart else 0] += couple * terms[c]
+            for c in range(3):
+                out[i, q, p, c if apart else 0] += bend * terms[c]
+
+
+@njit(cache=True, forceinline=True, uncounted=True)
+def _currents(e, k_in, g, k_out, wave, element, normal, table, m, k):  # type: ignore[no-untyped-def]
+    """Return what the currents of one of the two waves of e on an element of material m radiate, projected on g."""
     kinds, eps, thickness, roughness = table
     fresnel = coefficients(kinds[m], eps[m], thickness[m], roughness[m], cosine(k_in, normal), k)
-    apart, to = out.shape[3] == 3, (-k_out[0], -k_out[1], -k_out[2])
-    for p in range(out.shape[2]):
-        for q in range(out.shape[1]):
-            e, g = row(arriving, p), row(leaving, q)
-            for c3 in range(3):
-                element = slot(elements, i, c3)
-                if wave == REFLECTED:
-                    couple = reflected_wave(e, k_in, to, element, fresnel[0], fresnel[1], g)
-                else:
-                    couple = shadow_wave(e, k_in, to, element, fresnel[2], fresnel[3], g)
-                out[i, q, p, c3 if apart else 0] += couple * terms[c3]
+    to = -k_out[0], -k_out[1], -k_out[2]
+    if wave == REFLECTED:
+        return reflected_wave(e, k_in, to, element, fresnel[0], fresnel[1], g)
+    return shadow_wave(e, k_in, to, element, fresnel[2], fresnel[3], g)

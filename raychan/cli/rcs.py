@@ -11,8 +11,18 @@ import typer
 from raychan.cli import show
 from raychan.cli.options import Threads, within
 from raychan.cli.rcs_options import MOST_ANGLES, angles, can_be_polar, metres, writable
-from raychan.cli.rcs_output import beyond_budget, csv_text, edge_fields, further_bounces, rows, table_of, uncertainties
+from raychan.cli.rcs_output import (
+    beyond_budget,
+    csv_text,
+    edge_fields,
+    further_bounces,
+    near_ends,
+    rows,
+    table_of,
+    uncertainties,
+)
 from raychan.scalars import as_text
+from raychan.units import C0
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -140,6 +150,7 @@ def rcs(
     show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
     show.warn(further_bounces(found, max_bounces, tolerance))
     show.warn(edge_fields(found, tolerance))
+    show.warn(near_ends(found, C0 / (1e9 * frequency_ghz)))
     show.warn(beyond_budget(found, max_rays))
     show.warn(uncertainties(mesh, found, tolerance, crease is not None))
     if files:

@@ -87,6 +87,17 @@ def edge_fields(found: Rcs, tolerance: float) -> list[str]:
     ]
 
 
+def near_ends(found: Rcs, wavelength: float) -> list[str]:
+    """Return a line where an end stands within a wavelength [m] of the body."""
+    near = int(found.too_near.sum())
+    if not near:
+        return []
+    return [
+        f"at {near} of {found.sigma.size} angles the radar is within a wavelength ({1e3 * wavelength:.2g} mm) of the "
+        "body: levels leave out near fields, and err beyond what is stated"
+    ]
+
+
 def beyond_budget(found: Rcs, most: int) -> list[str]:
     """Return a line where angles took more than twice the rays they may."""
     over, took = int((found.rays > 2 * most).sum()), int(found.rays.max(initial=0))

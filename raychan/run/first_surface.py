@@ -46,7 +46,7 @@ def _radiated(
     """Return the gains (n, 2, 2) of one of the two parts over a return leg with its mirror points and layers."""
     if not len(tubes):
         return np.zeros((0, 2, 2), complex)
-    area = np.empty((len(tubes), 3, 3))
+    area = np.empty((len(tubes), 4, 3))
     shape = geometry.facets.vertices, geometry.edge_curvature, geometry.curved, leg.image, out.image, out.far
     elements(tubes.points, tubes.normals, tubes.facet, tubes.bary, *shape, area)
     routes = routes_of(geometry, leg, out, tubes, True, *way)

@@ -20,7 +20,7 @@ from raychan.world.body import MeshLike
 from raychan.world.geometry import Geometry
 from raychan.world.limits import BOUNCES, CREASE, FREQUENCY, LENGTH, RAYS, TOLERANCE_DB
 from raychan.world.material import Material
-from raychan.world.point_in_body import refuse_within
+from raychan.world.point_in_body import nearest_on, refuse_within, within
 from raychan.world.simplified import traced_alone
 
 Floats = NDArray[np.float64]
@@ -53,6 +53,9 @@ class Rcs:
     edges_db: Floats
     """Change [dB] that fringe fields of edges may bring, which physical optics leaves out: an estimate for perfect
     conductors that is not in error_db; 0 without edges, NaN where they may bring as much as the rest."""
+    too_near: NDArray[np.bool_]
+    """Whether an end is within a wavelength of the body: near fields, which rays do not carry, then change the level
+    beyond what is stated."""
 
     merged: str = ""
     """What was merged of a finely tessellated mesh: '327,680 facets merged into 7,956, deviation 0.24 um'."""
@@ -113,14 +116,15 @@ def rcs(
         # The caller's word on what is an edge; the default is a guess.
         other = replace(other, creased=None, rounded=None, rounded_halved=None)
     row, col = _POLARIZATIONS[polarization]
-    found = []
+    found, near = [], []
     for az, el, raz, rel in zip(*(a.ravel() for a in angles), strict=True):
         leg = _leg(direction(az, el), distance)
         out = _leg(direction(raz, rel), distance if rx_distance is None else rx_distance) if bistatic else leg
         _outside(geometry, leg, "distance")
         _outside(geometry, out, "distance" if rx_distance is None else "rx_distance")
+        near.append(_within(geometry, C0 / frequency, leg, out))
         found.append(refined(Case(geometry, other, leg, out, frequency, max_bounces, tolerance_db, max_rays, row, col)))
-    return _collected(found, angles[0].shape, str(body.merged or ""))
+    return _collected(found, near, angles[0].shape, str(body.merged or ""))
 
 
 def _angles(**given: ArrayLike) -> list[Floats]:
@@ -136,7 +140,7 @@ def _angles(**given: ArrayLike) -> list[Floats]:
         raise ValueError(f"angles of shapes {shapes}: must be of one shape, or single numbers") from None
 
 
-def _collected(found: list[Value], shape: tuple[int, ...], merged: str) -> Rcs:
+def _collected(found: list[Value], near: list[bool], shape: tuple[int, ...], merged: str) -> Rcs:
     """Return the cross-sections of all angles in their shape."""
 
     def column(name: str, kind: type) -> Any:
@@ -151,6 +155,7 @@ def _collected(found: list[Value], shape: tuple[int, ...], merged: str) -> Rcs:
         amplitude=np.array([one.matrix for one in found], complex).reshape(*shape, 2, 2),
         further_db=column("further_db", float),
         edges_db=column("edges_db", float),
+        too_near=np.array(near, bool).reshape(shape),
         merged=merged,
     )
 
@@ -165,6 +170,14 @@ def _outside(geometry: Geometry, leg: Leg, name: str) -> None:
     if not leg.far:
         far = float(np.linalg.norm(leg.end))
         refuse_within(geometry.facets.vertices, leg.end, f"{name} = {far:g} m: the radar")
+
+
+def _within(geometry: Geometry, wavelength: float, *legs: Leg) -> bool:
+    """Return whether the end of a leg is nearer to the body than a wavelength [m]."""
+    v = geometry.facets.vertices
+    box = np.array([v.min(axis=(0, 1)) - wavelength, v.max(axis=(0, 1)) + wavelength])
+    ends = [leg.end for leg in legs if not leg.far and within(box, leg.end)]
+    return any(float(np.linalg.norm(nearest_on(v, x) - x)) < wavelength for x in ends)
 
 
 def _polarizations(given: object) -> str:

@@ -73,13 +73,13 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
     vertices and edge curvature (f, 3, 3), curved (f,); image of the end of the leg out, or the direction to it when
     far; out: points (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): the mean
     obliquity times spreading at corners over that at the centre, for areas of the flat footprints, zero beyond the
-    terminator; area (n,) and length (n,) [m] of the leg out.
+    terminator, scaled to the mean over the footprint; area (n,) and length (n,) [m] of the leg out.
     """
     points, k, normals, length, facet, bary = tubes
     facing, vertices, edge_curvature, curved = facets
     six, lengths, whole, taper, area, back_length = out
     bent = bary.shape[1] == 3
-    flat, element = np.empty(3), np.empty(3)
+    flat, element, at, lit = np.empty(3), np.empty(3), np.empty(3), np.empty(4)
     back_k, back = np.empty((4, 3)), np.empty(4)
     for i in range(len(facet)):
         for j in range(4):
@@ -105,12 +105,11 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
         centre = max(_mean_cosine(normals[i, 3], k[i, 3], back_k[3]), 0.0)
         if not far:
             centre /= length[i, 3] * back[3]
-        for j in range(3):
+        for j in range(4):
             if bent and curved[f]:
-                element_of(vertices[f], edge_curvature[f], bary[i, j], element)
-                strength = _mean_cosine(element, k[i, j], back_k[j]) * (0.5 * abs(share) / least)
-                if side < 0.0:
-                    strength = -strength
+                _place_of(bary[i], j, at)
+                element_of(vertices[f], edge_curvature[f], at, element)
+                strength = _mean_cosine(element, k[i, j], back_k[j]) * math.copysign(0.5 * share / least, side)
             else:
                 # Where the curved surface turns away from the flat footprint it has more area.
                 turned = 0.0
@@ -120,7 +119,25 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
             strength = max(strength, 0.0)
             if not far:
                 strength /= length[i, j] * back[j]
-            taper[i, j] = min(strength / centre, 4.0) if centre > 0.0 else 0.0
+            lit[j] = min(strength / centre, 4.0) if centre > 0.0 else 0.0
+        by = _to_mean(lit)
+        for j in range(3):
+            taper[i, j] = by * lit[j]
+
+
+@njit(cache=True, forceinline=True)
+def _place_of(w, j, out):  # type: ignore[no-untyped-def]
+    """Write the barycentric place (3,) of corner j of a patch of corners w (3, 3), or with j = 3 of its centre."""
+    for c in range(3):
+        out[c] = w[j, c] if j < 3 else (w[0, c] + w[1, c] + w[2, c]) / 3.0
+
+
+@njit(cache=True, forceinline=True)
+def _to_mean(lit):  # type: ignore[no-untyped-def]
+    """Return by what values (4,) at the corners and the centre of a triangle, of a quadratic, have to be multiplied
+    for the mean over the corners to be the quadratic's: 3/4 of the centre's value and 1/12 of each corner's."""
+    mean = (lit[0] + lit[1] + lit[2]) / 3.0
+    return 0.25 + 0.75 * lit[3] / mean if mean > 0.0 else 1.0
 
 
 @njit(cache=True, forceinline=True)
@@ -131,24 +148,22 @@ def _distance(p, image, far):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def elements(points, normals, facet, bary, vertices, edge_curvature, curved, image, out_image, far, out):  # type: ignore[no-untyped-def]
-    """Write the vector elements of area (n, 3, 3) [m^2] of first tubes at their corners, on the lit side: the mean of
-    the three is the tube's, weighted by both ends' spreading there over that at the centre.
+    """Write the vector elements of area (n, 4, 3) [m^2] of first tubes at their corners and centres, on the lit side,
+    for the area of the tube, weighted by both ends' spreading there over that at the centre.
 
     Args: points, normals (n, 4, 3), facet (n,), bary (n, 3, 3) of the tubes; vertices, edge curvature (f, 3, 3),
     curved (f,) of facets; images of both ends [m], or directions to them when far.
     """
-    one = np.empty(3)
+    one, at = np.empty((2, 3))
     for i in range(len(facet)):
-        f, w = facet[i], bary[i]
-        share = w[0, 0] * (w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1])
-        share -= w[0, 1] * (w[1, 0] * w[2, 2] - w[1, 2] * w[2, 0])
-        share += w[0, 2] * (w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0])
+        f, share = facet[i], _share(bary[i])
         centre = _distance(points[i, 3], image, far) * _distance(points[i, 3], out_image, far)
         p, q, r = points[i, 0], points[i, 1], points[i, 2]
-        for j in range(3):
+        for j in range(4):
             size = 0.5 * centre / (_distance(points[i, j], image, far) * _distance(points[i, j], out_image, far))
             if curved[f]:
-                element_of(vertices[f], edge_curvature[f], w[j], one)
+                _place_of(bary[i], j, at)
+                element_of(vertices[f], edge_curvature[f], at, one)
                 size *= share
             else:
                 for c in range(3):

@@ -15,7 +15,7 @@ from raychan.units import C0
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats
-from raychan.world.point_in_body import Place, in_plane_of, place_of, within
+from raychan.world.point_in_body import Place, in_plane_of, nearest_on, place_of, within
 from raychan.world.schema import RadarTable
 
 
@@ -115,14 +115,7 @@ def too_near(bodies: Iterable[Body], radar: Radar) -> list[str]:
 
 def nearest_point(body: Body, at: Floats) -> Floats:
     """Return the point of a body's facets (world, (3,)) that is nearest to a point (3,)."""
-    from trimesh.triangles import closest_point
-
-    corners, local = body.geometry.corners, body.motion.to_body(at)
-    middle = corners.mean(axis=1)
-    far, size = np.linalg.norm(middle - local, axis=1), np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    near = corners[far - size <= (far + size).min()]
-    found = closest_point(near, np.broadcast_to(local, (len(near), 3)))
-    return np.asarray(body.motion.to_world(found[np.argmin(np.linalg.norm(found - local, axis=1))]))
+    return np.asarray(body.motion.to_world(nearest_on(body.geometry.corners, body.motion.to_body(at))))
 
 
 def aliases(bodies: Iterable[Body], radar: Radar) -> list[str]:

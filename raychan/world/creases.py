@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from raychan.world.mesh import Mesh, crease_angle
 from raychan.world.tessellation import rounded
+from raychan.world.topology import point_numbers
 from raychan.world.vertex_normals import components, folds, smoothed
 
 Floats = NDArray[np.float64]
@@ -29,7 +30,10 @@ _WIDE = 0.5  # of the crease angle: mean folds above this may be edges
 _STRIPS = 0.125  # of the crease angle: the same on singly curved patches, as prisms and cones are
 _ONE_WAY = 0.02  # of a patch's bending: with more across it, the patch is doubly curved
 _UNEVEN = 0.17  # difference over sum of the heights of two facets about an edge: with more, no regular tessellation
-_FEW = 4  # folds: fewer are no evidence of a tessellation
+_FEW = 4
+"""Folds, or vertices within a doubly curved patch: fewer are no evidence of a tessellation. Four small folds about one
+vertex are what hulls of some points have by chance."""
+_ROUND = 3  # bent folds about a vertex where a surface is doubly curved: two are a ridge that runs through it
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +198,8 @@ def _uneven(mesh: Mesh, pair: Ints) -> Floats:
 
 def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
     """Return which smooth folds (e,) may be edges: those of patches that fold strongly or whose facets are uneven, in
-    the mean over the patch weighted by fold times length."""
+    the mean over the patch weighted by fold times length, and those of patches that are too small to tell: of few
+    folds, or, where they are doubly curved, with few vertices that smooth folds surround."""
     one, span = pair[:, 0], _spans(mesh, pair)
     weight = fold * np.linalg.norm(span, axis=1)
     of_facet = components(pair // 3, len(mesh.faces))
@@ -203,9 +208,26 @@ def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
     def mean(x: Floats) -> Floats:
         return np.asarray(np.bincount(patch, weight * x) / np.maximum(np.bincount(patch, weight), 1e-300))
 
-    wide = crease * np.where(_one_way(mesh, pair, span, fold, of_facet)[: patch.max() + 1], _STRIPS, _WIDE)
+    one_way = _one_way(mesh, pair, span, fold, of_facet)[: patch.max() + 1]
+    wide = crease * np.where(one_way, _STRIPS, _WIDE)
     uncertain = (mean(_uneven(mesh, pair)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
+    uncertain |= ~one_way & (_within(mesh, pair, fold, of_facet)[: patch.max() + 1] < _FEW)
     return np.asarray(uncertain[patch])
+
+
+def _within(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how many vertices of each patch lie within it, where it is doubly curved: smooth folds lie between all
+    facets about them, three of them bent at least. Args: as for `_one_way`."""
+    point = point_numbers(mesh.corners.reshape(-1, 3))
+    one = pair[:, 0]
+    ends = np.concatenate([point[one], point[np.where(one % 3 == 2, one - 2, one + 1)]])
+    n = int(point.max()) + 1
+    surrounded = (np.bincount(ends, minlength=n) == np.bincount(point, minlength=n)) & (
+        np.bincount(ends, np.tile(fold > 0.0, 2), n) >= _ROUND
+    )
+    of_point = np.zeros(n, np.int64)
+    of_point[point] = np.repeat(patch, 3)
+    return np.bincount(of_point[surrounded], minlength=int(patch.max()) + 1)
 
 
 def _one_way(mesh: Mesh, pair: Ints, span: Floats, fold: Floats, patch: NDArray[np.int64]) -> Bools:

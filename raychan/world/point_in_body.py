@@ -1,4 +1,5 @@
-"""Point-in-body test: whether a point is outside a surface, inside it, on it, or in the plane of a facet."""
+"""Point-in-body test: whether a point is outside a surface, inside it, on it, or in the plane of a facet; and what of
+the surface is nearest to it."""
 
 from __future__ import annotations
 
@@ -43,6 +44,17 @@ def place_of(corners: Floats, point: Floats) -> Place:
         return Place.ON
     turns = winding(v, point)
     return Place.INSIDE if abs(turns) > 0.5 and abs(turns - round(turns)) < _WHOLE else Place.OUTSIDE
+
+
+def nearest_on(corners: Floats, point: Floats) -> Floats:
+    """Return the point (3,) [m] of facets (n, 3, 3) [m] that is nearest to a point (3,) [m]."""
+    from trimesh.triangles import closest_point
+
+    middle = corners.mean(axis=1)
+    far, size = np.linalg.norm(middle - point, axis=1), np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    near = corners[far - size <= (far + size).min()]
+    found = closest_point(near, np.broadcast_to(point, (len(near), 3)))
+    return np.asarray(found[np.argmin(np.linalg.norm(found - point, axis=1))])
 
 
 def in_plane_of(planes: tuple[Floats, Floats, Floats], point: Floats) -> int:

@@ -176,6 +176,7 @@ def made(*errors, numerical=None):
     return Rcs(
         sigma=np.ones(n), error_db=np.array(errors), numerical_db=np.array(numerical or errors), rays=np.full(n, 10),
         bounces=np.ones(n, int), amplitude=np.zeros((n, 2, 2), complex), further_db=np.zeros(n), edges_db=np.zeros(n),
+        too_near=np.zeros(n, bool),
     )  # fmt: skip
 
 
