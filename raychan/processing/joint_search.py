@@ -1,0 +1,125 @@
+"""Directions of several plane waves at once: the set that explains most of what an array of any form receives.
+
+Where the elements fill no line or rectangle side lobes are high: the strongest beam of a sum of waves may be that of
+none of them, and turns that move one wave at a time then end beside the set that explains most. Sets are sought
+here on a grid of beams, with the best partner of each beam by a closed form, and the best of them refined.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.processing.spectra import PER_BEAM, Form, climb, peaks
+from raychan.radar.aperture import Aperture
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complexfloating[Any, Any]]
+
+_SETS = 16  # that are kept from one wave to the next
+_PAIRS = 1 << 18  # of beams tried: all of a line of 30 wavelengths; of more beams the strongest have partners sought
+_ALONE = 0.1  # of a beam's power that others must leave it: nearer than a quarter of a beam width pairs are one
+_SAME = 0.5  # beam widths: sets whose waves are all nearer are one
+_ROUNDS = 20  # of refining a set by turns
+_STILL = 1e-5  # beam widths: a wave that moves less has arrived
+_BETTER = 1e-9  # of the power: less is rounding
+
+
+def joint(data: Complexes, aperture: Aperture, start: Floats) -> Floats:
+    """Return the cosines (k, 2) of the k waves that explain most of snapshots (n, a), `start` if none explain more.
+
+    Source: Ziskind and Wax 1988 (alternating projection), from several sets of the grid in place of one."""
+    total = float((np.abs(data) ** 2).sum())
+    best, most = start, explained(data, aperture, start)
+    sets, values = _on_grid(data, aperture, len(start))
+    slack = 2.0 * _between(aperture) * total
+    for at, value in zip(sets, values, strict=True):
+        if value + slack > most + _BETTER * total:
+            at = _refined(data, aperture, at)
+            if (value := explained(data, aperture, at)) > most + _BETTER * total:
+                best, most = at, value
+    return _searched_anew(data, aperture, best, most, _BETTER * total)
+
+
+def explained(data: Complexes, aperture: Aperture, at: Floats) -> float:
+    """Return the power that waves from cosines (k, 2) explain of snapshots (n, a), by least squares."""
+    return float((np.abs(data @ _basis(aperture.steering(at)).conj().T) ** 2).sum())
+
+
+def _basis(waves: Complexes) -> Complexes:
+    """Return orthonormal rows (k, a) that span waves (k, a)."""
+    return np.asarray(np.linalg.qr(waves.T)[0].T)
+
+
+def _beside(data: Complexes, aperture: Aperture, others: Floats) -> Form:
+    """Return the power that a wave explains of snapshots (n, a) beside others from cosines (k, 2)."""
+    basis = _basis(aperture.steering(others))
+    rest = data - (data @ basis.conj().T) @ basis
+
+    def value(steering: Complexes) -> Floats:
+        wave = steering.conj() @ rest.T
+        alone = steering.shape[1] - (np.abs(steering @ basis.conj().T) ** 2).sum(axis=1)
+        power = (wave.real**2 + wave.imag**2).sum(axis=1)
+        return np.where(alone > _ALONE * steering.shape[1], power / np.maximum(alone, 1e-300), 0.0)
+
+    return value
+
+
+def _on_grid(data: Complexes, aperture: Aperture, count: int) -> tuple[Floats, Floats]:
+    """Return sets of beams (s, count, 2) on a grid that explain most of snapshots (n, a), and how much (s,)."""
+    beams = aperture.spread(PER_BEAM) if aperture.deep else aperture.grid(PER_BEAM).points
+    steering = aperture.steering(beams)
+    power = (np.abs(steering.conj() @ data.T) ** 2).sum(axis=1) / steering.shape[1]
+    rows = np.argsort(-power, kind="stable")[: max(_SETS, _PAIRS // len(beams))]
+    sets, values = beams[rows, None], power[rows]
+    for _ in range(1, count):
+        more = np.array([value + _beside(data, aperture, at)(steering) for at, value in zip(sets, values, strict=True)])
+        found = []
+        for _ in range(_SETS):
+            row, column = np.unravel_index(int(more.argmax()), more.shape)
+            if not more[row, column] > 0.0:
+                break
+            found.append((np.concatenate([sets[row], beams[column, None]]), float(more[row, column])))
+            near = aperture.apart(sets[:, :, None], found[-1][0]) < _SAME
+            # A row may hold the same set again where it lacks one wave of it.
+            for lacked in range(len(found[-1][0])):
+                same = np.delete(near, lacked, axis=2).any(axis=2).all(axis=1)
+                more[np.ix_(same, aperture.apart(beams, found[-1][0][lacked]) < _SAME)] = 0.0
+        sets, values = np.array([x[0] for x in found]), np.array([x[1] for x in found])
+    return sets, values
+
+
+def _between(aperture: Aperture) -> float:
+    """Return the share of a wave's power that the nearest beam of the grid may lose."""
+    step = np.where(np.isfinite(aperture.beamwidth), 0.5 / PER_BEAM * aperture.beamwidth, 0.0)
+    return 1.0 - float(np.abs(np.exp(2j * np.pi / aperture.wavelength * aperture.elements[:, 1:] @ step).mean()) ** 2)
+
+
+def _refined(data: Complexes, aperture: Aperture, at: Floats) -> Floats:
+    """Return cosines (k, 2) moved by turns to where they explain most of snapshots (n, a)."""
+    at, grid = at.copy(), aperture.grid(PER_BEAM)
+    for _ in range(_ROUNDS):
+        before = at.copy()
+        for k in range(len(at)):
+            at[k] = climb(_beside(data, aperture, np.delete(at, k, axis=0)), aperture, at[k : k + 1], grid)[0][0]
+        if aperture.apart(at, before).max() < _STILL:
+            break
+    return at
+
+
+def _searched_anew(data: Complexes, aperture: Aperture, at: Floats, value: float, least: float) -> Floats:
+    """Return cosines (k, 2) of which none, sought anew over all directions, explains more beside the others."""
+    for _ in range(_ROUNDS):
+        for k in range(len(at)):
+            form = _beside(data, aperture, np.delete(at, k, axis=0))
+            tried = at.copy()
+            tried[k] = peaks(form, aperture, 1)[0]
+            tried = _refined(data, aperture, tried)
+            if (more := explained(data, aperture, tried)) > value + least:
+                at, value = tried, more
+                break
+        else:
+            break
+    return at
