@@ -31,7 +31,7 @@ def joint(data: Complexes, aperture: Aperture, start: Floats) -> Floats:
     """Return the cosines (k, 2) of the k waves that explain most of snapshots (n, a), `start` if none explain more.
 
     Source: Ziskind and Wax 1988 (alternating projection), from several sets of the grid in place of one."""
-    total = float((np.abs(data) ** 2).sum())
+    total = float(squared(data).sum())
     best, most = start, explained(data, aperture, start)
     sets, values = _on_grid(data, aperture, len(start))
     slack = 2.0 * _between(aperture) * total
@@ -45,7 +45,12 @@ def joint(data: Complexes, aperture: Aperture, start: Floats) -> Floats:
 
 def explained(data: Complexes, aperture: Aperture, at: Floats) -> float:
     """Return the power that waves from cosines (k, 2) explain of snapshots (n, a), by least squares."""
-    return float((np.abs(data @ _basis(aperture.steering(at)).conj().T) ** 2).sum())
+    return float(squared(data @ _basis(aperture.steering(at)).conj().T).sum())
+
+
+def squared(wave: Complexes) -> Floats:
+    """Return the power of complex values."""
+    return np.asarray(wave.real**2 + wave.imag**2)
 
 
 def _basis(waves: Complexes) -> Complexes:
@@ -59,9 +64,8 @@ def _beside(data: Complexes, aperture: Aperture, others: Floats) -> Form:
     rest = data - (data @ basis.conj().T) @ basis
 
     def value(steering: Complexes) -> Floats:
-        wave = steering.conj() @ rest.T
-        alone = steering.shape[1] - (np.abs(steering @ basis.conj().T) ** 2).sum(axis=1)
-        power = (wave.real**2 + wave.imag**2).sum(axis=1)
+        alone = steering.shape[1] - squared(steering @ basis.conj().T).sum(axis=1)
+        power = squared(steering.conj() @ rest.T).sum(axis=1)
         return np.where(alone > _ALONE * steering.shape[1], power / np.maximum(alone, 1e-300), 0.0)
 
     return value
@@ -71,24 +75,42 @@ def _on_grid(data: Complexes, aperture: Aperture, count: int) -> tuple[Floats, F
     """Return sets of beams (s, count, 2) on a grid that explain most of snapshots (n, a), and how much (s,)."""
     beams = aperture.spread(PER_BEAM) if aperture.deep else aperture.grid(PER_BEAM).points
     steering = aperture.steering(beams)
-    power = (np.abs(steering.conj() @ data.T) ** 2).sum(axis=1) / steering.shape[1]
-    rows = np.argsort(-power, kind="stable")[: max(_SETS, _PAIRS // len(beams))]
-    sets, values = beams[rows, None], power[rows]
+    seen = steering.conj() @ data.T
+    values = squared(seen).sum(axis=1) / steering.shape[1]
+    rows = np.argsort(-values, kind="stable")[: max(_SETS, _PAIRS // len(beams))]
+    sets, values = beams[rows, None], values[rows]
     for _ in range(1, count):
-        more = np.array([value + _beside(data, aperture, at)(steering) for at, value in zip(sets, values, strict=True)])
-        found = []
-        for _ in range(_SETS):
-            row, column = np.unravel_index(int(more.argmax()), more.shape)
-            if not more[row, column] > 0.0:
-                break
-            found.append((np.concatenate([sets[row], beams[column, None]]), float(more[row, column])))
-            near = aperture.apart(sets[:, :, None], found[-1][0]) < _SAME
-            # A row may hold the same set again where it lacks one wave of it.
-            for lacked in range(len(found[-1][0])):
-                same = np.delete(near, lacked, axis=2).any(axis=2).all(axis=1)
-                more[np.ix_(same, aperture.apart(beams, found[-1][0][lacked]) < _SAME)] = 0.0
-        sets, values = np.array([x[0] for x in found]), np.array([x[1] for x in found])
+        bases = [_basis(aperture.steering(at)) for at in sets]
+        sets, values = _longer(aperture, beams, sets, values[:, None] + _gains(data, steering, seen, np.array(bases)))
     return sets, values
+
+
+def _gains(data: Complexes, steering: Complexes, seen: Complexes, bases: Complexes) -> Floats:
+    """Return what beams (b, a), which see (b, n) of snapshots (n, a), explain beside each of bases (s, k, a)."""
+    sets, count, size = bases.shape
+    shared = (steering.conj() @ bases.reshape(-1, size).T).reshape(-1, sets, count)
+    alone = size - squared(shared).sum(axis=2)
+    power = np.zeros(alone.shape)
+    for snapshot, wave in zip(data, seen.T, strict=True):
+        power += squared(wave[:, None] - (shared * (bases.conj() @ snapshot)).sum(axis=2))
+    return np.where(alone > _ALONE * size, power / np.maximum(alone, _ALONE), 0.0).T
+
+
+def _longer(aperture: Aperture, beams: Floats, sets: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return the sets (s, k + 1, 2) of highest values, and these, from sets (r, k, 2) and their values (r, b) with one
+    more of beams (b, 2)."""
+    found: list[Floats] = []
+    most: list[float] = []
+    while len(found) < _SETS and values.max(initial=0.0) > 0.0:
+        row, column = np.unravel_index(int(values.argmax()), values.shape)
+        most.append(float(values[row, column]))
+        found.append(np.concatenate([sets[row], beams[column, None]]))
+        near = aperture.apart(sets[:, :, None], found[-1]) < _SAME
+        # Found again are those that lack one wave of it, with a beam near to that.
+        for lacked, wave in enumerate(found[-1]):
+            same = np.delete(near, lacked, axis=2).any(axis=2).all(axis=1)
+            values[np.ix_(same, aperture.apart(beams, wave) < _SAME)] = 0.0
+    return np.array(found).reshape(-1, sets.shape[1] + 1, 2), np.array(most)
 
 
 def _between(aperture: Aperture) -> float:
@@ -116,9 +138,9 @@ def _searched_anew(data: Complexes, aperture: Aperture, at: Floats, value: float
             form = _beside(data, aperture, np.delete(at, k, axis=0))
             tried = at.copy()
             tried[k] = peaks(form, aperture, 1)[0]
-            tried = _refined(data, aperture, tried)
-            if (more := explained(data, aperture, tried)) > value + least:
-                at, value = tried, more
+            if explained(data, aperture, tried) > value + least:
+                at = _refined(data, aperture, tried)
+                value = explained(data, aperture, at)
                 break
         else:
             break
