@@ -71,6 +71,8 @@ class Echoes(Found):
 
     direction: Floats
     """Cosines (n, 2) along y and z"""
+    unsure: NDArray[np.bool_]
+    """(n,) whether the direction may be that of a side lobe: waves in the cell were not told apart"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +87,7 @@ class Row:
     direction: Floats
     misfit: float
     """Share of the power that is no plane wave: an echo that was not told apart from it, seen by all beams."""
+    unsure: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +122,10 @@ class Splitter:
             found = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k, kept))]
             kept += [row for row in found if row is found[0] or not any(self._same(row, other) for other in kept)]
         kept.sort(key=lambda row: -row.power)
-        names = ("cell", "shift", "power", "noise", "direction")
+        names = ("cell", "shift", "power", "noise", "direction", "unsure")
         if not kept:
-            return Echoes(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+            none, pairs = np.zeros(0), np.zeros((0, 2))
+            return Echoes(pairs.astype(np.int64), pairs, none, none, pairs, none.astype(bool))
         return Echoes(*(np.array([getattr(row, name) for row in kept]) for name in names))
 
     def _clear(self, power: float, cell: Ints, shift: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:
@@ -182,7 +186,8 @@ class Splitter:
         shift, power = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
-        row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)
+        unsure = held.unsure(self.scan.aperture)
+        row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit, bool(unsure[k]))
         beams = partial(held.weights.__getitem__, slice(k, k + 1))
         shown = float(level[at[0], at[1]])
         return row if k == 0 or self._clear(shown, cell, shift[0], kept, peaks, beams) else None
