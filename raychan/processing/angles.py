@@ -100,7 +100,9 @@ def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float) ->
     count = len(aperture.elements)
     for k in range(1, min(_MOST, count // 2) + 1):
         rest = data - amplitudes(data, aperture, found.direction) @ aperture.steering(found.direction)
-        found = replace(found, least=least, rest=float(_told(rest, aperture, estimate(rest, aperture, "bartlett", 1)).power[0]))
+        found = replace(
+            found, least=least, rest=float(_told(rest, aperture, estimate(rest, aperture, "bartlett", 1)).power[0])
+        )
         if found.rest <= least or k == min(_MOST, count // 2):
             break
         directions = estimate(data, aperture, scan.method, k + 1)

@@ -220,13 +220,15 @@ class Splitter:
 
 
 def _top(level: Floats, middle: Ints, pad: Ints, reach: Ints) -> Ints:
-    """Return where (2,) a level peaks: the greatest up to `pad` (2,) from the middle (2,), and upwards from there to the
-    first maximum, or to an end of `reach` (2,)."""
+    """Return where (2,) a level peaks: the greatest up to `pad` (2,) from the middle (2,), and upwards from there to
+    the first maximum, or to an end of `reach` (2,)."""
     inner = tuple(slice(m - p, m + p + 1) for m, p in zip(middle, pad, strict=True))
     at = middle - pad + np.array(np.unravel_index(int(level[inner].argmax()), level[inner].shape))
     while True:
         low = np.maximum(at - (reach > 0), middle - reach)
-        around = level[tuple(slice(a, b + 1) for a, b in zip(low, np.minimum(at + (reach > 0), middle + reach), strict=True))]
+        around = level[
+            tuple(slice(a, b + 1) for a, b in zip(low, np.minimum(at + (reach > 0), middle + reach), strict=True))
+        ]
         higher = low + np.array(np.unravel_index(int(around.argmax()), around.shape))
         if level[tuple(higher)] <= level[tuple(at)]:
             return np.asarray(at)
