@@ -294,7 +294,7 @@ class Detections(Record):
     speed: Floats = column("n", unit="m/s", doc="range rate with the scalar ego speed added")
     azimuth: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
     elevation: Floats = column("n", unit="rad", doc="NaN where no array allows it", finite=False)
-    ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="whether another direction, or rate, looks alike")
+    ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="whether another direction, or rate, may be the true one")
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
     cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")

@@ -22,6 +22,7 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 _MOST = 8  # echoes in a cell
 _FLOOR = 1e-4  # of a cell's strongest echo: what a wave that is no plane one to rounding and side lobes leaves
 _APART = 0.05  # beam widths: nearer echoes share their power at the noise's whim (not measured)
+_UNTOLD = 0.01  # of an echo's power: waves that were not told apart, weaker than this, move its level by 0.9 dB at most
 _SAFETY = 4.0  # on the power that a plane wave cannot fit (not measured)
 
 
@@ -71,11 +72,19 @@ class CellEchoes:
     """Beams (k, a): times the cell's snapshot (a,) the echoes' waves."""
     rest: float = 0.0
     """Power [W] of the strongest beam of what they leave: more than noise where two echoes were not told apart."""
+    least: float = 0.0
+    """Power [W] below which what they leave is noise, or what of the strongest is no plane wave."""
 
     @property
     def noise_gain(self) -> Floats:
         """Noise power in each beam (k,) over that of one receiver."""
         return np.asarray((np.abs(self.weights) ** 2).sum(axis=1))
+
+    def unsure(self, aperture: Aperture) -> NDArray[np.bool_]:
+        """Return which directions (k,) may be wrong by more than a beam width: where side lobes are high, those of sums
+        of waves that were not told apart."""
+        untold = aperture.table is None and self.rest > self.least
+        return np.asarray(untold & (self.rest > _UNTOLD * self.power))
 
 
 def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float) -> CellEchoes:
@@ -91,7 +100,9 @@ def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float) ->
     count = len(aperture.elements)
     for k in range(1, min(_MOST, count // 2) + 1):
         rest = data - amplitudes(data, aperture, found.direction) @ aperture.steering(found.direction)
-        found = replace(found, rest=float(_told(rest, aperture, estimate(rest, aperture, "bartlett", 1)).power[0]))
+        found = replace(
+            found, least=least, rest=float(_told(rest, aperture, estimate(rest, aperture, "bartlett", 1)).power[0])
+        )
         if found.rest <= least or k == min(_MOST, count // 2):
             break
         directions = estimate(data, aperture, scan.method, k + 1)

@@ -71,6 +71,8 @@ class Echoes(Found):
 
     direction: Floats
     """Cosines (n, 2) along y and z"""
+    unsure: NDArray[np.bool_]
+    """(n,) whether the direction may be that of a side lobe: waves in the cell were not told apart"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +87,13 @@ class Row:
     direction: Floats
     misfit: float
     """Share of the power that is no plane wave: an echo that was not told apart from it, seen by all beams."""
+    unsure: bool
+    weights: Complexes
+    """(a,) of its beam, with nulls towards the others of the cell."""
+    shown: float
+    """[W] power in its cell."""
+    beside: bool
+    """Whether it peaks a resolution cell or more from that peak."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +115,10 @@ class Splitter:
         """Return the echoes in the cells of peaks, strongest first.
 
         A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain, or those of what
-        is stronger in its row or column."""
+        is stronger in its row or column. An echo that peaks beside its cell may have a peak of its own there, or none,
+        as a stronger one has it: it counts where no other peak gives it."""
         kept: list[Row] = []
+        beside: list[Row] = []
         for i in range(len(peaks.cells)):
             beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
             clear = self._clear(float(peaks.shown[i]), peaks.cells[i], peaks.shift[i], kept, peaks, beams)
@@ -116,12 +127,18 @@ class Splitter:
             v, r = peaks.cells[i]
             snapshot = self.map.spectrum[:, v, r]
             held = echoes_in(snapshot, self.scan, float(peaks.least[i]), float(self.map.range[r]))
-            found = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k, kept))]
+            rows = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k))]
+            beside += [row for row in rows if row.beside]
+            found = [rows[0], *(row for row in rows[1:] if not row.beside and self._own(row, kept, peaks))]
             kept += [row for row in found if row is found[0] or not any(self._same(row, other) for other in kept)]
+        for row in sorted(beside, key=lambda row: -row.power):
+            if not any(self._same(row, other) for other in kept) and self._own(row, kept, peaks):
+                kept.append(row)
         kept.sort(key=lambda row: -row.power)
-        names = ("cell", "shift", "power", "noise", "direction")
+        names = ("cell", "shift", "power", "noise", "direction", "unsure")
         if not kept:
-            return Echoes(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+            none, pairs = np.zeros(0), np.zeros((0, 2))
+            return Echoes(pairs.astype(np.int64), pairs, none, none, pairs, none.astype(bool))
         return Echoes(*(np.array([getattr(row, name) for row in kept]) for name in names))
 
     def _clear(self, power: float, cell: Ints, shift: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:
@@ -162,30 +179,37 @@ class Splitter:
         turned = round(float(one[0] - other[0]) / len(self.map.rate))
         return bool((int(self.map.fold[tuple(one)]) - int(self.map.fold[tuple(other)]) + turned) % tested)
 
-    def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int, kept: list[Row]) -> Row | None:
+    def _own(self, row: Row, kept: list[Row], peaks: Peaks) -> bool:
+        """Return whether an echo is above what the side lobes of others show where it peaks."""
+        return self._clear(row.shown, row.cell, row.shift, kept, peaks, lambda: row.weights[None])
+
+    def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int) -> Row | None:
         """Return echo k in the cell of peak i where its own beam peaks; None for what is none.
 
-        An echo beside the strongest must peak within a resolution cell, above what the side lobes of echoes in other
-        cells show there: else it is the foot of an echo that has a peak of its own.
+        An echo beside the strongest must peak within two resolution cells: else it is the foot of an echo farther off.
         """
         pad, shape = np.array(self.grid.pad), self.map.power.shape
-        near = np.meshgrid(*(c + np.arange(-p, p + 1) for c, p in zip(peaks.cells[i], pad, strict=True)), indexing="ij")
+        reach = 2 * pad
+        near = np.meshgrid(
+            *(c + np.arange(-n, n + 1) for c, n in zip(peaks.cells[i], reach, strict=True)), indexing="ij"
+        )
         v, r = self.shape.cells_at(near[0], near[1], shape)
         level = np.abs(np.tensordot(held.weights[k], self.map.spectrum[:, v, r], 1)) ** 2
-        at = pad if k == 0 else np.array(np.unravel_index(int(level.argmax()), level.shape))
         # Along an axis of two cells there is nothing to compare with.
-        at = np.where(np.array(shape) <= 2, pad, at)
-        if not (np.abs(at - pad) < pad).all():
+        fixed = np.array(shape) <= 2
+        at = reach if k == 0 else _top(level, reach, np.where(fixed, 0, pad), np.where(fixed, 0, reach))
+        if not (np.abs(at - reach) < reach).all():
             return None
         cell = np.array([v[tuple(at)], r[tuple(at)]])
         beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
         shift, power = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
-        row = Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit)
-        beams = partial(held.weights.__getitem__, slice(k, k + 1))
-        shown = float(level[at[0], at[1]])
-        return row if k == 0 or self._clear(shown, cell, shift[0], kept, peaks, beams) else None
+        unsure, shown = bool(held.unsure(self.scan.aperture)[k]), float(level[at[0], at[1]])
+        aside = not bool((np.abs(at - reach) < pad).all())
+        return Row(
+            i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit, unsure, held.weights[k], shown, aside
+        )
 
     def _same(self, one: Row, other: Row) -> bool:
         """Return whether echoes of neighbouring peaks are one."""
@@ -193,3 +217,19 @@ class Splitter:
         apart = np.minimum(apart, np.array(self.map.power.shape) - apart)
         turn = self.scan.aperture.apart(one.direction, other.direction)
         return bool((apart <= np.array(self.grid.pad)).all() and turn < _SAME_BEAM)
+
+
+def _top(level: Floats, middle: Ints, pad: Ints, reach: Ints) -> Ints:
+    """Return where (2,) a level peaks: the greatest up to `pad` (2,) from the middle (2,), and upwards from there to
+    the first maximum, or to an end of `reach` (2,)."""
+    inner = tuple(slice(m - p, m + p + 1) for m, p in zip(middle, pad, strict=True))
+    at = middle - pad + np.array(np.unravel_index(int(level[inner].argmax()), level[inner].shape))
+    while True:
+        low = np.maximum(at - (reach > 0), middle - reach)
+        around = level[
+            tuple(slice(a, b + 1) for a, b in zip(low, np.minimum(at + (reach > 0), middle + reach), strict=True))
+        ]
+        higher = low + np.array(np.unravel_index(int(around.argmax()), around.shape))
+        if level[tuple(higher)] <= level[tuple(at)]:
+            return np.asarray(at)
+        at = higher

@@ -227,7 +227,8 @@ def _reported(
     ambiguous = np.zeros(len(rate), bool)
     if aperture is not None and isinstance(found, Echoes):
         angles = np.array(aperture.angles(found.direction))
-        ambiguous = twins.ambiguous(aperture, found.direction, looks * found.power / np.maximum(found.noise, _TINY))
+        snr = looks * found.power / np.maximum(found.noise, _TINY)
+        ambiguous = found.unsure | twins.ambiguous(aperture, found.direction, snr)
     return Detections(
         range=map.range[0] + place[:, 1] * (map.range_resolution / grid.pad[1]),
         rate=rate,

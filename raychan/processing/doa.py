@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from raychan.columns import Record, column
 from raychan.processing.covariance import Covariance, covariance
 from raychan.processing.esprit import esprit
+from raychan.processing.joint_search import joint
 from raychan.processing.monopulse import monopulse
 from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, capon, climb, music, peaks
@@ -144,4 +145,6 @@ def by_turns(data: Complexes, aperture: Aperture, count: int) -> Floats:
                 found[k] = climb(form, aperture, found[k : k + 1], grid)[0][0]
             if np.abs((found - before) / width).max() < _STILL:
                 break
+    if count > 1 and aperture.table is None:
+        found = joint(data, aperture, found)
     return aperture.canonical(found)
