@@ -22,7 +22,6 @@ from raychan.cli.rcs_output import (
     uncertainties,
 )
 from raychan.scalars import as_text
-from raychan.units import C0
 from raychan.world import limits
 
 if TYPE_CHECKING:
@@ -150,7 +149,7 @@ def rcs(
     show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
     show.warn(further_bounces(found, max_bounces, tolerance))
     show.warn(edge_fields(found, tolerance))
-    show.warn(near_ends(found, C0 / (1e9 * frequency_ghz)))
+    show.warn(near_ends(found, 1e9 * frequency_ghz))
     show.warn(beyond_budget(found, max_rays))
     show.warn(uncertainties(mesh, found, tolerance, crease is not None))
     if files:

@@ -87,14 +87,16 @@ def edge_fields(found: Rcs, tolerance: float) -> list[str]:
     ]
 
 
-def near_ends(found: Rcs, wavelength: float) -> list[str]:
-    """Return a line where an end stands within a wavelength [m] of the body."""
+def near_ends(found: Rcs, frequency: float) -> list[str]:
+    """Return a line where an end stands within a wavelength of the body, at a frequency [Hz]."""
+    from raychan.units import C0
+
     near = int(found.too_near.sum())
     if not near:
         return []
     return [
-        f"at {near} of {found.sigma.size} angles the radar is within a wavelength ({1e3 * wavelength:.2g} mm) of the "
-        "body: levels leave out near fields, and err beyond what is stated"
+        f"at {near} of {found.sigma.size} angles the radar is within a wavelength ({1e3 * C0 / frequency:.2g} mm) of "
+        "the body: levels leave out near fields, and err beyond what is stated"
     ]
 
 

@@ -189,7 +189,7 @@ class Splitter:
         An echo beside the strongest must peak within two resolution cells: else it is the foot of an echo farther off.
         """
         pad, shape = np.array(self.grid.pad), self.map.power.shape
-        reach = 2 * pad
+        reach = 2 * pad if k else pad
         near = np.meshgrid(
             *(c + np.arange(-n, n + 1) for c, n in zip(peaks.cells[i], reach, strict=True)), indexing="ij"
         )

@@ -39,7 +39,7 @@ def test_a_client_goes_through_the_whole_sequence(tmp_path):
         assert host.ask("20 24")[:2] == b"\xa0\x00"
         scans = [decode_scan(p) for p in host.scans(1.5)]
         assert 3 <= len(scans) <= 17 and host.bad == 0, "97 ms each"
-        # The quay's near side is 28 m to the left of the scanner, beyond the water's reach.
+        # The quay's near side is 38 m to the left of the ship, beyond the water's reach.
         assert any(np.isfinite(s.range_m).any() for s in scans)
         assert host.ask("31")[8] == 0x24, "an answer while it streams"
         assert host.ask("20 48")[:2] == b"\xa0\x00"

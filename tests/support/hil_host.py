@@ -23,10 +23,10 @@ reflectivity = 0.1
 [[bodies]]
 name = "quay"
 shape = "box"
-params = { length = 4.0, width = 400.0, height = 20.0 }
-position = [40.0, 0.0, 0.0]
+params = { length = 4000.0, width = 4.0, height = 20.0 }
+position = [0.0, 40.0, 0.0]
 """
-"""A container ship that heads for a quay."""
+"""A container ship along a quay."""
 
 
 def check_sum(data):
