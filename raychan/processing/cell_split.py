@@ -94,6 +94,8 @@ class Row:
     """[W] power in its cell."""
     beside: bool
     """Whether it peaks a resolution cell or more from that peak."""
+    crest: bool
+    """Whether its beam shows no more in the map cells around its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +132,13 @@ class Splitter:
             rows = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k))]
             beside += [row for row in rows if row.beside]
             found = [rows[0], *(row for row in rows[1:] if not row.beside and self._own(row, kept, peaks))]
-            kept += [row for row in found if row is found[0] or not any(self._same(row, other) for other in kept)]
+            # The strongest in a cell may be the foot of one that has its own peak, beside which another one peaks here.
+            sure = [k == 0 and (row.crest or len(rows) == 1) for k, row in enumerate(found)]
+            kept += [
+                row
+                for row, own in zip(found, sure, strict=True)
+                if own or not any(self._same(row, other) for other in kept)
+            ]
         for row in sorted(beside, key=lambda row: -row.power):
             if not any(self._same(row, other) for other in kept) and self._own(row, kept, peaks):
                 kept.append(row)
@@ -207,9 +215,9 @@ class Splitter:
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
         unsure, shown = bool(held.unsure(self.scan.aperture)[k]), float(level[at[0], at[1]])
         aside = not bool((np.abs(at - reach) < pad).all())
-        return Row(
-            i, cell, shift[0], float(power[0]), noise, held.direction[k], misfit, unsure, held.weights[k], shown, aside
-        )
+        crest = bool(level[at[0] - 1 : at[0] + 2, at[1] - 1 : at[1] + 2].max() <= shown)
+        fit = misfit, unsure, held.weights[k], shown
+        return Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], *fit, aside, crest)
 
     def _same(self, one: Row, other: Row) -> bool:
         """Return whether echoes of neighbouring peaks are one."""

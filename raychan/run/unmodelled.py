@@ -99,7 +99,8 @@ def _further(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, boun
     found = _by_ratio(paths, radar, settings, bounces, weakest)
     if isinstance(found.level_db, float) and found.level_db > 0.0:
         return found
-    over = coming_back(paths, geometry, bounces)
+    # What comes back to the transmitter does not reach a receiver elsewhere.
+    over = coming_back(paths, geometry, bounces) if radar.rx_position is None else ()
     how = f"waves over {' > '.join(over)} come back by {bounces + 1} interactions (model.max_bounces)"
     return Entry(UNKNOWN, SEEN, how) if over else found
 

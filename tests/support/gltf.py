@@ -7,8 +7,10 @@ import json
 import struct
 
 import numpy as np
+import pytest
 import trimesh
 
+from raychan.world.errors import SceneError
 from raychan.world.mesh_io import load
 
 BOX = trimesh.creation.box([1.0, 2.0, 3.0])  # 22 m2, 6 m3
@@ -58,3 +60,13 @@ class Gltf:
             )
         file.write_bytes(text)
         return load(file)
+
+
+def refused(form, folder, ending):
+    """Change the file by `form` and read it from a folder; return the words by which it is refused, with its name."""
+    made = Gltf()
+    form(made)
+    with pytest.raises(SceneError) as told:
+        made.read(folder, ending)
+    assert f"m.{ending}" in str(told.value)
+    return str(told.value)
