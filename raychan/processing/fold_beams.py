@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.parallel import parallel_for
+from raychan.processing.fold_kernels import climb_all, fit_beams, left_by
 from raychan.radar.aperture import Aperture
 from raychan.radar.radar import Radar
 from raychan.units import C0
@@ -21,7 +24,7 @@ _LEFT = 0.5  # of a power that at least one beam sees: at the edge of the half s
 WEAK = 0.25  # of the strongest beam: where CLEAR asks for more, cells are too weak for detections, and are not refined
 _SHRINKS = 3  # rounds of refining, each over half the distance: by parabolas, to 1e-5 of the power
 _TURNS = 4  # rounds in which several beams are refined, each on what the others leave (not measured)
-_RIDGE = 1e-6  # of a beam's weight: beams that come to lie on each other have amplitudes nevertheless (not measured)
+_CELLS = 200  # at least, for a thread to help: some milliseconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +76,9 @@ class Beams:
         near &= (near.sum(axis=0) > 1) & (clear < WEAK * top)
         for k, values in enumerate(held):
             some = np.flatnonzero(near[k])
-            power[k, some], at[k, some] = self._refined(values[:, some].T, at[k, some], power[k, some])
+            level, towards = power[k, some], at[k, some]
+            climb_all(level, towards, np.ascontiguousarray(values[:, some].T), *self._search, _SHRINKS)
+            power[k, some], at[k, some] = level, towards
         return power, at
 
     def fitted_together(self, values: Complexes, at: Floats) -> tuple[Floats, Floats]:
@@ -81,48 +86,22 @@ class Beams:
         one beam, and the cosines (c, k + 1, 2): each is by turns refined on what the others leave.
 
         Args: values (c, t * a) of cells. Source: Li and Stoica 1996 (RELAX)."""
-        level = squared(self.weights(self.at) @ self._rest(values, at).T)
-        more = self.at[level.argmax(axis=0)]
-        at = np.concatenate([at, more[:, None]], axis=1)
-        for _ in range(_TURNS):
-            for k in range(at.shape[1]):
-                rest = self._rest(values, at, k)
-                start = squared((self.weights(at[:, k]) * rest).sum(axis=1))
-                at[:, k] = self._refined(rest, at[:, k], start)[1]
-        left = squared(self._rest(values, at)).sum(axis=1)
-        return (squared(values).sum(axis=1) - left) * len(self.places), at
+        values, rest = np.ascontiguousarray(values, np.complex64), np.empty(values.shape, np.complex64)
+        left_by(rest, np.ascontiguousarray(at), values, self.places)
+        more = self.at[squared(self.weights(self.at) @ rest.T).argmax(axis=0)]
+        at, power = np.concatenate([at, more[:, None]], axis=1), np.empty(len(values))
 
-    def _rest(self, values: Complexes, at: Floats, own: int | None = None) -> Complexes:
-        """Return what plane waves from cosines (c, k, 2), fitted by least squares, leave of values (c, t * a), or all
-        but one of them."""
-        weights = self.weights(at).astype(np.complex128)
-        gram = weights @ weights.conj().transpose(0, 2, 1)
-        gram += _RIDGE * len(self.places) * np.eye(at.shape[1])
-        waves = np.linalg.solve(gram, weights @ values[:, :, None])
-        if own is not None:
-            waves[:, own] = 0.0
-        return np.asarray(values - (weights.conj() * waves).sum(axis=1))
+        def fit(some: slice) -> None:
+            fit_beams(power[some], at[some], values[some], *self._search, _TURNS, _SHRINKS)
 
-    def _refined(self, values: Complexes, at: Floats, power: Floats) -> tuple[Floats, Floats]:
-        """Return the power (c,) and the cosines (c, 2) of the peaks next to beams towards cosines (c, 2), in cells that
-        hold (c, t * a)."""
-
-        def of(towards: Floats) -> Floats:
-            return squared((self.weights(towards) * values).sum(axis=1))
-
-        step = self.step
-        for _ in range(_SHRINKS if len(at) else 0):
-            for axis in np.flatnonzero(step):
-                aside = step * (np.arange(2) == axis)
-                below, above = of(at - aside), of(at + aside)
-                bend = below - 2.0 * power + above
-                shift = np.divide(0.5 * (below - above), bend, out=np.sign(above - below), where=bend < 0.0)
-                tried = self.array.visible(at + np.clip(shift, -1.0, 1.0)[:, None] * aside)
-                value = of(tried)
-                better = value > power
-                at, power = np.where(better[:, None], tried, at), np.where(better, value, power)
-            step = 0.5 * step
+        parallel_for(len(values), fit, _CELLS)
         return power, at
+
+    @cached_property
+    def _search(self) -> tuple[Floats, ...]:
+        """Places, distances of beams alike, and the first step, as kernels take them."""
+        period = np.where(self.array.wraps, self.array.period, np.inf)
+        return self.places, period, np.ascontiguousarray(self.array.skewed, np.float64), self.step
 
 
 def squared(wave: Any) -> Floats:
