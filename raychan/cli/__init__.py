@@ -163,6 +163,11 @@ def invoke(argv: list[str]) -> int:
         return _stopped(str(stop))
     except BrokenPipeError:
         return _unprinted() or 0
+    except SystemExit as stop:
+        # typer's answer to a closed pipe, as when `head` has read enough of a help text.
+        if isinstance(stop.__context__, BrokenPipeError):
+            return _unprinted() or 0
+        raise
     except MemoryError:
         return _fail("out of memory; ask for a coarser --tolerance or fewer --max-bounces")
     except Exception as error:

@@ -100,10 +100,13 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
 
     def add_overload(self, compiled: Any) -> None:
         """Add compiled code, for calls from Python if it has a wrapper. Raises: TypeError if an uncounted function
-        returns arrays."""
+        returns arrays, or one that Python calls a named tuple: the wrapper makes it by calls to Python, and does not
+        look whether one of them failed, as at a Ctrl-C."""
         if not self.targetoptions.get("_nrt", True) and _held(compiled.signature.return_type):
             raise TypeError(f"{self.py_func.__qualname__} counts no references, but returns an array")
         if _wrapped(compiled):
+            if _named(compiled.signature.return_type):
+                raise TypeError(f"{self.py_func.__qualname__} returns a named tuple to Python")
             super().add_overload(compiled)
         else:
             self.overloads[tuple(compiled.signature.args)] = compiled
@@ -112,6 +115,11 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
 def _held(kind: Any) -> bool:
     """Tell whether a type is an array, or a tuple that holds one."""
     return isinstance(kind, types.Array) or any(map(_held, getattr(kind, "types", ())))
+
+
+def _named(kind: Any) -> bool:
+    """Tell whether a type is a named tuple, or a tuple that holds one."""
+    return isinstance(kind, types.NamedTuple | types.NamedUniTuple) or any(map(_named, getattr(kind, "types", ())))
 
 
 def _wrapped(compiled: Any) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +14,18 @@ from raychan.radar.aperture import cosines
 from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
+from raychan.run.point_spread import PointSpread
 from raychan.run.receiver import aperture_of, check_cube, check_map, map_of, receivers
 from raychan.run.receiver_losses import range_spread
-from raychan.run.result import Result
+from raychan.run.result import Receiver, Result
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
-Complexes = NDArray[np.complexfloating[Any, Any]]
+Ints = NDArray[np.int64]
+Complexes = NDArray[np.complex128]
+
+_LITTLE = 1e-3  # of a cell's amplitude: largest sum of the paths left out of a beam (not measured)
+_UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
 
 def range_azimuth(data: Cube | RangeDoppler, radar: Radar) -> RangeAzimuth:
@@ -56,8 +60,8 @@ def angles_in(result: Result) -> RangeAzimuth | None:
 class Beams:
     """The beams of an array towards its detections."""
 
-    passed: Callable[[int], Complexes]
-    """What the beam towards a detection (row) passes of each path (n,), as a factor of its wave."""
+    passed: Callable[[int, Ints], Complexes]
+    """What the beam towards a detection (row) passes of paths (n,), rows of all, as factors of their waves."""
     spread: Floats
     """Range cells (d,) by which the range of each detection differs over the array."""
 
@@ -68,17 +72,48 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
     if not any(aperture.scans):
         return None
 
-    def passed(row: int) -> Complexes:
+    def passed(row: int, some: Ints) -> Complexes:
         look = np.nan_to_num([found.azimuth[row], found.elevation[row]])
         rows = aperture.steering(cosines(*look)).conj()[0] / len(aperture.elements)
         # A path over several bodies leaves and arrives in different directions.
+        one, way = paths.trajectories, paths.trajectory[some]
         sent, seen = (
             np.exp(2j * np.pi / aperture.wavelength * (look @ axes @ elements.T))
             for look, axes, elements in (
-                (paths.departure, radar.axes, radar.tx_elements),
-                (paths.arrival, radar.rx_axes, radar.elements),
+                (one.departure[way], radar.axes, radar.tx_elements),
+                (one.arrival[way], radar.rx_axes, radar.elements),
             )
         )
         return np.asarray(((sent @ rows.reshape(sent.shape[1], -1)) * seen).sum(axis=1))
 
     return Beams(passed, range_spread(found, radar)[0])
+
+
+def wave_in_beam(
+    paths: Paths,
+    response: PointSpread,
+    at: Floats,
+    power: tuple[float, float],
+    beams: Beams,
+    row: int,
+    receiver: Receiver,
+) -> Complexes | None:
+    """Return what an array's beam lets through of each path (n,) that may bring something to the cell of a detection, 0
+    of others; None where that does not explain it, but what arrives at the middle of the array does: the direction of
+    an ambiguous detection may not be that of its echo.
+
+    Args: at (3,) range [m], rate [m/s] and amplitude of the cell; power [W] of the cell and of the detection, a row
+    of those that the beams are of."""
+    place = paths.delay, paths.range_rate, float(at[0]), float(at[1])
+    middle = response.in_cell(paths.amplitude, *place)[0]
+    near = np.flatnonzero(np.abs(middle) * len(middle) > _LITTLE * at[2])
+    wave = np.zeros_like(paths.amplitude)
+    wave[near] = paths.amplitude[near] * beams.passed(row, near)
+    seen = response.in_cell(wave, *place)[0].sum()
+    other = unexplained(seen, power[1], receiver) and not unexplained(middle.sum(), power[0], receiver)
+    return None if other else wave
+
+
+def unexplained(wave: complex, power: float, receiver: Receiver) -> bool:
+    """Return whether paths give too little of a power [W] to explain it. Args: wave, the sum of what they bring."""
+    return bool(abs(wave) ** 2 * receiver.power < _UNEXPLAINED * power)

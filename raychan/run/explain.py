@@ -14,8 +14,8 @@ from raychan.columns import Record, column
 from raychan.poses import angles
 from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
-from raychan.run.directions import beam_to
-from raychan.run.labels import Chains, by_beam, chains, explain_cell, response_of, waves_in
+from raychan.run.directions import beam_to, wave_in_beam
+from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result
 
 _VERBS = ("", "reflect", "pass", "scatter", "point", "diffract")  # by InteractionType
@@ -56,7 +56,7 @@ class CellExplanation(Explanation):
     others: tuple[int, ...] = ()
     """Numbers of other detections as near to the place asked for as a resolution cell."""
     beam: bool = False
-    """Whether shares are those in the beam of an array towards the detection (see `by_beam`)."""
+    """Whether shares are those in the beam of an array towards the detection."""
 
 
 def explain(
@@ -101,17 +101,24 @@ def explain(
 def _of_detection(result: Result, near: list[int]) -> CellExplanation:
     row, column = map(int, result.detections.cell[near[0]])
     held = _held(result.provenance[near[0]])
-    paths = _paths_in(result, row, column)
-    at = near[0]
-    several = len(result.rdmap.spectrum) > 1
-    power, wave = float(result.rdmap.power[row, column]), paths.wave.sum() / np.sqrt(result.receiver.power)
-    beam = several and by_beam(result.detections.cell, at, power, wave, result.receiver)
+    at, wave = near[0], None
     # A result whose scene cannot be read again does not know where its receivers stand.
-    towards = beam_to(result.scene.radar, result.detections, result.paths) if beam and result.scene else None
-    if towards is not None:
-        paths = _paths_in(result, row, column, passed=towards.passed(at))
+    if len(result.rdmap.spectrum) > 1:
+        wave = _in_beam(result, at, row, column)
+    paths = _paths_in(result, row, column, amplitude=wave)
     others = tuple(i + 1 for i in near[1:])
-    return CellExplanation(**held, paths=paths, detection=at + 1, others=others, beam=beam)
+    return CellExplanation(**held, paths=paths, detection=at + 1, others=others, beam=wave is not None)
+
+
+def _in_beam(result: Result, at: int, row: int, column: int) -> Complexes | None:
+    """Return what `wave_in_beam` does for a detection (row of them) in a cell of the map."""
+    rdmap, detections, receiver = result.rdmap, result.detections, result.receiver
+    beam = beam_to(result.scene.radar, detections, result.paths) if result.scene is not None else None
+    if beam is None:
+        return None
+    power = float(rdmap.power[row, column]), float(detections.power[at])
+    place = np.array([rdmap.range[column], rdmap.rate[row], np.sqrt(power[0] / receiver.power)])
+    return wave_in_beam(result.paths, response_of(receiver), place, power, beam, at, receiver)
 
 
 def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
@@ -129,21 +136,21 @@ def _held(why: Explanation) -> dict[str, Any]:
 
 
 def _paths_in(
-    result: Result, row: int, column: int, known: Chains | None = None, passed: NDArray[Any] | None = None
+    result: Result, row: int, column: int, known: Chains | None = None, amplitude: Complexes | None = None
 ) -> CellPaths:
-    """Return the paths of a cell; passed (n,) is what a beam passes of each, else they are those at the middle."""
+    """Return the paths of a cell; amplitude (n,) of each in a beam, else they are those at the middle of the array."""
     paths, receiver = result.paths, result.receiver
     known = known or chains(paths, receiver.background)
     place = float(result.rdmap.range[column]), float(result.rdmap.rate[row])
-    wave, at = waves_in(paths, response_of(receiver), *place)
-    wave = wave if passed is None else wave * passed
+    seen = paths if amplitude is None else paths.replace(amplitude=amplitude)
+    wave, at = waves_in(seen, response_of(receiver), *place)
     order = np.argsort(-np.abs(wave), kind="stable")
-    amplitude, trajectory = paths.amplitude[order], paths.trajectory[order]
+    alone, trajectory = paths.amplitude[order], paths.trajectory[order]
     kind = paths.trajectories.kind
     return CellPaths(
         row=order.astype(np.int32),
-        power=np.abs(amplitude) ** 2 * receiver.power,
-        phase=np.asarray(np.angle(amplitude), float),
+        power=np.abs(alone) ** 2 * receiver.power,
+        phase=np.asarray(np.angle(alone), float),
         wave=wave[order] * np.sqrt(receiver.power),
         range=at[order],
         rate=paths.range_rate[order],
@@ -153,7 +160,7 @@ def _paths_in(
         chain=known.part[order],
         chains=known.names,
         met=_met(paths, known),
-        beam=passed is not None,
+        beam=amplitude is not None,
     )
 
 

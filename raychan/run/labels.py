@@ -15,7 +15,7 @@ from raychan.radar.waveform import Waveform
 from raychan.records import TRANSMIT, Detections, InteractionType, Paths, RangeDoppler
 from raychan.run.cell_sums import cell_sums
 from raychan.run.convergence import figure
-from raychan.run.directions import Beams
+from raychan.run.directions import Beams, unexplained, wave_in_beam
 from raychan.run.folding import Shown, truth
 from raychan.run.point_spread import PointSpread
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, SIDELOBE, Contribution, Explanation, Receiver
@@ -28,7 +28,6 @@ _LEAST_SHARE = 0.005  # of a cell's power: weaker chains are not listed (not mea
 _DIGITS = 9  # decimals to which shares are compared: a chain and its reverse differ by rounding
 _DEPTH = 0.3  # m: an echo over the ground less than this behind its target, the depth of a person, is no ghost
 _MANY = 20_000  # trajectories from which on a second thread pays; not measured
-_UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def _explained(
     range, rate = cell.shown.at_range, cell.shown.at_rate
     place = range, rate, rate + receiver.ego_speed
     shares = np.abs(summed) ** 2
-    if predicted < _UNEXPLAINED * cell.power or not shares.sum() > 0.0:
+    if unexplained(whole, cell.power, receiver) or not shares.sum() > 0.0:
         error_db = figure(cell.power, cell.error)  # of noise: the launches' difference against the cell's power
         return Explanation(*place, cell.power, predicted, error_db, CLUTTER, ())
     shares /= shares.sum()
@@ -158,8 +157,8 @@ def provenance(
 ) -> tuple[Explanation, ...]:
     """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate.
 
-    Args: beam, those of an array towards detections, for those that are `by_beam`; known the paths' chains, if they are
-    known already.
+    Args: beam, those of an array towards detections, of whose paths each is explained; known the paths' chains, if they
+    are known already.
     """
     known, response = known or chains(paths, receiver.background), response_of(receiver)
     rows, columns = detections.cell.T
@@ -175,24 +174,15 @@ def provenance(
         shown = Shown(*map(float, (at[i, 0], at[i, 1], stands, detections.rate[i])))
         spread = 0.0 if beam is None else float(beam.spread[i])
         cell, own = Cell(shown, float(powers[i]), float(errors[i]), paths.amplitude, spread), tuple(x[i] for x in sums)
-        if beam is not None and by_beam(detections.cell, i, float(powers[i]), own[0].sum(), receiver):
-            wave = paths.amplitude * beam.passed(i)
+        both = cell.power, float(detections.power[i])
+        wave = None if beam is None else wave_in_beam(paths, response, at[i], both, beam, i, receiver)
+        if wave is not None:
             one = response.in_cells(known.part, len(known.names), wave, paths.delay, paths.range_rate, at[i : i + 1])
-            cell, own = replace(cell, power=float(detections.power[i]), amplitude=wave), tuple(x[0] for x in one)
+            cell, own = replace(cell, power=both[1], amplitude=wave), tuple(x[0] for x in one)
         why = _explained(paths, known, response, own, cell, receiver)
         at_range, at_rate, speed, level = (float(x[i]) for x in places)
         found.append(replace(why, range=at_range, rate=at_rate, speed=speed, power=level))
     return tuple(found)
-
-
-def by_beam(cells: NDArray[np.integer[Any]], row: int, power: float, wave: complex, receiver: Receiver) -> bool:
-    """Return whether an array's detection is explained by the paths in its beam: where another is in its cell, or where
-    echoes of several directions cancel at the middle of the array.
-
-    Args: cells (n, 2) of all detections; row of the detection; power [W] of its cell; wave, the sum of its paths there.
-    """
-    shared = int((cells == cells[row]).all(axis=1).sum()) > 1
-    return shared or abs(wave) ** 2 * receiver.power < _UNEXPLAINED * power
 
 
 def response_of(receiver: Receiver) -> PointSpread:

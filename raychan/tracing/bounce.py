@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from raychan.geometry.embree_packet import own_packet
 from raychan.parallel import parallel_for, threads
 from raychan.records import REFLECT
-from raychan.tracing.bounce_records import Flight, Landed, Rules, none_landed, nothing_met, surroundings
+from raychan.tracing.bounce_records import Flight, Landed, Rules, named, none_landed, nothing_met, surroundings
 from raychan.tracing.bounce_stages import ALL, CENTRES, CORNERS, SETTLE, fly
 from raychan.tracing.contributions import RAYS, Contributions
 from raychan.tracing.launch import write_layers
@@ -108,11 +108,12 @@ def _followed(step: _Bounce, tubes: Tubes) -> tuple[Landed, int]:
     start = np.zeros((n, 4)) if step.first else clearance(geometry, tubes)
     none = np.zeros(n, np.int8)
     flight = Flight(tubes.columns, start, np.full((n, rule.layers), -1, np.int32), none, none)
-    *state, _ = staged(ALL, (flight, nothing_met(), none_landed(flight.tubes, rule.layers), 0), slice(0, n))
+    state: Any = flight, nothing_met(), none_landed(flight.tubes, rule.layers), 0
+    state = named(*staged(ALL, state, slice(0, n))[:-1])
     while wave := len(state[0].tubes.facet):
         for stage in (CENTRES, CORNERS):
             account[RAYS] += _cast_by_all(wave, partial(staged, stage, state))
-        *state, _ = staged(SETTLE, state, slice(0, wave))
+        state = named(*staged(SETTLE, state, slice(0, wave))[:-1])
     budget.settle(geometry, account, uncut)
     return state[2], state[3]
 

@@ -106,6 +106,12 @@ class Landed(NamedTuple):
     through: Ints
 
 
+def named(flight: Any, met: Any, landed: Any, count: int) -> tuple[Flight, Met, Landed, int]:
+    """Return with names what compiled code returns as plain tuples."""
+    flight, landed = (x(TubeColumns(*y[0]), *y[1:]) for x, y in ((Flight, flight), (Landed, landed)))
+    return flight, Met(TubeRays(*met[0]), *met[1:]), landed, count
+
+
 def nothing_met() -> Met:
     """Return what the rays of no tubes met."""
     none, point, flag = np.empty((0, 4)), np.empty((0, 4, 3)), np.empty(0, bool)

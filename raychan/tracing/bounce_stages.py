@@ -21,8 +21,8 @@ def fly(stage, begin, end, most, flight, met, landed, count, world, how, account
 
     Args: flight as `Flight`, met, room for it, as `Met`; landed as `Landed`, of which `count` are in use; world as
     `Surroundings`, how as `Rules`; account of the budget (see `contributions`), uncut (b,) tubes of bodies that it
-    kept from being subdivided; packet as of `embree_packet`. Returns: flight, met, landed, count; rays cast by CENTRES
-    or CORNERS, which all others add to the account.
+    kept from being subdivided; packet as of `embree_packet`. Returns: flight, met, landed as plain tuples
+    (see `bounce_records.named`), count; rays cast by CENTRES or CORNERS, which all others add to the account.
     """
     # Not constants: the compiler would make what takes them once more.
     casts, tag, none = np.int64(0), np.int64(0), np.int64(0)
@@ -50,4 +50,5 @@ def fly(stage, begin, end, most, flight, met, landed, count, world, how, account
         keep_to_budget(met.wanted, flight.tubes.facet, world.body, how, account, uncut)
         landed, count, ready = land(flight, met, landed, count, world, how)
         flight = going_on(flight, met, ready, world, how)
-    return flight, met, landed, count, casts
+    flown, seen = (flight.tubes[0:],) + flight[1:], (met.rays[0:],) + met[1:]  # noqa: RUF005 (numba)
+    return flown, seen, (landed.tubes[0:],) + landed[1:], count, casts  # noqa: RUF005

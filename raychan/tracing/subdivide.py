@@ -80,25 +80,25 @@ def subdivide(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def bisected(tubes, rows, edge, patches, first, jitter):  # type: ignore[no-untyped-def]
-    """Return what `bisect` does, as columns."""
+    """Return what `bisect` does, as a tuple of columns."""
     n = len(rows)
     parent = np.empty(2 * n, np.int64)
     for i in range(2 * n):
         parent[i] = rows[i % n]
-    return _parts(tubes, parent, bisection_weights(edge, jitter), patches, first)
+    return _parts(tubes, parent, bisection_weights(edge, jitter), patches, first)[0:]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def subdivided(tubes, rows, side, patches, first, jitter):  # type: ignore[no-untyped-def]
-    """Return what `subdivide` does, as columns, and the parents."""
+    """Return what `subdivide` does, as a tuple of columns, and the parents."""
     parts, parent, kept = parts_and_parents(tubes, rows, side, patches, first, jitter)
     if len(kept) == len(parent):
-        return parts, parent
+        return parts[0:], parent
     out, parents = room_for_tubes(len(kept), first), np.empty(len(kept), np.int64)
     copy_tubes(parts, kept, out, 0)
     for j in range(len(kept)):
         parents[j] = parent[kept[j]]
-    return out, parents
+    return out[0:], parents
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

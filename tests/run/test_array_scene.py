@@ -99,3 +99,31 @@ def test_receivers_a_wavelength_apart_say_that_directions_are_ambiguous():
     wide = rc.simulate(rc.Scene.from_text(scene([(3.9 * k, 0) for k in range(8)])))
     assert wide.detections.ambiguous.all()
     assert any("ambiguous in direction" in line for line in wide.warnings)
+
+
+WAVE = rc.Waveform(77e9, 300e6, 20e-6, n_chirps=32, n_samples=64)
+
+
+def target(name, range, azimuth_deg, level_dbsm):
+    direction = np.array([np.cos(np.radians(azimuth_deg)), np.sin(np.radians(azimuth_deg)), 0.0])
+    place = tuple(np.array([0.0, 0.0, 1.0]) + range * direction)
+    return rc.Body(name=name, shape="sphere", params={"radius": 0.004}, position=place, rcs_dbsm=level_dbsm)
+
+
+@pytest.mark.parametrize("away", [0.3, 0.5, 1.0, 1.5])
+@pytest.mark.parametrize(("strong", "weak"), [(28.5, -11.3), (-20.0, 35.0)])
+def test_an_echo_beside_a_stronger_one_in_another_cell_and_direction_is_explained_by_its_own_body(away, strong, weak):
+    """Its predicted power is its own too: what another direction brings does not pass its beam."""
+    radar = rc.Radar(WAVE, position=(0, 0, 1), power=1.0, elements=rc.uniform_array(16, 0.5 * WAVE.wavelength))
+    far = 12.0 + away * WAVE.range_resolution
+    bodies = [target("strong", 12.0, strong, 10.0), target("weak", far, weak, 2.0)]
+    result = rc.simulate(rc.Scene(bodies=bodies, radar=radar, model={"max_bounces": 1}))
+    found, reasons = result.detections, result.provenance
+    assert len(found.range) == 2
+    for k in range(2):
+        own, place = ("strong", 12.0) if abs(np.degrees(found.azimuth[k]) - strong) < 1.0 else ("weak", far)
+        assert reasons[k].bodies == own and reasons[k].true_range == pytest.approx(place, abs=0.01)
+        assert abs(10.0 * np.log10(reasons[k].predicted / found.power[k])) < 1.5
+        told = rc.explain(result, detection=k + 1)
+        assert told.beam and told.paths.chains[told.paths.chain[0]][0].startswith(own)
+        assert abs(told.paths.wave.sum()) ** 2 == pytest.approx(reasons[k].predicted, rel=1e-3)

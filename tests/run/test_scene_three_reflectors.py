@@ -48,7 +48,8 @@ def test_shares_and_levels_of_a_detection_are_those_in_its_beam(result):
         assert level[0] / level.sum() == pytest.approx(first.share, abs=1e-3)
         assert why.predicted == pytest.approx(abs(why.paths.wave.sum()) ** 2, rel=2e-2)
     alone = rc.explain(result, detection=1)
-    assert not alone.beam and not alone.paths.beam
+    assert alone.beam and alone.paths.beam
+    assert alone.predicted == pytest.approx(rc.explain(result, alone.range, alone.speed, cell=True).predicted, rel=1e-3)
 
 
 def test_a_pair_that_cancels_at_the_middle_of_the_array_is_named(result):

@@ -1,0 +1,61 @@
+"""A signal that comes while compiled code runs ends what called it, not the process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from raychan.compile.jit import njit
+
+pytestmark = pytest.mark.compiled(reason="it is about compiled code")
+
+
+class Pair(NamedTuple):  # noqa: D101
+    one: np.ndarray
+    two: np.ndarray
+
+
+@njit(cache=True)
+def paired(x):
+    return Pair(x, x + 1.0)
+
+
+@njit(cache=True)
+def unpaired(x):
+    return paired(x)[0:], 1
+
+
+def test_a_kernel_that_python_calls_returns_plain_tuples_only():
+    (one, two), _ = unpaired(np.ones(2))
+    assert type(unpaired(np.ones(2))[0]) is tuple and one.tolist() == [1.0, 1.0] and two.tolist() == [2.0, 2.0]
+    with pytest.raises(TypeError, match="paired returns a named tuple to Python"):
+        paired(np.ones(2))
+
+
+_INTERRUPTED = """
+import random, signal
+import raychan as rc
+signal.signal(signal.SIGALRM, signal.default_int_handler)
+body = rc.Body(name="corner", shape="trihedral", params={"size": 0.35}).geometry
+rc.rcs(body, 77e9, 10.0)
+stopped, random = 0, random.Random(1)
+for _ in range(30):
+    signal.setitimer(signal.ITIMER_REAL, random.uniform(0.005, 0.1))
+    try:
+        while True:
+            rc.rcs(body, 77e9, 10.0)
+    except (KeyboardInterrupt, SystemError):
+        stopped += 1
+print(stopped)
+"""
+
+
+def test_thirty_interruptions_of_a_computation_are_caught():
+    """A third of them ended the process with a segmentation fault, where results were named tuples."""
+    command = [sys.executable, "-c", _INTERRUPTED]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert (done.returncode, done.stdout) == (0, "30\n"), done.stderr
