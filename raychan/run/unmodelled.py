@@ -99,15 +99,16 @@ def _further(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, boun
     found = _by_ratio(paths, radar, settings, bounces, weakest)
     if isinstance(found.level_db, float) and found.level_db > 0.0:
         return found
-    # What comes back to the transmitter does not reach a receiver elsewhere.
-    over = coming_back(paths, geometry, bounces) if radar.rx_position is None else ()
+    over = coming_back(paths, geometry, bounces, C0 / radar.waveform.middle)
     how = f"waves over {' > '.join(over)} come back by {bounces + 1} interactions (model.max_bounces)"
     return Entry(UNKNOWN, SEEN, how) if over else found
 
 
 def _by_ratio(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
     met = interactions(paths)
-    last, before = (peak(paths, met == n, radar, settings) for n in (bounces, bounces - 1))
+    # The line of sight to a receiver elsewhere tells nothing of bounces.
+    orders = (bounces, bounces - 1) if bounces > 1 else (bounces,)
+    last, before = ([peak(paths, met == n, radar, settings) for n in orders] + [0.0])[:2]
     if last == 0.0 or before == 0.0:
         few = f"no path has {bounces} interactions" if bounces > 1 else "one bounce is modelled"
         return Entry(UNKNOWN, "none", f"{few}: nothing to extrapolate from")

@@ -40,6 +40,7 @@ PAD = Limit(1, 64, "", "1 pads nothing; more than 64 only draws the same map fin
 CELLS = Limit(0, 1000, "cells", "cells on each side of the one under test")
 
 POWER_DBM = Limit(-100.0, 100.0, "dBm", "from less than a receiver's noise to ten megawatts")
+LEVEL_DBM = Limit(-200.0, 100.0, "dBm", "from less than a map cell's noise to ten megawatts")
 INSTANT_US = Limit(-1e6, 1e6, "us", "a ramp lasts at most a second")
 START_US = Limit(-1e7, 1e7, "us", "ten seconds are more than any frame")
 DEVIATION_KHZ = Limit(-1e8, 1e8, "kHz", "a ramp that errs by more than 100 GHz is another ramp")

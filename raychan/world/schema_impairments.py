@@ -20,6 +20,7 @@ from raychan.world.quantities import (
     Power,
     Pressure,
     RainRate,
+    SignalLevel,
 )
 
 _CLOSED = ConfigDict(extra="forbid", frozen=True)
@@ -42,7 +43,7 @@ class ImpairmentsTable(BaseModel):
     """Of Q over I."""
     iq_phase_deg: Angle = 0.0
     """By which Q is off 90 deg from I."""
-    dc_offset_dbm: Power | None = None
+    dc_offset_dbm: SignalLevel | None = None
     """A constant in all samples, referred to the antenna."""
 
     @model_validator(mode="after")

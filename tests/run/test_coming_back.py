@@ -39,3 +39,24 @@ def test_bodies_that_send_nothing_back_are_not_told(bounces):
 def test_a_dihedral_with_one_bounce_is_told_as_it_comes_back_by_two():
     assert "over corner come back by 2 interactions" in told(run("dihedral", 1, height=0.5, size=0.2))[0]
     assert told(run("plate", 1)) == told(run("sphere", 1)) == []
+
+
+def beside(shape, bounces, **params):
+    """Return a run with the receiver a few centimetres beside the transmitter, at 24 GHz."""
+    body = rc.Body(name="body", shape=shape, params=params, position=(4.0, 0.2, 0.5), yaw_deg=170.0)
+    wave = rc.Waveform(carrier=24.1e9, bandwidth=1e9, chirp_duration=30e-6, n_chirps=16, n_samples=128)
+    radar = rc.Radar(wave, position=(0, 0, 0.5), rx_position=(0.05, 0.12, 0.52), power=5.0)
+    return rc.simulate(rc.Scene(bodies=[body], radar=radar, model={"max_bounces": bounces, "tolerance_db": 1.0}))
+
+
+@pytest.mark.parametrize(("shape", "bounces"), [("dihedral", 1), ("trihedral", 2)])
+def test_a_corner_is_told_that_a_receiver_beside_the_transmitter_sees_by_one_bounce_more(shape, bounces):
+    short, whole = beside(shape, bounces, size=0.25), beside(shape, bounces + 1, size=0.25)
+    assert whole.detections.snr.max() > short.detections.snr.max() + 20.0
+    assert "over body come back by" in told(short)[0] and told(whole) == []
+
+
+def test_the_line_of_sight_tells_nothing_of_further_bounces():
+    found = beside("box", 1, length=0.3, width=0.3, height=0.3)
+    assert found.ledger["further bounces"].kind == "none" and told(found) == []
+    assert not [line for line in found.warnings if "further bounces" in line]
