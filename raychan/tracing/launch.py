@@ -19,10 +19,9 @@ from raychan.records import REFLECT, SCATTERER, TRANSMIT
 from raychan.tracing.cache import cache_of
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
-from raychan.tracing.image_paths import ON_PLANE
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.radiation import OBLIQUE, phases_of, radiating
-from raychan.tracing.subdivide import subdivide
+from raychan.tracing.subdivide import clipped, subdivide
 from raychan.tracing.tubes import CENTRE, MOST_BEND, Refinement, Tubes, launch_tubes, unit
 from raychan.tracing.visibility import centre_visibility, tube_visibility
 from raychan.world.geometry import Geometry
@@ -76,11 +75,7 @@ def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) 
     """Return the tubes, clipped at the planes behind which the gain of an end ends at once."""
     for end in [leg] if out is leg else [leg, out]:
         for normal in end.gain_ends:
-            side = (tubes.points[:, :CENTRE] - end.image) @ normal
-            across = (side.min(axis=1) < -ON_PLANE) & (side.max(axis=1) > ON_PLANE)
-            if across.any():
-                parts, _ = subdivide(geometry, leg, tubes, np.flatnonzero(across), side, True, 0.0)
-                tubes = Tubes.join([tubes.take(~across), parts])
+            tubes = clipped(geometry, leg, tubes, (tubes.points[:, :CENTRE] - end.image) @ normal)
     return tubes
 
 

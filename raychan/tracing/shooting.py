@@ -16,7 +16,7 @@ from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions, amplitudes
 from raychan.tracing.images import Images
-from raychan.tracing.launch import OBLIQUE_SHARE, launch
+from raychan.tracing.launch import OBLIQUE_SHARE, launch, seeds_of
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.outgoing import Leaving
 from raychan.tracing.radiation import FACING, LIT, OBLIQUE, Phases, phases_of, radiating_phases
@@ -25,6 +25,7 @@ from raychan.tracing.shared_work import all_of
 from raychan.tracing.subdivide import bisect, subdivide
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.tracing.visibility import BISECT, CLIP, KEEP, choose_actions, tube_visibility
+from raychan.tracing.ways import Way
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -85,26 +86,27 @@ def numbered_routes(
     each: Callable[[Routes, int, int, bool], T],
     first: Callable[[Tubes, Contributions], None] | None = None,
     wanted: Wanted | None = None,
-    back: bool = False,
+    way: Way | None = None,
     turned: bool = False,
 ) -> Iterator[T]:
     """Yield what `each` makes of the routes that `tube_routes` yields, of the number of the bounce at which they
     scatter, from 1 on, and of that of the leg over which they leave; it is called by any thread.
 
-    Args: images of all legs in and out; wanted, if not all; back: this is the other way, from the receiver, of which
-    routes count that the first one has not (see `tracing.ways`); turned: both ends are one, and routes that come over
+    Args: images of all legs in and out; wanted, if not all; way which of two ways this is, if rays are followed from
+    both ends; turned: both ends are one, and routes that come over
     one leg and leave over another, both over grounds alone, stand for those with their ends exchanged, for which `each`
     is called once more (its last argument tells so); else as for `tube_routes`.
     """
     more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone and (wanted is None or wanted.depth > 1)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
     only = None if wanted is None else wanted.facets
-    if back and not (more or images.one_way(geometry, leg, np.arange(len(geometry.plane))).any()):
-        return
+    if way is not None and way.back and not more:
+        # Nothing bounces: of the way back only what the other one has not counts.
+        only = way.may_have(geometry, leg, [outs[0], *others], seeds_of(geometry, leg, pieces), only)
     for tubes in launch(geometry, leg, outs[0], pieces, found, more, others, only):
         if first is not None:
             first(tubes, found)
-        wave = _Wave(geometry, leg, outs, images, bounces, each, wanted, back, turned)
+        wave = _Wave(geometry, leg, outs, images, bounces, each, wanted, way, turned)
         yield from wave.followed(tubes, found, first is None)
 
 
@@ -119,7 +121,7 @@ class _Wave(Generic[T]):
     bounces: int
     each: Callable[[Routes, int, int, bool], T]
     wanted: Wanted | None
-    back: bool
+    way: Way | None
     turned: bool
 
     def followed(self, tubes: Tubes, found: Contributions, single: bool) -> Iterator[T]:
@@ -136,8 +138,6 @@ class _Wave(Generic[T]):
             ends = count >= self.bounces or geometry.convex_alone or (wanted is not None and depth == wanted.depth)
             # Mirrors such as the ground return by their exact foot points, not by tubes.
             scatters = geometry.facets.role[geometry.facets.body[tubes.facet]] != MIRROR
-            if first and self.back:
-                scatters &= self.images.one_way(geometry, self.leg, tubes.facet)
             share = 1.0 / min(max(len(outs), 1), _SHARES)
             twice, which = self.images.returns(geometry, tubes, first), OBLIQUE if first else FACING
             any_over = self.leg if first else None
@@ -169,8 +169,10 @@ class _Wave(Generic[T]):
         rows, way = leaving.over(i), self._exchanged(depth, i)
         if way < 0:
             rows = rows[twice[rows]]
-        made = list[T]()
-        for routes in _returned(self.geometry, self.leg, self.outs[i], tubes.only(rows), depth == 1, found):
+        made, some = list[T](), tubes.only(rows)
+        if self.way is not None and depth == 1:
+            some = self.way.of_first_surface(self.geometry, self.leg, self.outs[i], some)
+        for routes in _returned(self.geometry, self.leg, self.outs[i], some, depth == 1, found):
             made.append(self.each(routes, depth, i, False))
             if way > 0:
                 plane = self.geometry.plane[routes.facet[np.arange(len(routes.kind)), routes.scatter]]

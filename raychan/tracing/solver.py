@@ -86,9 +86,7 @@ class Launch:
             self.outs = self.legs
             if rule.rx is not None:
                 self.outs = list(compress(self.every[1], lit_legs(geometry, self.every[1], layers)))
-        # Routes of one bounce, and of a body that no ray meets twice, are alike both ways.
-        both = rule.rx is not None and rule.bounces > 1 and not geometry.convex_alone
-        self._ways = Way.between(geometry, self.legs, self.outs, both)
+        self._ways = Way.between(geometry, self.legs, self.outs, both=rule.rx is not None)
         self._found: dict[int, Contributions] = {}
 
     def whole(self, stats: Stats, each: Callable[[Batch], T], progress: Progress | None = None) -> Iterator[Brought[T]]:
@@ -204,11 +202,11 @@ class Launch:
             source = sources_of(routes, i, len(leg.mirrors), out, depth)
             if turned:
                 return 0, each(turned_round(routes)), source
-            return len(routes.kind), each(way.counted(self.geometry, leg, routes, depth)), source
+            return len(routes.kind), each(way.counted(self.geometry, leg, way.outs[out], routes, depth)), source
 
         for tubes, *one in numbered_routes(
             self.geometry, leg, way.outs, way.images, pieces, self.rule.bounces, found, made, wanted=wanted,
-            back=way.back, turned=self.rule.rx is None,
+            way=None if way.alone else way, turned=self.rule.rx is None,
         ):  # fmt: skip
             stats.tubes += tubes
             yield one[0], one[1]

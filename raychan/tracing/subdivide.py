@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import write_rays_on
+from raychan.tracing.image_paths import ON_PLANE
 from raychan.tracing.legs import Leg
 from raychan.tracing.part_rays import (
     bisect_each,
@@ -61,6 +62,16 @@ def bisect(
         return tubes.take(rows)
     found = bisected(tubes.columns, rows, edge, patches_of(geometry, leg), first, jitter)
     return Tubes(*found, history=tubes.history)
+
+
+def clipped(geometry: Geometry, leg: Leg, tubes: Tubes, side: Floats) -> Tubes:
+    """Return the tubes, on their first surface, clipped where a height `side` (n, 3) [m] at their corners changes its
+    sign."""
+    across = (side.min(axis=1) < -ON_PLANE) & (side.max(axis=1) > ON_PLANE)
+    if not across.any():
+        return tubes
+    parts, _ = subdivide(geometry, leg, tubes, np.flatnonzero(across), side, True, 0.0)
+    return Tubes.join([tubes.take(~across), parts])
 
 
 def subdivide(
