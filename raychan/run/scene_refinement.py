@@ -153,10 +153,9 @@ class SceneRefinement:
     def converged(self, first: First) -> Converged:
         """Return the paths of a scene, refined where cells of its map need it."""
         radar, window = replace(self.radar, noise=False), self.settings.range_window
-        rough = synthesize(first.paths, radar, tolerance=_LEVEL)
         held = SourcedPaths(first.paths, first.source, self._probes)
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
-        cells = self._cells(rough, response, first.paths)
+        cells = self._cells(radar, response, first.paths)
         steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", 0
         if len(cells.place) and self.model.speckle:
             speckled = cells.loosened(
@@ -181,11 +180,15 @@ class SceneRefinement:
         remains = Remains(unreached, steps, ended, self.model.tolerance_db, speckled)
         return Converged(launched, others, self.model, first.chosen, remains)
 
-    def _cells(self, quiet: Cube, response: PointSpread, paths: Paths) -> MapCells:
-        """Return the cells of the map that are detections, or would be a little stronger, also beside stronger ones."""
+    def _cells(self, quiet: Radar, response: PointSpread, paths: Paths) -> MapCells:
+        """Return the cells of the map that are detections, or would be a little stronger, also beside stronger ones;
+        none where all paths are exact. Args: quiet, the radar without noise."""
+        if not self.stats.tubes:
+            return MapCells(np.zeros((0, 3)), np.zeros(0, complex), self.model.tolerance_db)
         radar, settings = self.radar, self.settings
+        rough = synthesize(paths, quiet, tolerance=_LEVEL)
         lower = replace(settings, pfa=math.sqrt(settings.pfa), min_snr_db=settings.min_snr_db - _MARGIN_DB)
-        rdmap = map_of(noisy(quiet, radar, stream(0, Stage.NOISE)), radar, settings)
+        rdmap = map_of(noisy(rough, radar, stream(0, Stage.NOISE)), radar, settings)
         seen = seen_in_map(rdmap, radar, settings)
         at = np.unique(detections_in(rdmap, radar, lower, seen).cell, axis=0).astype(np.int64)
         # Where the first launch finds too little of an echo, another one's slope hides it.
