@@ -218,7 +218,7 @@ def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapErro
     over beams in all directions where that is more: errors from elsewhere are outside of that beam.
     """
     change = quiet.samples - others.samples
-    if bank_of(radar, settings) is None:
+    if bank_of(radar, settings) is None or not change.any():
         return MapError(quiet_map(change, radar, settings))
     # By receiver: the spectra of all take much memory, and longer to write than to compute.
     own, off = (channel(Cube(samples=x, noise_power=0.0), radar).samples for x in (quiet.samples, change))
