@@ -200,17 +200,21 @@ class Wavefronts:
             look[rows] = source / np.maximum(radius[rows], 1e-300)[:, None]
         return Wavefronts(looks[1], radii[1], looks[0], radii[0], self.bare)
 
-    def longer(self, tx: Floats, rx: Floats) -> Floats:
-        """Return how much longer (n,) [m] paths are between elements at tx and rx (3,) [m] off the phase centres."""
-        out = np.zeros(len(self.radius))
+    def between(self, tx: Floats, rx: Floats) -> tuple[Floats, Floats]:
+        """Return how much longer (n,) [m] paths are between elements at tx and rx (3,) [m] off the phase centres, and
+        by which factor (n,) their amplitude is larger, as the waves spread over less or more."""
+        longer, factor = np.zeros(len(self.radius)), np.ones(len(self.radius))
         if rx.any():
-            out += excess(self.radius, self.arrival, rx)
+            more = excess(self.radius, self.arrival, rx)
+            longer, factor = more, _spread(self.radius, more)
         if tx.any():
-            out += excess(self.tx_radius, self.departure, tx)
+            more = excess(self.tx_radius, self.departure, tx)
+            longer, factor = longer + more, factor * _spread(self.tx_radius, more)
             rows = np.flatnonzero(self.bare)
             if len(rows):
-                out[rows] = self[rows]._longer_bare(tx, rx)
-        return out
+                longer[rows] = self[rows]._longer_bare(tx, rx)
+                factor[rows] = _spread(self.radius[rows], longer[rows])
+        return longer, factor
 
     def _longer_bare(self, tx: Floats, rx: Floats) -> Floats:
         """Return the same of paths over one mirror or none: the transmitter's image moves as the mirror shows it."""
@@ -222,6 +226,12 @@ class Wavefronts:
         along, square = (self.arrival * off).sum(axis=1), (off * off).sum(axis=1)
         far = np.sqrt(np.maximum(self.radius * (self.radius - 2.0 * along) + square, 0.0)) + self.radius
         return np.asarray((square - 2.0 * self.radius * along) / np.maximum(far, 1e-300))
+
+
+def _spread(radius: Floats, more: Floats) -> Floats:
+    """Return by which factor (n,) spherical waves are stronger `more` (n,) [m] farther off than a radius (n,) [m]."""
+    far = radius + more
+    return np.divide(radius, far, out=np.ones(len(far)), where=far > 0.0)
 
 
 def wavefronts(

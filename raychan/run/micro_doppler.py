@@ -219,8 +219,8 @@ class _Frame:
         code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
         split = np.asarray((amplitudes[:, :, 1:] != 0.0).any(axis=(0, 2)))
         for layer, element in zip(out, self.radar.elements_world, strict=True):
-            longer = fronts.longer(sent.offset, element, split)
-            turn = np.sqrt(self.radar.power) * np.exp(-2j * np.pi / wave.wavelength * longer)
+            longer, factor = fronts.between(sent.offset, element, split)
+            turn = np.sqrt(self.radar.power) * factor * np.exp(-2j * np.pi / wave.wavelength * longer)
             brought = self.ramps(lengths + longer, amplitudes * turn, chirps)
             layer[chirps] += brought if sent.turn == 0.0 else brought * code
 

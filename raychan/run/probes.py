@@ -28,9 +28,11 @@ class Probe:
     carrier: float
 
     def seen(self, paths: Paths) -> Paths:
-        """Return paths as these elements see them: with the phase of what is longer than between the phase centres."""
-        later = fronts_of(paths).longer(self.tx, self.rx) / C0
-        return paths.rebuilt(amplitude=paths.amplitude * np.exp(-2j * np.pi * self.carrier * later))
+        """Return paths as these elements see them: with the phase of what is longer than between the phase centres, and
+        spread as far."""
+        longer, factor = fronts_of(paths).between(self.tx, self.rx)
+        turn = factor * np.exp(-2j * np.pi * self.carrier / C0 * longer)
+        return paths.rebuilt(amplitude=paths.amplitude * turn)
 
 
 def probes_of(radar: Radar) -> tuple[Probe, ...]:

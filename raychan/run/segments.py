@@ -77,11 +77,14 @@ class PartFronts:
         parts = (3 * rows[:, None] + np.arange(3)).ravel()
         return PartFronts(whole, whole[np.repeat(np.arange(n), 3)].moved(parts, places))
 
-    def longer(self, tx: Floats, rx: Floats, split: NDArray[np.bool_]) -> Floats:
+    def between(self, tx: Floats, rx: Floats, split: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         """Return how much longer (n, 3) [m] the parts are between elements at tx and rx (3,) [m] off the phase centres,
-        of routes of which some (n,) are `split` into their corners."""
-        corners = self.corners.longer(tx, rx).reshape(-1, 3)
-        return np.where(split[:, None], corners, self.whole.longer(tx, rx)[:, None])
+        and by which factor (n, 3) stronger, of routes of which some (n,) are `split` into their corners."""
+        corners, whole = self.corners.between(tx, rx), self.whole.between(tx, rx)
+        longer, factor = (
+            np.where(split[:, None], x.reshape(-1, 3), y[:, None]) for x, y in zip(corners, whole, strict=True)
+        )
+        return longer, factor
 
 
 @dataclass(frozen=True)

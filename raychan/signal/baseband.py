@@ -110,8 +110,8 @@ def _fill(
     rate = echoes.delay_rate
     if isinstance(wave, OwnWaveform):
         for layer, pair in zip(out, pairs, strict=True):
-            later = echoes.later(*pair)
-            turned = echoes.amplitude * np.exp(-2j * np.pi * wave.carrier * later)
+            later, amplitude = echoes.between(*pair)
+            turned = amplitude * np.exp(-2j * np.pi * wave.carrier * later)
             layer[...] = wave.received(turned, echoes.delay + later, rate)
         return
     # The grid adds the carrier's phase over the time to the middle: its amplitudes are those of the start.
@@ -121,8 +121,8 @@ def _fill(
     cells = sum(grid.cells for grid, _ in grids) / (wave.n_chirps * wave.n_samples)
     if method == "direct" or (method == "auto" and len(rate) <= _FEW * cells):
         for layer, pair in zip(out, pairs, strict=True):
-            later = echoes.later(*pair)
-            turned = echoes.amplitude * np.exp(-2j * np.pi * wave.carrier * later)
+            later, amplitude = echoes.between(*pair)
+            turned = amplitude * np.exp(-2j * np.pi * wave.carrier * later)
             layer[...] = _direct(turned, echoes.delay + later, rate, wave)
     else:
         _add_fast(out, grids, pairs)

@@ -48,8 +48,9 @@ def burst(victim: Radar, interferer: Interferer, paths: Paths, rng: np.random.Ge
     here, rows = np.zeros(3), iter(out)
     for name in amplitudes_of(paths):
         for element in elements:
-            later = fronts.longer(here, element) / C0
-            size = np.sqrt(interferer.radar.power) * getattr(paths, name)
+            longer, factor = fronts.between(here, element)
+            later = longer / C0
+            size = np.sqrt(interferer.radar.power) * factor * getattr(paths, name)
             size = size * np.exp(-2j * np.pi * other.carrier * later)
             _burst(size, paths.delay + later, paths.length_rate / C0, own, others, begin, begins, phases, next(rows))
     if not wave.complex_sampling:

@@ -60,10 +60,9 @@ _CROWD = 64  # echoes in a box up to which they are summed in single precision: 
 
 @dataclass(frozen=True)
 class Echoes:
-    """Echoes at one instant; rows (n,). `Keystone` takes them at the middle sample of a frame."""
+    """Echoes at one instant; rows (n,), delay [s]. `Keystone` takes them at the middle sample of a frame."""
 
     delay: Floats
-    """[s]"""
     delay_rate: Floats
     """Change of the delay per time, 2 v / c."""
     amplitude: Complexes
@@ -93,9 +92,11 @@ class Echoes:
         turned = self.amplitude * np.exp(-2j * np.pi * carrier * grown)
         return Echoes(self.delay + grown, self.delay_rate, turned, self.fronts)
 
-    def later(self, tx: Floats, rx: Floats) -> Floats:
-        """Return by how much later (n,) [s] they come between elements at tx and rx (3,) [m] off the phase centres."""
-        return np.zeros(len(self.delay)) if self.fronts is None else self.fronts.longer(tx, rx) / C0
+    def between(self, tx: Floats, rx: Floats) -> tuple[Floats, Complexes]:
+        """Return by how much later (n,) [s] than at the phase centres they come between elements at tx and rx (3,) [m],
+        and their amplitudes (n,), less the phase of that."""
+        longer, factor = (np.zeros(len(self.delay)), 1.0) if self.fronts is None else self.fronts.between(tx, rx)
+        return longer / C0, self.amplitude * factor
 
 
 def middle(wave: Waveform) -> tuple[float, float, float]:
@@ -209,10 +210,9 @@ class Keystone:
 
         def gridded(part: slice) -> tuple[int, NDArray[Any]]:
             some = echoes[part]
-            later = some.later(*elements)
-            x, y = np.empty(len(later)), np.empty(len(later))
-            strength = np.empty((len(later), self.planes), self.sort)
-            waves = some.amplitude, some.delay, some.delay_rate, later
+            later, amplitude = some.between(*elements)
+            (x, y), strength = np.empty((2, len(later))), np.empty((len(later), self.planes), self.sort)
+            waves = amplitude, some.delay, some.delay_rate, later
             place_sources(x, y, strength, *waves, ramp, grid, self.rest, self.terms)
             first, rows = rows_under(x, self.width)
             cells = np.zeros((self.planes, rows, self.columns + 2 * half), self.sort)

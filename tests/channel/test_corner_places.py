@@ -67,7 +67,7 @@ def test_ways_between_elements_over_plane_mirrors_are_those_between_their_images
         stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
         fronts = wavefronts(stops, routes.scatter, *departures(routes), routes.length)
         for c in range(3):
-            got = fronts.moved(rows, places[:, c]).longer(tx, rx)[rows]
+            got = fronts.moved(rows, places[:, c]).between(tx, rx)[0][rows]
             for row, value in zip(rows, got, strict=True):
                 at, used = routes.scatter[row], int((routes.kind[row] > 0).sum())
                 want = 0.0

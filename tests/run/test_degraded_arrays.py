@@ -136,7 +136,7 @@ def test_clutter_ends_at_each_element_by_the_length_of_its_own_way():
     for element in elements:
         there = np.linalg.norm(spots - radar.position - element, axis=1)
         exact = there - np.linalg.norm(spots - radar.position, axis=1)
-        np.testing.assert_allclose(fronts.longer(np.zeros(3), element), exact, atol=1e-5)
+        np.testing.assert_allclose(fronts.between(np.zeros(3), element)[0], exact, atol=1e-5)
 
 
 def test_an_interferer_is_heard_where_the_receivers_stand():

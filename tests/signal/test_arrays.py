@@ -46,7 +46,10 @@ def test_near_field_delays_are_exact_distances_to_a_nanometre():
         np.zeros(200, int), points / far[:, None], points / far[:, None], 2.0 * far,
     )  # fmt: skip
     true = np.linalg.norm(points - tx, axis=1) + np.linalg.norm(points - rx, axis=1) - 2.0 * far
-    np.testing.assert_allclose(fronts.longer(tx, rx), true, rtol=0.0, atol=1e-9)
+    longer, factor = fronts.between(tx, rx)
+    np.testing.assert_allclose(longer, true, rtol=0.0, atol=1e-9)
+    spread = far**2 / (np.linalg.norm(points - tx, axis=1) * np.linalg.norm(points - rx, axis=1))
+    np.testing.assert_allclose(factor, spread, rtol=1e-9)
 
 
 def test_far_field_is_the_plane_wave():
@@ -72,7 +75,8 @@ def test_paths_without_a_scatterer_end_at_each_element_of_both_arrays(mirror):
     leave = -(look - 2.0 * (look @ n) * n) if mirror else -look
     waves = Wavefronts(look[None], np.array([length]), leave[None], np.array([length]), np.array([True]))
     true = np.linalg.norm(shown(tx + a) - (rx + b)) - length
-    assert waves.longer(a, b)[0] == pytest.approx(true, abs=1e-9)
+    longer, factor = waves.between(a, b)
+    assert longer[0] == pytest.approx(true, abs=1e-9) and factor[0] == pytest.approx(length / (length + true))
 
 
 def test_waves_arrive_from_the_image_of_the_scatterer_over_the_mirrors_behind_it():
@@ -95,8 +99,9 @@ def test_each_pair_of_elements_has_the_samples_of_a_radar_with_its_own_path(meth
         for j in range(4):
             alone = []
             for i in range(2):
-                length = float(np.linalg.norm(point[0] - tx[i]) + np.linalg.norm(point[0] - rx[j]))
-                turn = np.exp(-2j * np.pi * SMALL.carrier * (length - 2.0 * far) / C0)
+                out, back = (float(np.linalg.norm(point[0] - x)) for x in (tx[i], rx[j]))
+                length = out + back
+                turn = far**2 / (out * back) * np.exp(-2j * np.pi * SMALL.carrier * (length - 2.0 * far) / C0)
                 alone.append(
                     synthesize(echoes(0.5 * length, rate, turn), make_radar(SMALL), method="direct").samples[0]
                 )

@@ -185,7 +185,8 @@ def test_a_receiver_set_aside_sees_the_paths_of_a_shifted_receiver():
     paths = echoes([10.0], 3.0, 1.0, azimuth + 0.3)
     source = 20.0 * np.array([np.cos(azimuth), np.sin(azimuth)])
     shorter = 20.0 - np.linalg.norm(source - [0.0, aside])
-    moved = echoes([10.0 - 0.5 * shorter], 3.0, np.exp(2j * np.pi * SMALL.carrier * shorter / C0), azimuth + 0.3)
+    turn = 20.0 / (20.0 - shorter) * np.exp(2j * np.pi * SMALL.carrier * shorter / C0)
+    moved = echoes([10.0 - 0.5 * shorter], 3.0, turn, azimuth + 0.3)
     both = synthesize(paths, radar).samples
     assert np.allclose(both[1], synthesize(moved, make_radar(SMALL)).samples[0], atol=1e-4)
     assert np.allclose(both[0], synthesize(paths, make_radar(SMALL)).samples[0], atol=1e-6)
