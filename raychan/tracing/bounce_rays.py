@@ -74,7 +74,7 @@ def cast_corners(begin, end, matter, tag, flight, met, world, how, packet, teste
     """
     rays, casts = met.rays, 0
     for i in range(begin, end):
-        hit, side = rays.hit[i], met.side[i]
+        hit, side, wide = rays.hit[i], met.side[i], False
         mid = hit[3]
         one_surface, any_hit = mid >= 0, mid >= 0
         for q in range(3):
@@ -92,9 +92,10 @@ def cast_corners(begin, end, matter, tag, flight, met, world, how, packet, teste
                 i, rays, far, outlines.extent, outlines.planes, world.first_edge, world.plane_edges, side, room, landed
             )
             if side[0] == 0.0 and side[1] == 0.0 and side[2] == 0.0:
-                longest_crossing(i, tag + i, rays, far, outlines, side, tested, room)
+                # What stands where a tube is too wide to be searched shows once it is bisected.
+                wide = longest_crossing(i, tag + i, rays, far, outlines, side, tested, room)
         met.one_surface[i] = one_surface
-        mixed = (not one_surface and any_hit) or side[0] != 0.0 or side[1] != 0.0 or side[2] != 0.0
+        mixed = (not one_surface and any_hit) or side[0] != 0.0 or side[1] != 0.0 or side[2] != 0.0 or wide
         met.wanted[i] = mixed and matters and flight.cuts[i] < how.levels
     return casts
 

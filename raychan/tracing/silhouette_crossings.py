@@ -35,8 +35,8 @@ Ints = NDArray[np.int32]
 
 _MOST_CELLS = 2_000_000  # of a grid: trades memory for edges a cell; not measured
 _LEAST_CELL = 0.02  # m; not measured
-_WIDEST_LAYER = 150  # cells in a layer beyond which a tube is taken to be bisected before; not measured
-_WIDEST_FAN = 10  # cells of width beyond which the same holds for a fan with rays along the layers; not measured
+_WIDEST_LAYER = 150  # cells in a layer beyond which a tube is bisected before it is searched; not measured
+_WIDEST_FAN = 10  # cells of width beyond which a fan with rays along the layers is not searched; not measured
 _TOUCHING = 1e-5  # m: what lies nearer to a surface belongs to it
 
 
@@ -93,7 +93,7 @@ def _steepest(k):  # type: ignore[no-untyped-def]
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def longest_crossing(i, tag, rays, far, outlines, out, tested, room):  # type: ignore[no-untyped-def]
     """Write into out (3,) the distances [m] of the corners of tube i from the plane through its source and the
-    silhouette edge of which the longest part lies inside it.
+    silhouette edge of which the longest part lies inside it; return whether it is too wide to be searched to its end.
 
     Args: tag a number of this search, tested (e,) that of the last one for each edge; rays as `TubeRays`; far whether
     they come from a direction instead of a point; outlines as `Outlines`; room (9, 3) for work.
@@ -115,7 +115,7 @@ def longest_crossing(i, tag, rays, far, outlines, out, tested, room):  # type: i
     looks = x, y, z, 0.0 if parallel else 1.0
     reach = rays.reach[i, 3] if lands else outlines.extent
     span = _span(points, ks, reach, grid.cell, outlines.centre, outlines.radius)
-    _longest_along(tag, tube, floor, looks, span, grid, tested, side, out)
+    return _longest_along(tag, tube, floor, looks, span, grid, tested, side, out)
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
@@ -133,7 +133,7 @@ def _span(points, ks, reach, cell, centre, radius):  # type: ignore[no-untyped-d
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
 def _longest_along(tag, tube, floor, looks, span, grid, tested, side, out):  # type: ignore[no-untyped-def]
     """Write into out (3,) the corners' distances from the edge of which the longest part lies inside a tube, layer by
-    layer from the mirror on: what is far off is left out where the tube grows too wide."""
+    layer from the mirror on; return whether what is far off is left out, as the tube grows too wide."""
     points, ks = tube[0], tube[1]
     axis, near, far_end = span
     # Not constants: the compiler would make `layer_cells` anew for each of those.
@@ -155,8 +155,9 @@ def _longest_along(tag, tube, floor, looks, span, grid, tested, side, out):  # t
         # The outermost layers of a grid that is cut off hold all that lies beyond: no width tells anything there.
         outermost = grid.cut_off and (layer == 0 or layer == grid.shape[axis] - 1)
         if room > _WIDEST_LAYER and not outermost:
-            break
+            return True
         best = _longest_in_box(tag, tube, floor, looks, begin, end, grid, best, tested, side, out)
+    return False
 
 
 @njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
