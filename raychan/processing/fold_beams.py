@@ -24,7 +24,7 @@ _LEFT = 0.5  # of a power that at least one beam sees: at the edge of the half s
 WEAK = 0.25  # of the strongest beam: where CLEAR asks for more, cells are too weak for detections, and are not refined
 _SHRINKS = 3  # rounds of refining, each over half the distance: by parabolas, to 1e-5 of the power
 _TURNS = 4  # rounds in which several beams are refined, each on what the others leave (not measured)
-_CELLS = 200  # at least, for a thread to help: some milliseconds
+_CELLS = 200  # at least, for a thread to help: some milliseconds (not measured)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,9 +19,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _RAYS = 6_000  # at most, of all chains as many; the rest of a chain counts as these do (not measured)
-_NARROW = 0.01  # rad: a smaller angle between normals is none, a wave that passes the receiver no farther reaches it
+_NARROW = 0.01  # rad between normals or to the receiver that counts as none (not measured)
 _LOBES = 3  # side lobes of a mirror's beam, 21 dB below its middle where it is evenly lit (not measured)
-_ASIDE = 0.003  # rad by which rays pass a specular point: a corner's own lies on its edge
+_ASIDE = 0.003  # rad by which rays pass a specular point: a corner's own lies on its edge (not measured)
 _MANY, _SOME = 0.1, 2  # of the rays over the same bodies: far above chance; a corner's all come back (not measured)
 _START = 1e-3  # m from which hits count: places of paths are rounded
 

@@ -93,9 +93,9 @@ def numbered_routes(
     scatter, from 1 on, and of that of the leg over which they leave; it is called by any thread.
 
     Args: images of all legs in and out; wanted, if not all; way which of two ways this is, if rays are followed from
-    both ends; turned: both ends are one, and routes that come over
-    one leg and leave over another, both over grounds alone, stand for those with their ends exchanged, for which `each`
-    is called once more (its last argument tells so); else as for `tube_routes`.
+    both ends; turned: both ends are one, and routes that come over one leg and leave over another, both over grounds
+    alone, stand for those with their ends exchanged, for which `each` is called once more (its last argument tells so);
+    else as for `tube_routes`.
     """
     more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone and (wanted is None or wanted.depth > 1)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
