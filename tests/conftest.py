@@ -2,6 +2,9 @@
 
 import os
 
+# As `raychan.blas` does for users; here parts of raychan are called that do not ask for it. Read as numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from raychan.blas import on_one_blas_thread
 from raychan.columns import Record, column
 from raychan.processing.covariance import Covariance, covariance
 from raychan.processing.esprit import esprit
@@ -41,6 +42,7 @@ class Directions(Record):
     ambiguous: NDArray[np.bool_] = column("n", np.bool_, doc="another direction shows alike")
 
 
+@on_one_blas_thread
 def doa(
     snapshots: ArrayLike,
     elements: ArrayLike,

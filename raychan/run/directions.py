@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.blas import on_one_blas_thread
 from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.processing.range_azimuth import range_azimuth as from_map
 from raychan.radar.aperture import cosines
@@ -28,6 +29,7 @@ _LITTLE = 1e-3  # of a cell's amplitude: largest sum of the paths left out of a 
 _UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
 
+@on_one_blas_thread
 def range_azimuth(data: Cube | RangeDoppler, radar: Radar) -> RangeAzimuth:
     """Return the range-azimuth map of samples or of a range-Doppler map, of all range rates the strongest.
 

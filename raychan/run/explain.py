@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.blas import on_one_blas_thread
 from raychan.columns import Record, column
 from raychan.poses import angles
 from raychan.radar.declared import check_type
@@ -59,6 +60,7 @@ class CellExplanation(Explanation):
     """Whether shares are those in the beam of an array towards the detection."""
 
 
+@on_one_blas_thread
 def explain(
     result: Result | str | Path,
     range: float | None = None,

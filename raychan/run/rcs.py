@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from raychan.blas import on_one_blas_thread
 from raychan.channel.mesh_error import mesh_error
 from raychan.poses import direction
 from raychan.radar.declared import check_type, reals
@@ -66,6 +67,7 @@ class Rcs:
         return np.isfinite(self.error_db)
 
 
+@on_one_blas_thread
 def rcs(
     mesh: MeshLike,
     frequency: float,

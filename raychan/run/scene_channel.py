@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from raychan.blas import on_one_blas_thread
 from raychan.parallel import run_pair
 from raychan.radar.beam_table import beam_of
 from raychan.radar.radar import Radar
@@ -56,6 +57,7 @@ class Channel:
         return self.turned.cube if self.turned else self.launched.quiet
 
 
+@on_one_blas_thread
 def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None, clock: Clock) -> Channel:
     """Return the channel of a scene; arguments and errors as those of `simulate`.
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from raychan.blas import on_one_blas_thread
 from raychan.parallel import run_pair
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDoppler
@@ -58,6 +59,7 @@ def simulate(
     return result_of(scene, channel, seed, clock)
 
 
+@on_one_blas_thread
 def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result:
     """Return what the receiver makes of a channel, and how each detection came about."""
     radar, settings = scene.radar, scene.processing

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import ShortTimeFFT
 
+from raychan.blas import on_one_blas_thread
 from raychan.columns import Record, column
 from raychan.radar.declared import reals
 from raychan.radar.radar import Radar
@@ -72,6 +73,7 @@ class Spectrogram(Record, Plotted):
     """What a user should know: samples that the converter clips, and what is left out."""
 
 
+@on_one_blas_thread
 def spectrogram(
     scene: Scene,
     duration: float,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from raychan.blas import on_one_blas_thread
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
@@ -75,6 +76,7 @@ def _again(facets: Facets, *rest: Any) -> SceneRoutes:
     return SceneRoutes(Geometry(facets), *rest)
 
 
+@on_one_blas_thread
 def trace(
     scene: Scene, tolerance_db: float | None = None, max_bounces: int | None = None, check: bool = False
 ) -> SceneRoutes:
@@ -111,6 +113,7 @@ def trace(
     return SceneRoutes(geometry, rule, batches, stats)
 
 
+@on_one_blas_thread
 def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
     """Return what routes carry for a radar: gain, delay and rate of each path.
 
@@ -130,6 +133,7 @@ def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
     return join([nothing(facets, radar), *every])
 
 
+@on_one_blas_thread
 def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     """Return the dechirped samples of a frame, with the radar's noise and impairments, without interferers.
 
@@ -143,6 +147,7 @@ def synthesize(paths: Paths, radar: Radar, seed: int = 0) -> Cube:
     return received(clean, paths, radar, seed, clean=clean)[0]
 
 
+@on_one_blas_thread
 def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler:
     """Return the range-Doppler map of samples, by the windows and padding of `radar.processing`.
 
@@ -155,6 +160,7 @@ def range_doppler(cube: Cube, radar: Radar, cross: bool = False) -> RangeDoppler
     return map_of(cube, radar, radar.processing, cross)
 
 
+@on_one_blas_thread
 def detect(rdmap: RangeDoppler, radar: Radar) -> Detections:
     """Return what the radar's detector finds in a map, by the CFAR of `radar.processing`.
 

@@ -10,7 +10,7 @@ from support.places import TESTS
 ROOT = Path(__file__).parents[2] / "raychan"
 STOREYS = (
     ("crew",),
-    ("units", "scalars", "parallel", "compile"),
+    ("units", "scalars", "parallel", "blas", "compile"),
     ("poses", "reprs", "kinds", "vectors", "limits"),
     ("columns",),
     ("records",),
