@@ -6,7 +6,8 @@ FUZZ ?= --minutes 30
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-# Tests of the kernels, which `make test` also runs with bounds checked; the rest of the suite: make test-bounds.
+# Tests of the kernels: `make test` runs them with bounds checked and no second time without; the rest of the suite with
+# bounds checked: make test-bounds. No test that is skipped with bounds checked is among them.
 BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py processing/test_fold_kernels.py signal/test_nufft.py \
 	world/test_shapes.py world/test_ray_caster.py world/test_contractions.py run/test_provenance.py run/test_preview_bounds.py channel/test_corner_places.py \
 	channel/test_layers_over_a_footprint.py channel/test_fields_over_a_footprint.py tracing/test_landing_on_curves.py \
@@ -21,7 +22,7 @@ PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile
 
 help:
 	@echo "make demo   install into $(VENV) and run scenes/urban.toml into out/urban"
-	@echo "make test   ruff, ruff format, mypy, pytest; the three scenes and the kernels' tests with bounds checked"
+	@echo "make test   ruff, ruff format, mypy, pytest; of these the three scenes and the kernels' tests with bounds checked"
 	@echo "make test-bounds   all tests with the bounds of every array in compiled code checked"
 	@echo "make test-nojit   the kernels' tests with the compiler off, where that takes no minutes"
 	@echo "make coverage   which lines tests reach, the kernels' as plain Python (some minutes)"
@@ -38,7 +39,7 @@ test: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(PYTEST)
+	$(PYTEST) $(addprefix --ignore=,$(BOUNDS))
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDS)
 
 test-bounds: $(VENV)/.installed-dev

@@ -21,7 +21,7 @@ from raychan.units import C0, db
 LAMBDA = C0 / SMALL.middle
 
 
-SHORT = Waveform(77e9, 1e9, 20e-6, 40e-6, 16, 64)
+SHORT = Waveform(77e9, 1e9, 20e-6, 40e-6, 16, 32)
 
 
 def seen(elements, ranges, azimuth_deg, amplitudes, seed=0, noisy=True, wave=SMALL, **settings):
@@ -78,7 +78,7 @@ def test_elevation_is_reported_by_an_array_that_measures_it():
 
 
 def test_snr_of_64_elements_is_9_db_above_that_of_8():
-    snr = {n: np.mean([seen(line(n), [6.0], 10.0, 3e-6, seed)[1].snr[0] for seed in range(12)]) for n in (8, 64)}
+    snr = {n: np.mean([seen(line(n), [6.0], 10.0, 3e-6, seed)[1].snr[0] for seed in range(8)]) for n in (8, 64)}
     assert snr[64] - snr[8] == pytest.approx(db(8.0), abs=0.5)
 
 
@@ -89,7 +89,7 @@ def test_64_elements_detect_an_echo_9_db_weaker_than_8_do():
     def threshold(count):
         # From here on, in dB, an echo has an SNR of 20 dB in the sum of all receivers.
         start = 20.0 - (one + 60.0) - db(count)
-        steps = np.arange(-2.0, 2.1, 0.5)
+        steps = np.linspace(-1.5, 1.5, 5)
         hits = [
             np.mean(
                 [
@@ -105,14 +105,20 @@ def test_64_elements_detect_an_echo_9_db_weaker_than_8_do():
 
 
 @pytest.mark.parametrize(
-    ("elements", "pfa"), [(line(8), 1e-2), (line(8), 1e-3), (plane(4, 4), 1e-3), (line(5, 0.8), 1e-3)]
+    ("method", "elements", "pfa"),
+    [
+        ("ca", line(8), 1e-2),
+        ("os", line(8), 1e-3),
+        ("ca", plane(4, 4), 1e-3),
+        ("os", plane(4, 4), 1e-3),
+        ("os", line(5, 0.8), 1e-3),
+    ],
 )
-@pytest.mark.parametrize("method", ["ca", "os"])
 def test_the_strongest_beam_of_noise_keeps_the_false_alarm_rate_of_a_cell(method, elements, pfa):
     wave = Waveform(77e9, 1e9, 20e-6, 40e-6, 128, 128)
     rng, bank = np.random.default_rng(5), BeamBank(Aperture(elements, 1.0))
     alarms = cells = 0
-    while cells * pfa < 800:
+    while cells * pfa < 400:
         m = range_doppler(Cube(rng.standard_normal((len(elements), 128, 128, 2)).view(complex)[..., 0], 2.0), wave)
         ring = training(Grid.of(m), (2, 2), (3, 3))
         beams = StrongestBeam(m, bank)

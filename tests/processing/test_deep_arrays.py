@@ -46,7 +46,7 @@ def test_a_circle_finds_directions_up_to_90_deg(axis, method):
 @pytest.mark.parametrize("elements", [ball(2.0, 64), circle(1.5, 16, (-0.75, -0.25, 0.25, 0.75))], ids=["ball", "drum"])
 def test_arrays_round_two_axes_find_directions_everywhere_ahead(elements):
     rng = np.random.default_rng(1)
-    for k in range(60):
+    for k in range(30):
         look = rng.standard_normal(3)
         # Every second wave comes from near the edge.
         look[0] = abs(look[0]) * (0.1 if k % 2 else 1.0)

@@ -45,7 +45,7 @@ def found(radar, ranges, rates, amplitudes, azimuth, seed=0):
 @pytest.mark.parametrize("array", ARRAYS)
 def test_a_lone_echo_is_one_detection(array, complex_sampling):
     rng = np.random.default_rng(7)
-    for _ in range(12):
+    for _ in range(7):
         windows, pad = tuple(rng.choice(["hann", "hamming", "rect"], 2)), tuple(int(x) for x in rng.integers(1, 5, 2))
         radar = made(array, complex_sampling, windows, pad, noise=bool(rng.integers(2)))
         wave = radar.waveform
@@ -98,7 +98,7 @@ def test_side_lobes_round_the_end_of_the_rates_are_no_detections(windows):
 def test_ranges_are_right_at_the_end_of_a_span_of_rates(array):
     radar = made(array, True, ("hann", "hann"), (2, 2))
     span = radar.waveform.unambiguous_rate / radar.slots
-    for share in (0.9, 0.98, 0.995, 1.0, 1.01, -0.99):
+    for share in (0.9, 0.995, 1.01, -0.99):
         seen = found(radar, [9.12], [share * span], [3e-5], 0.3)
         assert seen.range == pytest.approx([9.12], abs=0.02 * radar.waveform.range_resolution)
 
@@ -110,7 +110,7 @@ def test_rates_and_ranges_are_right_all_round_the_end_of_the_rates(array, comple
     wave = Waveform(77e9, 5e8, 20e-6, 22e-6, 48, 128, complex_sampling=complex_sampling)
     radar = make_radar(wave, **ARRAYS[array])
     span = C0 / (4.0 * wave.middle * wave.repetition * radar.slots)
-    for share in (-0.995, -0.98, -0.97, 0.96, 0.975, 0.985, 0.99, 0.998):
+    for share in (-0.995, -0.97, 0.96, 0.985, 0.998):
         seen = found(radar, [9.12], [share * span], [3e-5], 0.3)
         assert seen.rate == pytest.approx([share * span], abs=0.05 * wave.rate_resolution)
         assert seen.range == pytest.approx([9.12], abs=0.02 * wave.range_resolution)

@@ -28,7 +28,7 @@ def _seen(paths, wave, window, pad):
 def test_a_lone_echo_anywhere_between_cells_reads_its_power_range_and_rate(window, pad, real):
     wave = Waveform(77e9, 300e6, 30e-6, 30e-6, 64, 128, complex_sampling=not real)
     rng = np.random.default_rng(8)
-    for _ in range(6):
+    for _ in range(3):
         reach, rate = rng.uniform(12.0, 18.0), rng.uniform(-8.0, 8.0)
         found = detect(_seen(echoes([reach], rate, 1e-3), wave, window, pad), windows=(window, window), waveform=wave)
         # By real sampling an echo's image shows through the side lobes of some windows.

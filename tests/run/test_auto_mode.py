@@ -22,7 +22,7 @@ def both(bodies, **radar):
     return [rc.simulate(rc.Scene(bodies=bodies, radar={**RADAR, **radar}, model={"mode": m})) for m in modes]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 3])
 def test_detections_are_those_of_the_fixed_model_within_the_errors_stated(seed):
     ours, theirs = (rc.simulate(scene_of(seed, mode=mode)) for mode in ("auto", "physical"))
     found = agreement(ours, theirs, 0.5)

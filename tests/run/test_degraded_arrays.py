@@ -48,7 +48,9 @@ def test_phase_noise_converter_rain_interferer_clutter_and_a_fluctuating_target_
     assert np.isfinite(one.cube.samples).all() and np.isfinite(one.rdmap.power).all()
     assert one.cube.samples.tobytes() == two.cube.samples.tobytes()
     assert one.detections.power.tobytes() == two.detections.power.tobytes()
-    assert one.cube.samples.tobytes() != rc.simulate(scene, seed=4).cube.samples.tobytes()
+    # Of another seed the samples are looked at only.
+    other = rc.simulate(scene.override(["processing.min_snr_db=100"]), seed=4)
+    assert one.cube.samples.tobytes() != other.cube.samples.tobytes()
     found, asked = one.detections, np.hypot(18.0, 6.0)
     post = int(np.argmax(np.where(np.abs(found.range - asked) < 0.5, found.power, 0.0)))
     assert found.range[post] == pytest.approx(asked, abs=0.15)
@@ -182,27 +184,30 @@ def test_the_link_budget_of_a_bistatic_target_is_that_of_the_run():
 
 
 def test_probability_of_detection_of_an_array_is_the_share_of_frames_that_detect():
-    """An echo in the middle of a beam and of a cell, 300 frames of noise; the share has a deviation of 0.03 or less.
+    """An echo in the middle of a beam and of a cell, 200 frames of noise; the share has a deviation of 0.035 or less.
 
     Cells and beams beside that of the echo give it further chances, as if it were up to 0.5 dB stronger.
     """
     settings = rc.Processing(pfa=1e-4, min_snr_db=8.0, cfar="os")
     radar = rc.Radar(
-        dataclasses.replace(WAVE, n_samples=64), (0, 0, 0.5), elements=rc.uniform_array(8, HALF), processing=settings
+        dataclasses.replace(WAVE, n_chirps=16, n_samples=32),
+        (0, 0, 0.5),
+        elements=rc.uniform_array(8, HALF),
+        processing=settings,
     )
     detector, rng = detector_of(radar), np.random.default_rng(6)
     wave, power = radar.waveform, radar.noise_power
-    beat = np.exp(-2j * np.pi * 20.0 * np.arange(64) / 64)
+    beat = np.exp(-2j * np.pi * 10.0 * np.arange(32) / 32)
     for snr in (11.0, 14.0):
         # SNR in the beam of 8 receivers, after Hann windows along both axes.
-        gain = 8.0 * (64 / 1.5) * (32 / 1.5)
+        gain = 8.0 * (32 / 1.5) * (16 / 1.5)
         echo = np.sqrt(10 ** (snr / 10) * power / gain) * beat
         hits = 0
-        for _ in range(300):
-            noise = rng.standard_normal((8, 32, 64, 2)).view(complex)[..., 0] * np.sqrt(0.5 * power)
+        for _ in range(200):
+            noise = rng.standard_normal((8, 16, 32, 2)).view(complex)[..., 0] * np.sqrt(0.5 * power)
             cube = Cube(samples=(noise + echo).astype(np.complex64), noise_power=power)
             found = rc.detect(rc.range_doppler(cube, radar), radar)
-            near = np.abs(found.range / wave.range_resolution - 20.0) < 1.0
+            near = np.abs(found.range / wave.range_resolution - 10.0) < 1.0
             hits += bool((near & (np.abs(found.rate) < wave.rate_resolution)).any())
         low, high = (float(detection_probability(x, detector)) for x in (snr, snr + 0.5))
-        assert low - 0.06 < hits / 300 < high + 0.06
+        assert low - 0.06 < hits / 200 < high + 0.06

@@ -85,10 +85,9 @@ def test_levels_are_those_of_geometrical_optics_and_do_not_depend_on_the_tessell
         assert abs(one / (0.5 * truth * np.exp(-4j * np.pi * reach / WAVELENGTH)) - 1.0) < 0.15
 
 
-@pytest.mark.parametrize("subdivisions", [3, 4])
-def test_tubes_over_a_plate_bring_what_a_mirror_leg_brings_to_a_ball(monkeypatch, subdivisions):
+def test_tubes_over_a_plate_bring_what_a_mirror_leg_brings_to_a_ball(monkeypatch):
     """Plate, then ball: over the plate's image the ball is the first surface; by tubes it is the second."""
-    ball = trimesh.creation.icosphere(subdivisions, 0.5)
+    ball = trimesh.creation.icosphere(3, 0.5)
     found = []
     for least in (0.5, 1e9):
         monkeypatch.setattr(legs, "_LEAST_AREA", least)

@@ -79,8 +79,7 @@ def _cells(size, middle, step):
     return middle + ((np.arange(count) + 0.5) / count - 0.5) * size, size / count
 
 
-@pytest.mark.parametrize("tolerance", [3.0, 0.5, 0.1])
-@pytest.mark.parametrize("shape", [_plate, _box])
+@pytest.mark.parametrize(("shape", "tolerance"), [(_plate, 3.0), (_plate, 0.1), (_box, 0.5)])
 @pytest.mark.parametrize("face", _FACES)
 def test_a_near_face_returns_what_a_direct_sum_over_it_does(face, shape, tolerance):
     level, error = _echo(shape(*face[1:]), face[0], tolerance)
@@ -88,8 +87,7 @@ def test_a_near_face_returns_what_a_direct_sum_over_it_does(face, shape, toleran
     assert error < max(tolerance, 0.3)
 
 
-@pytest.mark.parametrize("tolerance", [3.0, 0.5, 0.1])
-@pytest.mark.parametrize("shape", [_plate, _box])
+@pytest.mark.parametrize(("shape", "tolerance"), [(_plate, 3.0), (_plate, 0.1), (_box, 0.5)])
 @pytest.mark.parametrize("face", _WIDE)
 def test_a_wide_face_nearby_returns_what_its_image_does(face, shape, tolerance):
     level, error = _echo(shape(*face[1:]), face[0], tolerance)

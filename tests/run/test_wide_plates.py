@@ -39,9 +39,8 @@ def _run(place, width):
     return rc.simulate(rc.Scene.load(file))
 
 
-@pytest.mark.parametrize("width", [8_000.0, 20_000.0])
-def test_a_wide_plate_returns_what_a_narrower_one_does(usual, width, tmp_path):
-    found = _run(tmp_path, width)
+def test_a_plate_20_km_wide_returns_what_a_narrower_one_does(usual, tmp_path):
+    found = _run(tmp_path, 20_000.0)
     assert found.detections.range == pytest.approx([6.0], abs=0.01)
     error = found.detections.error_db[0] + usual.detections.error_db[0]
     assert abs(found.detections.snr[0] - usual.detections.snr[0]) < error < 0.5

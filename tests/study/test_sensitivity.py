@@ -95,7 +95,7 @@ def two_phasors(given, track):
 def test_two_spheres_in_one_cell_move_as_two_phasors_of_uniform_phase_where_shifts_are_wide():
     pair = scene(ball("one", 12, 0.8, 0), ball("two", 12, -0.8, 0), power_dbm=50.0)
     # sigma of 1/50 of the wavelength: near their sum; of 0.8, turns of the phase by 14 rad: uniform.
-    for shift, draws in ((0.08, 20), (3.0, 50)):
+    for shift, draws in ((0.08, 10), (3.0, 40)):
         given = Tolerances(turn_deg=0.0, shift_mm=shift, draws=draws)
         (one,) = sensitivity(pair, given).moves
         asked = two_phasors(given, one.track)
@@ -113,7 +113,7 @@ def test_two_spheres_in_one_cell_move_as_two_phasors_of_uniform_phase_where_shif
 def test_a_body_moved_alone_has_the_share_of_its_echo_in_the_cell():
     # Of phasors 1 and a in one cell, either turned by a small phase: levels move alike, so both have half.
     pair = scene(ball("one", 12, 0.8, 0), ball("two", 12, -0.8, 0), ball("far", 20, 3, 0), power_dbm=50.0)
-    done = sensitivity(pair, Tolerances(0.0, 1.0, draws=12, each=True))
+    done = sensitivity(pair, Tolerances(0.0, 1.0, draws=6, each=True))
     near, far = sorted(done.moves, key=lambda m: m.track.first.range)
     assert set(near.shares) == {"one", "two", "far"} == set(done.bodies)
     assert sum(share for _, share in near.shares.values()) == pytest.approx(1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import tomllib
 from collections import Counter
@@ -220,7 +221,10 @@ def test_beam_angle_is_the_first_at_which_the_patterns_give_no_more_than_the_cha
 
 @pytest.fixture(scope="module")
 def bench(study):
-    return Bench(study, TOLERANCE_DB, 3, lambda stage, share: None)
+    # Two interactions make ghosts enough of the street by the array; the third takes three times the rays.
+    two = study.runs["street_array"].model_copy(update={"max_bounces": 2})
+    given = dataclasses.replace(study, runs={**study.runs, "street_array": two})
+    return Bench(given, TOLERANCE_DB, 3, lambda stage, share: None)
 
 
 def test_link_budget_is_the_radar_equation_over_thermal_noise(bench):
@@ -266,6 +270,7 @@ def test_the_level_of_a_thing_that_is_detected_is_its_detection(bench):
 def test_every_ghost_is_explained_by_a_path_as_long_to_a_range_bin(bench, run):
     result = bench.run(run)
     found = [g for g in ghosts(bench) if g.run == run]
+    assert found or run == "street"
     assert len(found) == sum(w.label == MULTIPATH for w in result.provenance)
     assert all(abs(g.range - g.path) <= 0.0375 for g in found)
     assert all(g.explained for g in found)

@@ -16,9 +16,10 @@ def _pulses(apart, step):
 def strip(width, arrival, departure, along, cells=None):
     """Return what a strip scatters, and physical optics' part of it: integrals of the current, over wavelength / 2 pi.
 
-    Args: width times 2 pi / wavelength; arrival, departure angles [rad] from the normal; along, which field is along
-    the edges, "E" or "H".
+    Args: width times 2 pi / wavelength; arrival, departure angles [rad] from the normal, of departures one or many;
+    along, which field is along the edges, "E" or "H".
     """
+    departure = np.asarray(departure)
     count = cells or max(60, int(20 * width))
     step = width / count
     ends = np.linspace(-0.5 * width, 0.5 * width, count + 1)
@@ -36,5 +37,5 @@ def strip(width, arrival, departure, along, cells=None):
         matrix = 0.25 * _pulses(np.abs(at[:, None] - at), step) + np.diff(charge @ slope, axis=0) / step
         optics = 2.0 * np.exp(1j * middle * np.sin(arrival))
         current = np.linalg.solve(matrix, np.cos(arrival) * np.exp(1j * at * np.sin(arrival)))
-    whole = (current * np.exp(1j * at * np.sin(departure))).sum() * step * cosine
-    return whole, (optics * np.exp(1j * middle * np.sin(departure))).sum() * step * cosine
+    whole = np.exp(1j * at * np.sin(departure)[..., None]) @ current * step * cosine
+    return whole, np.exp(1j * middle * np.sin(departure)[..., None]) @ optics * step * cosine
