@@ -44,10 +44,12 @@ def ledger(
     """
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         why = "the scene has no bodies" if weakest > 0.0 else "nothing was detected"
-        return {name: Entry(UNKNOWN, "none", why) for name in _NAMES}
+        found = {name: Entry(UNKNOWN, "none", why) for name in _NAMES}
+        # A corner whose last bounce is left out may be all that a scene has.
+        return found | {"further bounces": _returning(paths, geometry, radar, model) or found["further bounces"]}
     # Those that take longest first: at the end threads wait for the last one.
     entries: dict[str, Callable[[], Entry]] = {
-        "further bounces": lambda: _further(paths, geometry, radar, settings, model.max_bounces, weakest),
+        "further bounces": lambda: _further(paths, geometry, radar, settings, model, weakest),
         "transmission": lambda: _transmission(paths, geometry.facets, radar, settings, model, weakest),
         "diffraction to point targets": lambda: _around(geometry, points, radar, settings, model, weakest),
         "diffuse scattering": lambda: _diffuse(geometry, radar, model, weakest),
@@ -93,15 +95,20 @@ _MONOSTATIC = (
 """Effects whose estimates take the way back to be the way out."""
 
 
-def _further(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
+def _further(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, model: Any, weakest: float) -> Entry:
     """Return the entry of further bounces, extrapolated by the ratio of the last two orders; where that tells of
     nothing above the weakest detection, but waves come back just then, of unknown level."""
-    found = _by_ratio(paths, radar, settings, bounces, weakest)
+    found = _by_ratio(paths, radar, settings, model.max_bounces, weakest)
     if isinstance(found.level_db, float) and found.level_db > 0.0:
         return found
-    over = coming_back(paths, geometry, bounces, C0 / radar.waveform.middle)
-    how = f"waves over {' > '.join(over)} come back by {bounces + 1} interactions (model.max_bounces)"
-    return Entry(UNKNOWN, SEEN, how) if over else found
+    return _returning(paths, geometry, radar, model) or found
+
+
+def _returning(paths: Paths, geometry: Geometry, radar: Radar, model: Any) -> Entry | None:
+    """Return the entry of waves that come back by one bounce more than is modelled; None where there are none."""
+    over = coming_back(paths, geometry, model.max_bounces, C0 / radar.waveform.middle)
+    how = f"waves over {' > '.join(over)} come back by {model.max_bounces + 1} interactions (model.max_bounces)"
+    return Entry(UNKNOWN, SEEN, how) if over else None
 
 
 def _by_ratio(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
@@ -233,8 +240,9 @@ def _tessellation(
 
 
 def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
-    """Return the entry of changes of rate within a frame: for crossing and turning bodies the phase deviates by at most
-    k a T^2 / 4, a being the radial acceleration."""
+    """Return the entry of changes within a frame: for crossing and turning bodies the phase deviates by at most
+    k a T^2 / 4, a being the radial acceleration; amplitudes, those of its start, fall until its middle by L' T / L as
+    the length L of a path grows."""
     frame = radar.waveform.frame_duration
     if not len(paths.delay):
         return Entry(NOTHING, "exact", "no path")
@@ -255,5 +263,9 @@ def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     bend = np.where(used, across / nearest[taken, None] + turning**2 * 2.5, 0.0).max(axis=1)
     phase = 2.0 * np.pi * radar.waveform.middle / C0 * bend * frame**2 / 4.0
     worst = float(phase.max(initial=0.0))
-    how = f"at most {worst:.2g} rad of unmodelled phase over the frame; level relative to the echo that has it"
-    return Entry(float(db(max(worst, 1e-15) ** 2)), "bound", how)
+    grown = float((np.abs(paths.length_rate[strong]) * frame / paths.length[strong]).max())
+    how = (
+        f"at most {worst:.2g} rad of unmodelled phase over the frame, amplitudes of its start within {grown:.1%} of "
+        "those of its middle; level relative to the echo that has it"
+    )
+    return Entry(float(db(max(worst, grown, 1e-15) ** 2)), "bound", how)

@@ -36,9 +36,9 @@ Ints = NDArray[np.int32]
 _MOST_CELLS = 2_000_000  # of a grid: trades memory for edges a cell; not measured
 _LEAST_CELL = 0.02  # m; not measured
 _WIDEST_LAYER = 150  # cells in a layer beyond which a tube is bisected before it is searched; not measured
-# Cells of width beyond which a fan with rays along the layers is not searched. Fans cut short so may be bisected as wide
-# layers are: no level of three scenes at 0.5 dB, nor of 60 pairs of plates, then moves by more than its error, for 0.1 %,
-# -3 % and 7 % more rays (command not kept).
+# Cells of width beyond which a fan with rays along the layers is not searched. Were fans cut short bisected as wide
+# layers are, no level of three scenes at 0.5 dB, nor of 60 pairs of plates, would move by more than its error, for
+# 0.1 %, -3 % and 7 % more rays (command not kept).
 _WIDEST_FAN = 10
 _TOUCHING = 1e-5  # m: what lies nearer to a surface belongs to it
 

@@ -7,12 +7,13 @@ import raychan as rc
 from raychan.run.ledger import SEEN
 
 
-def run(shape, bounces, yaw=0.0, height=0.4, **params):
+def run(shape, bounces, yaw=0.0, height=0.4, alone=False, **params):
     corner = rc.Body(name="corner", shape=shape, params=params, position=(8.0, 0.3, height), yaw_deg=180.0 + yaw)
     ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.3}, position=(4.0, -0.3, 0.4))
     wave = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
     model = {"max_bounces": bounces, "tolerance_db": 1.0}
-    return rc.simulate(rc.Scene(bodies=[corner, ball], radar=rc.Radar(waveform=wave), model=model))
+    bodies = [corner] if alone else [corner, ball]
+    return rc.simulate(rc.Scene(bodies=bodies, radar=rc.Radar(waveform=wave), model=model))
 
 
 def told(result):
@@ -29,6 +30,12 @@ def test_a_trihedral_with_two_bounces_is_told_as_it_comes_back_by_three(yaw):
         "left out, of unknown level: further bounces: waves over corner come back by 3 interactions (model.max_bounces)"
     ]
     assert told(whole) == []
+
+
+def test_a_corner_alone_is_told_though_nothing_is_detected():
+    short, whole = (run("trihedral", n, height=0.7, alone=True, size=0.15) for n in (2, 3))
+    assert not len(short.detections.range) and np.abs(whole.detections.range - 8.0).min() < 0.1
+    assert len(told(short)) == 1 and "waves over corner come back by 3 interactions" in told(short)[0]
 
 
 @pytest.mark.parametrize("bounces", [2, 3])
