@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from html.parser import HTMLParser
 
 import matplotlib
@@ -116,3 +117,12 @@ def test_a_result_its_map_and_its_profile_draw_themselves_in_given_axes_or_new_o
         made.rdmap.plot(3)
     with pytest.raises(ValueError, match=r"axes = .*: two Axes of matplotlib are wanted, or None"):
         made.plot(mine)
+
+
+def test_the_gain_of_specular_paths_is_that_of_their_strongest_polarisation():
+    wave = rc.Waveform(77e9, 500e6, 40e-6, n_chirps=16, n_samples=32)
+    ground = rc.Scene(bodies=[rc.Body(name="ground", shape="ground")], radar=rc.Radar(wave))
+    paths = rc.specular_paths(ground, tx=(0, 0, 0.5), rx=(20, -3, 1.3), max_bounces=1)
+    free = 20.0 * np.log10(299_792_458.0 / wave.carrier / (4.0 * np.pi * paths.length[0]))
+    (shown,) = re.findall(r"gain +(\S+) to (\S+) dB", repr(paths))
+    assert float(shown[1]) == pytest.approx(free, abs=0.02) and free - 10.0 < float(shown[0]) < free
