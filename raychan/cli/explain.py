@@ -77,7 +77,7 @@ def explain(
     for line in _head(why, range is not None and not cell):
         screen.print(line, soft_wrap=True)
     if not why.contributions:
-        screen.print("no path explains this cell: noise")
+        screen.print(f"no path explains this cell: {why.bodies}")
         return
     for line in _chains(why):
         screen.print(line, soft_wrap=True)

@@ -91,7 +91,7 @@ def _drawing(source: Path, range: float | None, speed: float | None, detection: 
         except ValueError as error:
             raise typer.BadParameter(str(error)) from error
         if cell is not None and not cell.contributions:
-            show.warn(["no path explains this cell: noise"])
+            show.warn([f"no path explains this cell: {cell.bodies}"])
         return drawing_of(result.scene, result, cell)
     if wanted:
         raise typer.BadParameter(f"{source} is a scene; --range and --detection need a directory of `raychan run`")

@@ -144,13 +144,13 @@ def detect(
     if aperture is None or bank is None:
         place = (cells + shift) / np.array(grid.pad)
         kept = lobes.own(place, power, smear, shown, besides=lambda i: lines.own(cells[i]))
-        return _reported(map, grid, shape, Found(cells, shift, power, noise).take(kept), ego_speed)
+        return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, shown, bar.of_beam(bank, local, pfa), smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
-    return _reported(map, grid, shape, echoes.take(loud), ego_speed, aperture, seen.looks)
+    return _reported(map, grid, echoes.take(loud), ego_speed, aperture, seen.looks)
 
 
 def least_power(
@@ -213,7 +213,6 @@ def _smears(map: RangeDoppler, waveform: Waveform | None) -> Floats:
 def _reported(
     map: RangeDoppler,
     grid: Grid,
-    shape: PeakShape,
     found: Found,
     ego_speed: float,
     aperture: Aperture | None = None,
@@ -221,7 +220,8 @@ def _reported(
 ) -> Detections:
     """Return what is found as detections; with an aperture, of echoes with their directions, and SNR that is that in a
     beam over `looks`."""
-    place = shape.within(found.place, map.power.shape)
+    # A peak belongs to its cell: one a fraction before the first is at range 0, not at the far end, an ambiguity away.
+    place = np.maximum(found.place, (-np.inf, 0.0))
     rate = _rate(map, grid, place)
     angles = np.full((2, len(rate)), np.nan)
     ambiguous = np.zeros(len(rate), bool)

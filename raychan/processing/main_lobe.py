@@ -100,10 +100,6 @@ class PeakShape:
         skew = waveform.chirp_duration / waveform.frame_duration
         return cls(windows, (rates, waveform.n_samples), grid, skew, waveform.complex_sampling)
 
-    def within(self, place: Floats, shape: tuple[int, ...]) -> Floats:
-        """Return places (n, 2) in map cells with ranges that are on the axis."""
-        return np.stack([place[:, 0], place[:, 1] % shape[1] if self._wraps else place[:, 1]], axis=1)
-
     def refine(self, power: Floats, cells: Ints) -> tuple[Floats, Floats]:
         """Return the offsets (c, 2) in cells and the power (c,) of the peaks at map cells (c, 2)."""
         rows, columns = cells.T

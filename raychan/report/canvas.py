@@ -31,6 +31,7 @@ MARKS = {
     "multipath": ("^", "#ffd54a"),
     "clutter": ("X", "#ff8a80"),
     "sidelobe": ("v", "#80d8ff"),
+    "dc": ("D", "#b9f6ca"),
 }
 """Marker and colour of a detection by its label, chosen to stand out on the map."""
 

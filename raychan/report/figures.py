@@ -206,6 +206,6 @@ def _true_place(why: Explanation) -> str:
 def _short(why: Explanation) -> str:
     """Return the bodies of the leading chain without their parts and without repeats."""
     if not why.contributions:
-        return "noise"
+        return why.bodies
     bodies = [link.split(".")[0] for link in why.contributions[0].chain if not link.startswith("(")]
     return " > ".join(b for i, b in enumerate(bodies) if i == 0 or b != bodies[i - 1]) or LINE_OF_SIGHT

@@ -26,7 +26,7 @@ Ints = NDArray[np.int64]
 Complexes = NDArray[np.complex128]
 
 _LITTLE = 1e-3  # of a cell's amplitude: largest sum of the paths left out of a beam (not measured)
-_UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
+UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
 
 @on_one_blas_thread
@@ -118,4 +118,4 @@ def wave_in_beam(
 
 def unexplained(wave: complex, power: float, receiver: Receiver) -> bool:
     """Return whether paths give too little of a power [W] to explain it. Args: wave, the sum of what they bring."""
-    return bool(abs(wave) ** 2 * receiver.power < _UNEXPLAINED * power)
+    return bool(abs(wave) ** 2 * receiver.power < UNEXPLAINED * power)

@@ -15,6 +15,7 @@ from raychan.columns import Record, column
 from raychan.poses import angles
 from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
+from raychan.run.dc_offset import dc_power, named
 from raychan.run.directions import beam_to, wave_in_beam
 from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result
@@ -130,6 +131,9 @@ def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
     seen, error = float(result.rdmap.power[place]), float(result.error.power[place])
     response = response_of(result.receiver)
     why = explain_cell(result.paths, known, response, result.receiver, *at, seen, error)
+    radar = result.scene.radar if result.scene is not None else None
+    if radar is not None and (brought := dc_power(radar, radar.processing)) is not None:
+        why = named(why, float(brought[place]), error)
     return CellExplanation(**_held(why), paths=_paths_in(result, row, column, known))
 
 

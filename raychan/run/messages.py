@@ -14,7 +14,7 @@ from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
 from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
-from raychan.run.result import SIDELOBE, ExplainedDetections, Explanation, Result
+from raychan.run.result import DC, SIDELOBE, ExplainedDetections, Explanation, Result
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry
 
@@ -132,6 +132,17 @@ def beside_echoes(reasons: Sequence[Explanation]) -> list[str]:
     ]
 
 
+def dc_offset(reasons: Sequence[Explanation]) -> list[str]:
+    """Return a line if detections are the receiver's DC offset."""
+    rows = np.array([why.label == DC for why in reasons], bool)
+    if not rows.any():
+        return []
+    return [
+        f"{_of(rows)} {_verb(rows)} the receiver's DC offset ({_numbers(rows)}), a constant in all samples, and "
+        "nothing stands where shown (radar.impairments.dc_offset_dbm)"
+    ]
+
+
 def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Entry]) -> list[str]:
     """Return the lines that stand below the table of detections: on the tolerance, and on what was left out."""
     said = []
@@ -163,6 +174,7 @@ def told(
     """Return all lines on detections, of which each has a reason."""
     return [
         *beside_echoes(reasons),
+        *dc_offset(reasons),
         *warned(found, tolerance_db, rdmap, radar),
         *noted(found, tolerance_db, ledger),
     ]

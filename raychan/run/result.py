@@ -19,8 +19,8 @@ from raychan.run.ledger import Entry
 if TYPE_CHECKING:
     from raychan.world.scene import Scene
 
-LABELS = DIRECT, MULTIPATH, CLUTTER, SIDELOBE = "direct", "multipath", "clutter", "sidelobe"
-"""Of detections: what their leading chain of bodies is."""
+LABELS = DIRECT, MULTIPATH, CLUTTER, SIDELOBE, DC = "direct", "multipath", "clutter", "sidelobe", "dc"
+"""Of detections: what their leading chain of bodies is; of DC, the receiver's offset, there is none."""
 LINE_OF_SIGHT = "line of sight"
 """Names the way straight from a transmitter to a receiver elsewhere, which meets no body."""
 
@@ -90,8 +90,11 @@ class Explanation:
 
     @property
     def bodies(self) -> str:
-        """Chain of the leading contribution, 'line of sight' if it meets none; 'noise' if no path explains the cell."""
-        return (" > ".join(self.contributions[0].chain) or LINE_OF_SIGHT) if self.contributions else "noise"
+        """Chain of the leading contribution, 'line of sight' if it meets none; if no path explains the cell, 'noise' or
+        'dc offset'."""
+        if not self.contributions:
+            return "dc offset" if self.label == DC else "noise"
+        return " > ".join(self.contributions[0].chain) or LINE_OF_SIGHT
 
 
 @dataclass(frozen=True)

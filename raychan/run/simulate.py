@@ -12,6 +12,7 @@ from raychan.parallel import run_pair
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDoppler
 from raychan.run.clock import Clock, Progress
+from raychan.run.dc_offset import all_named
 from raychan.run.directions import beam_to
 from raychan.run.interferers import interference, never_heard
 from raychan.run.labels import Chains, chains, provenance
@@ -151,7 +152,7 @@ def _explained(
         return provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths), by_chain)
 
     if model.mode == PREVIEW:
-        return explained(), preview_ledger()
+        return all_named(explained(), found, error.power, radar, settings), preview_ledger()
     reasons, left_out = run_pair(
         explained,
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
@@ -160,7 +161,7 @@ def _explained(
         left_out["intra-frame motion"] = motion(turned)
         brought = quiet_map(turned.turning, radar, settings)
         reasons = claimed(reasons, paths, turned.turns, brought, error.power, found, receiver)
-    return reasons, left_out
+    return all_named(reasons, found, error.power, radar, settings), left_out
 
 
 def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:

@@ -23,14 +23,21 @@ def digitized(cube: Cube, impairments: Impairments, complex_sampling: bool = Tru
     if not impairments.iq_balanced:
         samples = imbalanced(samples, impairments.iq_gain_db, impairments.iq_phase_deg)
     if impairments.dc_offset_dbm is not None:
-        size = float(np.sqrt(watt(impairments.dc_offset_dbm)))
-        samples = samples + (size * np.exp(0.25j * np.pi) if complex_sampling else size)
+        samples = samples + offset(impairments, complex_sampling)
     clipped = 0
     if impairments.converter is not None:
         samples, clipped = quantized(samples, impairments.converter, complex_sampling)
     if samples is cube.samples:
         return cube, 0
     return Cube(samples=samples.astype(np.complex64), noise_power=cube.noise_power), clipped
+
+
+def offset(impairments: Impairments, complex_sampling: bool = True) -> complex:
+    """Return the constant [sqrt(W)] that a receiver's DC offset adds to its samples; 0 without an offset."""
+    if impairments.dc_offset_dbm is None:
+        return 0.0
+    size = float(np.sqrt(watt(impairments.dc_offset_dbm)))
+    return complex(size * np.exp(0.25j * np.pi)) if complex_sampling else size
 
 
 def imbalanced(samples: Samples, gain_db: float, phase_deg: float) -> Samples:

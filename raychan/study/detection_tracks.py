@@ -56,7 +56,7 @@ def sightings(result: Result) -> list[Sighting]:
     for i, why in enumerate(result.provenance):
         level = why.predicted if why.contributions else why.power
         azimuth = float(found.azimuth[i])
-        met = frozenset(b for part in why.contributions for b in _chain(part.chain)) or frozenset([NOISE])
+        met = frozenset(b for part in why.contributions for b in _chain(part.chain)) or frozenset([why.bodies])
         place = float(found.range[i]), float(found.rate[i]), azimuth
         out.append(Sighting(*place, float(dbm(max(level, 1e-40))), why.error_db, why.label, why.bodies, met))
     return out

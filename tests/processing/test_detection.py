@@ -187,6 +187,14 @@ def test_a_target_at_the_edge_of_the_map_is_found_once():
         assert len(detect(rdmap(echoes([r], v, 1e-3), noise=True)).range) == 1
 
 
+@pytest.mark.parametrize("away", [-0.2, -0.01, 0.0, 0.01, 0.2])
+def test_a_peak_within_half_a_map_cell_of_range_0_is_there_and_not_an_ambiguity_away(away):
+    # Two map cells a resolution cell: less than 0.25 of these belongs to the first.
+    size = SMALL.range_resolution
+    found = detect(rdmap(echoes([SMALL.n_samples * size + away * size], amplitudes=1e-3)), waveform=SMALL)
+    assert found.range == pytest.approx([max(away, 0.0) * size], abs=0.01 * size)
+
+
 def test_noise_alone_and_silence_give_no_detections():
     assert len(detect(rdmap(echoes([]), noise=True)).range) == 0
     assert len(detect(rdmap(echoes([]))).range) == 0
