@@ -1,5 +1,5 @@
-"""Limits of numbers with unit and reason, and those of waveforms, receivers, antennas and air; all others, for scene
-files, options and Python arguments, are in `raychan.world.limits`.
+"""Limits of numbers with unit and reason, and those of waveforms, receivers, antennas, air and diffuse scattering; all
+others, for scene files, options and Python arguments, are in `raychan.world.limits`.
 
 A number beyond them is a mistake (a wrong unit, a digit too many) or asks for physics that is not modelled.
 """
@@ -81,3 +81,8 @@ VAPOUR_GM3 = Limit(0.0, 100.0, "g/m3", "7.5 in the reference air, 17 in saturate
 RAIN_MMH = Limit(0.0, 400.0, "mm/h", "2 is light rain, 10 heavy, 100 a cloudburst; the heaviest minutes reach 400")
 FOG_GM3 = Limit(0.0, 5.0, "g/m3", "0.05 where one sees 300 m, 0.5 where one sees 50 m")
 LOSS_DB = Limit(-60.0, 100.0, "dB", "above, an antenna radiates nothing; below 0, it corrects a published gain")
+DIFFUSE_DB = Limit(-120.0, 30.0, "dB", "sigma-nought of natural surfaces lies between")
+EXPONENT = Limit(1, 50, "", "of a lobe: 1 is nearly Lambert's, 50 a few degrees wide")
+CROSS_DB = Limit(0.0, 100.0, "dB", "the cross-polarised return is weaker than the co-polarised one")
+K_SHAPE = Limit(0.01, 1000.0, "", "0.1 is spiky, 100 nearly Rayleigh")
+TEXTURE_M = Limit(1e-3, 1e4, "m", "side of a square of one texture")

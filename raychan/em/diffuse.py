@@ -11,11 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan import limits
 from raychan.scalars import is_number, is_one_of, meant, plain, shown
 
 Floats = NDArray[np.float64]
 
 _MAY_MISS = ("cross_db", "k_shape")
+_LIMITS = {
+    "level_db": limits.DIFFUSE_DB,
+    "exponent": limits.EXPONENT,
+    "cross_db": limits.CROSS_DB,
+    "k_shape": limits.K_SHAPE,
+    "texture_m": limits.TEXTURE_M,
+}
 LAWS = ("constant", "gamma", "lambert", "lobe")
 
 
@@ -43,22 +51,14 @@ class Diffuse:
     def __post_init__(self) -> None:
         if not is_one_of(self.law, LAWS):
             raise ValueError(f"law = {self.law!r}: must be one of {', '.join(LAWS)}{meant(self.law, LAWS)}")
-        for name in ("level_db", "exponent", "cross_db", "k_shape", "texture_m"):
+        for name in _LIMITS:
             value = plain(getattr(self, name))
             if not ((value is None and name in _MAY_MISS) or is_number(value)):
                 raise ValueError(f"{name} = {shown(value)}: a number is wanted")
-            object.__setattr__(self, name, value)
-            if name in ("level_db", "cross_db") and value is not None and not math.isfinite(value):
-                raise ValueError(f"{name} = {value!r}: must be finite")
+            held = value if value is None else _LIMITS[name].check(name, value, whole=name == "exponent")
+            object.__setattr__(self, name, held)
         if self.law in ("lambert", "lobe") and self.level_db > 0.0:
             raise ValueError(f"level_db = {self.level_db:g} dB: a surface cannot scatter more than it receives (0 dB)")
-        if not (1 <= self.exponent <= 50 and int(self.exponent) == self.exponent):
-            raise ValueError(f"exponent = {self.exponent!r}: must be a whole number from 1 to 50")
-        object.__setattr__(self, "exponent", int(self.exponent))
-        for name in ("k_shape", "texture_m"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} = {value!r}: must be positive and finite")
 
     def sigma0(self, cos_in: Floats, cos_out: Floats, cos_lobe: Floats) -> Floats:
         """Return sigma-nought (n,) [m^2/m^2] of cosines (n,): of incidence and scattering angle off the normal, and of

@@ -8,8 +8,12 @@ from __future__ import annotations
 from raychan.limits import BANDWIDTH_MHZ as BANDWIDTH_MHZ
 from raychan.limits import CARRIER_GHZ as CARRIER_GHZ
 from raychan.limits import CELSIUS as CELSIUS
+from raychan.limits import CROSS_DB as CROSS_DB
+from raychan.limits import DIFFUSE_DB as DIFFUSE_DB
+from raychan.limits import EXPONENT as EXPONENT
 from raychan.limits import FOG_GM3 as FOG_GM3
 from raychan.limits import FREQUENCY as FREQUENCY
+from raychan.limits import K_SHAPE as K_SHAPE
 from raychan.limits import KELVIN as KELVIN
 from raychan.limits import LOSS_DB as LOSS_DB
 from raychan.limits import NOISE_DB as NOISE_DB
@@ -17,6 +21,7 @@ from raychan.limits import PRESSURE_HPA as PRESSURE_HPA
 from raychan.limits import RAIN_MMH as RAIN_MMH
 from raychan.limits import RAMP_US as RAMP_US
 from raychan.limits import SAMPLES as SAMPLES
+from raychan.limits import TEXTURE_M as TEXTURE_M
 from raychan.limits import VAPOUR_GM3 as VAPOUR_GM3
 from raychan.limits import Limit as Limit
 
@@ -79,11 +84,6 @@ EPS_R = Limit(1.0, 1e4, "", "of passive materials: 1 is vacuum, 80 water")
 SIGMA = Limit(0.0, 1e9, "S/m", "of passive materials: silver has 6e7")
 THICKNESS_MM = Limit(1e-7, 1e4, "mm", "no atom is thinner; thicker is opaque: leave the key out")
 ROUGHNESS_MM = Limit(0.0, 1e3, "mm", "rms height of a surface, not of a landscape")
-DIFFUSE_DB = Limit(-120.0, 30.0, "dB", "sigma-nought of natural surfaces lies between")
-EXPONENT = Limit(1, 50, "", "of a lobe: 1 is nearly Lambert's, 50 a few degrees wide")
-CROSS_DB = Limit(0.0, 100.0, "dB", "the cross-polarised return is weaker than the co-polarised one")
-K_SHAPE = Limit(0.01, 1000.0, "", "0.1 is spiky, 100 nearly Rayleigh")
-TEXTURE_M = Limit(1e-3, 1e4, "m", "side of a square of one texture")
 SCALE = Limit(1e-9, 1e9, "", "a factor on a mesh's size", above=True)
 
 VOYAGE_S = Limit(0.0, 1e5, "s", "a day under way", above=True)

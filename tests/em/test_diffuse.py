@@ -64,6 +64,10 @@ def test_textures_are_one_a_square_and_of_mean_one():
         {"law": "gamma", "level_db": np.nan},
         {"law": "lobe", "level_db": -3.0, "exponent": 0},
         {"law": "constant", "level_db": -3.0, "k_shape": 0.0},
+        {"law": "gamma", "level_db": 1e300},
+        {"law": "gamma", "level_db": -3.0, "cross_db": -1e9},
+        {"law": "gamma", "level_db": -3.0, "texture_m": 1e-300},
+        {"law": "lobe", "level_db": -3.0, "exponent": 4.5},
     ],
 )
 def test_what_cannot_be_is_refused(wrong):

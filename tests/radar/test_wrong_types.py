@@ -98,7 +98,7 @@ def measured(**change):
         (lambda: measured(azimuth=[1.0, 0.0, 2.0]), "MeasuredAntenna.azimuth: 2 or more angles .* increasing"),
         (lambda: measured(gain_db=np.full((3, 2), NAN)), "MeasuredAntenna.gain_db: finite numbers are wanted"),
         (lambda: measured(gain_db=np.zeros((2, 3))), r"gain_db of shape \(2, 3\): \(3, 2\) is wanted"),
-        (lambda: Diffuse("gamma", -3.0, cross_db=NAN), "cross_db = nan: must be finite"),
+        (lambda: Diffuse("gamma", -3.0, cross_db=NAN), "cross_db = nan: must lie between 0 and 100 dB"),
         (lambda: Diffuse("gamma", "a"), "level_db = 'a': a number is wanted"),
         (lambda: Diffuse("gamma", -3.0, exponent="4"), "exponent = '4': a number is wanted"),
         (lambda: Diffuse("gamma", -3.0, k_shape=True), "k_shape = True: a number is wanted"),
