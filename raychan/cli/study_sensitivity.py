@@ -74,7 +74,9 @@ def sensitivity(
             _write(done, stage)
     _print(done)
     if out:
-        show.console().print(f"table and figure: {out / names[0]}, {out / names[1]}", soft_wrap=True)
+        what = "tables and figure" if each else "table and figure"
+        written = ", ".join(str(out / name) for name in names[: 3 if each else 2])
+        show.console().print(f"{what}: {written}", soft_wrap=True)
 
 
 def _write(done: Sensitivity, stage: Path) -> None:

@@ -37,13 +37,13 @@ def _near(file: Path, known: Sequence[str]) -> str:
 def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
     """Return the text of a scene file, or of the scene of that name that comes with raychan, and the file.
 
-    Args: known names that a message proposes; none: those of all bundled scenes.
+    Args: known names that a message proposes; none: those of the bundled scenes of radars.
     Raises: SceneError where there is none, or where it cannot be read.
     """
     if not isinstance(path, str | PathLike):
         allowed = "a scene file, or the name of a bundled scene"
         raise SceneError(f"{shown(path)} is not possible", key="path", value=path, allowed=allowed)
-    known = known or bundled.names() + bundled.ship_names()
+    known = known or bundled.names()
     if "\0" in str(path):
         raise SceneError(f"{shown(str(path))} is not possible", value=str(path), allowed="a name without a zero byte")
     if not str(path).strip() or str(path) == ".":  # Path("") is the current directory

@@ -30,6 +30,7 @@ def test_the_command_writes_tables_and_a_figure_and_tells_speckle_from_error(fil
     said = capsys.readouterr().out
     assert "over 3 draws of 1 body" in said and "speckle: spread above the tolerance" in said
     assert {p.name for p in out.iterdir()} == {"sensitivity.csv", "sensitivity.png", "each.csv"}
+    assert all(str(p) in said for p in out.iterdir())
     assert (out / "sensitivity.png").stat().st_size > 5_000
     with open(out / "sensitivity.csv", newline="") as table:
         rows = list(csv.DictReader(table))

@@ -77,6 +77,8 @@ def test_run_without_a_scene_lists_those_that_come_along(elsewhere, capsys):
     assert invoke(["run"]) == 0
     said = capsys.readouterr().out
     assert all(name in said for name in bundled.names())
+    # `run` does not take them.
+    assert not any(name in said for name in bundled.ship_names())
     assert invoke(["run", "urban"]) == 2
     assert "--out" in capsys.readouterr().err
 
