@@ -73,12 +73,16 @@ def test_a_missing_scene_is_told_with_the_files_of_close_names_beside_it(elsewhe
     assert "did you mean 'crossing.toml'?" in capsys.readouterr().err
 
 
+def test_an_unknown_scene_is_answered_with_those_of_radars(capsys):
+    assert invoke(["info", "nothere"]) == 2
+    said = capsys.readouterr().err
+    assert all(name in said for name in bundled.names()) and not any(name in said for name in bundled.ship_names())
+
+
 def test_run_without_a_scene_lists_those_that_come_along(elsewhere, capsys):
     assert invoke(["run"]) == 0
     said = capsys.readouterr().out
     assert all(name in said for name in bundled.names())
-    # `run` does not take them.
-    assert not any(name in said for name in bundled.ship_names())
     assert invoke(["run", "urban"]) == 2
     assert "--out" in capsys.readouterr().err
 
