@@ -28,16 +28,15 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 _Kind = TypeVar("_Kind", bound=np.generic)
-
 _SMALL = 1e-3
-"""Of the noise in a map cell: by so much the samples may be off for each footprint that is long in range but is one
-path all the same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
+"""Of the noise in a map cell: by so much samples may be off for each footprint long in range that is one path all the
+same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
 _TURN = 0.25
 """rad: footprints over which the phase at the outermost elements differs by more from the centre's become a path for
-each corner, or are divided into pieces over which it does not. What is left is a share x^2 / 4 of such a phase x at
-most, 0.14 dB at the outermost elements: paths against rays. A plate 2 m before eight elements is then known to -34 dB,
-without pieces to -11 dB (tests/channel/test_corner_places.py, at 1 dB); other values were not measured."""
-_PIECES = 32  # along an edge: 40 plates before 7 receivers are off by 1.2 stated errors at most, by 13 with 8 pieces
+each corner, or are divided into pieces over which it does not: a share x^2 / 4 of such a phase x is left at most, 0.14
+dB. A plate 2 m before eight elements is then known to -34 dB, without pieces to -11 dB (other values not measured)."""
+_PIECES, _MOST_PIECES = 8, 32  # along an edge, for 45 paths, or 561 where a lone footprint tells: see docs/measurements
+_LOUD = 0.3  # of the noise in a map cell: what a footprint of 8 pieces may lack; 0.1 and 1 measured for cost only
 _MANY = 20_000  # trajectories from which on a second thread pays; not measured
 
 
@@ -126,9 +125,11 @@ def _tells(radar: Any, noise: float, size: Floats, length: Floats, rate: Floats,
 def _pieces(noise: float, size: Floats, turned: Floats) -> NDArray[np.int64]:
     """Return into how many pieces along each edge footprints (r,) are divided for the outermost elements; size and
     turned as for `_tells`."""
-    most = _over_three(np.maximum, turned)
-    many = np.clip(np.ceil(most / _TURN), 1.0, _PIECES).astype(np.int64)
-    return np.where(_over_three(np.add, size) * np.minimum(most**2 / 4.0, 2.0) > _SMALL * noise, many, 1)
+    most, level = _over_three(np.maximum, turned), _over_three(np.add, size)
+    # Of m pieces a share (most / m)^2 / 4 is left. Without noise none is louder than others.
+    lone = np.clip(0.5 * most * np.sqrt(level / (_LOUD * noise if noise else np.inf)), _PIECES, _MOST_PIECES)
+    many = np.clip(np.ceil(np.minimum(most / _TURN, lone)), 1.0, None).astype(np.int64)
+    return np.where(level * np.minimum(most**2 / 4.0, 2.0) > _SMALL * noise, many, 1)
 
 
 def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDArray[Any]) -> Paths:
