@@ -36,7 +36,7 @@ _TURN = 0.25
 each corner, or are divided into pieces over which it does not: a share x^2 / 4 of such a phase x is left at most, 0.14
 dB. A plate 2 m before eight elements is then known to -34 dB, without pieces to -11 dB (other values not measured)."""
 _PIECES, _MOST_PIECES = 8, 32  # along an edge, for 45 paths, or 561 where a lone footprint tells: see docs/measurements
-_LOUD = 0.3  # of the noise in a map cell: what a footprint of 8 pieces may lack; 0.1 and 1 measured for cost only
+_STRONG = 0.3  # of the noise in a map cell: what a footprint of 8 pieces may lack; 0.1 and 1 measured for cost only
 _MANY = 20_000  # trajectories from which on a second thread pays; not measured
 
 
@@ -126,8 +126,8 @@ def _pieces(noise: float, size: Floats, turned: Floats) -> NDArray[np.int64]:
     """Return into how many pieces along each edge footprints (r,) are divided for the outermost elements; size and
     turned as for `_tells`."""
     most, level = _over_three(np.maximum, turned), _over_three(np.add, size)
-    # Of m pieces a share (most / m)^2 / 4 is left. Without noise none is louder than others.
-    lone = np.clip(0.5 * most * np.sqrt(level / (_LOUD * noise if noise else np.inf)), _PIECES, _MOST_PIECES)
+    # Of m pieces a share (most / m)^2 / 4 is left. Without noise none is stronger than others.
+    lone = np.clip(0.5 * most * np.sqrt(level / (_STRONG * noise if noise else np.inf)), _PIECES, _MOST_PIECES)
     many = np.clip(np.ceil(np.minimum(most / _TURN, lone)), 1.0, None).astype(np.int64)
     return np.where(level * np.minimum(most**2 / 4.0, 2.0) > _SMALL * noise, many, 1)
 

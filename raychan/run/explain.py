@@ -131,8 +131,8 @@ def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
     seen, error = float(result.rdmap.power[place]), float(result.error.power[place])
     response = response_of(result.receiver)
     why = explain_cell(result.paths, known, response, result.receiver, *at, seen, error)
-    radar = result.scene.radar if result.scene is not None else None
-    if radar is not None and (brought := dc_power(radar, radar.processing)) is not None:
+    scene = result.scene
+    if scene is not None and (brought := dc_power(scene.radar, scene.processing)) is not None:
         why = named(why, float(brought[place]), error)
     return CellExplanation(**_held(why), paths=_paths_in(result, row, column, known))
 
