@@ -66,15 +66,16 @@ def grow_cells(net, limits, most, rows, slab, cell, away, far):  # type: ignore[
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def misshapen(net, limits, cell, begin, stop, bad):  # type: ignore[no-untyped-def]
+def misshapen(net, limits, cell, moved, begin, stop, bad):  # type: ignore[no-untyped-def]
     """Mark in bad (k,) the cells of facets that turn over or have edges that may not come; return how many facets do.
 
-    Args: begin, stop: of which facets.
+    Args: moved (k,) vertices that have another cell than before: of facets without any nothing is asked; begin, stop:
+    of which facets.
     """
     v, n, faces, corner, _, half, _, _, _, reach, _, _ = net
     count = 0
     for f in range(begin, stop):
-        if faces[f, 0] < 0:
+        if faces[f, 0] < 0 or not (moved[faces[f, 0]] or moved[faces[f, 1]] or moved[faces[f, 2]]):
             continue
         a, b, c = cell[faces[f, 0]], cell[faces[f, 1]], cell[faces[f, 2]]
         if a == b or b == c or c == a or (a == faces[f, 0] and b == faces[f, 1] and c == faces[f, 2]):
@@ -90,6 +91,15 @@ def misshapen(net, limits, cell, begin, stop, bad):  # type: ignore[no-untyped-d
             bad[a], bad[b], bad[c] = True, True, True
             count += 1
     return count
+
+
+@njit(cache=True, nogil=True)
+def dissolve(bad, begin, stop, cell, moved):  # type: ignore[no-untyped-def]
+    """Let some vertices of bad cells (k,) stay, in cell (k,), and tell in moved (k,) which of them went before."""
+    for a in range(begin, stop):
+        moved[a] = cell[a] != a and bad[cell[a]]
+        if moved[a]:
+            cell[a] = a
 
 
 @njit(cache=True, forceinline=True)
@@ -146,6 +156,36 @@ def corners_of_cells(faces, cell, own):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def corners_before(net, cell, own, begin, stop, seen):  # type: ignore[no-untyped-def]
+    """Write into seen (k,) the corner at each of some vertices; return how many of them go, -1 where one that stays is
+    of no facet that stays.
+
+    Args: own as `corners_of_cells` writes it; begin, stop: which vertices.
+    """
+    _, _, _, corner, _, half, _, _, gone, _, _, _ = net
+    went = 0
+    for a in range(begin, stop):
+        seen[a] = corner[half[a] // 3, half[a] % 3]
+        if not gone[a]:
+            if cell[a] == a and own[a] < 0:
+                return -1
+            went += cell[a] != a
+    return went
+
+
+@njit(cache=True, nogil=True)
+def leave_vertices(net, cell, own, turn, begin, stop):  # type: ignore[no-untyped-def]
+    """Let some vertices go to the middles of their cells; those that stay are touched in round `turn`; else as for
+    `corners_before`."""
+    _, _, _, _, _, half, _, _, gone, _, touched, _ = net
+    for a in range(begin, stop):
+        if cell[a] != a:
+            gone[a] = True
+        elif not gone[a]:
+            half[a], touched[a] = own[a], turn
+
+
+@njit(cache=True, nogil=True)
 def merge_cells(net, cell, own, seen, beyond, begin, stop):  # type: ignore[no-untyped-def]
     """Move the vertices of some facets to the middles of their cells: facets within two cells go.
 
@@ -177,31 +217,31 @@ def contract(net: Net, limits: Limits, most: int, turn: int, slabs: tuple[NDArra
     number of this round; slabs: the slab (k,) of each vertex, the vertices that may go by slab, and where each begins.
     """
     cell = _cells(net, limits, most, slabs)
-    n, number = len(net.faces), np.arange(len(cell))
+    n, moved = len(net.faces), np.ones(len(cell), bool)
     while True:
         bad, count = np.zeros(len(cell), bool), list[int]()
 
         def marked(r: slice, bad: NDArray[np.bool_] = bad, count: list[int] = count) -> None:
-            count.append(misshapen(net, limits, cell, r.start, r.stop, bad))
+            count.append(misshapen(net, limits, cell, moved, r.start, r.stop, bad))
+
+        def stay(r: slice, bad: NDArray[np.bool_] = bad) -> None:
+            dissolve(bad, r.start, r.stop, cell, moved)
 
         parallel_for(n, marked)
         if not any(count):
             break
-        # Vertices of cells that do not fit stay.
-        apart = np.flatnonzero(bad[cell] & (cell != number))
-        cell[apart] = apart
-    own, went = np.empty(len(cell), np.int32), ~net.gone & (cell != number)
-    beyond, whole = np.empty(3 * n, np.int32), list[bool]()
-    facets, stays = corners_of_cells(net.faces, cell, own), ~net.gone & ~went
+        parallel_for(len(cell), stay)
+    own, seen = np.empty(len(cell), np.int32), np.empty(len(cell), np.int32)
+    beyond, whole, went = np.empty(3 * n, np.int32), list[bool](), list[int]()
+    facets = corners_of_cells(net.faces, cell, own)
     parallel_for(n, lambda r: whole.append(beyond_cells(net.faces, net.mate, cell, r.start, r.stop, beyond)))
+    parallel_for(len(cell), lambda r: went.append(corners_before(net, cell, own, r.start, r.stop, seen)))
     # Of cells that are discs two facets go with each vertex (Euler).
-    if not all(whole) or facets != 2 * went.sum() or (own[stays] < 0).any():
+    if not all(whole) or min(went) < 0 or facets != 2 * sum(went):
         return 0
-    seen = net.corner.ravel()[net.half]
     parallel_for(n, lambda r: merge_cells(net, cell, own, seen, beyond, r.start, r.stop))
-    net.half[stays], net.touched[stays] = own[stays], turn
-    net.gone[went] = True
-    return int(went.sum())
+    parallel_for(len(cell), lambda r: leave_vertices(net, cell, own, turn, r.start, r.stop))
+    return sum(went)
 
 
 def _cells(net: Net, limits: Limits, most: int, slabs: tuple[NDArray[np.int8], Ints, Ints]) -> NDArray[np.int32]:

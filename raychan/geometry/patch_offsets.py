@@ -137,14 +137,29 @@ def offsets(place, normal, begin, net, most, found, off, excess):  # type: ignor
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def centres(v, faces, n, rows, place, normal):  # type: ignore[no-untyped-def]
-    """Write the centres of the curved patches of some facets (r,) into place (r, 3) [m], and their normals there into
-    normal (r, 3).
+def vertices(v, n, half, facet, rows, place, normal, begin):  # type: ignore[no-untyped-def]
+    """Write some vertices (r,) into place (r, 3) [m], normals there into normal (r, 3), and of a facet at each its
+    `facet` (m,) into begin (r,).
+
+    Args: v (k, 3) [m]; n (3 m, 3) corner normals; half (k,) a half edge from each vertex.
+    """
+    for i in range(len(rows)):
+        a, h = rows[i], half[rows[i]]
+        begin[i] = facet[h // 3]
+        for x in range(3):
+            place[i, x], normal[i, x] = v[a, x], n[h, x]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def centres(v, faces, n, facet, rows, place, normal, begin):  # type: ignore[no-untyped-def]
+    """Write the centres of the curved patches of some facets (r,) into place (r, 3) [m], their normals there into
+    normal (r, 3), and their `facet` (m,) into begin (r,).
 
     Args: v (k, 3) [m]; faces (m, 3); n (3 m, 3) corner normals.
     """
     for i in range(len(rows)):
         f = rows[i]
+        begin[i] = facet[f]
         p, q, r = row(v, faces[f, 0]), row(v, faces[f, 1]), row(v, faces[f, 2])
         a, b, c = row(n, 3 * f), row(n, 3 * f + 1), row(n, 3 * f + 2)
         e, g, h = edge_curvature(p, q, a, b), edge_curvature(q, r, b, c), edge_curvature(r, p, c, a)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.geometry.collapses import Limits
 from raychan.geometry.half_edges import Net
-from raychan.geometry.patch_offsets import centres, offsets
+from raychan.geometry.patch_offsets import centres, offsets, vertices
 from raychan.geometry.triangles import edge_curvatures
 from raychan.parallel import parallel_for
 
@@ -28,18 +28,21 @@ class Check:
         """Take vertices (p,) and centres of facets, rows (q,), of a whole mesh; facet (n,) where the search for the
         centre of each of its facets begins."""
         self.vertex, self.rows, begin = vertex, rows, len(vertex)
-        corner = whole.half[self.vertex]
-        self._facet, count = facet[np.concatenate([corner // 3, self.rows])], begin + len(self.rows)
-        self._place, self._normal = np.empty((count, 3)), np.empty((count, 3))
-        self._place[:begin], self._normal[:begin] = whole.v[self.vertex], whole.n[corner]
+        count = begin + len(self.rows)
+        self._place, self._normal, self._facet = np.empty((count, 3)), np.empty((count, 3)), np.empty(count, np.int32)
         self._found, self._off, self._excess = np.zeros(count, np.int32), np.empty(count), np.empty(count)
         self._last: Net | None = None
-        place, normal = self._place[begin:], self._normal[begin:]
+        points = self._place, self._normal, self._facet
+        first, rest = [x[:begin] for x in points], [x[begin:] for x in points]
 
-        def some(r: slice) -> None:
-            centres(whole.v, whole.faces, whole.n, self.rows[r], place[r], normal[r])
+        def corners(r: slice) -> None:
+            vertices(whole.v, whole.n, whole.half, facet, self.vertex[r], *(x[r] for x in first))
 
-        parallel_for(len(self.rows), some)
+        def middles(r: slice) -> None:
+            centres(whole.v, whole.faces, whole.n, facet, self.rows[r], *(x[r] for x in rest))
+
+        parallel_for(begin, corners)
+        parallel_for(len(self.rows), middles)
 
     def __call__(self, net: Net, heir: Ints, limits: Limits) -> tuple[float, float]:
         """Return how far points of the surface may be off [m], and how far off points are in place or normal over the
