@@ -56,6 +56,8 @@ class Facets(Record):
     part_names: tuple[str, ...]
     attenuation: float = 0.0
     """Of the air between them: a field falls by exp(-attenuation L) over a length L [1/m]."""
+    since: float = 0.0
+    """Time [s] from the start of the radar's frame to this instant: paths are carried back to the start."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.ends import RadarEnds, paths_record, rx_fields
+from raychan.channel.ends import RadarEnds, at_start, paths_record, rx_fields
 from raychan.em.diffuse import Diffuse, texture
 from raychan.em.fresnel import coefficients_array
 from raychan.geometry.patches import Patches
@@ -62,10 +62,9 @@ def diffuse_paths(
         name: size * (_coupled(radar, rx_field, look, speckle, np.sqrt(cross)) * air)
         for name, rx_field in zip(("amplitude", "cross"), rx_fields(radar), strict=False)
     }
+    rate = 2.0 * np.einsum("ij,ij->i", moves, look)
     return paths_record(radar).of(
-        length=2.0 * distance,
-        **received,
-        length_rate=2.0 * np.einsum("ij,ij->i", moves, look),
+        **at_start(facets, radar, {"length": 2.0 * distance, **received, "length_rate": rate}),
         departure=look,
         arrival=look,
         body=body[:, None].astype(np.int16),

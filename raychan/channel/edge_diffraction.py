@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.ends import RadarEnds, paths_record, rx_fields, swept_by
+from raychan.channel.ends import RadarEnds, at_start, paths_record, rx_fields, swept_by
 from raychan.em.diffraction import diffract
 from raychan.em.fresnel import coefficients
 from raychan.records import DiffractedRoutes, Facets, Paths
@@ -38,9 +38,7 @@ def diffracted_paths(routes: DiffractedRoutes, facets: Facets, radar: RadarEnds,
     received = {name: x * back for name, x in received.items()}
     rate = np.array([_length_rate(routes, r, facets, np.asarray(radar.velocity)) for r in range(n)])
     return paths_record(radar).of(
-        length=length,
-        **received,
-        length_rate=rate,
+        **at_start(facets, radar, {"length": length, **received, "length_rate": rate}),
         departure=routes.leaves[:, 0],
         arrival=routes.leaves[:, 1],
         body=routes.body,

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.dual_paths import DualPaths
-from raychan.records import Paths
+from raychan.records import Facets, Paths
+from raychan.units import C0
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +50,18 @@ def swept_by(radar: RadarEnds) -> float:
     """Return the frequency [Hz] that a radar sweeps from the carrier, to which phases refer, to the middle of its ramp,
     where gains are taken: of a wide band they are those of the mean frequency. 0 for ends without a waveform."""
     return float(getattr(getattr(radar, "waveform", None), "swept", 0.0))
+
+
+def at_start(facets: Facets, radar: RadarEnds, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return columns of paths, among them length, length_rate and amplitudes, at the start of the radar's frame: carried
+    back by their rates from the instant at which the facets stand, with the gains of that instant."""
+    if facets.since == 0.0:
+        return columns
+    wave: Any = radar.waveform  # type: ignore[attr-defined]
+    grown = facets.since * columns["length_rate"]
+    back = np.exp(2j * np.pi * wave.carrier / C0 * grown)
+    turned = {name: columns[name] * back for name in ("amplitude", "cross") if name in columns}
+    return columns | turned | {"length": columns["length"] - grown}
 
 
 def rx_fields(radar: RadarEnds) -> tuple[Any, ...]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from raychan.channel.corner_places import corner_places
 from raychan.channel.corner_rays import departures
 from raychan.channel.edge_diffraction import diffracted_paths
-from raychan.channel.ends import RadarEnds, ends_of, paths_record, rx_fields, swept_by
+from raychan.channel.ends import RadarEnds, at_start, ends_of, paths_record, rx_fields, swept_by
 from raychan.channel.pieces import Split, parts_of
 from raychan.channel.rates import rates
 from raychan.channel.slow_time import APART, corner_rates
@@ -142,7 +142,7 @@ def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDA
     away, look = departures(routes)
     part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else np.zeros_like(routes.facet)
     return paths_record(radar)(
-        **columns,
+        **at_start(facets, radar, columns),
         trajectories=Trajectories(
             departure=away.astype(np.float32),
             arrival=look,

@@ -13,6 +13,7 @@ from raychan.radar.radar import Radar
 from raychan.records import Cube, Points
 from raychan.run.clock import Clock
 from raychan.run.fluctuation import check
+from raychan.run.instant import traced_at
 from raychan.run.ledger import ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages import merged, uncut
@@ -43,6 +44,8 @@ class Channel:
     """What the newest launches are held against, to tell how wrong they may be."""
     model: Any
     """The scene's, with what was asked for and what mode = "auto" chose."""
+    scene: Scene
+    """As it stands at the instant of the tracing."""
     chosen: ModelChoice | None
     stats: dict[str, Any]
     warnings: tuple[str, ...] = ()
@@ -67,16 +70,17 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     said = check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
     with clock.stage("geometry"):
-        geometry, points = geometry_of(scene, model.tolerance_db), scene.points(0.0)
+        scene, time, late = traced_at(scene, model)
+        geometry, points = geometry_of(scene, model.tolerance_db, time), scene.points(0.0)
         beam_of(scene.radar)
-    said += merged(geometry)
+    said += [*merged(geometry), *late]
     if model.mode == PREVIEW:
         with clock.stage("trace"):
             launched, stats = preview_of(geometry, points, scene.radar, scene.processing, model)
-        cost = _cost(stats, stats.rays, 1, model)
-        return Channel(geometry, points, launched, launched, model, None, cost, (*said, *preview_notes()))
+        cost = _cost(stats, stats.rays, 1, model, time)
+        return Channel(geometry, points, launched, launched, model, scene, None, cost, (*said, *preview_notes()))
     edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
-    if not needed(scene, model.retrace, edge):
+    if time or not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)
         if channel is not None:
             return replace(channel, warnings=(*said, *channel.warnings))
@@ -93,9 +97,9 @@ def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock
         if first is None:
             return None
         found = refinement.converged(first)
-    cost = _cost(stats, stats.rays, 1, found.model) | {"refinements": found.remains.steps}
-    launched, others, said = found.launched, found.others, uncut(geometry, stats)
-    return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, remains=found.remains)
+    cost = _cost(stats, stats.rays, 1, found.model, geometry.facets.since) | {"refinements": found.remains.steps}
+    launched, others, said, remains = found.launched, found.others, uncut(geometry, stats), found.remains
+    return Channel(geometry, points, launched, others, found.model, scene, found.chosen, cost, said, remains=remains)
 
 
 def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel:
@@ -111,7 +115,7 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
             chosen = choose(others.paths, radar, settings, model.tolerance_db)
             model = chosen.applied_to(model)
     rule = fine_rule(radar, settings, model)
-    again = needed(scene, model.retrace, rule.refinement.max_edge)
+    again = not geometry.facets.since and needed(scene, model.retrace, rule.refinement.max_edge)
     routes: list[Batch] = []
     with clock.stage("trace"):
         fine = partial(launch, rule, progress=clock.tell, keep=routes.append if again else None)
@@ -126,16 +130,17 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
             traced = Traced(launched.paths, tuple(routes))
             turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
     rays = stats.rays + more.rays + (turned.rays if turned else 0)
-    cost = _cost(stats, rays, len(turned.times) if turned else 1, model)
-    return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)
+    cost = _cost(stats, rays, len(turned.times) if turned else 1, model, geometry.facets.since)
+    return Channel(geometry, points, launched, others, model, scene, chosen, cost, uncut(geometry, stats, more), turned)
 
 
-def _cost(stats: Stats, rays: int, tracings: int, model: Any) -> dict[str, Any]:
+def _cost(stats: Stats, rays: int, tracings: int, model: Any, time: float) -> dict[str, Any]:
     return {
         "rays": rays,
         "tubes": stats.tubes,
         "mirror_chains": stats.legs,
         "tracings": tracings,
+        "traced_at_s": time,
         "tolerance_db": model.tolerance_db,
     }
 

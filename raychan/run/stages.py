@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.blas import on_one_blas_thread
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Facets, Paths, RangeDoppler
+from raychan.run.instant import traced_at
 from raychan.run.preview import preview_noise, preview_rule
 from raychan.run.preview_launch import preview_routes
 from raychan.run.received import received
@@ -39,11 +41,14 @@ from raychan.world.scene_given import check_scene
 from raychan.world.schema import PREVIEW
 
 
+Floats = NDArray[np.float64]
+
+
 @dataclass(frozen=True, eq=False)
 class SceneRoutes:
     """The routes of one launch over a scene: where waves go, no field yet.
 
-    `geometry` of the scene at the start of a frame, `rule` by which they were pruned, the routes in `batches`, and what
+    `geometry` of the scene at an instant of a frame, `rule` by which they were pruned, the routes in `batches`, and what
     they cost (`stats`). They serve any radar within the rule, and equal only themselves.
     """
 
@@ -51,6 +56,8 @@ class SceneRoutes:
     rule: PruneRule
     batches: tuple[Batch, ...]
     stats: Stats
+    shift: Floats
+    """By how much (2, 3) [m] transmitter and receivers have moved from the frame's start to that instant."""
     noise: float = 0.0
     """Amplitude of a path as strong as the noise of the radar that they were traced for, where that bounds paths."""
 
@@ -65,7 +72,7 @@ class SceneRoutes:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Embree's scene and the counts of threads stay here: what routes carry is asked of the facets alone.
-        return _again, (self.geometry.facets, self.rule, self.batches, self.stats, self.noise)
+        return _again, (self.geometry.facets, self.rule, self.batches, self.stats, self.shift, self.noise)
 
     def __repr__(self) -> str:
         return f"SceneRoutes({len(self):,} routes in {len(self.batches)} batches, {self.stats.rays:,} rays)"
@@ -83,34 +90,40 @@ def trace(
     """Return the routes of a scene from its radar and back, refined where detections need it, as `simulate` does.
 
     Args: tolerance_db [dB] and max_bounces override the scene's; check: those of one launch, coarser and on another
-    lattice. Where bodies turn within a frame, `simulate` traces several instants; these are the routes of its start.
+    lattice. They are those of the frame's middle, from where their paths are carried back to its start; where bodies
+    turn within a frame, of which `simulate` traces several instants, those of its start.
     Raises: ValueError on a tolerance or a number of bounces out of range, SceneError for no Scene.
     """
     check_scene(scene)
     check_type("check", check, bool)
     model = asked(scene.model, tolerance_db, max_bounces)
-    radar, settings, geometry, points = (
-        scene.radar,
-        scene.processing,
-        geometry_of(scene, model.tolerance_db),
-        scene.points(0.0),
-    )
+    scene, time, _ = traced_at(scene, model)
+    radar, settings, points = scene.radar, scene.processing, scene.points(0.0)
+    geometry, shift = geometry_of(scene, model.tolerance_db, time), time * np.array([radar.velocity, radar.rx_motion])
     if model.mode == PREVIEW and not check:
         rule = preview_rule(radar, settings, model)
         stats = Stats()
         batches = tuple(preview_routes(geometry, points, radar, rule, stats, lambda batch: batch))
-        return SceneRoutes(geometry, rule, batches, stats, preview_noise(radar, settings))
+        return SceneRoutes(geometry, rule, batches, stats, shift, preview_noise(radar, settings))
     rule = (check_rule if check else fine_rule)(radar, settings, model)
-    if not (check or needed(scene, model.retrace, rule.refinement.max_edge)):
+    if not check and (time or not needed(scene, model.retrace, rule.refinement.max_edge)):
         stats, launches = Stats(), list[list[Batch]]()
         refinement = SceneRefinement(geometry, points, radar, settings, model, lambda *_: None, stats, launches)
         if (first := refinement.first()) is not None:
             refinement.converged(first)
             batches = tuple(b for launch in launches for b in launch)
-            return SceneRoutes(geometry, rule, batches, stats, noise_amplitude(radar, settings))
+            return SceneRoutes(geometry, rule, batches, stats, shift, noise_amplitude(radar, settings))
     stats = Stats()
     batches = tuple(launch_routes(geometry, points, rule, stats))
-    return SceneRoutes(geometry, rule, batches, stats)
+    return SceneRoutes(geometry, rule, batches, stats, shift)
+
+
+def _moved(radar: Radar, shift: Floats) -> Radar:
+    """Return a radar whose transmitter and receivers are moved on by a shift (2, 3) [m]."""
+    if not shift.any():
+        return radar
+    there = None if radar.rx_position is None else radar.rx_position + shift[1]
+    return replace(radar, position=radar.position + shift[0], rx_position=there)
 
 
 @on_one_blas_thread
@@ -122,7 +135,7 @@ def transfer(routes: SceneRoutes, radar: Radar) -> Paths:
     """
     check_type("routes", routes, SceneRoutes)
     check_type("radar", radar, Radar)
-    carrier = radar.waveform.carrier
+    carrier, radar = radar.waveform.carrier, _moved(radar, routes.shift)
     own = replace(routes.rule.refinement, wavenumber=2.0 * np.pi * carrier / C0, cell=C0 / radar.waveform.bandwidth)
     noise = noise_equivalent_amplitude(radar, radar.processing)
     problem = routes.rule.refusal(rule_of(radar, noise, own, routes.rule.bounces))

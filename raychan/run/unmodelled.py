@@ -241,8 +241,8 @@ def _tessellation(
 
 def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     """Return the entry of changes within a frame: for crossing and turning bodies the phase deviates by at most
-    k a T^2 / 4, a being the radial acceleration; amplitudes, those of its start, fall until its middle by L' T / L as
-    the length L of a path grows."""
+    k a T^2 / 4, a being the radial acceleration; amplitudes fall as the length L of a path grows: those of its middle
+    differ from their mean by (L' T / L)^2 / 4, those of its start by L' T / L."""
     frame = radar.waveform.frame_duration
     if not len(paths.delay):
         return Entry(NOTHING, "exact", "no path")
@@ -264,8 +264,9 @@ def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     phase = 2.0 * np.pi * radar.waveform.middle / C0 * bend * frame**2 / 4.0
     worst = float(phase.max(initial=0.0))
     grown = float((np.abs(paths.length_rate[strong]) * frame / paths.length[strong]).max())
+    when, off = ("middle", 0.25 * grown**2) if facets.since else ("start", grown)
     how = (
-        f"at most {worst:.2g} rad of unmodelled phase over the frame, amplitudes of its start within {grown:.1%} of "
-        "those of its middle; level relative to the echo that has it"
+        f"at most {worst:.2g} rad of unmodelled phase over the frame, amplitudes of its {when} within {off:.2%} of "
+        "their mean over it; level relative to the echo that has it"
     )
-    return Entry(float(db(max(worst, grown, 1e-15) ** 2)), "bound", how)
+    return Entry(float(db(max(worst, off, 1e-15) ** 2)), "bound", how)

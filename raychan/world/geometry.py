@@ -268,20 +268,20 @@ class HasBodies(Protocol):
     def facets(self) -> Facets: ...
 
 
-def surface_at(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:
+def surface_at(scene: HasBodies, tolerance_db: float | None = None, since: float = 0.0) -> Geometry:
     """Return the geometry of a scene's bodies at time 0, for a tolerance [dB] (None: the scene's): finely tessellated
-    smooth surfaces are simplified, unless the scene's model says otherwise."""
+    smooth surfaces are simplified, unless the scene's model says otherwise; since as for `Facets`."""
     of, merged = traced_scene(scene, tolerance_db)
-    return Geometry(of.facets(), of.topology, of.inner_spheres, of.static_geometry, None, merged)
+    return Geometry(of.facets().replace(since=since), of.topology, of.inner_spheres, of.static_geometry, None, merged)
 
 
-def geometry_of(scene: HasBodies, tolerance_db: float | None = None) -> Geometry:
+def geometry_of(scene: HasBodies, tolerance_db: float | None = None, since: float = 0.0) -> Geometry:
     """Return the geometry of a scene's bodies at time 0 as `surface_at` does, built once and kept with the scene."""
     merged = traced_scene(scene, tolerance_db)[1]
-    key: Any = Geometry if merged is None else (Geometry, tolerance_db)
+    key: Any = (Geometry, since) if merged is None else (Geometry, since, tolerance_db)
     # A preview shares what stands, in groups whose float32 coordinates round otherwise: never the geometry of a run.
     key = (PREVIEW, key) if scene.model.mode == PREVIEW else key
     if key not in scene._derived:
-        scene._derived[key] = surface_at(scene, tolerance_db)
+        scene._derived[key] = surface_at(scene, tolerance_db, since)
     geometry: Geometry = scene._derived[key]
     return geometry
