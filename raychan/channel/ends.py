@@ -53,8 +53,8 @@ def swept_by(radar: RadarEnds) -> float:
 
 
 def at_start(facets: Facets, radar: RadarEnds, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Return columns of paths, among them length, length_rate and amplitudes, at the start of the radar's frame: carried
-    back by their rates from the instant at which the facets stand, with the gains of that instant."""
+    """Return columns of paths, among them length, length_rate and amplitudes, at the start of the radar's frame:
+    carried back by their rates from the instant at which the facets stand, with the gains of that instant."""
     if facets.since == 0.0:
         return columns
     wave: Any = radar.waveform  # type: ignore[attr-defined]

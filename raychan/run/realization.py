@@ -24,7 +24,7 @@ def realized(
 ) -> tuple[Cube, Launched]:
     """Return the samples without noise and the launch of one draw.
 
-    Args: geometry at the start of the frame; model, what is modelled; quiet and launched, of steady targets without
+    Args: geometry at the instant of the tracing, as the scene; model, what is modelled; quiet and launched, of steady targets without
     clutter; seed of the run.
     """
     radar = scene.radar

@@ -40,7 +40,6 @@ from raychan.world.scene import Scene
 from raychan.world.scene_given import check_scene
 from raychan.world.schema import PREVIEW
 
-
 Floats = NDArray[np.float64]
 
 
@@ -48,8 +47,8 @@ Floats = NDArray[np.float64]
 class SceneRoutes:
     """The routes of one launch over a scene: where waves go, no field yet.
 
-    `geometry` of the scene at an instant of a frame, `rule` by which they were pruned, the routes in `batches`, and what
-    they cost (`stats`). They serve any radar within the rule, and equal only themselves.
+    `geometry` of the scene at an instant of a frame, `rule` by which they were pruned, the routes in `batches`, and
+    what they cost (`stats`). They serve any radar within the rule, and equal only themselves.
     """
 
     geometry: Geometry

@@ -20,14 +20,16 @@ _PNG_END = b"IEND\xaeB`\x82"  # missing where the disk was full
 
 
 def drawing_of(scene: Any, result: Result | None = None, cell: CellExplanation | None = None) -> Drawing:
-    """Return the drawing of a scene, with the rays of its result if given, or with those of one cell of its map."""
-    radar, title = scene.radar, scene.title
+    """Return the drawing of a scene, with the rays of its result if given, or with those of one cell of its map: then
+    as it stood when they were traced."""
+    time = 0.0 if result is None else result.stats.get("traced_at_s", 0.0)
+    radar, title = scene.radar_at(time), scene.title
     if cell is not None:
         where = f"{cell.range:.2f} m, {cell.speed:+.2f} m/s, {cell.label}"
         where += f", folded from {cell.true_range:.2f} m" if cell.folded else ""
         where += "" if cell.converged else ", not converged"
         title = f"{title}: {where}" if title else where
-    return draw(title, scene.facets(0.0), scene.points(0.0), radar.position, radar.boresight, result, cell)
+    return draw(title, scene.facets(time), scene.points(time), radar.position, radar.boresight, result, cell)
 
 
 def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:

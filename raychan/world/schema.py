@@ -216,8 +216,8 @@ class Model(Table):
     max_memory_mb: MemoryMb | None = None
     """Memory of paths beyond which refinement takes no further step."""
     retrace: Literal["auto"] | Tracings = "auto"
-    """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, and paths keep the
-    range rates of the frame's start; more: all moving bodies are extrapolated between the tracings."""
+    """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, at its middle, whose
+    range rates paths keep; more: all moving bodies are extrapolated between the tracings."""
     diffuse: Literal["stated", "rough", "off"] = "stated"
     """Diffuse scattering, as clutter. stated: of materials with a diffuse table; rough: also of those with a roughness,
     by Lambert's law; off: none."""
