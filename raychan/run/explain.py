@@ -20,7 +20,7 @@ from raychan.run.directions import beam_to, wave_in_beam
 from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.result import Explanation, Result
 
-_VERBS = ("", "reflect", "pass", "scatter", "point", "diffract")  # by InteractionType
+_VERBS = ("", "reflect", "pass", "scatter", "point", "diffract", "diffuse")  # by InteractionType
 _SAME = 0.1  # resolution cells: a range and speed typed by hand do not tell closer places apart; not measured
 
 

@@ -24,8 +24,8 @@ def realized(
 ) -> tuple[Cube, Launched]:
     """Return the samples without noise and the launch of one draw.
 
-    Args: geometry at the instant of the tracing, as the scene; model, what is modelled; quiet and launched, of steady targets without
-    clutter; seed of the run.
+    Args: scene and geometry at the instant of the tracing; model, what is modelled; quiet and launched, of steady
+    targets without clutter; seed of the run.
     """
     radar = scene.radar
     factors = drawn(scene, radar.waveform.n_chirps, seed)

@@ -32,6 +32,26 @@ second.set()
 thread.join()
 print(most())
 """
+OVERLAP = """
+first, second, third = threading.Event(), threading.Event(), threading.Event()
+@on_one_blas_thread
+def begins():
+    first.set()
+    assert second.wait(10.0)
+@on_one_blas_thread
+def ends():
+    second.set()
+    assert third.wait(10.0)
+    print(most())
+one, other = threading.Thread(target=begins), threading.Thread(target=ends)
+one.start()
+assert first.wait(10.0)
+other.start()
+one.join()
+third.set()
+other.join()
+print(most(), seen(), most())
+"""
 FAILS = """
 try:
     on_one_blas_thread(lambda: 1 / 0)()
@@ -75,6 +95,10 @@ def test_an_error_gives_blas_its_threads_back():
 
 def test_several_threads_at_once_leave_blas_the_threads_it_had():
     assert said(THREADS) == ["1", "2"]
+
+
+def test_threads_whose_calls_overlap_leave_blas_the_threads_it_had():
+    assert said(OVERLAP) == ["1", "2", "1", "2"]
 
 
 def test_a_simulation_computes_on_one_thread_of_blas_and_leaves_the_users_alone(tmp_path):

@@ -168,3 +168,11 @@ def test_the_ledger_states_the_level_of_clutter_that_is_not_modelled_and_of_what
     beyond, asked = level_told(made, reach)
     assert f"beyond the unambiguous range of {reach:.4g} m" in beyond.how
     assert beyond.level_db == pytest.approx(asked, abs=0.7)
+
+
+def test_explain_lists_the_patches_that_a_cell_of_clutter_adds_up_from():
+    result = rc.simulate(scene(Diffuse("constant", -20.0)))
+    row, column = np.unravel_index(np.argmax(result.rdmap.power), result.rdmap.power.shape)
+    why = rc.explain(result, range=float(result.rdmap.range[column]), speed=float(result.rdmap.rate[row]), cell=True)
+    assert abs(why.paths.wave.sum()) ** 2 == pytest.approx(result.rdmap.power[row, column], rel=2e-2)
+    assert ("diffuse ground",) in why.paths.met
