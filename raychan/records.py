@@ -34,8 +34,7 @@ class Materials(Record):
     eps: Complexes = column("m", np.complex128, doc="relative permittivity eps_r - j sigma/(omega eps0); 1 for PEC")
     thickness: Floats = column("m", unit="m", doc="layer thickness; 0 unless LAYER")
     roughness: Floats = column("m", unit="m", doc="rms height")
-    diffuse: tuple[object, ...] = ()
-    """How each scatters diffusely (em.diffuse.Diffuse or None); empty: none does."""
+    diffuse: tuple[object, ...] = ()  # how each scatters diffusely (em.diffuse.Diffuse or None); empty: none does
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,7 @@ class Facets(Record):
     part_names: tuple[str, ...]
     attenuation: float = 0.0
     """Of the air between them: a field falls by exp(-attenuation L) over a length L [1/m]."""
-    since: float = 0.0
-    """Time [s] from the start of the radar's frame to this instant: paths are carried back to the start."""
+    since: float = 0.0  # s from the start of the radar's frame to this instant: paths are carried back to the start
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,6 @@ class Channel:
     """What the newest launches are held against, to tell how wrong they may be."""
     model: Any
     """The scene's, with what was asked for and what mode = "auto" chose."""
-    scene: Scene
-    """As it stands at the instant of the tracing."""
     chosen: ModelChoice | None
     stats: dict[str, Any]
     warnings: tuple[str, ...] = ()
@@ -78,7 +76,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         with clock.stage("trace"):
             launched, stats = preview_of(geometry, points, scene.radar, scene.processing, model)
         cost = _cost(stats, stats.rays, 1, model, time)
-        return Channel(geometry, points, launched, launched, model, scene, None, cost, (*said, *preview_notes()))
+        return Channel(geometry, points, launched, launched, model, None, cost, (*said, *preview_notes()))
     edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
     if time or not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)
@@ -99,7 +97,7 @@ def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock
         found = refinement.converged(first)
     cost = _cost(stats, stats.rays, 1, found.model, geometry.facets.since) | {"refinements": found.remains.steps}
     launched, others, said, remains = found.launched, found.others, uncut(geometry, stats), found.remains
-    return Channel(geometry, points, launched, others, found.model, scene, found.chosen, cost, said, remains=remains)
+    return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, remains=remains)
 
 
 def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel:
@@ -131,7 +129,7 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
             turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
     rays = stats.rays + more.rays + (turned.rays if turned else 0)
     cost = _cost(stats, rays, len(turned.times) if turned else 1, model, geometry.facets.since)
-    return Channel(geometry, points, launched, others, model, scene, chosen, cost, uncut(geometry, stats, more), turned)
+    return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)
 
 
 def _cost(stats: Stats, rays: int, tracings: int, model: Any, time: float) -> dict[str, Any]:

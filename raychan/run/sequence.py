@@ -115,7 +115,6 @@ def _shifted(channel: Channel, scene: Scene, time: float) -> Channel:
         channel,
         geometry=geometry_of(scene, channel.model.tolerance_db),
         points=points,
-        scene=scene,
         launched=channel.launched.moved(shift),
         others=channel.others.moved(shift),
         stats=stats,

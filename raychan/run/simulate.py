@@ -65,13 +65,12 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     """Return what the receiver makes of a channel, and how each detection came about."""
     radar, settings = scene.radar, scene.processing
     with clock.stage("synthesize"):
-        quiet, launched = realized(
-            channel.scene, channel.geometry, channel.model, channel.quiet, channel.launched, seed
-        )
+        then = scene.at(channel.geometry.facets.since)
+        quiet, launched = realized(then, channel.geometry, channel.model, channel.quiet, channel.launched, seed)
         noise = radar.noise_power if radar.noise else 0.0
         pdp, (cube, heard) = run_pair(
             lambda: profile_of(launched.response, radar.waveform, noise, settings.range_window),
-            lambda: _received(scene, channel, launched, quiet, seed),
+            lambda: _received(then, channel, launched, quiet, seed),
         )
     names = background(channel.geometry.facets)
     with clock.stage("detect"):
@@ -85,7 +84,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     windows = settings.range_window, settings.rate_window
     receiver = Receiver(radar.channel_waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
-        reasons, left_out = _explained(scene, channel, (rdmap, detections, error), receiver, by_chain)
+        reasons, left_out = _explained(then, channel, (rdmap, detections, error), receiver, by_chain)
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
@@ -126,7 +125,7 @@ def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, s
     """Return what the receiver records of noise-free samples, and what a user should know of it."""
     turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
-    others = interference(channel.scene, channel.geometry, seed)
+    others = interference(scene, channel.geometry, seed)
     # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
     clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
     cube, said = received(quiet, paths, scene.radar, seed, others, clean)
@@ -145,7 +144,7 @@ def _explained(
     scene: Scene, channel: Channel, detected: Detected, receiver: Receiver, by_chain: Chains | None
 ) -> tuple[tuple[Explanation, ...], dict[str, Entry]]:
     """Return where each detection came from, and the ledger of what the run left out."""
-    radar, then, settings, turned = scene.radar, channel.scene.radar, scene.processing, channel.turned
+    radar, settings, turned = scene.radar, scene.processing, channel.turned
     rdmap, found, error = detected
     paths, model = channel.launched.paths, channel.model
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
@@ -157,7 +156,7 @@ def _explained(
         return all_named(explained(), found, error.power, radar, settings), preview_ledger()
     reasons, left_out = run_pair(
         explained,
-        lambda: ledger(paths, channel.geometry, channel.points, then, settings, model, weakest, channel.scene.bodies),
+        lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
     )
     if turned:
         left_out["intra-frame motion"] = motion(turned)

@@ -99,7 +99,8 @@ def test_a_body_that_crosses_near_by_is_carried_on_if_asked_for():
     )
     truth, _ = every_chirp(cached)
     off = [energy_db(simulate(s).cube.samples - truth, truth) for s in (cached, thrice)]
-    assert off[0] > -25.0 and off[1] < -40.0, off
+    # Traced once, at its middle, the rates of the middle hold to a quarter of a radian at its ends.
+    assert off[0] > -30.0 and off[1] < -40.0, off
 
 
 def test_a_point_like_corner_on_a_turning_arm_returns_at_the_range_of_every_instant():
