@@ -67,3 +67,11 @@ def test_the_line_of_sight_tells_nothing_of_further_bounces():
     found = beside("box", 1, length=0.3, width=0.3, height=0.3)
     assert found.ledger["further bounces"].kind == "none" and told(found) == []
     assert not [line for line in found.warnings if "further bounces" in line]
+
+
+@pytest.mark.parametrize("alone", [True, False])
+@pytest.mark.parametrize(("shape", "bounces", "height"), [("trihedral", 3, 0.4), ("dihedral", 2, 0.5)])
+def test_a_corner_that_sent_all_rays_back_tells_of_no_further_bounces(shape, bounces, height, alone):
+    found = run(shape, bounces, height=height, alone=alone, size=0.15)
+    assert found.detections.snr.max() > 35.0 and np.abs(found.detections.range - 8.0).min() < 0.1
+    assert not [line for line in found.warnings if "further bounces" in line]
