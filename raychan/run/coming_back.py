@@ -29,14 +29,10 @@ def coming_back(paths: Paths, geometry: Geometry, bounces: int, wavelength: floa
     is one: whether it meets the same planes over there, and then the receiver. Where the mirrors are too small for
     one, the receiver may stand in the wave's next side lobes. Args: wavelength [m].
     """
-    way = paths.trajectories
-    last = np.unique(paths.trajectory[interactions(paths) == bounces])
-    # Behind thin layers the mirrored rays would meet the layer once more.
-    last = last[(way.kind[last] != TRANSMIT).all(axis=1)]
-    if not len(last):
-        return ()
-    last = last[of_each(np.unique(way.body[last, :bounces], axis=0, return_inverse=True)[1].ravel())]
-    first = followed(geometry, paths.tx, way.vertices[last, 0], bounces + 1)
+    way, met = paths.trajectories, interactions(paths)
+    # What the receiver does not see has no path of the last order: there rays to first surfaces tell.
+    begun = [_some(paths, met == n, n) for n in dict.fromkeys((bounces, 1))]
+    first = followed(geometry, paths.tx, way.vertices[np.concatenate(begun), 0], bounces + 1)
     place = _specular(first, paths.tx, paths.rx)
     towards, known = unit(place - paths.tx), unit(first.at[:, 0] - paths.tx)
     aside = known - towards
@@ -54,6 +50,14 @@ def coming_back(paths: Paths, geometry: Geometry, bounces: int, wavelength: floa
         return ()
     names = [paths.body_names[b] for b in ways[np.argmax(some)]]
     return tuple(name for k, name in enumerate(names) if k == 0 or names[k - 1] != name)
+
+
+def _some(paths: Paths, rows: NDArray[np.bool_], bounces: int) -> Ints:
+    """Return some trajectories of paths (n,) with as many interactions, of all chains of bodies as many."""
+    way, found = paths.trajectories, np.unique(paths.trajectory[rows])
+    # Behind thin layers the mirrored rays would meet the layer once more.
+    found = found[(way.kind[found] != TRANSMIT).all(axis=1)]
+    return found[of_each(np.unique(way.body[found, :bounces], axis=0, return_inverse=True)[1].ravel())]
 
 
 def _specular(met: Followed, start: Floats, end: Floats) -> Floats:

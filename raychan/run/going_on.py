@@ -39,7 +39,7 @@ def going_on(paths: Paths, geometry: Geometry, last: Bools) -> Bools:
 
 
 def _mirrored(paths: Paths, geometry: Geometry, way: Ints) -> Ints:
-    """Return the rows of trajectories (w,) whose rays, mirrored where they scatter, meet another surface."""
+    """Return the rows of trajectories (w,) whose rays, mirrored where they scatter, meet a surface more."""
     kind, rows = paths.trajectories.kind[way], np.arange(len(way))
     slot = np.argmax(kind == SCATTER, axis=1)
     bounced = np.cumsum(kind == REFLECT, axis=1)
@@ -50,7 +50,13 @@ def _mirrored(paths: Paths, geometry: Geometry, way: Ints) -> Ints:
     before = known[rows, np.minimum(beside, kind.shape[1] - 1)]
     before[beside < 0] = paths.tx
     before[beside == kind.shape[1]] = paths.rx
-    return followed(geometry, before, known[rows, slot], 2).row
+    # What mirrors of the other end the path meets already is no surface more.
+    own = np.where(back, bounced[rows, slot], bounced[:, -1] - bounced[rows, slot])
+    on = []
+    for count in np.unique(own):
+        some = np.flatnonzero(own == count)
+        on.append(some[followed(geometry, before[some], known[some, slot[some]], int(count) + 2).row])
+    return np.concatenate([np.zeros(0, np.int64), *on])
 
 
 def _last(paths: Paths, way: Ints) -> Ints:
