@@ -32,6 +32,7 @@ MARKS = {
     "clutter": ("X", "#ff8a80"),
     "sidelobe": ("v", "#80d8ff"),
     "dc": ("D", "#b9f6ca"),
+    "image": ("P", "#ea80fc"),
 }
 """Marker and colour of a detection by its label, chosen to stand out on the map."""
 

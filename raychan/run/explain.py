@@ -15,9 +15,9 @@ from raychan.columns import Record, column
 from raychan.poses import angles
 from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
-from raychan.run.dc_offset import dc_power, named
 from raychan.run.directions import beam_to, wave_in_beam
 from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
+from raychan.run.own_signals import named, own_signals
 from raychan.run.result import Explanation, Result
 
 _VERBS = ("", "reflect", "pass", "scatter", "point", "diffract", "diffuse")  # by InteractionType
@@ -132,8 +132,9 @@ def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
     response = response_of(result.receiver)
     why = explain_cell(result.paths, known, response, result.receiver, *at, seen, error)
     scene = result.scene
-    if scene is not None and (brought := dc_power(scene.radar, scene.processing)) is not None:
-        why = named(why, float(brought[place]), error)
+    if scene is not None:
+        own = own_signals(result.cube, result.rdmap, result.error.power, scene.radar, scene.processing)
+        why = named(why, place, own)
     return CellExplanation(**_held(why), paths=_paths_in(result, row, column, known))
 
 

@@ -51,7 +51,7 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
     known: dict[tuple[str, ...], int] = {}
     trajectories = paths.trajectories
     backdrop = set(map(whole, background))
-    first, index = _alike(paths)
+    first, index = alike(paths)
     links = (x[first].tolist() for x in (trajectories.body, trajectories.part, trajectories.kind))
     for row in zip(*links, strict=True):
         met = [link for link in zip(*row, strict=True) if link[2]]
@@ -196,7 +196,7 @@ def _spread(waveform: Waveform, range_window: str, rate_window: str) -> PointSpr
     return PointSpread(waveform, range_window, rate_window)
 
 
-def _alike(paths: Paths) -> tuple[Ints, Ints]:
+def alike(paths: Paths) -> tuple[Ints, Ints]:
     """Return a trajectory of each chain, and the chain of each path (n,)."""
     trajectories = paths.trajectories
     code, most = np.zeros(len(trajectories.kind), np.int64), 1

@@ -14,7 +14,7 @@ from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
 from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
-from raychan.run.result import DC, SIDELOBE, ExplainedDetections, Explanation, Result
+from raychan.run.result import DC, IMAGE, SIDELOBE, ExplainedDetections, Explanation, Result
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry
 
@@ -120,27 +120,32 @@ def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
     return said
 
 
-def beside_echoes(reasons: Sequence[Explanation]) -> list[str]:
-    """Return a line if detections are side lobes of echoes elsewhere."""
-    rows = np.array([why.label == SIDELOBE for why in reasons], bool)
-    if not rows.any():
-        return []
-    are = "are side lobes" if rows.sum() > 1 else "is a side lobe"
-    return [
-        f"{_of(rows)} {are} of stronger echoes ({_numbers(rows)}), and nothing stands where "
-        "shown: noise covers most of them (radar.noise), windows of lower side lobes have fewer (processing)"
-    ]
+_NO_ECHOES = {
+    SIDELOBE: (
+        ("is a side lobe of stronger echoes", "are side lobes of stronger echoes"),
+        "noise covers most of them (radar.noise), windows of lower side lobes have fewer (processing)",
+    ),
+    DC: (
+        ("is the receiver's DC offset", "are the receiver's DC offset"),
+        "it is a constant in all samples (radar.impairments.dc_offset_dbm)",
+    ),
+    IMAGE: (
+        ("is an I/Q image of a stronger echo", "are I/Q images of stronger echoes"),
+        "images are at minus the range and rate of their echoes (radar.impairments.iq_gain_db, iq_phase_deg)",
+    ),
+}
+"""What a detection of a label is, and detections are; and why something is shown there."""
 
 
-def dc_offset(reasons: Sequence[Explanation]) -> list[str]:
-    """Return a line if detections are the receiver's DC offset."""
-    rows = np.array([why.label == DC for why in reasons], bool)
-    if not rows.any():
-        return []
-    return [
-        f"{_of(rows)} {_verb(rows)} the receiver's DC offset ({_numbers(rows)}), a constant in all samples, and "
-        "nothing stands where shown (radar.impairments.dc_offset_dbm)"
-    ]
+def no_echoes(reasons: Sequence[Explanation]) -> list[str]:
+    """Return a line each if detections are side lobes of echoes elsewhere, or what the receiver itself makes."""
+    said = []
+    for label, ((one, more), why) in _NO_ECHOES.items():
+        rows = np.array([reason.label == label for reason in reasons], bool)
+        if rows.any():
+            what = one if rows.sum() == 1 else more
+            said.append(f"{_of(rows)} {what} ({_numbers(rows)}), and nothing stands where shown: {why}")
+    return said
 
 
 def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Entry]) -> list[str]:
@@ -173,8 +178,7 @@ def told(
 ) -> list[str]:
     """Return all lines on detections, of which each has a reason."""
     return [
-        *beside_echoes(reasons),
-        *dc_offset(reasons),
+        *no_echoes(reasons),
         *warned(found, tolerance_db, rdmap, radar),
         *noted(found, tolerance_db, ledger),
     ]

@@ -19,8 +19,10 @@ from raychan.run.ledger import Entry
 if TYPE_CHECKING:
     from raychan.world.scene import Scene
 
-LABELS = DIRECT, MULTIPATH, CLUTTER, SIDELOBE, DC = "direct", "multipath", "clutter", "sidelobe", "dc"
-"""Of detections: what their leading chain of bodies is; of DC, the receiver's offset, there is none."""
+LABELS = DIRECT, MULTIPATH, CLUTTER, SIDELOBE, DC, IMAGE = "direct", "multipath", "clutter", "sidelobe", "dc", "image"
+"""Of detections: what their leading chain of bodies is; of DC, the receiver's offset, and of IMAGE, its I/Q image of an
+echo, there is none."""
+_OWN = {DC: "dc offset", IMAGE: "I/Q image"}
 LINE_OF_SIGHT = "line of sight"
 """Names the way straight from a transmitter to a receiver elsewhere, which meets no body."""
 
@@ -90,10 +92,10 @@ class Explanation:
 
     @property
     def bodies(self) -> str:
-        """Chain of the leading contribution, 'line of sight' if it meets none; if no path explains the cell, 'noise' or
-        'dc offset'."""
+        """Chain of the leading contribution, 'line of sight' if it meets none; if no path explains the cell, 'noise',
+        'dc offset' or 'I/Q image'."""
         if not self.contributions:
-            return "dc offset" if self.label == DC else "noise"
+            return _OWN.get(self.label, "noise")
         return " > ".join(self.contributions[0].chain) or LINE_OF_SIGHT
 
 

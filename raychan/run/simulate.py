@@ -12,12 +12,12 @@ from raychan.parallel import run_pair
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDoppler
 from raychan.run.clock import Clock, Progress
-from raychan.run.dc_offset import all_named
 from raychan.run.directions import beam_to
 from raychan.run.interferers import interference, never_heard
 from raychan.run.labels import Chains, chains, provenance
 from raychan.run.ledger import Entry
 from raychan.run.messages import counts, told
+from raychan.run.own_signals import all_named, own_signals
 from raychan.run.path_stream import Launched
 from raychan.run.preview import preview_error, preview_ledger
 from raychan.run.rate_spread import claimed, launch_share, motion, without
@@ -84,7 +84,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     windows = settings.range_window, settings.rate_window
     receiver = Receiver(radar.channel_waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
-        reasons, left_out = _explained(then, channel, (rdmap, detections, error), receiver, by_chain)
+        reasons, left_out = _explained(then, channel, cube, (rdmap, detections, error), receiver, by_chain)
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
@@ -141,7 +141,7 @@ def _detected(scene: Scene, channel: Channel, cube: Cube) -> Detected:
 
 
 def _explained(
-    scene: Scene, channel: Channel, detected: Detected, receiver: Receiver, by_chain: Chains | None
+    scene: Scene, channel: Channel, cube: Cube, detected: Detected, receiver: Receiver, by_chain: Chains | None
 ) -> tuple[tuple[Explanation, ...], dict[str, Entry]]:
     """Return where each detection came from, and the ledger of what the run left out."""
     radar, settings, turned = scene.radar, scene.processing, channel.turned
@@ -152,8 +152,9 @@ def _explained(
     def explained() -> tuple[Explanation, ...]:
         return provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths), by_chain)
 
+    own = own_signals(cube, rdmap, error.power, radar, settings)
     if model.mode == PREVIEW:
-        return all_named(explained(), found, error.power, radar, settings), preview_ledger()
+        return all_named(explained(), found, own), preview_ledger()
     reasons, left_out = run_pair(
         explained,
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
@@ -162,7 +163,7 @@ def _explained(
         left_out["intra-frame motion"] = motion(turned)
         brought = quiet_map(turned.turning, radar, settings)
         reasons = claimed(reasons, paths, turned.turns, brought, error.power, found, receiver)
-    return all_named(reasons, found, error.power, radar, settings), left_out
+    return all_named(reasons, found, own), left_out
 
 
 def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:

@@ -15,6 +15,7 @@ from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Facets, Paths, Points
 from raychan.run.clutter import laws_of, scatters_diffusely
 from raychan.run.coming_back import coming_back
+from raychan.run.going_on import going_on
 from raychan.run.ledger import NOTHING, SEEN, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, layers_at_once, peak
 from raychan.run.solver import paths_over_wedges
@@ -98,7 +99,7 @@ _MONOSTATIC = (
 def _further(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, model: Any, weakest: float) -> Entry:
     """Return the entry of further bounces, extrapolated by the ratio of the last two orders; where that tells of
     nothing above the weakest detection, but waves come back just then, of unknown level."""
-    found = _by_ratio(paths, radar, settings, model.max_bounces, weakest)
+    found = _by_ratio(paths, geometry, radar, settings, model.max_bounces, weakest)
     if isinstance(found.level_db, float) and found.level_db > 0.0:
         return found
     return _returning(paths, geometry, radar, model) or found
@@ -111,7 +112,7 @@ def _returning(paths: Paths, geometry: Geometry, radar: Radar, model: Any) -> En
     return Entry(UNKNOWN, SEEN, how) if over else None
 
 
-def _by_ratio(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
+def _by_ratio(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
     met = interactions(paths)
     # The line of sight to a receiver elsewhere tells nothing of bounces.
     orders = (bounces, bounces - 1) if bounces > 1 else (bounces,)
@@ -120,7 +121,16 @@ def _by_ratio(paths: Paths, radar: Radar, settings: Any, bounces: int, weakest: 
         few = f"no path has {bounces} interactions" if bounces > 1 else "one bounce is modelled"
         return Entry(UNKNOWN, "none", f"{few}: nothing to extrapolate from")
     ratio = min(last / before, 1.0)
-    how = f"strongest cell of {bounces} interactions ({db(last / weakest):.0f} dB) times its ratio to {bounces - 1}"
+    goes = going_on(paths, geometry, met == bounces)
+    if not goes.any():
+        alone = f"no ray of {bounces} interactions meets a surface more: nothing to extrapolate from"
+        return Entry(UNKNOWN, "none", alone)
+    if goes.sum() < (met == bounces).sum():
+        last = peak(paths, goes, radar, settings)
+    how = (
+        f"strongest cell of waves of {bounces} interactions that meet a surface more ({db(last / weakest):.0f} dB) "
+        f"times the ratio of {bounces} interactions to {bounces - 1} ({db(ratio):.0f} dB)"
+    )
     return Entry(float(db(last * ratio / weakest)), "estimate", how)
 
 

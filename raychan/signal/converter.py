@@ -47,8 +47,28 @@ def imbalanced(samples: Samples, gain_db: float, phase_deg: float) -> Samples:
     K1 = (1 + g exp(-jp)) / 2 and K2 = (1 - g exp(jp)) / 2: an echo gets an image at minus its beat frequency.
     Source: Valkama, Renfors, Koivunen, IEEE Trans. Signal Process. 49(10), 2001, eqs. 2 to 4.
     """
-    turn = np.sqrt(undb(gain_db)) * np.exp(-1j * np.radians(phase_deg))
-    return np.asarray(0.5 * (1.0 + turn) * samples + 0.5 * (1.0 - np.conj(turn)) * np.conj(samples))
+    own, mirrored = _weights(gain_db, phase_deg)
+    return np.asarray(own * samples + mirrored * np.conj(samples))
+
+
+def images(samples: Samples, gain_db: float, phase_deg: float) -> tuple[float, Samples]:
+    """Return what of samples that such a mixer gave are images of echoes, and how strong these are to their echoes.
+
+    Args and source as for `imbalanced`. With y the samples, K2 / conj(K1) conj(y) has each image as y has it.
+    Returns: |K2 / K1|^2, 0 where images are not below their echoes (phases of 90 deg and more): which of two is the
+    image cannot be told there; and the samples of the images.
+    """
+    own, mirrored = _weights(gain_db, phase_deg)
+    if abs(mirrored) >= abs(own):
+        return 0.0, np.zeros_like(samples)
+    share = mirrored / np.conj(own)
+    return abs(share) ** 2, np.asarray(share * np.conj(samples))
+
+
+def _weights(gain_db: float, phase_deg: float) -> tuple[complex, complex]:
+    """Return K1 and K2 of `imbalanced`."""
+    turn = complex(np.sqrt(undb(gain_db)) * np.exp(-1j * np.radians(phase_deg)))
+    return 0.5 * (1.0 + turn), 0.5 * (1.0 - turn.conjugate())
 
 
 def image_rejection_db(gain_db: float, phase_deg: float) -> float:

@@ -67,3 +67,25 @@ def test_the_line_of_sight_tells_nothing_of_further_bounces():
     found = beside("box", 1, length=0.3, width=0.3, height=0.3)
     assert found.ledger["further bounces"].kind == "none" and told(found) == []
     assert not [line for line in found.warnings if "further bounces" in line]
+
+
+@pytest.mark.parametrize("alone", [True, False])
+@pytest.mark.parametrize(("shape", "bounces", "height"), [("trihedral", 3, 0.4), ("dihedral", 2, 0.5)])
+def test_a_corner_that_sent_all_rays_back_tells_of_no_further_bounces(shape, bounces, height, alone):
+    found = run(shape, bounces, height=height, alone=alone, size=0.15)
+    assert found.detections.snr.max() > 35.0 and np.abs(found.detections.range - 8.0).min() < 0.1
+    assert not [line for line in found.warnings if "further bounces" in line]
+
+
+def test_a_target_that_only_a_mirror_shows_is_told_though_no_path_of_two_bounces_comes_back():
+    places = {"mirror": (5.0, 0.0, 135.0, 0.8), "target": (5.0, 3.0, 270.0, 0.4), "wall": (2.5, 1.5, 211.0, 0.6)}
+    bodies = [
+        rc.Body(name=name, shape="plate", params={"width": s, "height": s}, position=(x, y, 0.5), yaw_deg=yaw)
+        for name, (x, y, yaw, s) in places.items()
+    ]
+    radar = rc.Radar(rc.Waveform(24e9, 500e6, 40e-6, n_chirps=8, n_samples=64), position=(0.0, 0.0, 0.5))
+    model = {"tolerance_db": 1.0}
+    short, whole = (rc.simulate(rc.Scene(bodies=bodies, radar=radar, model=model), max_bounces=n) for n in (2, 3))
+    assert np.abs(whole.detections.range - 8.0).min() < 0.1 < np.abs(short.detections.range - 8.0).min()
+    assert "waves over mirror > target > mirror come back by 3 interactions" in told(short)[0] and told(whole) == []
+    assert not [line for line in whole.warnings if "further bounces" in line]

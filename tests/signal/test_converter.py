@@ -8,7 +8,7 @@ from raychan.radar.impairments import Converter, Impairments
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube
 from raychan.signal.baseband import noisy, synthesize
-from raychan.signal.converter import digitized, image_rejection_db, imbalanced, quantized
+from raychan.signal.converter import digitized, image_rejection_db, images, imbalanced, quantized
 from raychan.units import db, dbm, watt
 
 
@@ -126,3 +126,13 @@ def test_imbalance_without_iq_sampling_is_refused():
     real = Waveform(77e9, 1e9, 20e-6, complex_sampling=False)
     with pytest.raises(ValueError, match="I/Q sampling"):
         make_radar(real, impairments=Impairments(iq_gain_db=0.5))
+
+
+@pytest.mark.parametrize(("gain", "phase"), [(0.5, 2.0), (-6.0, 20.0), (1.8, 80.0)])
+def test_images_in_samples_are_those_that_the_mixer_made(gain, phase):
+    recorded = imbalanced(sine(256, 1.0, 30 / 256), gain, phase)
+    share, found = images(recorded, gain, phase)
+    given, image = (np.fft.fft(x) / 256 for x in (recorded, found))
+    assert image[-30] == pytest.approx(given[-30], rel=1e-9)
+    assert -db(share) == pytest.approx(image_rejection_db(gain, phase), abs=1e-9)
+    assert images(recorded, gain, 100.0)[0] == 0.0
