@@ -89,13 +89,19 @@ def several(
     wide = np.flatnonzero(most > _TURN)
     strength = _strength(routes, rows[wide], facets, radar, frequency)
     level = over_three(np.add, np.abs(strength).max(axis=1))
-    needs = level * np.minimum(most[wide] ** 2 / 12.0, 2.0) > _SMALL * noise
+    needs = level * share_lacking(most[wide]) > _SMALL * noise
     wide, strength, level = wide[needs], strength[needs], level[needs]
     tells[wide] = False
     part = np.clip(_SMALL * noise / np.maximum(level, 1e-300), _FINEST, 1.0)
     found = _corners(routes, held.some(tells)), _points(routes, held.some(wide), strength, part, frequency)
     both: Any = zip(*found, strict=True)
     return Parts(*(np.concatenate(x) for x in both))
+
+
+def share_lacking(run: Floats) -> Floats:
+    """Return the share (r,) by which the corners of footprints are wrong at elements where the phase runs by so much
+    (r,) [rad] over each: at most all of it in place of its opposite."""
+    return np.minimum(run**2 / 12.0, 2.0)
 
 
 def over_three(how: np.ufunc, values: NDArray[Any]) -> NDArray[Any]:
