@@ -220,7 +220,7 @@ class Paths(PropagationPaths):
     amplitude: NDArray[np.complex128] = column(
         "n", np.complex128, doc="received over transmitted voltage wave, antennas in, carrier phase in"
     )
-    aside: NDArray[np.float32] = column("n e 3", np.float32, unit="m", doc="corner off centre, to tx and rx")
+    aside: NDArray[np.float32] = column("n e 3", np.float32, unit="m", doc="part of footprint off centre, to tx and rx")
 
     @classmethod
     def of(cls, **columns: object) -> Paths:

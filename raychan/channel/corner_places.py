@@ -30,9 +30,9 @@ def corner_places(routes: Routes, rows: NDArray[np.int64], facets: Facets) -> tu
     corner, as far as this is long: the ray is followed back from the footprint, whose lengths tell its direction.
     Args: rows (r,) of the routes, which have a footprint.
     Returns: by how much (r, 3, 2, 3) [m] each corner lies off the centre, as seen from the transmitter and from the
-    receiver; and by what angle (r, 3, 2) [rad], about.
+    receiver; and that across the line of sight over the distance, (r, 3, 2, 3) [rad].
     """
-    places, angles = np.empty((len(rows), 3, 2, 3), np.float32), np.empty((len(rows), 3, 2))
+    places, angles = np.empty((len(rows), 3, 2, 3), np.float32), np.empty((len(rows), 3, 2, 3))
 
     def some(at: slice) -> None:
         _corner_places(
@@ -60,7 +60,7 @@ def _corner_places(rows, ends, routes, surface, places, angles):  # type: ignore
 
 @njit(cache=True)
 def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[no-untyped-def]
-    """Write places (3, 2, 3) [m] and angles (3, 2) [rad] of route i as seen from one end."""
+    """Write places (3, 2, 3) [m] and angles (3, 2, 3) [rad] of route i as seen from one end."""
     vertices, normals, kind, facet, scatter, points, _ = routes
     d, at, step = kind.shape[1], scatter[i], 1 if end == 1 else -1
     centre, here = vec(vertices[i, at]), vec(vertices[i, at])
@@ -84,16 +84,14 @@ def _seen_from(i, end, ends, routes, surface, places, angles):  # type: ignore[n
         if bent and end == 0:
             source = _leaving_to(i, c, first, ends, routes, surface)
             off = _plus(source, far, last)
-            aside = _plus(off, -dot(off, last), last)
         else:
-            aside = _plus(off, -dot(off, first), first)
             for m in range(at + step, j, step):
                 if kind[i, m] == _REFLECT:
                     n = vec(normals[i, m])
                     off = _plus(off, -2.0 * dot(off, n), n)
-        angles[c, end] = dot(aside, aside) ** 0.5 / far
+        across = _plus(off, -dot(off, last), last)
         for x in range(3):
-            places[c, end, x] = off[x]
+            places[c, end, x], angles[c, end, x] = off[x], across[x] / far
 
 
 @njit(cache=True)

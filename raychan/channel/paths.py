@@ -1,5 +1,5 @@
-"""Paths of routes: the gain, delay and rate of each for a radar. A footprint long in range gives one path for each of
-its three corners."""
+"""Paths of routes: the gain, delay and rate of each for a radar. Footprints long in range or wide before an array give
+several (see `footprint_paths`)."""
 
 from __future__ import annotations
 
@@ -12,38 +12,26 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.corner_places import corner_places
 from raychan.channel.corner_rays import departures
 from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, at_start, ends_of, paths_record, rx_fields, swept_by
-from raychan.channel.pieces import Split, parts_of
+from raychan.channel.footprint_paths import over_three, several
 from raychan.channel.rates import rates
-from raychan.channel.slow_time import APART, corner_rates
 from raychan.channel.transfer import corner_gains
 from raychan.parallel import parallel_for
-from raychan.radar.array import reach
 from raychan.radar.dual_paths import columns_of
-from raychan.records import SCATTER, DiffractedRoutes, Facets, Paths, Routes, Trajectories
+from raychan.records import DiffractedRoutes, Facets, Paths, Routes, Trajectories
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
 _Kind = TypeVar("_Kind", bound=np.generic)
-_SMALL = 1e-3
-"""Of the noise in a map cell: by so much samples may be off for each footprint long in range that is one path all the
-same. Errors of footprints are unrelated: a thousand in one cell add up to -30 dB of the noise."""
-_TURN = 0.25
-"""rad: footprints over which the phase at the outermost elements differs by more from the centre's become a path for
-each corner, or are divided into pieces over which it does not: a share x^2 / 4 of such a phase x is left at most, 0.14
-dB. A plate 2 m before eight elements is then known to -34 dB, without pieces to -11 dB (other values not measured)."""
-_PIECES, _MOST_PIECES = 8, 32  # along an edge, for 45 paths, or 561 where a lone footprint tells: see docs/measurements
-_STRONG = 0.3  # of the noise in a map cell: what a footprint of 8 pieces may lack; 0.1 and 1 measured for cost only
 _MANY = 20_000  # trajectories from which on a second thread pays; not measured
 
 
 def paths_of(
     routes: Routes | DiffractedRoutes, facets: Facets, radar: RadarEnds, frequency: float, noise: float = 0.0
 ) -> Paths:
-    """Return what routes carry for a radar; a footprint long in range becomes three paths.
+    """Return what routes carry for a radar; a footprint long in range or wide before an array becomes several.
 
     Args: frequency [Hz] of the amplitudes' phases, that of the carrier; gains are those of the middle of the ramp, if
     the radar has a waveform; noise amplitude of a path as strong as the noise in a map cell: footprints stay one path
@@ -53,27 +41,16 @@ def paths_of(
         return diffracted_paths(routes, facets, radar, frequency)
     carrier, frequency = frequency, frequency + swept_by(radar)
     gains = corner_gains(routes, facets, radar, frequency)
-    speeds = ends_of(radar).tx_velocity, ends_of(radar).rx_velocity
-    rate = rates(routes, facets, *speeds)
-    corner = routes.lengths[:, :3]
-    scatters = (routes.scatter >= 0) & (routes.kind[np.arange(len(corner)), routes.scatter] == SCATTER)
-    long = scatters & (_over_three(np.maximum, corner) - _over_three(np.minimum, corner) > APART)
-    places, turn = _at_elements(routes, np.flatnonzero(scatters), facets, radar, frequency)
-    long[scatters] |= _over_three(np.maximum, turn) > _TURN
-    rows = np.flatnonzero(long)
-    places, turn, size = places[long[scatters]], turn[long[scatters]], np.abs(gains[rows]).max(axis=1)
-    corner_rate = 2.0 * corner_rates(routes, rows, facets, *speeds)
-    apart = np.abs(corner[rows] - routes.length[rows, None]), np.abs(corner_rate - 2.0 * rate[rows, None])
-    split = _tells(radar, noise, size, *apart, turn)
-    long[rows[~split]] = False
-    whole, rows = np.flatnonzero(~long), rows[split]
-    count = _pieces(noise, size[split], turn[split])
-    several = Split(rows, gains[rows], corner_rate[split], places[split])
-    parts = parts_of(routes, several, count, facets, radar, frequency)
+    own = ends_of(radar)
+    rate = rates(routes, facets, own.tx_velocity, own.rx_velocity)
+    parts = several(routes, gains, rate, facets, radar, frequency, noise)
+    one = np.ones(len(gains), bool)
+    one[parts.route] = False
+    whole = np.flatnonzero(one)
     length = np.concatenate([routes.length[whole], parts.length])
     back = np.exp(2j * np.pi * (frequency - carrier) / C0 * length)
     received = {
-        name: np.concatenate([_over_three(np.add, gains[whole, i]), parts.gain[:, i]]) * back
+        name: np.concatenate([over_three(np.add, gains[whole, i]), parts.gain[:, i]]) * back
         for i, name in enumerate(("amplitude", "cross")[: gains.shape[1]])
     }
     return over_routes(
@@ -84,59 +61,15 @@ def paths_of(
         **received,
         length_rate=np.concatenate([2.0 * rate[whole], parts.rate]),
         trajectory=np.concatenate([whole, parts.route]).astype(np.int32),
-        aside=np.concatenate([np.zeros((len(whole), *places.shape[2:]), np.float32), parts.place]),
+        aside=np.concatenate([np.zeros((len(whole), *parts.place.shape[1:]), np.float32), parts.place]),
     )
-
-
-def _over_three(how: np.ufunc, values: NDArray[Any]) -> NDArray[Any]:
-    """Return what numbers (n, 3) come to, row by row; numpy's own way over an axis of three takes 15 to 60 times as
-    long (5000 rows, load 5 of others, command not kept)."""
-    found: NDArray[Any] = how(how(values[:, 0], values[:, 1]), values[:, 2])
-    return found
-
-
-def _at_elements(
-    routes: Routes, rows: NDArray[np.int64], facets: Facets, radar: RadarEnds, frequency: float
-) -> tuple[NDArray[np.float32], Floats]:
-    """Return where the corners of footprints (r,) lie for elements, (r, 3, 2, 3) [m] as `corner_places` gives it, and
-    by how much (r, 3) [rad] the phase at the outermost elements differs there from the centre's; where no element
-    stands off the phase centres, (r, 3, 0, 3) and 0."""
-    far = reach(radar)
-    if not any(far):
-        return np.zeros((len(rows), 3, 0, 3), np.float32), np.zeros((len(rows), 3))
-    places, angles = corner_places(routes, rows, facets)
-    return places, 2.0 * np.pi * frequency / C0 * (angles @ np.array(far))
-
-
-def _tells(radar: Any, noise: float, size: Floats, length: Floats, rate: Floats, turned: Floats) -> NDArray[np.bool_]:
-    """Tell of which footprints (r,) the corners need delays and rates of their own: what one of each, that of the
-    centre, does to the samples is more than a small part of the noise.
-
-    Args: noise and size (r, 3) of the corners as amplitudes; by how much their length [m] and its rate [m/s] (r, 3)
-    differ from those of the centre; turned (r, 3) [rad], by how much the phase at the outermost elements does.
-    """
-    if noise == 0.0:
-        return np.ones(len(size), bool)
-    wave = radar.waveform
-    turn = np.pi * (wave.bandwidth * length + wave.carrier * wave.frame_duration * rate) / C0 + turned
-    return np.asarray(_over_three(np.add, size * np.minimum(turn, 2.0)) > _SMALL * noise)
-
-
-def _pieces(noise: float, size: Floats, turned: Floats) -> NDArray[np.int64]:
-    """Return into how many pieces along each edge footprints (r,) are divided for the outermost elements; size and
-    turned as for `_tells`."""
-    most, level = _over_three(np.maximum, turned), _over_three(np.add, size)
-    # Of m pieces a share (most / m)^2 / 4 is left. Without noise none is stronger than others.
-    lone = np.clip(0.5 * most * np.sqrt(level / (_STRONG * noise if noise else np.inf)), _PIECES, _MOST_PIECES)
-    many = np.clip(np.ceil(np.minimum(most / _TURN, lone)), 1.0, None).astype(np.int64)
-    return np.where(level * np.minimum(most**2 / 4.0, 2.0) > _SMALL * noise, many, 1)
 
 
 def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDArray[Any]) -> Paths:
     """Return the record of paths over routes for a radar that receives.
 
     Args: columns of the paths: length, amplitude, cross where the radar has cross-polarised receivers, length_rate,
-    trajectory, the number of each path's route, and aside, where some are of corners.
+    trajectory, the number of each path's route, and aside, where some are of parts of footprints.
     """
     columns.setdefault("aside", np.zeros((len(columns["length"]), 0, 3), np.float32))
     away, look = departures(routes)

@@ -14,10 +14,10 @@ from raychan.compile.jit import njit
 
 _SIZES = (8, 16, 24, 32)  # points along an edge, each a multiple of a vector unit's width
 _REACH = (9.0, 35.0, 62.0, 92.0)  # rad by which the phase may run and bend in all for an error of 1e-6
-_RULES = np.zeros((len(_SIZES), 2, max(_SIZES)))
+RULES = np.zeros((len(_SIZES), 2, max(_SIZES)))
 for _at, _size in enumerate(_SIZES):
     _knots, _weights = np.polynomial.legendre.leggauss(_size)
-    _RULES[_at, 0, :_size], _RULES[_at, 1, :_size] = 0.5 * _knots + 0.5, 0.5 * _weights
+    RULES[_at, 0, :_size], RULES[_at, 1, :_size] = 0.5 * _knots + 0.5, 0.5 * _weights
 _EVEN = np.array([(-1.0) ** i / math.factorial(2 * i) for i in range(10)])
 _ODD = np.array([(-1.0) ** i / math.factorial(2 * i + 1) for i in range(10)])
 
@@ -99,7 +99,7 @@ def mean_parts(phases, bend01, bend12, bend20, points, out):  # type: ignore[no-
     Args: phases (3,) or more [rad], first at the corners; bends [rad] of the edges' middles from straight; points along
     an edge, from `points_for`.
     """
-    rule = _RULES[points // 8 - 1]
+    rule = RULES[points // 8 - 1]
     knots, weights = rule[0, :points], rule[1, :points]
     turn = 0.5 / math.pi
     # Relative to the first corner's phase, which may be many turns.

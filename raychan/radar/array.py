@@ -149,10 +149,24 @@ class Transmission:
 
 def reach(radar: Any) -> tuple[float, float]:
     """Return how far [m] the transmitters and the receivers of a radar stand off its phase centres, at most."""
-    tx = [one.offset for one in getattr(radar, "transmissions", ())]
-    each = np.reshape(tx, (-1, 3)), np.reshape(getattr(radar, "elements_world", ()), (-1, 3))
-    sent, heard = (float(np.linalg.norm(x, axis=1).max(initial=0.0)) for x in each)
+    sent, heard = (float(np.linalg.norm(x, axis=1).max(initial=0.0)) for x in _offsets(radar))
     return sent, heard
+
+
+def half_axes(radar: Any) -> Floats:
+    """Return the half axes (2, 3, 3) [m] of boxes about the phase centres of transmitters and receivers in which all
+    elements stand, along the principal axes of these."""
+    boxes = np.zeros((2, 3, 3))
+    for box, offsets in zip(boxes, _offsets(radar), strict=True):
+        axes = np.linalg.svd(offsets, full_matrices=False)[2]
+        box[: len(axes)] = axes * np.abs(offsets @ axes.T).max(axis=0, initial=0.0)[:, None]
+    return boxes
+
+
+def _offsets(radar: Any) -> tuple[Floats, Floats]:
+    """Return where transmitters and receivers (n, 3) [m] stand off the phase centres."""
+    tx = [one.offset for one in getattr(radar, "transmissions", ())]
+    return np.reshape(tx, (-1, 3)), np.reshape(getattr(radar, "elements_world", ()), (-1, 3))
 
 
 def excess(radius: Floats, look: Floats, offset: Floats) -> Floats:

@@ -201,6 +201,16 @@ def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
     )
 
 
+def overrun(seconds: float, allowed: float | None) -> tuple[str, ...]:
+    """Return a line if tracing took more seconds than a budget allows."""
+    if allowed is None or seconds <= allowed:
+        return ()
+    return (
+        f"tracing took longer than the {allowed:g} s allowed (model.max_seconds), which end refinement after its first "
+        "step only: a larger tolerance (model.tolerance_db), fewer bounces or fewer elements far apart take less",
+    )
+
+
 def merged(geometry: Geometry) -> tuple[str, ...]:
     """Return a line if facets were merged, with the deviation of the surface."""
     return (f"smooth surfaces: {geometry.merged} (model.simplify)",) if geometry.merged else ()

@@ -74,7 +74,7 @@ _COMMENTS = {
     "vertices": "places of the interactions, without tx and rx; unused slots repeat rx",
     "body": "row of the attribute body_names; -1 in unused slots",
     "part": "row of the attribute part_names; -1 in unused slots",
-    "aside": "image of a footprint's corner minus that of its centre, as the transmitter and as the receiver sees it",
+    "aside": "image of a corner or point of a footprint minus that of its centre, as transmitter and receiver see it",
 }
 _SCALARS = {"noise": "W", "noise_power": "W", "range_resolution": "m", "rate_resolution": "m s-1"} | {
     "unambiguous_range": "m",

@@ -27,6 +27,7 @@ from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.unmodelled import ledger
+from raychan.run.wide_arrays import WIDE, before_wide_arrays
 from raychan.scalars import as_text
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
@@ -161,6 +162,7 @@ def _explained(
     )
     if turned:
         left_out["intra-frame motion"] = motion(turned)
+        left_out[WIDE] = before_wide_arrays(paths, turned.turns, then, settings, weakest)
         brought = quiet_map(turned.turning, radar, settings)
         reasons = claimed(reasons, paths, turned.turns, brought, error.power, found, receiver)
     return all_named(reasons, found, own), left_out

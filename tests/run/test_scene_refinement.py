@@ -77,6 +77,12 @@ def test_a_budget_ends_refinement_and_is_told(key, value, word):
     assert any(f"ended by the budget of {word} (model.{key})" in line for line in found.warnings)
 
 
+@pytest.mark.parametrize(("allowed", "told"), [(0.0, True), (1e6, False)])
+def test_a_run_says_where_tracing_took_longer_than_the_seconds_allowed(allowed, told):
+    found = rc.simulate(scene_of(2, max_seconds=allowed))
+    assert any("longer than the 0 s allowed (model.max_seconds)" in line for line in found.warnings) is told
+
+
 def test_more_rays_state_smaller_errors():
     few, many = (rc.simulate(scene_of(1, tolerance_db=0.05, max_rays=n)) for n in (1, 2_000_000))
     assert many.stats["rays"] > few.stats["rays"]
