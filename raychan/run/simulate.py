@@ -162,7 +162,7 @@ def _explained(
     )
     if turned:
         left_out["intra-frame motion"] = motion(turned)
-        left_out[WIDE] = before_wide_arrays(paths, turned.turns, then, settings, weakest)
+        left_out[WIDE] = before_wide_arrays(paths, turned.turns, radar, settings, weakest)
         brought = quiet_map(turned.turning, radar, settings)
         reasons = claimed(reasons, paths, turned.turns, brought, error.power, found, receiver)
     return all_named(reasons, found, own), left_out
