@@ -152,6 +152,11 @@ class Result(Described, PlottedTwice):
     path: str = ""
     """Where the scene file was, so that its mesh files can be found again."""
 
+    @property
+    def traced_at(self) -> float:
+        """Time [s] from the frame's start to the instant whose levels, rates and directions the paths have."""
+        return self.stats.get("traced_at_s", 0.0)
+
     def require_scene(self) -> Scene:
         """Return the scene. Raises: ValueError where it could not be read again."""
         if self.scene is None:

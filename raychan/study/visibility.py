@@ -64,8 +64,8 @@ def visibility(result: Result, target: str) -> Visibility:
     Raises: ValueError for no Result, an unknown body, the ground, or the radar's own vehicle.
     """
     check_type("result", result, Result)
-    scene = check_target(result.scene, target)
-    facets, points, radar = scene.facets(0.0), scene.points(0.0), scene.radar
+    scene, time = check_target(result.scene, target), result.traced_at
+    facets, points, radar = scene.facets(time), scene.points(time), scene.radar_at(time)
     hidden = occlusion(facets, points, radar.position, target, scene.model.max_transmissions)
     return Visibility(target, hidden, _levels(result, facets, points, radar, target), led_by(result, target))
 

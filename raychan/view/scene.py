@@ -22,7 +22,7 @@ _PNG_END = b"IEND\xaeB`\x82"  # missing where the disk was full
 def drawing_of(scene: Any, result: Result | None = None, cell: CellExplanation | None = None) -> Drawing:
     """Return the drawing of a scene, with the rays of its result if given, or with those of one cell of its map: then
     as it stood when they were traced."""
-    time = 0.0 if result is None else result.stats.get("traced_at_s", 0.0)
+    time = 0.0 if result is None else result.traced_at
     radar, title = scene.radar_at(time), scene.title
     if cell is not None:
         where = f"{cell.range:.2f} m, {cell.speed:+.2f} m/s, {cell.label}"
