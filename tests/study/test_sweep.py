@@ -45,7 +45,12 @@ def file(tmp_path):
 
 @pytest.fixture(scope="module")
 def out_of_cover(scene):
-    return sweep(scene, "walker", [Axis.of("bodies.walker.position.y=-1:1:3")])
+    return sweep(scene, "walker", [Axis.of(f"bodies.walker.position.y={-1 - gone(scene)}:{1 - gone(scene)}:3")])
+
+
+def gone(scene):
+    """Return how far [m] the walker goes until the middle of the frame."""
+    return 2.0 * scene.radar.waveform.centre
 
 
 def reported(distance):
@@ -125,8 +130,7 @@ def test_what_is_detected_reads_its_level(out_of_cover):
 
 def test_just_behind_an_edge_a_quarter_of_the_field_returns(scene):
     # Half the field at the shadow's boundary (Sommerfeld), on the way in and on the way out: 12 dB.
-    y = -1e-4 - 2.0 * scene.radar.waveform.centre  # at mid frame, by its speed of 2 m/s
-    behind = visibility(simulate(scene.override([f"bodies.walker.position.y={y}"])), "walker")
+    behind = visibility(simulate(scene.override([f"bodies.walker.position.y={-1e-4 - gone(scene)}"])), "walker")
     assert behind.levels["direct"].power == 0.0
     assert behind.levels["diffracted"].margin_db == pytest.approx(reported(10.0) - 12.04, abs=0.5)
 
