@@ -113,8 +113,8 @@ def _chains(why: CellExplanation) -> list[str]:
     lines = []
     for part in why.contributions:
         brings = ""
-        if why.paths is not None and part.chain in why.paths.chains:
-            wave = why.paths.wave[why.paths.chain == why.paths.chains.index(part.chain)].sum()
+        if why.paths is not None and (mine := why.paths.of(part)).any():
+            wave = why.paths.wave[mine].sum()
             brings = f", {dbm(abs(wave) ** 2):.1f} dBm at {np.degrees(np.angle(wave)):+.0f} deg"
         lines.append(f"  {part.text()}{brings}")
     if why.beam:

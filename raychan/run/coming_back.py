@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import TRANSMIT, Paths
+from raychan.records import Paths
 from raychan.run.mechanisms import interactions
 from raychan.run.mirrored_rays import NARROW, Followed, followed, meets, of_each, unit
 from raychan.world.geometry import Geometry
@@ -54,9 +54,7 @@ def coming_back(paths: Paths, geometry: Geometry, bounces: int, wavelength: floa
 
 def _some(paths: Paths, rows: NDArray[np.bool_], bounces: int) -> Ints:
     """Return some trajectories of paths (n,) with as many interactions, of all chains of bodies as many."""
-    way, found = paths.trajectories, np.unique(paths.trajectory[rows])
-    # Behind thin layers the mirrored rays would meet the layer once more.
-    found = found[(way.kind[found] != TRANSMIT).all(axis=1)]
+    way, found = paths.trajectories, np.unique(paths.trajectory[rows]).astype(np.int64)
     return found[of_each(np.unique(way.body[found, :bounces], axis=0, return_inverse=True)[1].ravel())]
 
 

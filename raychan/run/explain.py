@@ -18,7 +18,7 @@ from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, Rang
 from raychan.run.directions import beam_to, wave_in_beam
 from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
 from raychan.run.own_signals import named, own_signals
-from raychan.run.result import Explanation, Result
+from raychan.run.result import Contribution, Explanation, Result
 
 _VERBS = ("", "reflect", "pass", "scatter", "point", "diffract", "diffuse")  # by InteractionType
 _SAME = 0.1  # resolution cells: a range and speed typed by hand do not tell closer places apart; not measured
@@ -46,6 +46,17 @@ class CellPaths(Record):
     """What happened to each chain, as 'reflect truck.tail'."""
     beam: bool = False
     """Whether waves are those in the beam of an array towards the detection; else those at the middle of the array."""
+
+    def of(self, part: Contribution) -> NDArray[np.bool_]:
+        """Return which paths (n,) are those of a contribution: of chains of one name, as the mirrored and the diffuse
+        return of the ground, of the one that has its share."""
+        waves = np.zeros(len(self.chains), np.complex128)
+        np.add.at(waves, self.chain, self.wave)
+        power = np.abs(waves) ** 2
+        alike = [g for g, names in enumerate(self.chains) if names == part.chain]
+        if not alike:
+            return np.zeros(len(self.chain), bool)
+        return self.chain == min(alike, key=lambda g: abs(power[g] - part.share * power.sum()))
 
 
 @dataclass(frozen=True)

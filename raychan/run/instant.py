@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from raychan.run.rules import fine_rule
-from raychan.run.turning import moving, needed
+from raychan.run.turning import moves_as_one, needed
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
@@ -20,7 +20,7 @@ def traced_at(scene: Scene, model: Any) -> tuple[Scene, float, tuple[str, ...]]:
     """
     time = scene.radar.waveform.centre
     edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
-    if time <= 0.0 or (not moving(scene).any() and not scene.interferers) or needed(scene, model.retrace, edge):
+    if time <= 0.0 or (moves_as_one(scene) and not scene.interferers) or needed(scene, model.retrace, edge):
         return scene, 0.0, ()
     try:
         then = scene.at(time)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.records import LAYER
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -14,6 +15,7 @@ Ints = NDArray[np.int64]
 
 RAYS = 6_000  # at most, of all groups as many; the rest of a group counts as these do (not measured)
 NARROW = 0.01  # rad between normals or to the receiver that counts as none (not measured)
+_LAYERS = 8  # that a ray passes at most; not measured
 _START = 1e-3  # m from which hits count: places of paths are rounded
 
 
@@ -36,7 +38,7 @@ def followed(geometry: Geometry, start: Floats, towards: Floats, bounces: int) -
     at, normals = np.zeros((2, len(towards), bounces, 3))
     facets = np.zeros((len(towards), bounces), np.int32)
     for k in range(bounces):
-        facet, reach = geometry.cast(begin[row], leaves[row], facet, np.full(len(row), _START))
+        facet, reach = _cast(geometry, begin[row], leaves[row], facet)
         met = facet >= 0
         row, facet = row[met], facet[met]
         begin[row] += reach[met, None] * leaves[row]
@@ -46,13 +48,29 @@ def followed(geometry: Geometry, start: Floats, towards: Floats, bounces: int) -
     return Followed(row, at[row], normals[row], facets[row], leaves[row])
 
 
+def _cast(geometry: Geometry, start: Floats, way: Floats, facet: NDArray[np.int32]) -> tuple[NDArray[np.int32], Floats]:
+    """Return which facets (m,) rays meet beyond the ones that they leave, and at which distance (m,) [m]: straight
+    through thin layers, of which most passes."""
+    f = geometry.facets
+    thin = (f.materials.kind == LAYER)[f.material]
+    hit, reach = geometry.cast(start, way, facet, np.full(len(start), _START))
+    for _ in range(_LAYERS):
+        on = np.flatnonzero((hit >= 0) & thin[hit])
+        if not len(on):
+            break
+        then = start[on] + reach[on, None] * way[on]
+        hit[on], more = geometry.cast(then, way[on], hit[on], np.full(len(on), _START))
+        reach[on] += more
+    return hit, reach
+
+
 def meets(geometry: Geometry, rays: Followed, end: Floats, slack: Floats) -> NDArray[np.bool_]:
     """Return which rays leave towards a point (3,) that nothing hides, to within angles (m,) [rad]."""
     towards = end - rays.at[:, -1]
     far = np.linalg.norm(towards, axis=1)
     towards = unit(towards)
     near = np.flatnonzero(np.linalg.norm(rays.leaves - towards, axis=1) < slack)
-    hits = geometry.cast(rays.at[near, -1], towards[near], rays.facet[near, -1], np.full(len(near), _START))[1]
+    hits = _cast(geometry, rays.at[near, -1], towards[near], rays.facet[near, -1])[1]
     out = np.zeros(len(far), bool)
     out[near] = hits > far[near]
     return out

@@ -45,8 +45,10 @@ def own_signals(cube: Cube, rdmap: RangeDoppler, error: Floats, radar: Radar, se
         power = quiet_map(mirrored, radar, settings)
         # Images of what may be noise, as such a mixer gives it, are none of an echo.
         noise = 0.5 * (1.0 + float(undb(faults.iq_gain_db))) * rdmap.noise
-        power = np.where(power < share * float(undb(settings.min_snr_db)) * noise, 0.0, power)
         there = np.ix_(_mirrored(rdmap.rate), _mirrored(rdmap.range))
+        # Of two echoes that are images of each other the stronger one is real.
+        none = (power < share * float(undb(settings.min_snr_db)) * noise) | (rdmap.power > rdmap.power[there])
+        power = np.where(none, 0.0, power)
         found.append(OwnSignal(IMAGE, power, error + share * error[there]))
     return found
 

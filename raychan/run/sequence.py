@@ -15,6 +15,7 @@ from raychan.run.result import Result
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.simulate import result_of
 from raychan.run.storage import CONTENTS, columns_of, rows, write_result
+from raychan.run.turning import moves_as_one
 from raychan.world.geometry import geometry_of
 from raychan.world.limits import FRAMES, INTERVAL, SEED
 from raychan.world.scene import Scene
@@ -99,22 +100,15 @@ def _frames(
         yield Frame(k, time, result)
 
 
-def moves_as_one(scene: Scene) -> bool:
-    """Return whether all bodies move with the radar, so that its channel does not change."""
-    own = np.asarray(scene.radar.velocity, float)
-    return all(np.array_equal(b.motion.velocity, own) and not b.motion.turns for b in scene.bodies)
-
-
 def _shifted(channel: Channel, scene: Scene, time: float) -> Channel:
     """Return the channel of a scene whose bodies and radar have all moved alike for a time [s]."""
-    shift = time * np.asarray(scene.radar.velocity, float)
-
-    points = scene.points()
+    shift, since = time * np.asarray(scene.radar.velocity, float), channel.geometry.facets.since
+    then = scene.at(since)
     stats = channel.stats | {"rays": 0, "tubes": 0}
     return replace(
         channel,
-        geometry=geometry_of(scene, channel.model.tolerance_db),
-        points=points,
+        geometry=geometry_of(then, channel.model.tolerance_db, since),
+        points=then.points(),
         launched=channel.launched.moved(shift),
         others=channel.others.moved(shift),
         stats=stats,

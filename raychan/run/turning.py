@@ -23,6 +23,11 @@ def moving(scene: Scene) -> NDArray[np.bool_]:
     return turning(scene) | np.array([not np.array_equal(b.motion.velocity, own) for b in scene.bodies], bool)
 
 
+def moves_as_one(scene: Scene) -> bool:
+    """Return whether all bodies and both ends of the radar move alike, so that its channel does not change."""
+    return np.array_equal(scene.radar.rx_motion, scene.radar.velocity) and not moving(scene).any()
+
+
 def carried_on(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
     """Return which bodies (b,) are extrapolated between tracings: those that turn, or all that move."""
     return turning(scene) if retrace == "auto" else moving(scene)

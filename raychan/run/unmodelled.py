@@ -12,10 +12,11 @@ from raychan.channel.diffuse import mean_sigma0
 from raychan.channel.mesh_error import CUBIC
 from raychan.parallel import parallel_map
 from raychan.radar.radar import Radar
-from raychan.records import MIRROR, Facets, Paths, Points
+from raychan.records import Facets, Paths, Points
 from raychan.run.clutter import laws_of, scatters_diffusely
 from raychan.run.coming_back import coming_back
 from raychan.run.going_on import going_on
+from raychan.run.intra_frame import intra_frame
 from raychan.run.ledger import NOTHING, SEEN, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, layers_at_once, peak
 from raychan.run.solver import paths_over_wedges
@@ -57,7 +58,7 @@ def ledger(
         "creeping waves": lambda: creeping_waves(paths, geometry, points, radar, settings, weakest),
         "change over the band": lambda: over_band(paths, geometry, radar, settings, weakest),
         "tessellation": lambda: _tessellation(paths, geometry, bodies, radar, settings, weakest),
-        "intra-frame motion": lambda: _motion(paths, geometry.facets, radar),
+        "intra-frame motion": lambda: intra_frame(paths, geometry.facets, radar),
         "diffraction": lambda: _diffraction(geometry, radar, weakest),
         "range migration": lambda: Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
     }
@@ -91,7 +92,6 @@ _MONOSTATIC = (
     "diffraction to point targets",
     "diffuse scattering",
     "creeping waves",
-    "intra-frame motion",
 )
 """Effects whose estimates take the way back to be the way out."""
 
@@ -247,36 +247,3 @@ def _tessellation(
     return Entry(
         NOTHING, "exact", "no echo comes from smoothed facets" if estimated else "no body has estimated normals"
     )
-
-
-def _motion(paths: Paths, facets: Facets, radar: Radar) -> Entry:
-    """Return the entry of changes within a frame: for crossing and turning bodies the phase deviates by at most
-    k a T^2 / 4, a being the radial acceleration; amplitudes fall as the length L of a path grows: those of its middle
-    differ from their mean by (L' T / L)^2 / 4, those of its start by L' T / L."""
-    frame = radar.waveform.frame_duration
-    if not len(paths.delay):
-        return Entry(NOTHING, "exact", "no path")
-    size = np.abs(paths.amplitude)
-    strong = np.flatnonzero(size > 1e-3 * size.max())
-    nearest = np.full(len(paths.trajectories.kind), np.inf)
-    np.minimum.at(nearest, paths.trajectory[strong], np.maximum(0.5 * paths.length[strong], 0.5))
-    taken = np.flatnonzero(np.isfinite(nearest))
-    body, away = paths.trajectories.body[taken], paths.trajectories.departure[taken].astype(float)
-    used = body >= 0
-    body = np.maximum(body, 0)
-    used &= facets.role[body] != MIRROR
-    relative = facets.velocity - np.asarray(radar.velocity)
-    along = np.einsum("ndi,ni->nd", relative[body], away)
-    across = np.einsum("bi,bi->b", relative, relative)[body] - along**2
-    turning = np.linalg.norm(facets.spin, axis=1)[body]
-    # Lever arm of turning bodies: 2.5 m, of a vehicle (not measured).
-    bend = np.where(used, across / nearest[taken, None] + turning**2 * 2.5, 0.0).max(axis=1)
-    phase = 2.0 * np.pi * radar.waveform.middle / C0 * bend * frame**2 / 4.0
-    worst = float(phase.max(initial=0.0))
-    grown = float((np.abs(paths.length_rate[strong]) * frame / paths.length[strong]).max())
-    when, off = ("middle", 0.25 * grown**2) if facets.since else ("start", grown)
-    how = (
-        f"at most {worst:.2g} rad of unmodelled phase over the frame, amplitudes of its {when} within {off:.2%} of "
-        "their mean over it; level relative to the echo that has it"
-    )
-    return Entry(float(db(max(worst, off, 1e-15) ** 2)), "bound", how)

@@ -211,7 +211,7 @@ def rays_in(result: Result, cell: CellExplanation) -> tuple[Ray, ...]:
         raise ValueError("cell: its paths are wanted, as `explain` returns them")
     rays = []
     for part in sorted(cell.contributions, key=lambda part: part.share):
-        strongest = np.argmax(told.chain == told.chains.index(part.chain))  # rows come strongest first
+        strongest = np.argmax(told.of(part))  # rows come strongest first
         rays.append(_ray(result.paths, int(told.row[strongest]), part.chain, part.share * cell.predicted, cell))
     return tuple(rays)
 

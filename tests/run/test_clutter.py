@@ -176,3 +176,14 @@ def test_explain_lists_the_patches_that_a_cell_of_clutter_adds_up_from():
     why = rc.explain(result, range=float(result.rdmap.range[column]), speed=float(result.rdmap.rate[row]), cell=True)
     assert abs(why.paths.wave.sum()) ** 2 == pytest.approx(result.rdmap.power[row, column], rel=2e-2)
     assert ("diffuse ground",) in why.paths.met
+
+
+def test_of_two_chains_over_the_ground_explain_lists_the_level_of_the_one_that_a_cell_has():
+    plate = rc.Body(name="plate", shape="plate", params={"width": 0.3, "height": 0.3}, position=(6.0, 0.0, 0.6))
+    result = rc.simulate(scene(Diffuse("constant", -20.0), [plate]))
+    row, column = np.unravel_index(np.argmax(result.rdmap.power[:, 20:]), result.rdmap.power[:, 20:].shape)
+    at = float(result.rdmap.range[column + 20]), float(result.rdmap.rate[row])
+    why = rc.explain(result, range=at[0], speed=at[1], cell=True)
+    powers = [abs(why.paths.wave[why.paths.of(part)].sum()) ** 2 for part in why.contributions]
+    shares = np.array([part.share for part in why.contributions])
+    assert powers / np.sum(powers) * shares.sum() == pytest.approx(shares, rel=0.02)

@@ -38,6 +38,20 @@ def test_a_corner_alone_is_told_though_nothing_is_detected():
     assert len(told(short)) == 1 and "waves over corner come back by 3 interactions" in told(short)[0]
 
 
+@pytest.mark.parametrize("shape", ["dihedral", "trihedral"])
+def test_a_corner_behind_a_pane_is_told_as_without_it(shape):
+    bounces = {"dihedral": 1, "trihedral": 2}[shape]
+    pane = rc.Body(
+        name="pane", shape="plate", params={"width": 2.0, "height": 2.0}, position=(1.0, 0.0, 0.5), yaw_deg=160.0,
+        material="car_glass",
+    )  # fmt: skip
+    corner = rc.Body(name="corner", shape=shape, params={"size": 0.2}, position=(8.0, 0.0, 0.5), yaw_deg=180.0)
+    wave = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
+    radar = rc.Radar(wave, position=(0.0, 0.0, 0.5))
+    scene = rc.Scene(bodies=[pane, corner], radar=radar, model={"max_bounces": bounces, "tolerance_db": 1.0})
+    assert f"come back by {bounces + 1} interactions" in told(rc.simulate(scene))[0]
+
+
 @pytest.mark.parametrize("bounces", [2, 3])
 def test_bodies_that_send_nothing_back_are_not_told(bounces):
     assert told(run("box", bounces, 30.0)) == told(run("dihedral", bounces, size=0.2)) == []

@@ -114,3 +114,46 @@ def test_phases_are_carried_back_by_the_carrier() -> None:
     there = rc.simulate(_scene((9.0 + 20.0 * middle, 0.0, 1.0), (0.0, 0.0, 0.0))).paths.amplitude.sum()
     turned = there * np.exp(2j * np.pi * scene.radar.waveform.carrier / C0 * 2.0 * 20.0 * middle)
     assert abs(rc.simulate(scene).paths.amplitude.sum() / turned - 1.0) < 0.02
+
+
+def test_receivers_elsewhere_that_move_are_where_they_are_at_mid_frame_in_each_frame_of_a_sequence() -> None:
+    radar = rc.Radar(
+        rc.Waveform(**_WAVE, n_chirps=64, repetition=400e-6),
+        position=(0.0, 0.0, 1.0),
+        rx_position=(0.0, 6.0, 1.0),
+        rx_velocity=(20.0, 0.0, 0.0),
+        antenna=rc.IsotropicAntenna(),
+    )
+    point = rc.Body("p", shape="sphere", params={"radius": 0.01}, position=(10.0, 2.0, 1.0), rcs_dbsm=20.0)
+    scene = rc.Scene(bodies=[point], radar=radar, model={"max_bounces": 1})
+    for frame in rc.frames(scene, 2, 0.05):
+        then = frame.time + radar.waveform.centre
+        way = np.array([10.0 - 20.0 * then, -4.0, 0.0])
+        rates = frame.result.paths.range_rate
+        assert np.abs(rates - 0.5 * (-20.0 * way[0]) / np.linalg.norm(way)).min() < 1e-6
+
+
+def test_frames_with_an_interferer_that_moves_are_those_of_runs_by_themselves() -> None:
+    wave = rc.Waveform(**_WAVE, n_chirps=32, repetition=200e-6)
+    radar = rc.Radar(wave, position=(0.0, 0.0, 1.0), power=0.01)
+    other = rc.Radar(wave, position=(10.0, 3.0, 1.0), yaw_deg=180.0, velocity=(0.0, -20.0, 0.0), power=0.01)
+    point = rc.Body("p", shape="sphere", params={"radius": 0.01}, position=(20.0, 1.0, 1.0), rcs_dbsm=20.0)
+    beside = [rc.Interferer(radar=other, name="other", locked=True)]
+    scene = rc.Scene(bodies=[point], radar=radar, interferers=beside, model={"max_bounces": 1})
+    for frame in rc.frames(scene, 2, 0.05):
+        alone = rc.simulate(scene.at(frame.time), seed=frame.number).cube.samples
+        off = np.linalg.norm(frame.result.cube.samples - alone) / np.linalg.norm(alone)
+        assert off < 1e-4
+
+
+def test_the_phase_left_out_of_receivers_beside_the_transmitter_is_that_of_one_place() -> None:
+    levels = []
+    for aside in (None, (0.0, 0.01, 1.0)):
+        radar = rc.Radar(rc.Waveform(**_WAVE, n_chirps=64, repetition=300e-6), position=(0, 0, 1), rx_position=aside)
+        point = rc.Body(
+            "p", shape="sphere", params={"radius": 0.01}, position=(8, 0, 1), velocity=(0, 22, 0), rcs_dbsm=30
+        )
+        result = rc.simulate(rc.Scene(bodies=[point], radar=radar, model={"max_bounces": 1}))
+        levels.append(result.ledger["intra-frame motion"].level_db)
+        assert any("intra-frame motion" in line for line in result.warnings)
+    assert levels[0] == pytest.approx(levels[1], abs=0.1)

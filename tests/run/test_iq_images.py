@@ -69,3 +69,8 @@ def test_explain_names_it_from_a_stored_result_too(tmp_path, capsys):
     assert stored.provenance[1].label == rc.explain(stored, at, 0.0, cell=True).label == "image"
     assert invoke(["explain", str(tmp_path), "--detection", "2"]) == 0
     assert "no path explains this cell: I/Q image" in capsys.readouterr().out
+
+
+def test_the_stronger_of_two_detections_that_are_images_of_each_other_is_never_the_image():
+    result = rc.simulate(scene((60.0, 3.0, 60.0), iq={"iq_gain_db": 16.0}))
+    assert result.provenance[0].label != "image" and result.provenance[1].label == "image"

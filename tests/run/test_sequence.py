@@ -13,8 +13,9 @@ from support.scene_texts import PLATE
 
 import raychan as rc
 from raychan.cli import invoke
-from raychan.run.sequence import Store, frames, moves_as_one, overlap
+from raychan.run.sequence import Store, frames, overlap
 from raychan.run.storage import load_result
+from raychan.run.turning import moves_as_one
 
 SCENE = f"""{PLATE}
 [[bodies]]
