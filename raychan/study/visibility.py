@@ -65,7 +65,7 @@ def visibility(result: Result, target: str) -> Visibility:
     """
     check_type("result", result, Result)
     scene, time = check_target(result.scene, target), result.traced_at
-    facets, points, radar = scene.facets(time), scene.points(time), scene.radar_at(time)
+    facets, points, radar = scene.facets(time).replace(since=time), scene.points(time), scene.radar_at(time)
     hidden = occlusion(facets, points, radar.position, target, scene.model.max_transmissions)
     return Visibility(target, hidden, _levels(result, facets, points, radar, target), led_by(result, target))
 

@@ -263,3 +263,13 @@ def test_ctrl_c_in_the_first_step_of_a_sweep_leaves_nothing(file, tmp_path):
     assert (done.returncode, done.stdout) == (130, ""), done.stderr
     assert but_compiling(done.stderr) == "raychan: interrupted; nothing was written\n"
     assert [p.name for p in tmp_path.iterdir()] == [file.name]
+
+
+def test_the_diffracted_level_of_a_walker_is_that_of_one_at_rest_where_it_is_at_mid_frame(scene):
+    def level(velocity, y):
+        changes = [f"bodies.walker.velocity_mps=[0, {velocity}, 0]", f"bodies.walker.position.y={y}"]
+        return visibility(simulate(scene.override(changes)), "walker").levels["diffracted"].margin_db
+
+    middle = level(0.0, -0.1)
+    assert level(20.0, -0.1 - 10.0 * gone(scene)) == pytest.approx(middle, abs=0.05)
+    assert level(0.0, -0.1 - 10.0 * gone(scene)) < middle - 1.0
