@@ -9,8 +9,6 @@ from raychan.run.turning import moves_as_one, needed
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
-INSIDE = "levels, rates and directions are those of the frame's start: by its middle {problem}"
-
 
 def traced_at(scene: Scene, model: Any) -> tuple[Scene, float, tuple[str, ...]]:
     """Return a scene as it stands when it is traced, the time [s] of that from the frame's start, and what a user
@@ -25,7 +23,7 @@ def traced_at(scene: Scene, model: Any) -> tuple[Scene, float, tuple[str, ...]]:
     try:
         then = scene.at(time)
     except SceneError as problem:
-        return scene, 0.0, (INSIDE.format(problem=problem),)
+        return scene, 0.0, (f"levels, rates and directions are those of the frame's start: by its middle {problem}",)
     # The same scene stands alike at each run of it.
     then._derived = scene._derived.setdefault(("at", time), {})
     return then, time, ()

@@ -99,7 +99,7 @@ def test_a_body_that_crosses_near_by_is_carried_on_if_asked_for():
     )
     truth, _ = every_chirp(cached)
     off = [energy_db(simulate(s).cube.samples - truth, truth) for s in (cached, thrice)]
-    # Traced once, at its middle, the rates of the middle hold to a quarter of a radian at its ends.
+    # Traced once, at its middle, the phase is k a T^2 / 4 = 0.1 rad off at the frame's ends.
     assert off[0] > -30.0 and off[1] < -40.0, off
 
 
