@@ -94,7 +94,7 @@ def test_stages_and_simulate_trace_the_same_instant() -> None:
 
 
 def test_a_frame_in_whose_middle_the_radar_is_inside_a_body_is_that_of_its_start_and_says_so() -> None:
-    result = rc.simulate(_scene((0.45, 0.0, 1.0), (-20.0, 0.0, 0.0)))
+    result = rc.simulate(_scene((2.0, 0.0, 1.0), (-60.0, 0.0, 0.0), repetition=1e-3))
     assert result.stats["traced_at_s"] == 0.0
     assert any("frame's start" in line for line in result.warnings)
 
