@@ -8,13 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from raychan.geometry.triangles import half_edge_ends
 from raychan.parallel import cached
 from raychan.records import LAYER, MIRROR, Facets
+from raychan.world.pieces import pieces as join
 from raychan.world.topology import MeshTopology
 
 Floats = NDArray[np.float64]
@@ -171,10 +170,7 @@ def _coincident(edges: NDArray[np.float64], frame: NDArray[np.int64]) -> tuple[N
 
 def _linked(label: NDArray[np.signedinteger], a: NDArray[np.signedinteger], b: NDArray[np.signedinteger]) -> Ints:
     """Return labels (n,) numbered anew, the labels a (k,) and b (k,) being the same."""
-    count = int(label.max(initial=-1)) + 1
-    graph = coo_matrix((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
-    found: Ints = connected_components(graph, directed=False)[1][label]
-    return found
+    return join(a, b, int(label.max(initial=-1)) + 1).astype(np.int32)[label]
 
 
 def closed_pieces(topology: MeshTopology, opaque: Bools) -> Bools:

@@ -1,46 +1,42 @@
-"""Large meshes have the edges and pieces that small ones have, though other code finds them."""
+"""Edges, equal rows and connected pieces of meshes, against sorting and a library's graphs."""
 
 from __future__ import annotations
 
 import numpy as np
 import trimesh
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from raychan.geometry.grouping import connected, equal_rows
-from raychan.world import pieces as module
 from raychan.world.mesh import make_mesh
 from raychan.world.pieces import edges, grouped, pieces
 from raychan.world.point_in_body import in_plane_of
 
 
-def test_counted_rows_are_in_the_order_of_sorted_ones() -> None:
-    rng = np.random.default_rng(3)
-    columns = rng.integers(0, 40, (3, 5000))
-    order, run = equal_rows(columns.astype(np.int32), 40)
-    expected = grouped(*columns)
-    assert np.array_equal(order, expected[0])
-    assert np.array_equal(run, expected[1])
+def test_equal_rows_are_in_the_order_of_sorted_ones() -> None:
+    columns = np.random.default_rng(3).integers(0, 40, (3, 5000))
+    order, run = grouped(*columns)
+    assert np.array_equal(order, np.lexsort(columns[::-1]))
+    assert np.array_equal(run, np.unique(columns[:, order], axis=1, return_inverse=True)[1].ravel())
+
+
+def test_of_no_rows_there_is_no_order() -> None:
+    assert [len(x) for x in grouped(*np.zeros((2, 0), np.int64))] == [0, 0]
+    assert len(pieces(*np.zeros((2, 0), np.int64), 0)) == 0
 
 
 def test_joined_pieces_are_those_of_the_graph() -> None:
-    rng = np.random.default_rng(4)
-    one, other = rng.integers(0, 3000, (2, 2000))
-    assert np.array_equal(connected(one, other, 3000), pieces(one, other, 3000))
+    one, other = np.random.default_rng(4).integers(0, 3000, (2, 2000))
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(3000, 3000))
+    assert np.array_equal(pieces(one, other, 3000), connected_components(graph, directed=False)[1])
 
 
-def test_the_way_to_find_edges_does_not_change_a_mesh(monkeypatch) -> None:
+def test_edges_of_a_mesh_with_doubled_faces_and_two_pieces_are_in_the_order_of_their_ends() -> None:
     ball = trimesh.creation.icosphere(subdivisions=3)
-    # Doubled faces and a second piece, so that there is something to tell apart.
     faces = np.concatenate([ball.faces, ball.faces[:7, [1, 2, 0]], ball.faces + len(ball.vertices)])
     vertices = np.concatenate([ball.vertices, ball.vertices + np.array([3.0, 0.0, 0.0])])
-    few = make_mesh(vertices, faces)
-    monkeypatch.setattr(module, "_MANY", 1)
-    many = make_mesh(vertices, faces)
-    assert many.report == few.report
-    assert many.report.duplicates == 7 and many.report.bodies == 2
-    for name in ("vertices", "faces", "normals"):
-        assert np.array_equal(getattr(many, name), getattr(few, name))
-    assert np.array_equal(many.topology.pair, few.topology.pair)
-    assert np.array_equal(edges(many.faces)[0], np.argsort(_key(many.faces), kind="stable"))
+    mesh = make_mesh(vertices, faces)
+    assert mesh.report.duplicates == 7 and mesh.report.bodies == 2
+    assert np.array_equal(edges(mesh.faces)[0], np.argsort(_key(mesh.faces), kind="stable"))
 
 
 def test_a_point_in_the_plane_of_facets_is_found_among_the_rounded_planes() -> None:
