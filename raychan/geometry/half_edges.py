@@ -49,18 +49,16 @@ class Net(NamedTuple):
         return Net(self.v, self.n, *(x.copy() for x in self[2:]))  # type: ignore[arg-type]
 
     def packed(self) -> tuple[Net, NDArray[np.int64], NDArray[np.int64]]:
-        """Return the net without what went, and which facets and vertices of this one it has; its corners are numbered
-        as its facets have them."""
+        """Return the net without what went, and which facets and vertices of this one it has."""
         live, stays = np.flatnonzero(self.faces[:, 0] >= 0), np.flatnonzero(~self.gone)
         facet, vertex = np.full(len(self.faces), -1, np.int32), np.zeros(len(self.v), np.int32)
         facet[live], vertex[stays] = np.arange(len(live)), np.arange(len(stays))
-        corner = self.corner[live]
         mate, half = self.mate.reshape(-1, 3)[live].ravel(), self.half[stays]
         net = Net(
             v=self.v[stays],
-            n=self.n[corner.ravel()],
+            n=self.n,
             faces=vertex[self.faces[live]],
-            corner=np.arange(corner.size, dtype=np.int32).reshape(-1, 3),
+            corner=self.corner[live],
             mate=np.where(mate < 0, np.int32(-1), 3 * facet[mate // 3] + mate % 3),
             half=3 * facet[half // 3] + half % 3,
             heir=np.arange(len(live), dtype=np.int32),

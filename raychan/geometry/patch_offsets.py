@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from raychan.compile.jit import njit
-from raychan.geometry.triangles import edge_curvature
+from raychan.geometry.triangles import edge_curvature, facet_edge
 from raychan.vectors import cross, dot, less, row
 
 _OUTSIDE = -1e-9  # barycentric coordinate from which a point lies beyond an edge: rounding
@@ -97,6 +97,22 @@ def _corners(v, f):  # type: ignore[no-untyped-def]
         (v[f, 1, 0], v[f, 1, 1], v[f, 1, 2]),
         (v[f, 2, 0], v[f, 2, 1], v[f, 2, 2]),
     )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def patches(net, rows, v, n, b):  # type: ignore[no-untyped-def]
+    """Write the corners, corner normals and edge curvatures (r, 3, 3) of the patches of some facets (r,) of a net, its
+    vertices (k, 3) [m], normals (c, 3), faces (m, 3) and corners (m, 3) there."""
+    place, normal, faces, corner = net
+    for i in range(len(rows)):
+        f = rows[i]
+        for k in range(3):
+            a, c = faces[f, k], corner[f, k]
+            for x in range(3):
+                v[i, k, x], n[i, k, x] = place[a, x], normal[c, x]
+        for k in range(3):
+            p, q = facet_edge(v, i, k)
+            b[i, k, 0], b[i, k, 1], b[i, k, 2] = edge_curvature(p, q, *facet_edge(n, i, k))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

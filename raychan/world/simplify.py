@@ -86,14 +86,14 @@ def simplify(
             return None
         if rounds.all_checked():
             break
-    net, corner = rounds.net, rounds.corner[rounds.net.corner]
+    net, corner = rounds.net, rounds.net.corner
     used, faces = np.unique(net.faces, return_inverse=True)
     coarse = Mesh(
         vertices=net.v[used],
         faces=faces.reshape(-1, 3).astype(np.int32),
         part=mesh.part[rounds.facet],
         part_names=mesh.part_names,
-        normals=np.ascontiguousarray(net.n[net.corner]),
+        normals=np.ascontiguousarray(net.n[corner]),
         report=mesh.report,
         part_materials=mesh.part_materials,
     )
@@ -144,16 +144,15 @@ def _net(mesh: Mesh, fixed: Bools) -> tuple[Net, float]:
 class _Rounds:
     """Rounds of removals, numbered on, each on slabs of the mesh across another axis.
 
-    Fields: net what is left of the whole mesh, all within the limits; vertex (k,), facet (m,), corner (3 m,) its
-    numbers in the whole mesh; heir (n,) the facet in whose place each facet of the whole mesh is looked for; deviation
-    [m] of the points checked.
+    Fields: net what is left of the whole mesh, all within the limits; vertex (k,), facet (m,) its numbers in the whole
+    mesh; heir (n,) the facet in whose place each facet of the whole mesh is looked for; deviation [m] of the points
+    checked.
     """
 
     def __init__(self, whole: Net, limits: Limits, few: int) -> None:
         """Begin with a whole mesh; few: the check of every so manieth point serves where all are near."""
         n, self.net, self.deviation = len(whole.faces), whole, 0.0
-        self.vertex, self.facet, self.corner = np.arange(len(whole.v)), np.arange(n), np.arange(3 * n, dtype=np.int32)
-        self.heir = np.arange(n, dtype=np.int32)
+        self.vertex, self.facet, self.heir = np.arange(len(whole.v)), np.arange(n), np.arange(n, dtype=np.int32)
         closer = 1.0 if few == 1 else _CLOSER
         self._limits = limits._replace(deviation=closer * limits.deviation, normal=closer * limits.normal)
         self._last, self._stage, self._turn = limits, 0, 0
@@ -255,7 +254,6 @@ class _Rounds:
         self._checked = every == 1
         self.heir = then[self.heir]
         self.vertex, self.facet = self.vertex[stays], self.facet[live]
-        self.corner = self.corner[now.corner[live].ravel()]
         return None
 
     def _slabs(self, axis: int) -> tuple[NDArray[np.int8], NDArray[np.intp], NDArray[np.intp]]:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.geometry.collapses import Limits
 from raychan.geometry.half_edges import Net
-from raychan.geometry.patch_offsets import centres, offsets, vertices
-from raychan.geometry.triangles import edge_curvatures
+from raychan.geometry.patch_offsets import centres, offsets, patches, vertices
 from raychan.parallel import parallel_for
 
 Floats = NDArray[np.float64]
@@ -50,8 +49,9 @@ class Check:
         live = np.flatnonzero(net.faces[:, 0] >= 0)
         number = np.zeros(len(net.faces), np.int32)
         number[live] = np.arange(len(live))
-        v, n = net.v[net.faces[live]], net.n[net.corner[live]]
-        shape = heir, (v, n, edge_curvatures(v, n)[0]), net.mate, number, self._same(net)
+        drawn, own = np.empty((3, len(live), 3, 3)), (net.v, net.n, net.faces, net.corner)
+        parallel_for(len(live), lambda r: patches(own, live[r], *drawn[:, r]))
+        shape = heir, tuple(drawn), net.mate, number, self._same(net)
         most = limits.deviation, limits.normal
         ends = list[tuple[float, float]]()
 
