@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -235,10 +235,10 @@ def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None =
         return legs
     mirrors = planes_that_mirror(geometry, direct.end)
     everything = mirrors if bounces < 2 else _both_sides(geometry, mirrors)
-    for count in range(1, bounces + 1):
-        for chain in permutations(everything, count):
-            if _possible(direct.end, chain):
-                legs.append(Leg(end=direct.end, mirrors=chain, beam=beam))
+    last = [((), direct.end)]
+    for _ in range(bounces):
+        last = [more for chain, image in last for more in _longer(chain, image, everything)]
+        legs += [Leg(end=direct.end, mirrors=chain, beam=beam) for chain, _ in last]
     return legs
 
 
@@ -248,14 +248,14 @@ def _both_sides(geometry: Geometry, mirrors: list[Mirror]) -> list[Mirror]:
     return mirrors + [m for m in backs if geometry.facets.role[m.body] != MIRROR]
 
 
-def _possible(end: Floats, chain: tuple[Mirror, ...]) -> bool:
-    """Tell whether every image lies in front of the mirror it is mirrored at."""
-    x = end
-    for m in chain:
-        if (x - m.point) @ m.normal <= 1e-9:
-            return False
-        x = m.image(x)
-    return True
+def _longer(
+    chain: tuple[Mirror, ...], image: Floats, mirrors: list[Mirror]
+) -> Iterator[tuple[tuple[Mirror, ...], Floats]]:
+    """Yield the chains of one mirror more, and the images (3,) [m] in them: the image in a chain lies in front of the
+    next mirror, which is of another plane than the last one."""
+    for m in mirrors:
+        if (image - m.point) @ m.normal > 1e-9 and not (chain and chain[-1].facet == m.facet):
+            yield (*chain, m), m.image(image)
 
 
 def reachable(geometry: Geometry, leg: Leg) -> Bools:
