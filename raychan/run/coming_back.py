@@ -32,12 +32,13 @@ def coming_back(paths: Paths, geometry: Geometry, bounces: int, wavelength: floa
     way, met = paths.trajectories, interactions(paths)
     # What the receiver does not see has no path of the last order: there rays to first surfaces tell.
     begun = [_some(paths, met == n, n) for n in dict.fromkeys((bounces, 1))]
-    first = followed(geometry, paths.tx, way.vertices[np.concatenate(begun), 0], bounces + 1)
+    more = bounces + 1
+    first = followed(geometry, paths.tx, way.vertices[np.concatenate(begun), 0], more, split=more)
     place = _specular(first, paths.tx, paths.rx)
     towards, known = unit(place - paths.tx), unit(first.at[:, 0] - paths.tx)
     aside = known - towards
     aside *= np.minimum(1.0, _ASIDE / np.maximum(np.linalg.norm(aside, axis=1), 1e-300))[:, None]
-    again = followed(geometry, paths.tx, paths.tx + towards + aside, bounces + 1)
+    again = followed(geometry, paths.tx, paths.tx + towards + aside, more, split=more)
     same = np.linalg.norm(again.normal - first.normal[again.row], axis=2).max(axis=1, initial=0.0) < NARROW
     ways, own, count = np.unique(geometry.facets.body[first.facet], axis=0, return_inverse=True, return_counts=True)
     size = np.array([np.linalg.norm(np.ptp(first.at[own.ravel() == k, -1], axis=0)) for k in range(len(ways))])

@@ -55,7 +55,9 @@ def _mirrored(paths: Paths, geometry: Geometry, way: Ints) -> Ints:
     on = []
     for count in np.unique(own):
         some = np.flatnonzero(own == count)
-        on.append(some[followed(geometry, before[some], known[some, slot[some]], int(count) + 2).row])
+        more = int(count) + 1
+        # On its way back a wave meets all layers that it passed: not as a mirror.
+        on.append(some[followed(geometry, before[some], known[some, slot[some]], more + 1, split=more).row])
     return np.concatenate([np.zeros(0, np.int64), *on])
 
 
@@ -67,10 +69,10 @@ def _last(paths: Paths, way: Ints) -> Ints:
 
 def _over_mirrors(geometry: Geometry, end: Floats, points: Vectors) -> Ints:
     """Return the rows of points (n, 3) that an end (3,) of the link sees, and over a mirror too."""
-    seen = followed(geometry, end, points.astype(float), 1)
+    seen = followed(geometry, end, points.astype(float), 1, split=0)
     at, piece, on = seen.at[:, 0], geometry.piece[seen.facet[:, 0]], np.zeros(len(seen.row), bool)
     for leg in legs_over(geometry, end, 1)[1:]:
         left = np.flatnonzero(~on & returning(geometry, leg)[piece])
-        over = followed(geometry, at[left], leg.mirror_points(at[left])[:, 0], 1)
+        over = followed(geometry, at[left], leg.mirror_points(at[left])[:, 0], 1, split=0)
         on[left[over.row[meets(geometry, over, end, np.full(len(over.row), NARROW))]]] = True
     return seen.row[on]

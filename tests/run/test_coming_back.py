@@ -7,13 +7,15 @@ import raychan as rc
 from raychan.run.ledger import SEEN
 
 
-def run(shape, bounces, yaw=0.0, height=0.4, alone=False, **params):
-    corner = rc.Body(name="corner", shape=shape, params=params, position=(8.0, 0.3, height), yaw_deg=180.0 + yaw)
+def run(shape, bounces, yaw=0.0, height=0.4, alone=False, material=None, power=0.01, **params):
+    corner = rc.Body(
+        name="corner", shape=shape, params=params, position=(8.0, 0.3, height), yaw_deg=180.0 + yaw, material=material
+    )
     ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.3}, position=(4.0, -0.3, 0.4))
     wave = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
     model = {"max_bounces": bounces, "tolerance_db": 1.0}
     bodies = [corner] if alone else [corner, ball]
-    return rc.simulate(rc.Scene(bodies=bodies, radar=rc.Radar(waveform=wave), model=model))
+    return rc.simulate(rc.Scene(bodies=bodies, radar=rc.Radar(waveform=wave, power=power), model=model))
 
 
 def told(result):
@@ -36,6 +38,15 @@ def test_a_corner_alone_is_told_though_nothing_is_detected():
     short, whole = (run("trihedral", n, height=0.7, alone=True, size=0.15) for n in (2, 3))
     assert not len(short.detections.range) and np.abs(whole.detections.range - 8.0).min() < 0.1
     assert len(told(short)) == 1 and "waves over corner come back by 3 interactions" in told(short)[0]
+
+
+@pytest.mark.parametrize(("shape", "bounces"), [("dihedral", 2), ("trihedral", 3)])
+def test_a_corner_of_thin_glass_is_told_by_one_bounce_too_few_and_not_by_enough(shape, bounces):
+    thin = {"height": 0.5, "alone": True, "material": "car_glass", "power": 1.0, "size": 0.2}
+    short, whole = run(shape, bounces - 1, **thin), run(shape, bounces, **thin)
+    assert whole.detections.snr.max(initial=0.0) > 20.0
+    assert f"waves over corner come back by {bounces} interactions" in told(short)[0]
+    assert told(whole) == []
 
 
 @pytest.mark.parametrize("shape", ["dihedral", "trihedral"])
