@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -235,10 +235,10 @@ def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None =
         return legs
     mirrors = planes_that_mirror(geometry, direct.end)
     everything = mirrors if bounces < 2 else _both_sides(geometry, mirrors)
-    last = [((), direct.end)]
+    last = [direct]
     for _ in range(bounces):
-        last = [more for chain, image in last for more in _longer(chain, image, everything)]
-        legs += [Leg(end=direct.end, mirrors=chain, beam=beam) for chain, _ in last]
+        last = [more for leg in last for more in _longer(leg, everything)]
+        legs += last
     return legs
 
 
@@ -248,14 +248,16 @@ def _both_sides(geometry: Geometry, mirrors: list[Mirror]) -> list[Mirror]:
     return mirrors + [m for m in backs if geometry.facets.role[m.body] != MIRROR]
 
 
-def _longer(
-    chain: tuple[Mirror, ...], image: Floats, mirrors: list[Mirror]
-) -> Iterator[tuple[tuple[Mirror, ...], Floats]]:
-    """Yield the chains of one mirror more, and the images (3,) [m] in them: the image in a chain lies in front of the
-    next mirror, which is of another plane than the last one."""
-    for m in mirrors:
-        if (image - m.point) @ m.normal > 1e-9 and not (chain and chain[-1].facet == m.facet):
-            yield (*chain, m), m.image(image)
+def _longer(leg: Leg, mirrors: list[Mirror]) -> list[Leg]:
+    """Return the legs over one mirror more: one before which the image lies, of another plane than the last, to whose
+    rectangle rays run over all others."""
+    last, image = (leg.mirrors[-1].facet if leg.mirrors else -1), leg.image
+    found = [m for m in mirrors if m.facet != last and (image - m.point) @ m.normal > 1e-9]
+    if leg.mirrors and found:
+        halves = np.concatenate([m.corners[[[0, 1, 2], [0, 2, 3]]] for m in found])
+        one, other = leg.may_leave(halves).reshape(-1, 2).T
+        found = list(compress(found, one | other))
+    return [Leg(end=leg.end, mirrors=(*leg.mirrors, m), beam=leg.beam) for m in found]
 
 
 def reachable(geometry: Geometry, leg: Leg) -> Bools:
