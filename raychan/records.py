@@ -270,8 +270,7 @@ class RangeDoppler(Record, Plotted):
     rate: Floats = column("v", unit="m/s", doc="range rate, positive = receding, increasing")
     spectrum: NDArray[np.complex64] = column("a v r", np.complex64, unit="sqrt(W)")
     power: Floats = column("v r", unit="W", doc="mean over antennas of |spectrum|^2")
-    noise: float
-    """Expected thermal noise power per cell [W]; 0 when unknown."""
+    noise: float  # expected, thermal, per cell [W]; 0 when unknown
     range_resolution: float
     rate_resolution: float
     unambiguous_range: float
@@ -298,3 +297,4 @@ class Detections(Record):
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
     cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")
+    beam: Complexes = column("n a", np.complex128, doc="antennas' weights in its beam; none where no array allows it")

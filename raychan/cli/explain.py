@@ -118,9 +118,10 @@ def _chains(why: CellExplanation) -> list[str]:
             brings = f", {dbm(abs(wave) ** 2):.1f} dBm at {np.degrees(np.angle(wave)):+.0f} deg"
         lines.append(f"  {part.text()}{brings}")
     if why.beam:
-        levels = "and levels " if why.paths is not None and why.paths.beam else ""
-        rest = "" if levels else "; levels are those at the middle of the array, for want of the scene"
-        lines.append(f"shares {levels}are those in the array's beam towards the detection{rest}")
+        lines.append("shares and levels are those in the array's beam of the detection, with nulls towards others")
+    elif why.antennas > 1:
+        power = "of the detection is in a beam" if why.detection else "of the cell is the mean over antennas"
+        lines.append(f"levels of paths are those at the middle of the array; the power {power}")
     return lines
 
 

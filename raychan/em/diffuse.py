@@ -60,6 +60,12 @@ class Diffuse:
         if self.law in ("lambert", "lobe") and self.level_db > 0.0:
             raise ValueError(f"level_db = {self.level_db:g} dB: a surface cannot scatter more than it receives (0 dB)")
 
+    @property
+    def power(self) -> int:
+        """Power of the cosine of incidence with which sigma-nought back to the radar falls, about: of the lobe that of
+        cos psi = 2 cos^2 - 1 and of the surface seen."""
+        return {"constant": 0, "gamma": 1, "lambert": 2, "lobe": 2 * self.exponent + 1}[self.law]
+
     def sigma0(self, cos_in: Floats, cos_out: Floats, cos_lobe: Floats) -> Floats:
         """Return sigma-nought (n,) [m^2/m^2] of cosines (n,): of incidence and scattering angle off the normal, and of
         the angle between the scattered and the mirrored direction."""

@@ -73,6 +73,8 @@ class Echoes(Found):
     """Cosines (n, 2) along y and z"""
     unsure: NDArray[np.bool_]
     """(n,) whether the direction may be that of a side lobe: waves in the cell were not told apart"""
+    weights: Complexes
+    """Beams (n, a) that the echoes are seen in, with nulls towards the others of their cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +145,10 @@ class Splitter:
             if not any(self._same(row, other) for other in kept) and self._own(row, kept, peaks):
                 kept.append(row)
         kept.sort(key=lambda row: -row.power)
-        names = ("cell", "shift", "power", "noise", "direction", "unsure")
+        names = ("cell", "shift", "power", "noise", "direction", "unsure", "weights")
         if not kept:
-            none, pairs = np.zeros(0), np.zeros((0, 2))
-            return Echoes(pairs.astype(np.int64), pairs, none, none, pairs, none.astype(bool))
+            none, pairs, weights = np.zeros(0), np.zeros((0, 2)), np.zeros((0, len(self.map.spectrum)), complex)
+            return Echoes(pairs.astype(np.int64), pairs, none, none, pairs, none.astype(bool), weights)
         return Echoes(*(np.array([getattr(row, name) for row in kept]) for name in names))
 
     def _clear(self, power: float, cell: Ints, shift: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:

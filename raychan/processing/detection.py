@@ -224,11 +224,11 @@ def _reported(
     place = np.maximum(found.place, (-np.inf, 0.0))
     rate = _rate(map, grid, place)
     angles = np.full((2, len(rate)), np.nan)
-    ambiguous = np.zeros(len(rate), bool)
+    ambiguous, beam = np.zeros(len(rate), bool), np.zeros((len(rate), 0), complex)
     if aperture is not None and isinstance(found, Echoes):
         angles = np.array(aperture.angles(found.direction))
         snr = looks * found.power / np.maximum(found.noise, _TINY)
-        ambiguous = found.unsure | twins.ambiguous(aperture, found.direction, snr)
+        ambiguous, beam = found.unsure | twins.ambiguous(aperture, found.direction, snr), found.weights
     return Detections(
         range=map.range[0] + place[:, 1] * (map.range_resolution / grid.pad[1]),
         rate=rate,
@@ -239,4 +239,5 @@ def _reported(
         snr=db(found.power / np.maximum(found.noise, _TINY)),
         power=found.power,
         cell=found.cells.astype(np.int32),
+        beam=beam,
     )

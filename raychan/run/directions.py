@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from raychan.blas import on_one_blas_thread
 from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.processing.range_azimuth import range_azimuth as from_map
-from raychan.radar.aperture import cosines
 from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Paths, RangeDoppler
@@ -25,7 +24,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complexes = NDArray[np.complex128]
 
-_LITTLE = 1e-3  # of a cell's amplitude: largest sum of the paths left out of a beam (not measured)
+_LITTLE = 1e-3  # of a detection's amplitude: largest sum of the paths left out of a beam (not measured)
 UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
 
@@ -60,33 +59,31 @@ def angles_in(result: Result) -> RangeAzimuth | None:
 
 @dataclass(frozen=True)
 class Beams:
-    """The beams of an array towards its detections."""
+    """The beams of an array in which its detections are seen, with nulls towards the others of their cells."""
 
     passed: Callable[[int, Ints], Complexes]
-    """What the beam towards a detection (row) passes of paths (n,), rows of all, as factors of their waves."""
+    """What the beam of a detection (row) passes of paths (n,), rows of all, as factors of their waves."""
     spread: Floats
     """Range cells (d,) by which the range of each detection differs over the array."""
 
 
 def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
-    """Return the beams towards detections; None without an array."""
-    aperture = aperture_of(radar)
-    if not any(aperture.scans):
+    """Return the beams of detections; None without an array, or where a file does not hold them."""
+    if not found.beam.shape[1]:
         return None
+    turn = 2j * np.pi * radar.waveform.middle / C0
 
     def passed(row: int, some: Ints) -> Complexes:
-        look = np.nan_to_num([found.azimuth[row], found.elevation[row]])
-        rows = aperture.steering(cosines(*look)).conj()[0] / len(aperture.elements)
         # A path over several bodies leaves and arrives in different directions.
         one, way = paths.trajectories, paths.trajectory[some]
         sent, seen = (
-            np.exp(2j * np.pi / aperture.wavelength * (look @ axes @ elements.T))
+            np.exp(turn * (look @ axes @ elements.T))
             for look, axes, elements in (
                 (one.departure[way], radar.axes, radar.tx_elements),
                 (one.arrival[way], radar.rx_axes, radar.elements),
             )
         )
-        return np.asarray(((sent @ rows.reshape(sent.shape[1], -1)) * seen).sum(axis=1))
+        return np.asarray(((sent @ found.beam[row].reshape(sent.shape[1], -1)) * seen).sum(axis=1))
 
     return Beams(passed, range_spread(found, radar)[0])
 
@@ -100,12 +97,12 @@ def wave_in_beam(
     row: int,
     receiver: Receiver,
 ) -> Complexes | None:
-    """Return what an array's beam lets through of each path (n,) that may bring something to the cell of a detection, 0
-    of others; None where that does not explain it, but what arrives at the middle of the array does: the direction of
-    an ambiguous detection may not be that of its echo.
+    """Return what an array's beam lets through of each path (n,) that may bring something to a detection, 0 of others;
+    None where that does not explain it, but what arrives at the middle of the array does: the direction of an
+    ambiguous detection may not be that of its echo.
 
-    Args: at (3,) range [m], rate [m/s] and amplitude of the cell; power [W] of the cell and of the detection, a row
-    of those that the beams are of."""
+    Args: at (3,) range [m], rate [m/s] and amplitude of the detection's peak in the map; power [W] of the cell and of
+    the detection, a row of those that the beams are of."""
     place = paths.delay, paths.range_rate, float(at[0]), float(at[1])
     middle = response.in_cell(paths.amplitude, *place)[0]
     near = np.flatnonzero(np.abs(middle) * len(middle) > _LITTLE * at[2])

@@ -16,7 +16,7 @@ from raychan.poses import angles
 from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
 from raychan.run.directions import beam_to, wave_in_beam
-from raychan.run.labels import Chains, chains, explain_cell, response_of, waves_in
+from raychan.run.labels import Chains, chains, explain_cell, peaks_with_levels, response_of, waves_in
 from raychan.run.own_signals import named, own_signals
 from raychan.run.result import Contribution, Explanation, Result
 
@@ -45,7 +45,7 @@ class CellPaths(Record):
     met: tuple[tuple[str, ...], ...]
     """What happened to each chain, as 'reflect truck.tail'."""
     beam: bool = False
-    """Whether waves are those in the beam of an array towards the detection; else those at the middle of the array."""
+    """Whether waves are those in the beam of an array that the detection is seen in; else at its middle."""
 
     def of(self, part: Contribution) -> NDArray[np.bool_]:
         """Return which paths (n,) are those of a contribution: of chains of one name, as the mirrored and the diffuse
@@ -69,7 +69,10 @@ class CellExplanation(Explanation):
     others: tuple[int, ...] = ()
     """Numbers of other detections as near to the place asked for as a resolution cell."""
     beam: bool = False
-    """Whether shares are those in the beam of an array towards the detection."""
+    """Whether shares and levels are those in the beam of an array that the detection is seen in; else those at the
+    middle of the array."""
+    antennas: int = 1
+    """How many the map has."""
 
 
 @on_one_blas_thread
@@ -113,26 +116,21 @@ def explain(
 
 
 def _of_detection(result: Result, near: list[int]) -> CellExplanation:
-    row, column = map(int, result.detections.cell[near[0]])
-    held = _held(result.provenance[near[0]])
-    at, wave = near[0], None
+    row, found, receiver = near[0], result.detections, result.receiver
+    at, powers = peaks_with_levels(found, result.rdmap, receiver)
     # A result whose scene cannot be read again does not know where its receivers stand.
-    if len(result.rdmap.spectrum) > 1:
-        wave = _in_beam(result, at, row, column)
-    paths = _paths_in(result, row, column, amplitude=wave)
-    others = tuple(i + 1 for i in near[1:])
-    return CellExplanation(**held, paths=paths, detection=at + 1, others=others, beam=wave is not None)
-
-
-def _in_beam(result: Result, at: int, row: int, column: int) -> Complexes | None:
-    """Return what `wave_in_beam` does for a detection (row of them) in a cell of the map."""
-    rdmap, detections, receiver = result.rdmap, result.detections, result.receiver
-    beam = beam_to(result.scene.radar, detections, result.paths) if result.scene is not None else None
-    if beam is None:
-        return None
-    power = float(rdmap.power[row, column]), float(detections.power[at])
-    place = np.array([rdmap.range[column], rdmap.rate[row], np.sqrt(power[0] / receiver.power)])
-    return wave_in_beam(result.paths, response_of(receiver), place, power, beam, at, receiver)
+    beam, wave = None if result.scene is None else beam_to(result.scene.radar, found, result.paths), None
+    if beam is not None:
+        both = float(powers[row]), float(found.power[row])
+        wave = wave_in_beam(result.paths, response_of(receiver), at[row], both, beam, row, receiver)
+    return CellExplanation(
+        **_held(result.provenance[row]),
+        paths=_paths_at(result, float(at[row, 0]), float(at[row, 1]), amplitude=wave),
+        detection=row + 1,
+        others=tuple(i + 1 for i in near[1:]),
+        beam=wave is not None,
+        antennas=len(result.rdmap.spectrum),
+    )
 
 
 def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
@@ -146,22 +144,23 @@ def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
     if scene is not None:
         own = own_signals(result.cube, result.rdmap, result.error.power, scene.radar, scene.processing)
         why = named(why, place, own)
-    return CellExplanation(**_held(why), paths=_paths_in(result, row, column, known))
+    antennas = len(result.rdmap.spectrum)
+    return CellExplanation(**_held(why), paths=_paths_at(result, *at, known), antennas=antennas)
 
 
 def _held(why: Explanation) -> dict[str, Any]:
     return {f.name: getattr(why, f.name) for f in fields(Explanation)}
 
 
-def _paths_in(
-    result: Result, row: int, column: int, known: Chains | None = None, amplitude: Complexes | None = None
+def _paths_at(
+    result: Result, range: float, rate: float, known: Chains | None = None, amplitude: Complexes | None = None
 ) -> CellPaths:
-    """Return the paths of a cell; amplitude (n,) of each in a beam, else they are those at the middle of the array."""
+    """Return the paths at a place in the map, range [m] and rate [m/s]; amplitude (n,) of each in a beam, else they are
+    those at the middle of the array."""
     paths, receiver = result.paths, result.receiver
     known = known or chains(paths, receiver.background)
-    place = float(result.rdmap.range[column]), float(result.rdmap.rate[row])
     seen = paths if amplitude is None else paths.replace(amplitude=amplitude)
-    wave, at = waves_in(seen, response_of(receiver), *place)
+    wave, at = waves_in(seen, response_of(receiver), range, rate)
     order = np.argsort(-np.abs(wave), kind="stable")
     alone, trajectory = paths.amplitude[order], paths.trajectory[order]
     kind = paths.trajectories.kind

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import Complexes, Paths
+from raychan.records import Complexes, Detections, Paths, RangeDoppler
 from raychan.run.point_spread import PointSpread
 from raychan.units import C0
 
@@ -35,12 +35,18 @@ UNKNOWN = Truth()
 
 @dataclass(frozen=True)
 class Shown:
-    """A map cell, range [m] and rate [m/s] (None for a cell of the profile), and the place reported for it."""
+    """A place in the map, range [m] and rate [m/s] (None for one in the profile), and the rate reported for it."""
 
     range: float
     rate: float | None
-    at_range: float
     at_rate: float
+
+
+def peaks_of(found: Detections, rdmap: RangeDoppler, response: PointSpread) -> Floats:
+    """Return where in the map detections (d,) peak, between its cells: ranges [m] and rates [m/s] (d, 2). What the
+    receiver took off the range of a folded rate is put back: peaks stand where the beat does."""
+    folded = response.periods[1] * np.rint((found.rate - rdmap.rate[found.cell[:, 0]]) / response.periods[1])
+    return np.stack([found.range + folded * response.drift, found.rate - folded], axis=1)
 
 
 def truth(paths: Paths, rows: Ints, strongest: int, response: PointSpread, shown: Shown) -> Truth:
@@ -108,7 +114,7 @@ def ambiguities(
     at, rate = response.stands(*_moving(paths, rows), shown.rate is not None)
     sign = -1.0 if mirrored else 1.0
     away, smear = np.zeros((len(rows), 2)), np.zeros(len(rows))
-    away[:, 0] = sign * at - shown.at_range
+    away[:, 0] = sign * at - shown.range
     if shown.rate is not None:
         # Each row of the map is corrected for its own Doppler within the ramp; other rates keep the difference.
         away[:, 0] += (sign * rate - shown.rate) * response.drift

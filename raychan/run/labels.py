@@ -16,7 +16,7 @@ from raychan.records import TRANSMIT, Detections, InteractionType, Paths, RangeD
 from raychan.run.cell_sums import cell_sums
 from raychan.run.convergence import figure
 from raychan.run.directions import Beams, unexplained, wave_in_beam
-from raychan.run.folding import Shown, truth
+from raychan.run.folding import Shown, peaks_of, truth
 from raychan.run.point_spread import PointSpread
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, SIDELOBE, Contribution, Explanation, Receiver
 from raychan.run.side_lobes import Cell, is_side_lobe
@@ -83,7 +83,7 @@ def explain_cell(
     """
     wave, at = waves_in(paths, response, range, rate)
     sums = cell_sums(known.part, len(known.names), wave, at, paths.range_rate)
-    cell = Cell(Shown(range, rate, range, rate or 0.0), power, error, paths.amplitude)
+    cell = Cell(Shown(range, rate, rate or 0.0), power, error, paths.amplitude)
     return _explained(paths, known, response, tuple(x[0] for x in sums), cell, receiver)
 
 
@@ -94,7 +94,7 @@ def _explained(
     summed, sizes, strongest = sums
     whole = complex(summed.sum())
     predicted = abs(whole) ** 2 * receiver.power
-    range, rate = cell.shown.at_range, cell.shown.at_rate
+    range, rate = cell.shown.range, cell.shown.at_rate
     place = range, rate, rate + receiver.ego_speed
     shares = np.abs(summed) ** 2
     if unexplained(whole, cell.power, receiver) or not shares.sum() > 0.0:
@@ -155,23 +155,20 @@ def provenance(
     beam: Beams | None = None,
     known: Chains | None = None,
 ) -> tuple[Explanation, ...]:
-    """Return one explanation for each detection: of the cell of its peak, with the detection's range and rate.
+    """Return one explanation for each detection: of the place of its peak, with the detection's range and rate.
 
-    Args: beam, those of an array towards detections, of whose paths each is explained; known the paths' chains, if they
-    are known already.
+    Args: beam, those of an array's detections, of whose paths each is explained; known the paths' chains, if they are
+    known already.
     """
     known, response = known or chains(paths, receiver.background), response_of(receiver)
-    rows, columns = detections.cell.T
-    powers, errors = rdmap.power[rows, columns], error[rows, columns]
-    at = np.stack([rdmap.range[columns], rdmap.rate[rows], np.sqrt(powers / receiver.power)], axis=1)
+    at, powers = peaks_with_levels(detections, rdmap, receiver)
+    # Between cells an error is larger than in its cell, as the echo is.
+    errors = error[tuple(detections.cell.T)] * powers / rdmap.power[tuple(detections.cell.T)]
     sums = response.in_cells(known.part, len(known.names), paths.amplitude, paths.delay, paths.range_rate, at)
     places = detections.range, detections.rate, detections.speed, detections.power
     found = []
     for i in range(len(at)):
-        # What the receiver took off the range of a folded rate is put back: cells stand where the beat does.
-        folds = np.rint((detections.rate[i] - at[i, 1]) / response.periods[1])
-        stands = detections.range[i] + folds * response.periods[1] * response.drift
-        shown = Shown(*map(float, (at[i, 0], at[i, 1], stands, detections.rate[i])))
+        shown = Shown(float(at[i, 0]), float(at[i, 1]), float(detections.rate[i]))
         spread = 0.0 if beam is None else float(beam.spread[i])
         cell, own = Cell(shown, float(powers[i]), float(errors[i]), paths.amplitude, spread), tuple(x[i] for x in sums)
         both = cell.power, float(detections.power[i])
@@ -183,6 +180,14 @@ def provenance(
         at_range, at_rate, speed, level = (float(x[i]) for x in places)
         found.append(replace(why, range=at_range, rate=at_rate, speed=speed, power=level))
     return tuple(found)
+
+
+def peaks_with_levels(found: Detections, rdmap: RangeDoppler, receiver: Receiver) -> tuple[Floats, Floats]:
+    """Return the range [m], rate [m/s] and amplitude of the peaks of detections (d, 3) in the map, and the power (d,)
+    [W] of all that arrives there: of an array the mean over its antennas in the cell, where a beam has less of it."""
+    amplitude = np.sqrt(found.power / receiver.power)
+    at = np.column_stack([peaks_of(found, rdmap, response_of(receiver)), amplitude])
+    return at, np.maximum(rdmap.power[tuple(found.cell.T)], found.power)
 
 
 def response_of(receiver: Receiver) -> PointSpread:

@@ -2,7 +2,7 @@
 
 Each record is a group, each column a variable with its unit; range and range rate are coordinates. A complex column is
 two real ones, `_re` and `_im`, so that xarray, MATLAB's h5read and any HDF5 reader open it alike. Label, bodies and
-stated error of each detection are variables beside its columns.
+stated error of each detection are variables beside its columns, the beams of an array's detections a group.
 """
 
 from __future__ import annotations
@@ -50,6 +50,8 @@ _FORMER = {"length": ("delay", C0), "length_rate": ("range_rate", 2.0)}
 """Columns that files of format 2 have instead, and the factor on them."""
 _ADDED = {"elevation": np.nan, "ambiguous": False}
 """Columns that older files of format 3 do not have, and what stands for them."""
+_BEAMS = "beams"
+"""Group of the beams of an array's detections: beside these, so that a table of detections has a row each."""
 _UNITS = {"sqrt(W)": "V"}
 """Units as UDUNITS writes them, for waves at 1 ohm. UDUNITS has no decibel: it is written dB."""
 _TITLES = {
@@ -99,6 +101,9 @@ def as_netcdf(result: Result, attrs: dict[str, Any]) -> memoryview:
             # Most slots of paths are unused and compress well; samples are noise and do not.
             packed = name == "paths" and len(result.paths.delay) > 0
             _write(file.create_group(name), name, result, {"compression": 1, "shuffle": True} if packed else {})
+        if result.detections.beam.shape[1]:
+            of = next(f for f in columns(ExplainedDetections) if f.name == "beam")
+            _column(file.create_group(_BEAMS), "detections", of, result.detections.beam, {})
         angles = angles_in(result)
         if angles is not None:
             _directions(file.create_group("range_azimuth"), angles)
@@ -120,6 +125,8 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
             if name not in data and issubclass(kind, Paths) and name in _FORMER:
                 former, factor = _FORMER[name]
                 values[f.name] = factor * data[former].values
+            elif f.name == "beam":
+                values[f.name] = _beams(file, data.sizes[_ROWS[group]])
             elif f.name in _ADDED and name not in data:
                 values[f.name] = np.full(data.sizes[_ROWS[group]], _ADDED[f.name], f.metadata["dtype"])
             elif f.name == "cell" and "cell" not in data:
@@ -137,6 +144,16 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
     return kind.of(**values) if issubclass(kind, Paths) else kind(**values)
 
 
+def _beams(file: Path, count: int) -> NDArray[np.complex128]:
+    """Return the beams (count, a) of detections; no columns without an array, and of older files."""
+    import h5netcdf
+
+    with h5netcdf.File(file, "r") as held:
+        if _BEAMS not in held.groups:
+            return np.zeros((count, 0), np.complex128)
+        return np.asarray(held[_BEAMS]["beam_re"][:] + 1j * held[_BEAMS]["beam_im"][:])
+
+
 def columns(kind: Any) -> list[dataclasses.Field[Any]]:
     """Return the columns of a record; in a file all columns of paths have a row for each path."""
     if not issubclass(kind, Paths):
@@ -152,7 +169,7 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
     for f in columns(type(record)):
         value = record.trajectories.vertices[record.trajectory] if f.name == "vertices" else getattr(record, f.name)
         if "axes" in f.metadata:
-            if f.name == "aside" and not value.size:
+            if f.name == "beam" or (f.name == "aside" and not value.size):
                 continue
             if f.name == "cell":  # a column each, so that a table of detections has a row each
                 for k, axis in enumerate(_CELL):

@@ -13,7 +13,7 @@ from raychan.channel.mesh_error import CUBIC
 from raychan.parallel import parallel_map
 from raychan.radar.radar import Radar
 from raychan.records import Facets, Paths, Points
-from raychan.run.clutter import laws_of, scatters_diffusely
+from raychan.run.clutter import laws_of, scatters_diffusely, share_of_distance
 from raychan.run.coming_back import coming_back
 from raychan.run.going_on import going_on
 from raychan.run.intra_frame import intra_frame
@@ -211,7 +211,7 @@ def _diffuse(geometry: Geometry, radar: Radar, model: Any, weakest: float) -> En
     eye = np.asarray(radar.position, float)
     farthest = _FOLDED * reach if modelled.any() else min(reach, _NEAR)
     step = max(cell, farthest / _RINGS)
-    patches = visible_patches(geometry, eye, rough, PatchSize(step, _SECTOR, farthest))
+    patches = visible_patches(geometry, eye, rough, PatchSize(step, _SECTOR, farthest, share_of_distance(laws, rough)))
     look, r, gain = _gain(radar, patches.point)
     row = f.material[patches.facet]
     left = ~modelled[row] | (r > reach)

@@ -1,7 +1,8 @@
 """Patches of rough surfaces that the radar sees: where diffuse scattering starts.
 
 The ground is cut into sectors of rings about the foot of the radar, rings of half a range cell; other bodies into their
-facets, and these into triangles of half a range cell. One ray tells whether the middle of a patch is seen.
+facets, and these into triangles of half a range cell. Near the radar both are finer: over a plane the law of scattering
+changes with the range alone. One ray tells whether the middle of a patch is seen.
 """
 
 from __future__ import annotations
@@ -25,11 +26,18 @@ _TOUCH = 1e-3  # of the distance: a hit this near the middle of a patch is the p
 
 @dataclass(frozen=True)
 class PatchSize:
-    """How large patches may be: along the range [m], across it [rad], and how far away they may be [m]."""
+    """How large patches may be: along the range [m], across it [rad], how far away they may be [m], and which share of
+    their distance they may extend along the range."""
 
     range: float
     angle: float
     farthest: float
+    share: float
+
+    @property
+    def nearest(self) -> float:
+        """Distance [m] within which patches become no finer: so near a radar stands on its surface."""
+        return self.share * self.range
 
 
 def visible_patches(geometry: Geometry, end: Floats, materials: Bools, size: PatchSize) -> Patches:
@@ -53,10 +61,9 @@ def _rings(geometry: Geometry, end: Floats, body: int, size: PatchSize) -> Patch
     reach = float(np.linalg.norm(f.vertices[rows] - foot, axis=2).max())
     farthest = min(size.farthest, float(np.hypot(reach, height)))
     sectors = max(int(np.ceil(2.0 * np.pi / size.angle)), 8)
-    rings = min(int(np.ceil(max(farthest - height, 0.0) / size.range)), max(_MOST // sectors, 1))
-    if rings == 0:
+    if farthest <= height:
         return Patches(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0))
-    edges = np.sqrt(np.maximum(np.linspace(height, farthest, rings + 1) ** 2 - height**2, 0.0))
+    edges = np.sqrt(np.maximum(_ranges(height, farthest, size, max(_MOST // sectors, 1)) ** 2 - height**2, 0.0))
     # The middle of area: half of a ring lies on either side.
     radius = np.sqrt(0.5 * (edges[1:] ** 2 + edges[:-1] ** 2))
     angle = 2.0 * np.pi * (np.arange(sectors) + 0.5) / sectors
@@ -67,6 +74,19 @@ def _rings(geometry: Geometry, end: Floats, body: int, size: PatchSize) -> Patch
     point = foot + np.einsum("i,jk->ijk", radius, np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y))
     area = np.repeat(np.pi / sectors * np.diff(edges**2), sectors)
     return Patches(point.reshape(-1, 3), np.full(len(area), rows[0], np.int64), area)
+
+
+def _ranges(height: float, farthest: float, size: PatchSize, most: int) -> Floats:
+    """Return the distances [m] of the edges of at most so many rings: each a share of its distance wide, and at most
+    `size.range`."""
+    start = min(max(height, size.nearest), farthest)
+    turn = min(max(size.range / size.share, start), farthest)
+    finer = np.log(turn / start) / size.share
+    count = finer + (farthest - turn) / size.range
+    at = np.linspace(0.0, count, min(int(np.ceil(count)), most) + 1)
+    edges = np.where(at < finer, start * np.exp(size.share * at), turn + (at - finer) * size.range)
+    edges[0] = height
+    return edges
 
 
 def _triangles(geometry: Geometry, end: Floats, rows: Ints, size: PatchSize) -> Patches:
@@ -80,23 +100,39 @@ def _triangles(geometry: Geometry, end: Floats, rows: Ints, size: PatchSize) -> 
     longest = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     step = max(size.range, float(np.sqrt(geometry.area[rows].sum() / _MOST)))
     splits = np.maximum(np.ceil(longest / step), 1).astype(np.int64)
-    point, facet, area = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
+    corners, facet, area = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
     for n in np.unique(splits):
         some = np.flatnonzero(splits == n)
-        bary = _middles(int(n))
-        point.append(np.einsum("kc,ncx->nkx", bary, v[some]).reshape(-1, 3))
-        facet.append(np.repeat(rows[some], len(bary)))
-        area.append(np.repeat(geometry.area[rows[some]] / len(bary), len(bary)))
-    return Patches(np.concatenate(point), np.concatenate(facet), np.concatenate(area))
+        corners.append(_cut(v[some], int(n)))
+        facet.append(np.repeat(rows[some], n**2))
+        area.append(np.repeat(geometry.area[rows[some]] / n**2, n**2))
+    return _finer(np.concatenate(corners), np.concatenate(facet), np.concatenate(area), end, size)
 
 
-def _middles(n: int) -> Floats:
-    """Return the barycentric middles (n^2, 3) of a triangle cut into n^2 equal ones."""
+def _finer(corners: Floats, facet: Ints, area: Floats, end: Floats, size: PatchSize) -> Patches:
+    """Return triangles of corners (n, 3, 3) as patches, cut into four as long as they extend over more than a share of
+    their distance along the range, and are not too many."""
+    done, count = [], len(corners)
+    while True:
+        middle = corners.mean(axis=1)
+        away = np.linalg.norm(np.concatenate([corners, middle[:, None]], axis=1) - end, axis=2)
+        wide = np.ptp(away, axis=1) > size.share * np.maximum(away[:, 3], size.nearest)
+        count += 3 * int(wide.sum())
+        wide &= count <= _MOST
+        done.append(Patches(middle[~wide], facet[~wide], area[~wide]))
+        if not wide.any():
+            return Patches(*(np.concatenate(x) for x in zip(*((p.point, p.facet, p.area) for p in done), strict=True)))
+        corners, facet, area = _cut(corners[wide], 2), np.repeat(facet[wide], 4), np.repeat(0.25 * area[wide], 4)
+
+
+def _cut(corners: Floats, n: int) -> Floats:
+    """Return the corners (m n^2, 3, 3) of triangles (m, 3, 3) cut into n^2 equal ones each."""
     i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
-    up, down = i + j < n, i + j < n - 1
-    a = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3])
-    b = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3])
-    return np.column_stack([a, b, n - a - b]) / n
+    at = np.stack([i, j], axis=1)[:, None]
+    up, down = at + np.array([[0, 0], [1, 0], [0, 1]]), at + np.array([[1, 1], [0, 1], [1, 0]])
+    at = np.concatenate([up[i + j < n], down[i + j < n - 1]])
+    bary = np.concatenate([at, n - at.sum(axis=2, keepdims=True)], axis=2) / n
+    return np.einsum("kjc,mcx->mkjx", bary, corners).reshape(-1, 3, 3)
 
 
 def _seen(geometry: Geometry, end: Floats, patches: Patches) -> Patches:

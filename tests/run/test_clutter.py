@@ -122,7 +122,7 @@ def test_patches_of_a_wall_add_up_to_its_area():
     made = scene(None, [wall])
     geometry = geometry_of(made)
     which = np.array([m is not None for m in geometry.facets.materials.diffuse])
-    patches = visible_patches(geometry, np.array([0.0, 0.0, HEIGHT]), which, PatchSize(0.15, 0.03, 100.0))
+    patches = visible_patches(geometry, np.array([0.0, 0.0, HEIGHT]), which, PatchSize(0.15, 0.03, 100.0, 0.1))
     assert patches.area.sum() == pytest.approx(8.0, rel=1e-12)
     np.testing.assert_allclose(patches.point[:, 0], 7.9, atol=1e-6)
 
@@ -143,8 +143,8 @@ def test_equal_seeds_give_equal_bytes_and_other_seeds_others():
 
 def test_patches_are_finer_for_a_fast_radar():
     still, moving = (scene(None, velocity=(v, 0.0, 0.0)).radar for v in (0.0, 90.0))
-    assert patch_size(moving).angle < patch_size(still).angle
-    assert 90.0 * patch_size(moving).angle <= 0.5 * WAVE.rate_resolution + 1e-12
+    assert patch_size(moving, 0.1).angle < patch_size(still, 0.1).angle
+    assert 90.0 * patch_size(moving, 0.1).angle <= 0.5 * WAVE.rate_resolution + 1e-12
 
 
 def level_told(made, near):

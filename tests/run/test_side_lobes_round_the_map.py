@@ -14,7 +14,7 @@ LIMIT = WAVE.unambiguous_range
 
 def told(at, rate, shown_range, shown_rate, unfolded=0.0, wave=WAVE):
     """Return the truth of a cell that one path explains."""
-    shown = Shown(shown_range, shown_rate, shown_range, shown_rate + unfolded)
+    shown = Shown(shown_range, shown_rate, shown_rate + unfolded)
     return truth(echoes([at], rate), np.array([0]), 0, PointSpread(wave, "hann", "hann"), shown)
 
 

@@ -66,7 +66,7 @@ def result(p: Paths, where, text: str = "", differ=0.01) -> Result:
     found = Detections(
         range=where[:, 0], rate=where[:, 1], speed=where[:, 1] + 7.0, azimuth=np.full(n, np.nan),
         elevation=np.full(n, np.nan), ambiguous=np.zeros(n, bool), snr=np.full(n, 30.0), power=where[:, 2],
-        cell=np.array(cells, int).reshape(-1, 2),
+        cell=np.array(cells, int).reshape(-1, 2), beam=np.zeros((n, 0)),
     )  # fmt: skip
     spectrum = np.sqrt(power)[None].astype(np.complex64)
     rdmap = RangeDoppler(
