@@ -47,6 +47,9 @@ def ledger(
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         why = "the scene has no bodies" if weakest > 0.0 else "nothing was detected"
         found = {name: Entry(UNKNOWN, "none", why) for name in _NAMES}
+        if weakest > 0.0:
+            # A receiver elsewhere hears the transmitter all the same.
+            found["intra-frame motion"] = intra_frame(paths, geometry.facets, radar)
         # A corner whose last bounce is left out may be all that a scene has.
         return found | {"further bounces": _returning(paths, geometry, radar, model) or found["further bounces"]}
     # Those that take longest first: at the end threads wait for the last one.
