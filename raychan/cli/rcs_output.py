@@ -133,7 +133,8 @@ def uncertainties(mesh: Mesh, found: Rcs, tolerance: float, sure: bool) -> list[
     nothing = found.sigma == 0.0
     if nothing.any():
         lines.append(
-            f"{int(nothing.sum())} of {count} angles return nothing in physical optics: their error is unknown"
+            f"{int(nothing.sum())} of {count} angles return nothing in physical optics, or less than rounding leaves "
+            "of the returns of single faces: their error is unknown"
         )
     if lost := int((np.isnan(found.numerical_db) & ~nothing).sum()):
         lines.append(

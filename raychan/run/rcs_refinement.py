@@ -18,7 +18,7 @@ from raychan.channel.mesh_error import MeshError, creeping, has_edges
 from raychan.channel.terminator_error import terminator_error
 from raychan.run.rcs_doubt import Doubt
 from raychan.run.rcs_edges import edges_db
-from raychan.run.scattering import BodyLaunch, BySource
+from raychan.run.scattering import BodyLaunch, BySource, rounding
 from raychan.run.source_sums import SourceSums
 from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import Refinement
@@ -42,7 +42,8 @@ _CURVED = 0.01  # of the value, a radian of a rule's `phase`: error that launche
 _TERMINATOR = 0.25  # of 1 / k: PO's abrupt terminator on a sphere of any radius, against Mie's series
 _TUBES = 30_000  # tubes that a launch may always subdivide, if max_rays allow
 _NULL = 1e-4  # of the strongest polarisation, -80 dB: a change below it does not count
-_ROUNDING = 1e-12  # of the strongest: what is left where an amplitude is zero
+_ROUNDING = 16.0  # times what rounding may leave: below it is none. Amplitudes that are zero (the other polarisation,
+# edges on, nulls; plates, boxes, corners, cylinder, sphere; 1 and 77 GHz; no command) are 0.04 times it at most
 _COUNTS = 1e-3  # of the strongest bounce, -60 dB: one below it does not count
 _LEFT = 0.3  # of the tolerance: what the last changes of sources that are not traced again may add up to; not measured
 _HALF = 0.5  # of the tolerance: launches within it are refined no further for what the mesh leaves open; not measured
@@ -106,9 +107,8 @@ def refined(case: Case) -> Value:
     counted = np.flatnonzero(np.abs(by_bounce) > _COUNTS * np.abs(by_bounce).max(initial=0.0))
     most, further = int(counted.max(initial=-1)) + 1, _further(case, rules[0], by_bounce)
     matrix = amplitudes.sum(axis=0)
-    # A flat face that is seen square on returns its area over the wavelength.
-    whole = float(case.geometry.area.sum()) * case.frequency / C0
-    if abs(sums.value) <= _ROUNDING * max(np.abs(amplitudes).max(initial=0.0), whole):
+    left = rounding(case.geometry, (case.leg, case.out), case.frequency, sums.sums.amplitude)
+    if abs(sums.value) <= _ROUNDING * left:
         matrix[case.row, case.col], error_db, numerical_db = 0.0, np.nan, np.nan
     value, rays = complex(matrix[case.row, case.col]), case.rays - rays
     edges = edges_db(case.geometry, (case.leg, case.out), rules[0].wavenumber, value, (case.col, case.row))

@@ -157,5 +157,17 @@ def _reach(leg: Leg, out: Leg) -> float:
     return math.prod(float(np.linalg.norm(x.end)) for x in (leg, out) if not x.far)
 
 
+def rounding(geometry: Geometry, ends: tuple[Leg, Leg], frequency: float, amplitude: Complexes) -> float:
+    """Return what rounding may leave [m], about, where sources of amplitudes (s, 2, 2) [m] add up to nothing: their
+    phases are as fine as the longest way, and so is the slope of faces seen edge on."""
+    centre, radius, _ = geometry.body_spheres
+    farthest = float((np.linalg.norm(centre, axis=1) + radius).max())
+    way = sum(farthest + (0.0 if x.far else float(np.linalg.norm(x.end))) for x in ends)
+    brought = np.abs(amplitude).sum(axis=0).max(initial=0.0)
+    # A flat face that is seen square on returns its area over the wavelength.
+    whole = float(geometry.area.sum()) * frequency / C0
+    return float(np.finfo(float).eps * (2.0 * np.pi * frequency / C0 * way * brought + whole))
+
+
 def _basis(look: Floats) -> Complexes:
     return np.stack(theta_phi(look), axis=1).astype(np.complex128)

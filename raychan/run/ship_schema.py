@@ -27,6 +27,7 @@ from raychan.world.quantities import (
     Rudder,
     RudderRate,
     ScanStep,
+    Seed,
     ShipSpeed,
     SpotWidth,
     Spread,
@@ -208,7 +209,7 @@ class ShipRunTable(Table):
     """Table [run]."""
 
     duration_s: Voyage = 60.0
-    seed: Annotated[int, Field(strict=True, ge=0, lt=1 << 63)] = 0
+    seed: Seed = 0
 
 
 class ReplayTable(Table):

@@ -47,6 +47,9 @@ def ledger(
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         why = "the scene has no bodies" if weakest > 0.0 else "nothing was detected"
         found = {name: Entry(UNKNOWN, "none", why) for name in _NAMES}
+        if weakest > 0.0:
+            # A receiver elsewhere hears the transmitter all the same.
+            found["intra-frame motion"] = intra_frame(paths, geometry.facets, radar)
         # A corner whose last bounce is left out may be all that a scene has.
         return found | {"further bounces": _returning(paths, geometry, radar, model) or found["further bounces"]}
     # Those that take longest first: at the end threads wait for the last one.
@@ -114,12 +117,13 @@ def _returning(paths: Paths, geometry: Geometry, radar: Radar, model: Any) -> En
 
 def _by_ratio(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
     met = interactions(paths)
-    # The line of sight to a receiver elsewhere tells nothing of bounces.
-    orders = (bounces, bounces - 1) if bounces > 1 else (bounces,)
-    last, before = ([peak(paths, met == n, radar, settings) for n in orders] + [0.0])[:2]
-    if last == 0.0 or before == 0.0:
-        few = f"no path has {bounces} interactions" if bounces > 1 else "one bounce is modelled"
-        return Entry(UNKNOWN, "none", f"{few}: nothing to extrapolate from")
+    if bounces == 1:
+        # The line of sight to a receiver elsewhere tells nothing of bounces.
+        return Entry(UNKNOWN, "none", "one bounce is modelled: nothing to extrapolate from")
+    orders = bounces - 1, bounces
+    before, last = (peak(paths, met == n, radar, settings) for n in orders)
+    if empty := [str(n) for n, level in zip(orders, (before, last), strict=True) if level == 0.0]:
+        return Entry(UNKNOWN, "none", f"no path has {' or '.join(empty)} interactions: nothing to extrapolate from")
     ratio = min(last / before, 1.0)
     goes = going_on(paths, geometry, met == bounces)
     if not goes.any():

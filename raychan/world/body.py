@@ -87,6 +87,10 @@ class Body:
         if (self.mesh is None) == (self.shape is None):
             raise SceneError("keys do not fit together", key=self.name, allowed="either shape or mesh")
         try:
+            if isinstance(self.mesh, (str, Path)):
+                return load(self.mesh, self.unit, self.up, self.forward, self.scale, self.crease_deg)
+            # Without effect on a shape or a Mesh, but no less wrong beside them.
+            turn = matrix_of(self.unit, self.up, self.forward, self.scale)
             if self.shape is not None:
                 try:
                     return shapes.build(self.shape, listed(self.params))
@@ -94,9 +98,6 @@ class Body:
                     raise e.at(key="" if e.key == "shape" else "params") from None
             if isinstance(self.mesh, Mesh):
                 return self.mesh
-            if isinstance(self.mesh, (str, Path)):
-                return load(self.mesh, self.unit, self.up, self.forward, self.scale, self.crease_deg)
-            turn = matrix_of(self.unit, self.up, self.forward, self.scale)
             return from_trimesh(self.mesh, self.crease_deg, turn)
         except SceneError as e:
             raise e.at(key=self.name) from None

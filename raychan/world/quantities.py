@@ -125,6 +125,7 @@ Cells = Annotated[int, _WHOLE, _whole(limits.CELLS)]
 Bounces = Annotated[int, _WHOLE, _whole(limits.BOUNCES)]
 Layers = Annotated[int, _WHOLE, _whole(limits.LAYERS)]
 Tracings = Annotated[int, _WHOLE, _whole(limits.TRACINGS)]
+Seed = Annotated[int, _WHOLE, _whole(limits.SEED)]
 Rays = Annotated[int, _WHOLE, _whole(limits.RAYS)]
 RunSeconds = Annotated[float, _REAL, _within(limits.RUN_SECONDS)]
 MemoryMb = Annotated[float, _REAL, _within(limits.MEMORY_MB)]
@@ -134,6 +135,16 @@ Instant = Annotated[float, _REAL, _within(limits.INSTANT_US)]
 Deviation = Annotated[float, _REAL, _within(limits.DEVIATION_KHZ)]
 FrequencyOffset = Annotated[float, _REAL, _within(limits.OFFSET_HZ)]
 NoiseDensity = Annotated[float, _REAL, _within(limits.DBC_HZ)]
+ChirpErrors = Annotated[
+    list[Annotated[tuple[Instant, Deviation], _listed("[time us, error kHz], a pair of numbers")]],
+    Field(min_length=2),
+    _listed("2 or more pairs [time us, error kHz]"),
+]
+Mask = Annotated[
+    list[Annotated[tuple[FrequencyOffset, NoiseDensity], _listed("[offset Hz, level dBc/Hz], a pair of numbers")]],
+    Field(min_length=1),
+    _listed("1 or more pairs [offset Hz, level dBc/Hz]"),
+]
 Decibel = Annotated[float, _REAL, _within(limits.IMBALANCE_DB)]
 Celsius = Annotated[float, _REAL, _within(limits.CELSIUS)]
 Pressure = Annotated[float, _REAL, _within(limits.PRESSURE_HPA)]

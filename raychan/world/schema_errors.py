@@ -26,9 +26,7 @@ def checked(kind: type[Any], data: Any, file: Any = None, key: str = "") -> Any:
 _TYPES = {
     "string_type": "a text",
     "bool_type": "true or false",
-    "list_type": "a list",
-    "too_short": "a list of at least {min_length}",
-    "too_long": "a list of at most {max_length}",
+    "list_type": "a list of tables",
     "dict_type": "a table",
     "model_type": "a table",
     "model_attributes_type": "a table",

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from raychan.world.quantities import (
     Angle,
     Bits,
     Celsius,
+    ChirpErrors,
     Decibel,
     Density,
-    Deviation,
     Fog,
-    FrequencyOffset,
-    Instant,
-    NoiseDensity,
+    Mask,
     Power,
     Pressure,
     RainRate,
@@ -32,9 +30,9 @@ class ImpairmentsTable(BaseModel):
 
     model_config = _CLOSED
 
-    chirp_error_us_khz: Annotated[list[tuple[Instant, Deviation]], Field(min_length=2)] | None = None
+    chirp_error_us_khz: ChirpErrors | None = None
     """[time in the ramp, frequency error] pairs; linear in between, level beyond the ends."""
-    phase_noise_hz_dbc: Annotated[list[tuple[FrequencyOffset, NoiseDensity]], Field(min_length=1)] | None = None
+    phase_noise_hz_dbc: Mask | None = None
     """[offset, dBc/Hz] pairs of the oscillator's mask; linear in dB over log offset, level beyond the ends."""
     adc_bits: Bits | None = None
     adc_full_scale_dbm: Power | None = None

@@ -48,6 +48,14 @@ def test_plate_against_angle_is_its_two_sincs(pol):
     assert got.rays.max() <= 65_536
 
 
+@pytest.mark.parametrize("size", [100.0, 2000.0])
+def test_far_side_lobes_of_a_large_plate_are_its_two_sincs(size):
+    """At 2000 m this is 254 dB below the level of the plate seen square on."""
+    got = rcs(quad(po.rectangle(size, size)), F, 40.0, 20.0, max_rays=20_000)
+    assert db(got.sigma) == pytest.approx(db(sigma(po.rectangle_far(size, size, K, view(40.0, 20.0)[0]))), abs=1e-3)
+    assert got.error_db < 0.5
+
+
 def test_plate_edge_on_returns_nothing():
     got = rcs(quad(po.rectangle(0.1, 0.1)), F, 90.0)
     assert got.sigma < 1e-12

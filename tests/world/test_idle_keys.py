@@ -1,6 +1,7 @@
 """Keys without effect are told, and only those that are set to another value than their default."""
 
 import pytest
+import trimesh
 from support.scene_texts import PLATE
 
 import raychan as rc
@@ -53,6 +54,16 @@ def test_keys_of_radar_and_materials_without_effect_are_told(keys, said):
 def test_keys_of_bodies_without_effect_are_told(key, said):
     assert idle(PLATE + key) == [said]
     assert idle(PLATE) == []
+
+
+@pytest.mark.parametrize(("key", "value"), [("unit", "x"), ("up", "w"), ("forward", 3), ("scale", -1.0)])
+@pytest.mark.parametrize("given", [{"shape": "plate"}, {"mesh": rc.Body(name="a", shape="plate").geometry}])
+def test_a_value_is_refused_where_it_has_no_effect_as_where_it_has_one(key, value, given):
+    with pytest.raises(rc.SceneError) as idle_one:
+        rc.Scene(bodies=[rc.Body(name="b", **given, **{key: value})])
+    with pytest.raises(rc.SceneError) as read:
+        rc.Scene(bodies=[rc.Body(name="b", mesh=trimesh.creation.box(), **{key: value})])
+    assert str(idle_one.value) == str(read.value) and idle_one.value.key == f"bodies.b.{key}"
 
 
 def test_objects_from_python_are_told_alike():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 import tracemalloc
 from dataclasses import replace
 
@@ -12,12 +14,19 @@ from support.scene_texts import PLATE
 import raychan as rc
 from raychan.cli import invoke
 from raychan.processing.cfar import fitting_guard
-from raychan.run import rules
-from raychan.world import limits, schema, schema_antenna
+from raychan.run import rules, ship_schema
+from raychan.world import limits, schema, schema_antenna, schema_impairments, schema_materials
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit
 from raychan.world.quantities import Within
+from raychan.world.schema_errors import checked
 
+TABLES = [
+    table
+    for module in (schema, schema_antenna, schema_impairments, schema_materials, ship_schema)
+    for table in vars(module).values()
+    if isinstance(table, type) and issubclass(table, BaseModel)
+]
 LIMITS = {name: value for name, value in vars(limits).items() if isinstance(value, Limit)}
 
 
@@ -39,10 +48,7 @@ def figures(annotation, metadata=()):
 
 
 def test_every_number_of_the_schema_has_limits():
-    tables = [
-        t for t in (vars(schema) | vars(schema_antenna)).values() if isinstance(t, type) and issubclass(t, BaseModel)
-    ]
-    fields = [(t, name, f) for t in tables for name, f in t.model_fields.items()]
+    fields = [(t, name, f) for t in TABLES for name, f in t.model_fields.items()]
     numbers = [(f"{t.__name__}.{n}", m) for t, n, f in fields for m in figures(f.annotation, tuple(f.metadata))]
     assert len(numbers) > 50
     assert [name for name, m in numbers if not any(isinstance(x, Within) for x in m)] == []
@@ -97,6 +103,37 @@ def test_figures_beyond_limits_are_refused_by_key_with_what_is_allowed(scene, ch
     with pytest.raises(SceneError) as caught:
         rc.Scene.load(scene).override([change])
     assert caught.value.key == key and says in str(caught.value)
+
+
+PAIRS = [
+    ("phase_noise_hz_dbc", "1 or more pairs [offset Hz, level dBc/Hz]", "[offset Hz, level dBc/Hz], a pair of numbers"),
+    ("chirp_error_us_khz", "2 or more pairs [time us, error kHz]", "[time us, error kHz], a pair of numbers"),
+]
+
+
+@pytest.mark.parametrize(("name", "every", "one"), PAIRS)
+def test_a_list_of_pairs_is_refused_with_the_pair_that_is_allowed(scene, name, every, one):
+    key = f"radar.impairments.{name}"
+    for given, at, says in (("1", "", every), ("[]", "", every), ('["x"]', ".0", one), ("[[1],[2]]", ".0", one)):
+        with pytest.raises(SceneError) as caught:
+            rc.Scene.load(scene).override([f"{key}={given}"])
+        assert caught.value.key == key + at and str(caught.value).endswith(f"is not possible; allowed: {says}")
+
+
+def refusals():
+    """Yield what is said of each key of all tables that holds something else."""
+    for table, junk in itertools.product(TABLES, ("x", 1, [], ["x"], [1, 2], [[1]], [[1, 2, 3]], {"a": 1}, True, None)):
+        for key in table.model_fields:
+            try:
+                checked(table, {key: junk})
+            except SceneError as refused:
+                yield str(refused)
+
+
+def test_every_key_is_refused_with_more_than_a_type():
+    said = list(refusals())
+    assert len(said) > 1000
+    assert [x for x in said if re.search("allowed: (a valid |a list$|a list of at)", x)] == []
 
 
 def test_a_ball_too_fine_to_build_is_refused_at_once():
