@@ -1,4 +1,4 @@
-"""Between two parallel walls a wave may meet each several times: images in a row stand for all of its ways."""
+"""Between two walls, or two panes, a wave may meet each several times: images in a row stand for all of its ways."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.units import C0
 
 _WIDTH, _FAR = 3.0, 8.0
 
@@ -59,3 +60,52 @@ def test_a_ball_is_as_strong_over_each_image_as_a_point_of_its_cross_section() -
     for reflections, chain in enumerate(("target", "left>target", "left>right>target", "left>right>left>target")):
         far = _leg(reflections) - 0.1
         assert levels[chain] / levels["target"] == pytest.approx((_FAR - 0.1) / far, rel=0.03)
+
+
+def _slab(material: rc.Material, frequency: float, cosine: float) -> tuple[complex, complex]:
+    """Return reflection at a pane's face and transmission through its middle plane, E across the plane of incidence,
+    by the matrix of a layer."""
+    k = 2.0 * np.pi * frequency / C0
+    inside = np.sqrt(material.eps(frequency) - (1.0 - cosine**2) + 0j)
+    turn = k * material.thickness * inside
+    b = np.cos(turn) + 1j * np.sin(turn) * cosine / inside
+    c = 1j * inside * np.sin(turn) + np.cos(turn) * cosine
+    through = 2.0 * cosine / (cosine * b + c)
+    return (cosine * b - c) / (cosine * b + c), through * np.exp(1j * k * material.thickness * cosine)
+
+
+def test_a_point_behind_two_panes_is_seen_over_all_ways_to_and_fro_in_their_gap() -> None:
+    normal, gap, far = np.array([np.cos(0.6), np.sin(0.6), 0.0]), 0.11, 9.0
+    material = rc.Material(eps_r=6.0, sigma=0.05, thickness=0.004)
+    panes = [
+        rc.Body(
+            name=f"pane_{i}",
+            shape="plate",
+            params={"width": 6.0, "height": 6.0},
+            material=material,
+            position=np.array([1.3, 0.0, 1.0]) + i * gap * normal,
+            yaw_deg=np.degrees(0.6),
+        )
+        for i in range(2)
+    ]
+    point = rc.Body("target", shape="sphere", params={"radius": 0.01}, position=(far, 0.0, 1.0), rcs_dbsm=20.0)
+    wave = rc.Waveform(
+        carrier=77e9, bandwidth=150e6, chirp_duration=30e-6, repetition=40e-6, n_chirps=16, n_samples=128
+    )
+    radar = rc.Radar(wave, position=(0.0, 0.0, 1.0), antenna=rc.IsotropicAntenna(front=True, polarization="V"))
+    scene = rc.Scene(bodies=[point, *panes], radar=radar, model={"max_bounces": 5, "tolerance_db": 1.0})
+    paths = rc.simulate(scene).paths
+    rows = np.flatnonzero((paths.bodies == "target").any(axis=1))
+
+    def leg(trips: int) -> tuple[float, complex]:
+        way = np.array([far, 0.0, 0.0]) + 2.0 * trips * gap * normal
+        length = float(np.linalg.norm(way))
+        back, through = _slab(material, wave.middle, abs(way @ normal) / length)
+        return length, through**2 * back ** (2 * trips) * np.exp(-2j * np.pi * wave.carrier * length / C0) / length
+
+    pairs = [(a, b) for a in range(3) for b in range(3) if a + b < 3]
+    expected = sorted(((leg(a)[0] + leg(b)[0], leg(a)[1] * leg(b)[1]) for a, b in pairs), key=lambda x: x[0])
+    order = np.argsort(paths.length[rows])
+    assert paths.length[rows][order] == pytest.approx([x for x, _ in expected], abs=1e-9)
+    found = paths.amplitude[rows][order]
+    assert found / found[0] == pytest.approx([x / expected[0][1] for _, x in expected], abs=1e-6)
