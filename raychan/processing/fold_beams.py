@@ -24,6 +24,7 @@ _LEFT = 0.5  # of a power that at least one beam sees: at the edge of the half s
 WEAK = 0.25  # of the strongest beam: where CLEAR asks for more, cells are too weak for detections, and are not refined
 _SHRINKS = 3  # rounds of refining, each over half the distance: by parabolas, to 1e-5 of the power
 _TURNS = 4  # rounds in which several beams are refined, each on what the others leave (not measured)
+_BATCH = 1 << 18  # beams times cells, or elements, at once, 2 MB: weights of a beam are made once for all cells
 _CELLS = 200  # at least, for a thread to help: some milliseconds (not measured)
 
 
@@ -65,12 +66,7 @@ class Beams:
         """Return the power (h, c) of the strongest beam under each hypothesis, from what cells hold under it
         (t * a, c), and its cosines (h, c, 2). Refined are those that may be the strongest or as strong as it, of cells
         that are not weak."""
-        weights, cells = self.weights(self.at), np.arange(held[0].shape[1])
-        power, at = np.zeros((len(held), len(cells))), np.zeros((len(held), len(cells), 2))
-        for k, values in enumerate(held):
-            level = squared(weights @ values)
-            beam = level.argmax(axis=0)
-            power[k], at[k] = level[beam, cells], self.at[beam]
+        power, at = (x.reshape(len(held), -1, *x.shape[1:]) for x in self._tested(np.concatenate(held, axis=1)))
         top = power.max(axis=0)
         near = power >= _LEFT * top
         near &= (near.sum(axis=0) > 1) & (clear < WEAK * top)
@@ -88,13 +84,26 @@ class Beams:
         Args: values (c, t * a) of cells. Source: Li and Stoica 1996 (RELAX)."""
         values, rest = np.ascontiguousarray(values, np.complex64), np.empty(values.shape, np.complex64)
         left_by(rest, np.ascontiguousarray(at), values, self.places)
-        more = self.at[squared(self.weights(self.at) @ rest.T).argmax(axis=0)]
-        at, power = np.concatenate([at, more[:, None]], axis=1), np.empty(len(values))
+        at, power = np.concatenate([at, self._tested(rest.T)[1][:, None]], axis=1), np.empty(len(values))
 
         def fit(some: slice) -> None:
             fit_beams(power[some], at[some], values[some], *self._search, _TURNS, _SHRINKS)
 
         parallel_for(len(values), fit, _CELLS)
+        return power, at
+
+    def _tested(self, values: Complexes) -> tuple[Floats, Floats]:
+        """Return the power (c,) that the strongest of the beams sees of values (t * a, c), and its cosines (c, 2)."""
+        cells = np.arange(values.shape[1])
+        power, at = np.full(len(cells), -1.0), np.zeros((len(cells), 2))
+        some = max(1, _BATCH // max(values.shape))
+        for beams in (self.at[i : i + some] for i in range(0, len(self.at), some)):
+            wave = self.weights(beams) @ values
+            level = wave.real**2 + wave.imag**2
+            beam = level.argmax(axis=0)
+            found = level[beam, cells]
+            better = found > power
+            power[better], at[better] = found[better], beams[beam[better]]
         return power, at
 
     @cached_property

@@ -30,6 +30,7 @@ _LOADING = 1e-9  # of the mean eigenvalue: keeps the inverse of a covariance wit
 _FEW_LOADING = 1e-2  # the same for fewer than 2 p snapshots (Reed, Mallett and Brennan 1974), whose least eigenvalues
 # are chance: echoes 20 dB weaker than the strongest are lost (not measured)
 _ONE = 0.02  # beam widths: twins, refined each by itself, are nearer (1/128 of a step, then a parabola)
+_ON = 0.1  # of _ONE: the nearest twins lie on each other (not measured)
 _BATCH = 1 << 21  # steering values at once, 32 MB
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
 
@@ -86,13 +87,22 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     start = np.stack([grid.u[m[order]], grid.w[n[order]]], axis=1)
     found, heights = climb(form, aperture, start, grid)
     found = aperture.canonical(found[np.argsort(-heights, kind="stable")])
-    return (_once(found, aperture) if len(aperture.skewed) else found)[:count]
+    return _once(found, aperture, count) if len(aperture.skewed) else found[:count]
 
 
-def _once(found: Floats, aperture: Aperture) -> Floats:
-    """Return directions (k, 2) without those that an earlier one is the twin of."""
-    near = np.tril(aperture.apart(found[:, None], found[None]) < _ONE, -1)
-    return found[~near.any(axis=1)]
+def _once(found: Floats, aperture: Aperture, count: int) -> Floats:
+    """Return the first `count` of directions (k, 2) that are not twins of one before."""
+    kept: list[Floats] = []
+    twin = np.zeros(len(found), bool)
+    while len(found) and len(kept) < count:
+        if not twin[0]:
+            kept.append(found[0])
+        apart = aperture.apart(found, found[0])
+        twin |= apart < _ONE
+        # What lies on it is the twin of no others: of thousands a few places are left.
+        further = apart > _ON * _ONE
+        found, twin = found[further], twin[further]
+    return np.array(kept).reshape(-1, 2)
 
 
 def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Floats:

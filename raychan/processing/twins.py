@@ -28,7 +28,7 @@ _SIGMAS = 3.5  # of a cosine: an echo is pushed farther over an end in 0.02 % of
 _PER_BEAM = 4  # directions tried per beam width of arrays with depth
 _NEAR = 0.3  # of the power: a twin between the directions tried shows that much (cos^4(pi/8) of HALF, and a margin)
 _SHRINKS = 8  # rounds of refining, each over half the distance: to 1/512 of a beam width, 4e-5 of the power
-_BATCH = 1 << 20  # directions tried times echoes at once
+_BATCH = 1 << 20  # directions tried, or grating lobes, times echoes at once
 
 
 def ambiguous(aperture: Aperture, cosines: Floats, snr: Floats | None = None) -> Bools:
@@ -51,6 +51,14 @@ def neighbours(aperture: Aperture, at: Floats) -> Ints:
 
 def _of_flat(aperture: Aperture, cosines: Floats, snr: Floats) -> Bools:
     """Return what `ambiguous` does of an array whose twins are its grating lobes away."""
+    out, blocks = np.zeros(len(cosines), bool), -(-len(cosines) * len(aperture.lobes.at) // _BATCH)
+    for some in np.array_split(np.arange(len(cosines)), max(1, blocks)):
+        out[some] = _within_lobes(aperture, cosines[some], snr[some])
+    return out
+
+
+def _within_lobes(aperture: Aperture, cosines: Floats, snr: Floats) -> Bools:
+    """Return what `_of_flat` does of directions few enough to be held with all lobes at once."""
     lobes = aperture.lobes
     enough = _alike(lobes.lost, snr[:, None])
     twin = cosines[:, None] + lobes.at

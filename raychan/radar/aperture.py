@@ -244,11 +244,16 @@ class Aperture:
         out = np.asarray(cosines - turns * period)
         if not len(self.skewed):
             return out
-        tried = out[..., None, :] - np.concatenate([np.zeros((1, 2)), self.skewed])
-        size = (tried**2).sum(axis=-1)
-        size[..., 0] -= SAME_EDGE  # of equal ones that which was given
-        chosen = size.argmin(axis=-1)[..., None, None]
-        return np.asarray(np.take_along_axis(tried, chosen, axis=-2)[..., 0, :])
+        away, nearest = self._skewed_tree.query(out)
+        beyond = away**2 < (out**2).sum(axis=-1) - SAME_EDGE  # of equal ones that which was given
+        return np.where(beyond[..., None], out - self.skewed[nearest], out)
+
+    @cached_property
+    def _skewed_tree(self) -> Any:
+        """The skewed lobes by their place: thousands, where few elements are wide in wavelengths."""
+        from scipy.spatial import cKDTree  # takes long to import, and most arrays need none of it
+
+        return cKDTree(self.skewed)
 
     def visible(self, cosines: Floats) -> Floats:
         """Return the directions of real waves that look like cosines (n, 2), or else the nearest at the edge.

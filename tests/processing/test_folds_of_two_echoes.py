@@ -3,6 +3,8 @@ own; and what a few beams explain."""
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from support.echoes import echoes, make_radar
@@ -72,3 +74,21 @@ def test_two_beams_explain_two_plane_waves_and_one_does_not():
     assert (one[0] < 0.9 * total).all()
     assert two == pytest.approx(total, rel=1e-3)
     assert np.sort(directions[..., 0]) == pytest.approx(np.array([[-0.1, 0.1]] * 2), abs=0.005)
+
+
+def test_the_strongest_of_all_beams_of_a_wide_area_is_found_and_few_are_held_at_once():
+    """The weights of all 190,000 beams are 18 MB, and more while they are made."""
+    places = np.random.default_rng(7).uniform(-0.16, 0.16, (6, 3)) * [0.0, 1.0, 1.0]
+    wave = Waveform(77e9, 2e8, 12e-6, n_chirps=64, n_samples=64)
+    senders = np.array([[0.0, 0.05, 0.0], [0.0, -0.03, 0.0]])
+    beams = Beams.of(make_radar(wave, elements=places, tx_elements=senders, multiplexing="ddm"))
+    values = beams.weights(np.array([[0.31, -0.22], [-0.05, 0.4], [0.9, 0.1]])).conj().T
+    assert len(beams.at) > 190_000 and not len(beams.array.skewed)
+    tracemalloc.start()
+    power, at = beams.strongest([values, 0.5 * values], np.inf)
+    held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert held < 24e6
+    level = squared(beams.weights(beams.at) @ values)
+    assert power == pytest.approx(np.outer([1.0, 0.25], level.max(axis=0)), rel=1e-5)
+    assert (at == beams.at[level.argmax(axis=0)]).all()

@@ -40,6 +40,19 @@ def test_on_a_skewed_lattice_all_twins_count_and_the_nearest_to_boresight_is_giv
         assert found.ambiguous.tolist() == [len(seen) > 1]
 
 
+def test_three_receivers_wide_in_wavelengths_give_the_nearest_to_boresight_of_their_dual_lattice():
+    """Places p are a lattice of three: all cosines that differ by whole multiples of the rows of inv(p) look alike."""
+    aperture = Aperture(26.0 * np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.23], [0.0, 0.31, 1.0]]), 1.0)
+    twins = np.indices((121, 121)).reshape(2, -1).T - 60
+    away = twins @ np.linalg.inv(aperture.elements[1:, 1:]).T
+    assert len(aperture.skewed) > 5000
+    for true in np.array([[0.11, 0.23], [-0.4, 0.05]]):
+        alike = true + away
+        found = by_turns(aperture.steering(true[None]), aperture, 1)
+        np.testing.assert_allclose(found, alike[[(alike**2).sum(axis=1).argmin()]], atol=1e-6)
+        assert ambiguous(aperture, found).all()
+
+
 def test_two_echoes_on_a_skewed_lattice_are_two_and_none_is_told_twice():
     aperture = Aperture(QUINCUNX, 1.0)
     true = np.array([[0.15, 0.1], [-0.3, -0.25]])
