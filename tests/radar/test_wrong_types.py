@@ -159,5 +159,7 @@ def test_scenes_tell_of_interferers_and_materials_of_the_wrong_type():
     with pytest.raises(SceneError, match="diffuse: 3 is not possible; allowed: a Diffuse, or None"):
         rc.Material(diffuse=3)
     empty = "[radar.waveform]\nbandwidth_mhz = 500.0\nchirp_us = 20.0\n[radar.impairments]\nphase_noise_hz_dbc = []\n"
-    with pytest.raises(SceneError, match=r"phase_noise_hz_dbc: \[\] is not possible; allowed: a list of at least 1"):
+    with pytest.raises(
+        SceneError, match=r"phase_noise_hz_dbc: \[\] is not possible; allowed: 1 or more pairs \[offset"
+    ):
         rc.Scene.from_text(empty)
