@@ -26,7 +26,8 @@ Bools = NDArray[np.bool_]
 Stop = tuple[Floats, Floats, int, int]
 
 _LEAST_AREA = 0.5  # m^2 of a mirror; at street distances smaller faces lie within a few Fresnel zones
-_MOST = 24  # mirrors kept as seen from one end: bounds the number of legs; not measured
+_BEFORE = 1e-6  # m: what lies no farther before a mirror lies in its plane, or shares an edge with it: rounding
+_MOST = 24  # mirrors kept as seen from one end, and as many that face away: bounds the legs; not measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,30 +201,32 @@ class Leg:
         return found
 
 
-def planes_that_mirror(geometry: Geometry, end: Floats) -> list[Mirror]:
-    """Return the mirrors that `end` (3,) [m] could use: ground planes, and the plane faces of at least half a square
-    metre that look largest from there. Smaller faces only scatter."""
+def planes_that_mirror(geometry: Geometry, end: Floats) -> tuple[list[Mirror], list[Mirror]]:
+    """Return the mirrors that `end` (3,) [m] lights, ground planes and the plane faces of at least half a square metre
+    that look largest from there, and as many that face away from it, which only other mirrors light. Smaller faces
+    only scatter."""
     f = geometry.facets
     if not len(f.vertices):
-        return []
+        return [], []
     usable = ~geometry.curved & (f.role[f.body] != BLOCKER)
     area = np.bincount(geometry.plane, weights=np.where(usable, geometry.area, 0.0))
     largest, large = np.full(len(area), -1, np.int64), area >= _LEAST_AREA
     rows = np.flatnonzero(large.take(geometry.plane))
     order = rows[np.argsort(geometry.area[rows], kind="stable")]
     largest[geometry.plane[order]] = order
-    found: list[tuple[float, Mirror]] = []
+    found: tuple[list[tuple[float, Mirror]], ...] = [], []
     for plane in np.flatnonzero(large):
         facet = int(largest[plane])
         body = int(f.body[facet])
         height = float((end - geometry.first[facet]) @ geometry.normal[facet])
-        if height < 0.0 and not geometry.both_sides[facet]:
+        away = height < 0.0 and not geometry.both_sides[facet]
+        if away and f.role[body] == MIRROR:
             continue
-        mirror = Mirror.of(geometry, facet, 1.0 if height >= 0.0 else -1.0)
+        mirror = Mirror.of(geometry, facet, 1.0 if height >= 0.0 or away else -1.0)
         view = area[plane] * abs(height) / np.linalg.norm(end - mirror.centre) ** 3
-        found.append((np.inf if f.role[body] == MIRROR else view, mirror))
-    found.sort(key=lambda pair: -pair[0])
-    return [m for _, m in found[:_MOST]]
+        found[away].append((np.inf if f.role[body] == MIRROR else view, mirror))
+    lit, others = ([m for _, m in sorted(x, key=lambda pair: -pair[0])[:_MOST]] for x in found)
+    return lit, others
 
 
 def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
@@ -233,8 +236,8 @@ def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None =
     legs = [direct]
     if bounces < 1:
         return legs
-    mirrors = planes_that_mirror(geometry, direct.end)
-    everything = mirrors if bounces < 2 else _both_sides(geometry, mirrors)
+    mirrors, away = planes_that_mirror(geometry, direct.end)
+    everything = mirrors if bounces < 2 else _both_sides(geometry, mirrors) + away
     last = [direct]
     for _ in range(bounces):
         last = [more for leg in last for more in _longer(leg, everything)]
@@ -249,10 +252,12 @@ def _both_sides(geometry: Geometry, mirrors: list[Mirror]) -> list[Mirror]:
 
 
 def _longer(leg: Leg, mirrors: list[Mirror]) -> list[Leg]:
-    """Return the legs over one mirror more: one before which the image lies, of another plane than the last, to whose
-    rectangle rays run over all others."""
-    last, image = (leg.mirrors[-1].facet if leg.mirrors else -1), leg.image
-    found = [m for m in mirrors if m.facet != last and (image - m.point) @ m.normal > 1e-9]
+    """Return the legs over one mirror more: one before which the image lies and that is not all behind the last one, to
+    whose rectangle rays run over all others."""
+    found = [m for m in mirrors if (leg.image - m.point) @ m.normal > 1e-9]
+    if leg.mirrors:
+        last = leg.mirrors[-1]
+        found = [m for m in found if ((m.corners - last.point) @ last.normal).max() > _BEFORE]
     if leg.mirrors and found:
         halves = np.concatenate([m.corners[[[0, 1, 2], [0, 2, 3]]] for m in found])
         one, other = leg.may_leave(halves).reshape(-1, 2).T

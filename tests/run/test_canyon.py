@@ -109,3 +109,34 @@ def test_a_point_behind_two_panes_is_seen_over_all_ways_to_and_fro_in_their_gap(
     assert paths.length[rows][order] == pytest.approx([x for x, _ in expected], abs=1e-9)
     found = paths.amplitude[rows][order]
     assert found / found[0] == pytest.approx([x / expected[0][1] for _, x in expected], abs=1e-6)
+
+
+def test_a_point_behind_a_lorry_is_seen_over_a_wall_and_the_back_of_the_lorry() -> None:
+    lorry = rc.Body(
+        name="lorry",
+        shape="box",
+        params={"length": 2.0, "width": 2.0, "height": 3.0},
+        position=(9.0, 2.0, 1.0),
+        material="pec",
+    )
+    wall = rc.Body(
+        name="wall",
+        shape="plate",
+        params={"width": 10.0, "height": 4.0},
+        position=(16.0, 2.0, 1.0),
+        yaw_deg=180.0,
+        material="pec",
+    )
+    point = rc.Body("target", shape="sphere", params={"radius": 0.01}, position=(13.0, 2.4, 1.0), rcs_dbsm=10.0)
+    wave = rc.Waveform(
+        carrier=77e9, bandwidth=150e6, chirp_duration=30e-6, repetition=40e-6, n_chirps=16, n_samples=128
+    )
+    radar = rc.Radar(wave, position=(0.0, 0.0, 1.0), antenna=rc.IsotropicAntenna())
+    model = {"max_bounces": 5, "tolerance_db": 1.0}
+    paths = rc.simulate(rc.Scene(bodies=[lorry, wall, point], radar=radar, model=model)).paths
+    row = np.flatnonzero((paths.bodies == "target").any(axis=1))
+    # Mirrored at the wall the radar is at x = 32, and that at the lorry's back at x = -12.
+    length = float(np.hypot(13.0 + 12.0, 2.4))
+    assert paths.length[row] == pytest.approx([2.0 * length], abs=1e-9)
+    level = 10.0 * (C0 / wave.middle) ** 2 / (4.0 * np.pi) ** 3 / length**4
+    assert np.abs(paths.amplitude[row]) ** 2 == pytest.approx([level], rel=1e-3)

@@ -17,7 +17,8 @@ _POINTS = 2000
 
 
 def _plates(rng: np.random.Generator) -> rc.Scene:
-    """Return four plates about the radar, two of them opposite to each other, and one of glass."""
+    """Return four plates about the radar, two of them opposite to each other, one of glass, and a box, of which it sees
+    the front only."""
     wave = rc.Waveform(24e9, 500e6, 15e-6, n_chirps=8, n_samples=64)
     bodies = []
     for k, angle in enumerate([0.0, 180.0, *rng.uniform(0.0, 360.0, 2)]):
@@ -30,6 +31,8 @@ def _plates(rng: np.random.Generator) -> rc.Scene:
                 f"p{k}", shape="plate", params=size, position=place, yaw_deg=yaw, pitch_deg=pitch, material=material
             )
         )
+    box, place = {"length": 0.8, "width": 1.0, "height": 1.2}, (1.2, 0.4, 0.0)
+    bodies.append(rc.Body("box", shape="box", params=box, position=place, yaw_deg=rng.uniform(0.0, 90.0)))
     return rc.Scene(bodies=bodies, radar=rc.Radar(wave, position=(0.0, 0.0, 0.0)))
 
 
@@ -55,17 +58,19 @@ def test_no_chain_of_mirrors_is_missing_over_which_a_ray_comes_to_a_point(seed: 
     geometry, end = geometry_of(_plates(rng)), np.zeros(3)
     there = {leg.mirrors for leg in legs_over(geometry, end, _BOUNCES)}
     points = rng.uniform(-4.0, 4.0, (_POINTS, 3))
-    front = planes_that_mirror(geometry, end)
-    mirrors, twice, missing = [*front, *(m.turned() for m in front if geometry.both_sides[m.facet])], 0, list[str]()
+    lit, away = planes_that_mirror(geometry, end)
+    mirrors = [*lit, *(m.turned() for m in lit if geometry.both_sides[m.facet]), *away]
+    twice, behind, missing = 0, 0, list[str]()
     own = {(m.facet, tuple(m.normal)): m for leg in there for m in leg}
     for count in range(1, _BOUNCES + 1):
         for chain in product(mirrors, repeat=count):
             known = tuple(own.get((m.facet, tuple(m.normal)), m) for m in chain)
             if _comes(end, chain, points).any():
                 twice += len({m.facet for m in chain}) < count
+                behind += any(m in away for m in chain)
                 missing += [" > ".join(str(m.body) for m in chain)] if known not in there else []
     assert missing == []
-    assert twice > 0
+    assert twice > 0 and behind > 0
 
 
 def test_a_wave_does_not_meet_the_plane_again_that_it_has_just_left() -> None:
