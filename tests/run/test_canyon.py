@@ -116,7 +116,7 @@ def test_a_point_behind_a_lorry_is_seen_over_a_wall_and_the_back_of_the_lorry() 
         name="lorry",
         shape="box",
         params={"length": 2.0, "width": 2.0, "height": 3.0},
-        position=(9.0, 2.0, 1.0),
+        position=(9.0, 2.0, -0.5),
         material="pec",
     )
     wall = rc.Body(
