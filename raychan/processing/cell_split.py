@@ -25,6 +25,7 @@ _LITTLE = 1e-3  # of a peak's power: what an echo may show there without its dir
 _HIDDEN = (
     10.0  # on what echoes leave in their cell: the fit takes some of an echo that was not told apart (not measured)
 )
+_STEPS = ((-1, 0), (1, 0)), ((0, -1), (0, 1))  # to the map cells beside one, along rate and range
 _SAME_BEAM = 0.5  # beam widths: nearer directions of neighbouring peaks are one echo (not measured)
 
 
@@ -211,7 +212,7 @@ class Splitter:
         if not (np.abs(at - reach) < reach).all():
             return None
         cell = np.array([v[tuple(at)], r[tuple(at)]])
-        beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
+        beside = np.array([[self._next(level, v, r, at, step) for step in axis] for axis in _STEPS])
         shift, power = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
@@ -220,6 +221,15 @@ class Splitter:
         crest = bool(level[at[0] - 1 : at[0] + 2, at[1] - 1 : at[1] + 2].max() <= shown)
         fit = misfit, unsure, held.weights[k], shown
         return Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], *fit, aside, crest)
+
+    def _next(self, level: Floats, v: Ints, r: Ints, at: Ints, step: tuple[int, int]) -> float:
+        """Return the level a step beside `at` (2,), of map cells v, r (k, l) with levels (k, l) in a beam."""
+        here, there = tuple(at), tuple(at + step)
+        own, other = (v[here], r[here]), (v[there], r[there])
+        if not self._folded_otherwise(np.array(other), np.array(own)):
+            return float(level[there])
+        # Held under another fold: the mean over antennas tells by how much less is there.
+        return float(level[here] * min(1.0, self.map.power[other] / self.map.power[own]))
 
     def _same(self, one: Row, other: Row) -> bool:
         """Return whether echoes of neighbouring peaks are one."""

@@ -61,3 +61,36 @@ def test_levels_at_the_middle_of_the_array_are_said_to_be_such(tmp_path, capsys)
         del held["beams"]
     assert invoke(["explain", str(tmp_path / "out"), "--detection", "1"]) == 0
     assert "levels of paths are those at the middle of the array" in capsys.readouterr().out
+
+
+def folded(multiplexing, azimuths, rate):
+    """Return by how much (n,) [dB] paths are off the levels of echoes of two points in a cell, one folded once more."""
+    wave = rc.Waveform(77e9, 300e6, 20e-6, repetition=25e-6, n_chirps=96, n_samples=128)
+    lines = [[(0.0, k * step * wave.wavelength, 0.0) for k in range(n)] for n, step in ((3, 2.0), (4, 0.5))]
+    radar = rc.Radar(
+        wave, position=(0.0, 0.0, 1.0), power=1.0, noise=False, elements=lines[1], tx_elements=lines[0],
+        multiplexing=multiplexing, antenna=rc.IsotropicAntenna(),
+    )  # fmt: skip
+    bodies = []
+    for k, (azimuth, rcs) in enumerate(zip(np.radians(azimuths), (10.0, 6.0), strict=True)):
+        way = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        velocity = (rate + k * wave.wavelength / (2.0 * radar.slots * wave.repetition)) * way
+        point = {"radius": 0.01}, tuple(11.0 * way + (0.0, 0.0, 1.0)), velocity
+        bodies.append(
+            rc.Body(f"t{k}", shape="sphere", params=point[0], position=point[1], velocity=point[2], rcs_dbsm=rcs)
+        )
+    result = rc.simulate(rc.Scene(bodies=bodies, radar=radar, model={"max_bounces": 1}))
+    return off(result)[[why.label == "direct" for why in result.provenance]]
+
+
+@pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
+def test_echoes_of_one_cell_and_other_folds_have_the_levels_of_their_paths(multiplexing):
+    cases = (
+        ((-15.0, -23.0), 3.62),
+        ((23.0, -11.0), 3.31),
+        ((0.6, 6.2), 5.71),
+        ((-17.0, 1.0), 3.94),
+        ((5.0, -30.0), -2.0),
+    )
+    away = np.abs(np.concatenate([folded(multiplexing, *case) for case in cases]))
+    assert len(away) >= 6 and away.max() < 0.1
