@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from raychan.records import Paths
 from raychan.run.mechanisms import interactions
-from raychan.run.mirrored_rays import NARROW, Followed, followed, meets, of_each, unit
+from raychan.run.mirrored_rays import NARROW, Followed, followed, meets, of_each
+from raychan.tracing.tubes import unit
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, NONE, REFLECT, TRANSMIT, Facets, Paths
 from raychan.run.ledger import NOTHING, Entry
+from raychan.tracing.tubes import unit
 from raychan.units import C0, db
 
 Floats = NDArray[np.float64]
@@ -80,13 +81,9 @@ def _across(paths: Paths, sight: Ints, velocity: Floats, radar: Radar) -> Floats
     for slot, kind in enumerate(way.kind[sight].T):
         at = np.flatnonzero(kind == REFLECT)
         before, here, after = stops[at, slot : slot + 3].swapaxes(0, 1)
-        normal = _unit(_unit(after - here) - _unit(here - before))
+        normal = unit(unit(after - here) - unit(here - before))
         closing = np.einsum("ni,ni->n", velocity[way.body[sight[at], slot]] - image[at], normal)
         image[at] += 2.0 * closing[:, None] * normal
     relative = radar.rx_motion - image
     along = np.einsum("ni,ni->n", relative, way.arrival[sight])
     return np.asarray(np.linalg.norm(relative - along[:, None] * way.arrival[sight], axis=1))
-
-
-def _unit(v: Floats) -> Floats:
-    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))

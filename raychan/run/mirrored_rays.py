@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import LAYER
+from raychan.tracing.tubes import unit
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -100,8 +101,3 @@ def of_each(group: Ints) -> Ints:
     groups = max(int(np.count_nonzero(count)), 1)
     every = np.repeat(-(-count // max(RAYS // groups, 1)), count)
     return rows[place % every == 0]
-
-
-def unit(v: Floats) -> Floats:
-    """Return vectors (m, 3) of length 1; those of none stay."""
-    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1), 1e-300)[:, None])

@@ -201,32 +201,30 @@ class Leg:
         return found
 
 
-def planes_that_mirror(geometry: Geometry, end: Floats) -> tuple[list[Mirror], list[Mirror]]:
-    """Return the mirrors that `end` (3,) [m] lights, ground planes and the plane faces of at least half a square metre
-    that look largest from there, and as many that face away from it, which only other mirrors light. Smaller faces
-    only scatter."""
+def planes_that_mirror(geometry: Geometry, end: Floats, away: bool = False) -> list[Mirror]:
+    """Return the mirrors that `end` (3,) [m] lights: ground planes, and the plane faces of at least half a square metre
+    that look largest from there. Smaller faces only scatter. Or those that face `away`, which only others light."""
     f = geometry.facets
     if not len(f.vertices):
-        return [], []
+        return []
     usable = ~geometry.curved & (f.role[f.body] != BLOCKER)
     area = np.bincount(geometry.plane, weights=np.where(usable, geometry.area, 0.0))
     largest, large = np.full(len(area), -1, np.int64), area >= _LEAST_AREA
     rows = np.flatnonzero(large.take(geometry.plane))
     order = rows[np.argsort(geometry.area[rows], kind="stable")]
     largest[geometry.plane[order]] = order
-    found: tuple[list[tuple[float, Mirror]], ...] = [], []
+    found: list[tuple[float, Mirror]] = []
     for plane in np.flatnonzero(large):
         facet = int(largest[plane])
         body = int(f.body[facet])
         height = float((end - geometry.first[facet]) @ geometry.normal[facet])
-        away = height < 0.0 and not geometry.both_sides[facet]
-        if away and f.role[body] == MIRROR:
+        if away != (height < 0.0 and not geometry.both_sides[facet]) or (away and f.role[body] == MIRROR):
             continue
         mirror = Mirror.of(geometry, facet, 1.0 if height >= 0.0 or away else -1.0)
         view = area[plane] * abs(height) / np.linalg.norm(end - mirror.centre) ** 3
-        found[away].append((np.inf if f.role[body] == MIRROR else view, mirror))
-    lit, others = ([m for _, m in sorted(x, key=lambda pair: -pair[0])[:_MOST]] for x in found)
-    return lit, others
+        found.append((np.inf if f.role[body] == MIRROR else view, mirror))
+    found.sort(key=lambda pair: -pair[0])
+    return [m for _, m in found[:_MOST]]
 
 
 def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None = None) -> list[Leg]:
@@ -236,11 +234,12 @@ def legs_over(geometry: Geometry, end: Floats, bounces: int, beam: Beam | None =
     legs = [direct]
     if bounces < 1:
         return legs
-    mirrors, away = planes_that_mirror(geometry, direct.end)
-    everything = mirrors if bounces < 2 else _both_sides(geometry, mirrors) + away
+    mirrors = planes_that_mirror(geometry, direct.end)
+    if bounces > 1:
+        mirrors = _both_sides(geometry, mirrors) + planes_that_mirror(geometry, direct.end, away=True)
     last = [direct]
     for _ in range(bounces):
-        last = [more for leg in last for more in _longer(leg, everything)]
+        last = [more for leg in last for more in _longer(leg, mirrors)]
         legs += last
     return legs
 

@@ -140,7 +140,7 @@ ChirpErrors = Annotated[
     Field(min_length=2),
     _listed("2 or more pairs [time us, error kHz]"),
 ]
-Mask = Annotated[
+PhaseNoiseMask = Annotated[
     list[Annotated[tuple[FrequencyOffset, NoiseDensity], _listed("[offset Hz, level dBc/Hz], a pair of numbers")]],
     Field(min_length=1),
     _listed("1 or more pairs [offset Hz, level dBc/Hz]"),

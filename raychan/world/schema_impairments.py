@@ -14,7 +14,7 @@ from raychan.world.quantities import (
     Decibel,
     Density,
     Fog,
-    Mask,
+    PhaseNoiseMask,
     Power,
     Pressure,
     RainRate,
@@ -32,7 +32,7 @@ class ImpairmentsTable(BaseModel):
 
     chirp_error_us_khz: ChirpErrors | None = None
     """[time in the ramp, frequency error] pairs; linear in between, level beyond the ends."""
-    phase_noise_hz_dbc: Mask | None = None
+    phase_noise_hz_dbc: PhaseNoiseMask | None = None
     """[offset, dBc/Hz] pairs of the oscillator's mask; linear in dB over log offset, level beyond the ends."""
     adc_bits: Bits | None = None
     adc_full_scale_dbm: Power | None = None

@@ -58,7 +58,7 @@ def test_no_chain_of_mirrors_is_missing_over_which_a_ray_comes_to_a_point(seed: 
     geometry, end = geometry_of(_plates(rng)), np.zeros(3)
     there = {leg.mirrors for leg in legs_over(geometry, end, _BOUNCES)}
     points = rng.uniform(-4.0, 4.0, (_POINTS, 3))
-    lit, away = planes_that_mirror(geometry, end)
+    lit, away = (planes_that_mirror(geometry, end, x) for x in (False, True))
     mirrors = [*lit, *(m.turned() for m in lit if geometry.both_sides[m.facet]), *away]
     twice, behind, missing = 0, 0, list[str]()
     own = {(m.facet, tuple(m.normal)): m for leg in there for m in leg}
