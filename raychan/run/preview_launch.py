@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from raychan.geometry.patch_cuts import edge_to_cut, halved
 from raychan.parallel import run_pair
+from raychan.poses import sizes
 from raychan.radar.beam_table import Beam
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, SCATTERER, Points, Routes
@@ -31,7 +32,7 @@ from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import Batch, Launch
 from raychan.tracing.stats import Stats
 from raychan.tracing.tubes import MOST_BEND, Refinement, Tubes, launch_tubes
-from raychan.tracing.visibility import centre_visibility
+from raychan.tracing.visibility import centre_visibility, corner_visibility
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -50,6 +51,11 @@ _SEEDS = 1.0  # facets, by their bounds, before it is known whether they are see
 _SEEN = 2.0  # tubes that are seen, by their bounds
 _SURE = 3.0  # tubes that are seen, by their amplitudes
 _CLASSES, _A_CLASS = 64, 4.0  # of sizes below the threshold, and of these to a factor of two; not measured
+# Flat facets whose bound is stronger than so much of the floor are halved, so often at most, where they are seen in
+# part: posts of a guard rail, 18 dB too weak of 4.9 stated behind their beam, are 2.4 dB too strong, legs of a bench 8
+# too strong, now 2 too weak; of 104 echoes of lone benches, rails, people, racks, cars and posts, 27 dB and more, the
+# worst is 6.9 dB off, was 10.2. The urban street takes 8 % more; halved whatever their bound, 2.7 times (no command).
+_STRONG, _HALVED = 1.0, 3
 _CUTS = 12  # times a facet is halved at most: 64 parts a side, of a wall of 40 m no part is longer than 0.6 m
 
 
@@ -143,15 +149,14 @@ class _Tubes:
         allowed = reachable(geometry, leg) & (geometry.piece_role == SCATTERER)
         allowed[leg.pieces(geometry)] = False
         facet = seed_facets(geometry, leg, allowed)
-        counts = np.zeros(len(facet), bool)
+        counts, strong = np.zeros((2, len(facet)), bool)
         for bound, length in facet_bounds(geometry, leg, outs, facet, rule.wavenumber):
             counts |= that_count(nothing, _turned(bound, length, rule), length, _SEEDS)
+            strong |= bound > _STRONG * rule.floor
+        parted = np.zeros(len(geometry.plane), bool)
+        parted[facet[strong]] = ~geometry.curved[facet[strong]]
         facet, bary = _cut(geometry, leg, outs[0], facet[counts], rule)
-        tubes = launch_tubes(geometry, leg, facet, bary)
-        if not (tubes.strength > 0.0).all():
-            tubes = tubes.take(tubes.strength > 0.0)
-        view = centre_visibility(geometry, leg, tubes, True, rule)
-        tubes, view = tubes.take(view.seen), view.take(view.seen)
+        tubes, view = _seen_parts(geometry, leg, launch_tubes(geometry, leg, facet, bary), parted, rule)
         write_leg(geometry, tubes, leg, view.corners, view.passed, rule)
         straight = None
         if leg in outs:
@@ -222,6 +227,24 @@ def that_count(found: Contributions, each: Complexes, length: Floats, weight: fl
 def _turned(bound: Floats, length: Floats, rule: Refinement) -> Complexes:
     """Return bounds (n,) [1/m] with the phases of paths of these lengths (n,) [m]."""
     return np.asarray(bound * np.exp(-1j * rule.wavenumber * length))
+
+
+def _seen_parts(geometry: Geometry, leg: Leg, tubes: Tubes, parted: Bools, rule: Refinement) -> tuple[Tubes, View]:
+    """Return the tubes of which a leg sees the centre, and how; before that those on facets `parted` (f,) are halved
+    while it sees them in part."""
+    parts, views = list[Tubes](), list[View]()
+    for level in range(_HALVED + 1):
+        tubes = tubes.take(tubes.strength > 0.0)
+        view, mixed = corner_visibility(geometry, leg, tubes, parted[tubes.facet] & (level < _HALVED), rule)
+        ready, rows = np.flatnonzero(view.seen & ~mixed), np.flatnonzero(mixed)
+        parts.append(tubes.take(ready))
+        views.append(view.take(ready))
+        if not len(rows):
+            break
+        edge = np.argmax(sizes(tubes.points[:, :3] - np.roll(tubes.points[:, :3], -1, axis=1)), axis=1)
+        halves = halved(tubes.facet, tubes.bary, edge.astype(np.int8), rows, 0.0, level)
+        tubes = launch_tubes(geometry, leg, *halves)
+    return Tubes.join(parts), View.join(views)
 
 
 def _cut(geometry: Geometry, leg: Leg, out: Leg, facet: Ints, rule: Refinement) -> tuple[Ints, Floats]:

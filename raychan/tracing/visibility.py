@@ -59,6 +59,17 @@ def centre_visibility(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool, r
     return View.of(rays)
 
 
+def corner_visibility(
+    geometry: Geometry, leg: Leg, tubes: Tubes, corners: Bools, rule: Refinement
+) -> tuple[View, Bools]:
+    """Return how the centres of tubes on their first surface are seen over a leg, and of which tubes (n,), of those
+    whose `corners` (n,) are tested too, a part only is seen."""
+    rays, none = ShadowRays.room(len(tubes), len(leg.mirrors), rule.layers), np.zeros(len(tubes), bool)
+    tested = Tested(corners & (not geometry.convex_alone), True, none, none, NONE_AWAY)
+    cast_shadow_rays(geometry, leg.chain, rays, tested, _drawn(geometry, tubes, True))
+    return View.of(rays), rays.mixed
+
+
 def tube_visibility(
     geometry: Geometry,
     leg: Leg,

@@ -184,3 +184,11 @@ def test_any_radar_sees_a_car_over_the_ground_as_in_a_fine_run_or_nothing(key):
     check(rc.simulate(rc.Scene(bodies=[ground, car], radar=radar, model={"max_bounces": 3, "tolerance_db": 1.0})), seen)
     empty = rc.simulate(rc.Scene(bodies=[], radar=radar, model={"mode": "preview"}))
     assert len(empty.paths.length) == ("rx_position" in key)
+
+
+def test_posts_half_hidden_by_the_beam_before_them_return_as_in_a_fine_run():
+    wave = rc.Waveform(carrier=24e9, bandwidth=200e6, chirp_duration=30e-6, n_chirps=8, n_samples=128)
+    radar = rc.Radar(wave, position=(0.0, 0.0, 1.0), antenna=rc.CosineAntenna(80.0, 40.0), power=1.0)
+    rail = rc.Body("rail", shape="guard_rail", position=(24.73, 5.97, 0.0), yaw_deg=192.4)
+    modes = {"max_bounces": 1, "tolerance_db": 1.0}, {"mode": "preview"}
+    check(*(rc.simulate(rc.Scene(bodies=[rail], radar=radar, model=model)) for model in modes), apart=1)
