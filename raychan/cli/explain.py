@@ -164,4 +164,5 @@ def _sum(why: CellExplanation) -> str:
     from raychan.units import dbm
 
     error = f"stated error {why.error_db:.2f} dB" if why.converged else "not converged: error unknown"
-    return f"sum of the paths: {dbm(why.predicted):.1f} dBm, {error}"
+    off = f", {why.reciprocity_db:.1f} dB off reciprocity" if why.reciprocity_db >= 0.1 else ""
+    return f"sum of the paths: {dbm(why.predicted):.1f} dBm, {error}{off}"

@@ -20,6 +20,7 @@ from raychan.run.folding import Shown, peaks_of, truth
 from raychan.run.point_spread import PointSpread
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, SIDELOBE, Contribution, Explanation, Receiver
 from raychan.run.side_lobes import Cell, is_side_lobe
+from raychan.run.turns import Turns, turns_of
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -41,6 +42,8 @@ class Chains:
     """Bodies met, in order, without thin layers passed."""
     targets: Ints
     """Chain of targets of each chain of parts, without ground and radar carrier; a chain and its reverse are one."""
+    turns: Turns
+    """Which chains are the same but for where on the way the wave scatters."""
 
 
 def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
@@ -61,7 +64,8 @@ def chains(paths: Paths, background: tuple[str, ...]) -> Chains:
         link = tuple(b for i, b in enumerate(left) if i == 0 or b != left[i - 1])
         # A chain and its reverse have equal gains, by reciprocity.
         targets.append(known.setdefault(min(link, link[::-1]), len(known)))
-    return Chains(index, tuple(names), tuple(bodies), np.array(targets, np.int64))
+    turns = turns_of(names, trajectories.kind[first], np.array_equal(paths.tx, paths.rx))
+    return Chains(index, tuple(names), tuple(bodies), np.array(targets, np.int64), turns)
 
 
 def explain_cell(
@@ -129,7 +133,8 @@ def _explained(
     if not math.isnan(true.range):
         parts = replace(parts[0], range=true.range, rate=true.rate), *parts[1:]
     error_db = figure(predicted, cell.error)
-    return Explanation(*place, cell.power, predicted, error_db, label, parts, true.folded, true.range, true.rate)
+    known_of = true.folded, true.range, true.rate
+    return Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of, known.turns.off_db(summed))
 
 
 def waves_in(

@@ -148,6 +148,20 @@ def no_echoes(reasons: Sequence[Explanation]) -> list[str]:
     return said
 
 
+def not_reciprocal(reasons: Sequence[Explanation], tolerance_db: float) -> list[str]:
+    """Return a line if levels of detections are off reciprocity by more than the tolerance and what is stated."""
+    off = np.array([reason.reciprocity_db for reason in reasons], float)
+    stated = np.array([reason.error_db for reason in reasons], float)
+    rows = off > np.fmax(stated, tolerance_db)
+    if not rows.any():
+        return []
+    return [
+        f"{_of(rows)} {'changes' if rows.sum() == 1 else 'change'} ({_numbers(rows)}), by up to {off[rows].max():.1f} "
+        "dB, with the surface on which waves over several are taken to scatter, which reciprocity makes alike: no "
+        "stated error has it; corners seen off the direction in which rays come back return by their edges only"
+    ]
+
+
 def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Entry]) -> list[str]:
     """Return the lines that stand below the table of detections: on the tolerance, and on what was left out."""
     said = []
@@ -179,6 +193,7 @@ def told(
     """Return all lines on detections, of which each has a reason."""
     return [
         *no_echoes(reasons),
+        *not_reciprocal(reasons, tolerance_db),
         *warned(found, tolerance_db, rdmap, radar),
         *noted(found, tolerance_db, ledger),
     ]

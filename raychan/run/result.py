@@ -85,6 +85,9 @@ class Explanation:
     """Range of the leading chain [m], mid frame; NaN where unknown."""
     true_rate: float = math.nan
     """Its range rate [m/s]; NaN where unknown."""
+    reciprocity_db: float = 0.0
+    """By how much the level changes as waves over several surfaces are taken to scatter on one of these or another,
+    which reciprocity makes alike [dB]: what paths differ by that are there either way, in no stated error."""
 
     @property
     def converged(self) -> bool:
