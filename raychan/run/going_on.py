@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from raychan.records import REFLECT, SCATTER, Paths, Vectors
 from raychan.run.labels import alike
 from raychan.run.mirrored_rays import NARROW, followed, meets, of_each
-from raychan.tracing.legs import legs_over, returning
+from raychan.tracing.legs import legs_over, reachable
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -72,7 +72,7 @@ def _over_mirrors(geometry: Geometry, end: Floats, points: Vectors) -> Ints:
     seen = followed(geometry, end, points.astype(float), 1, split=0)
     at, piece, on = seen.at[:, 0], geometry.piece[seen.facet[:, 0]], np.zeros(len(seen.row), bool)
     for leg in legs_over(geometry, end, 1)[1:]:
-        left = np.flatnonzero(~on & returning(geometry, leg)[piece])
+        left = np.flatnonzero(~on & reachable(geometry, leg)[piece])
         over = followed(geometry, at[left], leg.mirror_points(at[left])[:, 0], 1, split=0)
         on[left[over.row[meets(geometry, over, end, np.full(len(over.row), NARROW))]]] = True
     return seen.row[on]

@@ -23,6 +23,7 @@ from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import coarsest, strongest_bend
 from raychan.run.unmodelled_waves import creeping_waves, over_band
 from raychan.tracing.diffuse_patches import PatchSize, visible_patches
+from raychan.tracing.legs import mirrors_left_out
 from raychan.units import C0, db
 from raychan.world.body import Body
 from raychan.world.geometry import Geometry
@@ -63,6 +64,7 @@ def ledger(
         "tessellation": lambda: _tessellation(paths, geometry, bodies, radar, settings, weakest),
         "intra-frame motion": lambda: intra_frame(paths, geometry.facets, radar),
         "diffraction": lambda: _diffraction(geometry, radar, weakest),
+        "further mirrors": lambda: _mirrors(geometry, radar, model),
         "range migration": lambda: Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),
     }
     found = dict(zip(entries, parallel_map(lambda entry: entry(), list(entries.values())), strict=True))
@@ -78,6 +80,7 @@ _NEAR = 80.0  # m: the strongest range cell of rough ground lies nearer, by 1 / 
 _FOLDED = 2.0  # unambiguous ranges: what is farther adds at most an eighth, by 1 / r^3
 _NAMES = (
     "further bounces",
+    "further mirrors",
     "transmission",
     "diffraction",
     "diffraction to point targets",
@@ -136,6 +139,16 @@ def _by_ratio(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, bou
         f"times the ratio of {bounces} interactions to {bounces - 1} ({db(ratio):.0f} dB)"
     )
     return Entry(float(db(last * ratio / weakest)), "estimate", how)
+
+
+def _mirrors(geometry: Geometry, radar: Radar, model: Any) -> Entry:
+    """Return the entry of plane faces that might be mirrors but are not taken as such, seen from either end."""
+    ends = [end for end in (radar.position, radar.rx_position) if end is not None]
+    left, every = max(mirrors_left_out(geometry, np.asarray(end, float), model.max_bounces - 1) for end in ends)
+    if not left:
+        return Entry(NOTHING, "exact", "no plane face that might be a mirror is taken as none")
+    how = f"{left} of {every} large plane faces, those that look smallest from the radar, mirror no wave as a whole"
+    return Entry(UNKNOWN, SEEN, how)
 
 
 def _transmission(paths: Paths, facets: Facets, radar: Radar, settings: Any, model: Any, weakest: float) -> Entry:

@@ -21,7 +21,8 @@ class Images:
     """Returns that legs over mirrors carry already and tubes must not carry again; `planes` (p,) are the mirrors of
     legs in, `outward` (p,) those of legs out.
 
-    Over several such mirrors in a row a wave scatters at the last one.
+    Over several such mirrors in a row a wave scatters at the last one; one that goes back the way that it came, where
+    it turns.
     """
 
     planes: Bools
@@ -55,3 +56,26 @@ class Images:
         before = tubes.came_from()
         moved = geometry.piece[before] != geometry.piece[tubes.facet]
         return self.planes[geometry.plane[before]] & moved
+
+
+def turning(leg: Leg, out: Leg) -> int:
+    """Return the facet of the mirror of `leg` where a wave over it that leaves over `out` has turned and is on its way
+    back over the mirrors that it came by: it scatters where it turns. -1 if on none."""
+    there, back = leg.chain.facet.tolist(), out.chain.facet.tolist()
+    if len(there) <= len(back):
+        return -1
+    on = there[len(back)]
+    way = [*there, on, *back[::-1]]
+    return int(on) if way == way[::-1] else -1
+
+
+def without_turned(geometry: Geometry, leg: Leg, outs: list[Leg], pieces: Bools) -> Bools:
+    """Return pieces (p,) without those of mirrors of `leg` from which no wave returns, over none of `outs`, but by the
+    way that it came by."""
+    role, ok = geometry.facets.role, pieces
+    plain = [out for out in outs if out.alike(leg) or all(role[m.body] == MIRROR for m in out.mirrors)]
+    for facet in dict.fromkeys(m.facet for m in leg.mirrors[:-1]):
+        if all(turning(leg, out) == facet for out in plain):
+            ok = ok.copy()
+            ok[geometry.piece[facet]] = False
+    return ok

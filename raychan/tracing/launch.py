@@ -66,7 +66,7 @@ def seeds_of(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     """Return the `seed_facets` of a leg on pieces (p,) that may carry a first bounce, kept with the leg: launches that
     refine start from some of the same."""
     allowed = pieces & (geometry.piece_role == SCATTERER)
-    allowed[leg.pieces(geometry)] = False
+    allowed[leg.pieces(geometry)[-1:]] = False
     known, found = cache_of(geometry).by_leg("seeds", leg, lambda: (allowed, seed_facets(geometry, leg, allowed)))
     return found if np.array_equal(known, allowed) else seed_facets(geometry, leg, allowed)
 

@@ -13,7 +13,7 @@ from raychan.parallel import parallel_for
 from raychan.records import MIRROR
 from raychan.tracing.cache import cache_of
 from raychan.tracing.image_paths import each_may_leave
-from raychan.tracing.legs import Leg, returning
+from raychan.tracing.legs import Leg, reachable
 from raychan.tracing.radiation import radiates
 from raychan.tracing.tubes import Tubes
 from raychan.world.geometry import Geometry
@@ -46,8 +46,8 @@ class _OutgoingLegs(NamedTuple):
 
 class _LeavingTubes(NamedTuple):
     """Columns of `tubes.Tubes` by which these leave, and what of them is to be found: which `scatter` (n,), and which
-    are `twice` (n,), returned by legs over mirrors already (but over a leg without a mirror that scatters if
-    `but_plain`)."""
+    are `twice` (n,), returned by legs over mirrors already (but over a leg without a mirror that scatters, or that they
+    came by, if `but_plain`)."""
 
     points: Floats
     k: Floats
@@ -62,8 +62,9 @@ class Leaving:
     """Which tubes may leave over each of some legs.
 
     Args: outs all legs; wanted numbers of those that are asked for; scatter (n,) tubes that return; twice (n,) those
-    that legs over mirrors carry, but_plain: but over a leg without a mirror that scatters; which of them radiate
-    (see `tracing.radiation`), no matter which over the leg `any_over`."""
+    that legs over mirrors carry, but_plain: but over a leg without a mirror that scatters or over the mirrors that they
+    came by; which of them radiate (see `tracing.radiation`), no matter which over mirrors like those of the leg
+    `came_by`."""
 
     def __init__(
         self,
@@ -75,12 +76,12 @@ class Leaving:
         twice: Bools,
         but_plain: bool,
         which: int,
-        any_over: Leg | None,
+        came_by: Leg | None,
     ) -> None:
         legs = cache_of(geometry).newest("outgoing legs", tuple(outs), _SETS_KEPT, lambda: _packed(geometry, outs))
         given = _LeavingTubes(tubes.points, tubes.k, tubes.normals, tubes.facet, scatter, twice, but_plain)
         numbers = np.array(wanted, np.int64)
-        every = np.array([outs[i] is any_over for i in wanted], bool)
+        every = np.array([came_by is not None and outs[i].alike(came_by) for i in wanted], bool)
         self._rows: dict[int, Rows] = {}
 
         def some(part: slice) -> None:
@@ -106,7 +107,7 @@ def _packed(geometry: Geometry, outs: list[Leg]) -> _OutgoingLegs:
     role = geometry.facets.role
     legs = _OutgoingLegs(
         mirrors=np.array([len(out.mirrors) for out in outs], np.int64),
-        pieces=np.array([returning(geometry, out) for out in outs]).reshape(k, len(geometry.piece_role)),
+        pieces=np.array([reachable(geometry, out) for out in outs]).reshape(k, len(geometry.piece_role)),
         over=np.array([any(role[x.body] != MIRROR for x in out.mirrors) for out in outs], bool),
         far=np.array([out.far for out in outs], bool),
         images=np.zeros((k, m + 1, 3)),
@@ -178,7 +179,7 @@ def _candidates(tubes, piece, legs, i, every, which, found):  # type: ignore[no-
     """Write the rows of tubes, on pieces (n,), of which leg i can carry a return, and that radiate to its end, or
     `every`; return their number."""
     count, image, far, allowed = 0, legs.images[i, legs.mirrors[i]], legs.far[i], legs.pieces[i]
-    plain = tubes.but_plain and not legs.over[i]
+    plain = tubes.but_plain and (every or not legs.over[i])
     for j in range(len(piece)):
         if piece[j] < 0 or not allowed[piece[j]] or (tubes.twice[j] and not plain):
             continue

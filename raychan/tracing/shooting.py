@@ -15,7 +15,7 @@ from raychan.poses import sizes
 from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions, amplitudes
-from raychan.tracing.images import Images
+from raychan.tracing.images import Images, turning, without_turned
 from raychan.tracing.launch import OBLIQUE_SHARE, launch, seeds_of
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.outgoing import Leaving
@@ -99,7 +99,7 @@ def numbered_routes(
     """
     more = bounces > len(leg.mirrors) + 1 and not geometry.convex_alone and (wanted is None or wanted.depth > 1)
     others = [out for out in outs[1:] if len(leg.mirrors) + 1 + len(out.mirrors) <= bounces]
-    only = None if wanted is None else wanted.facets
+    only, pieces = None if wanted is None else wanted.facets, without_turned(geometry, leg, [outs[0], *others], pieces)
     if way is not None and way.back and not more:
         # Nothing bounces: of the way back only what the other one has not counts.
         only = way.may_have(geometry, leg, [outs[0], *others], seeds_of(geometry, leg, pieces), only)
@@ -140,8 +140,8 @@ class _Wave(Generic[T]):
             scatters = geometry.facets.role[geometry.facets.body[tubes.facet]] != MIRROR
             share = 1.0 / min(max(len(outs), 1), _SHARES)
             twice, which = self.images.returns(geometry, tubes, first), OBLIQUE if first else FACING
-            any_over = self.leg if first else None
-            leaving = Leaving(geometry, self.outs, outs, tubes, scatters, twice, first, which, any_over)
+            came_by = self.leg if first else None
+            leaving = Leaving(geometry, self.outs, outs, tubes, scatters, twice, first, which, came_by)
             outs = [i for i in outs if leaving.any_over(i)]
             left = partial(self._left, tubes, leaving, depth, twice)
             # What returns by the leg that it came by counts first, and the others against that.
@@ -169,6 +169,8 @@ class _Wave(Generic[T]):
         rows, way = leaving.over(i), self._exchanged(depth, i)
         if way < 0:
             rows = rows[twice[rows]]
+        if depth == 1 and (turned := turning(self.leg, self.outs[i])) >= 0:
+            rows = rows[self.geometry.piece[tubes.facet[rows]] != self.geometry.piece[turned]]
         made, some = list[T](), tubes.only(rows)
         if self.way is not None and depth == 1:
             some = self.way.of_first_surface(self.geometry, self.leg, self.outs[i], some)
