@@ -29,3 +29,13 @@ def test_point_targets_that_crossed_receivers_cannot_hear_are_told(pose):
     (said,) = warnings(rx_polarization="H", **pose)
     assert said.startswith("no body is heard: receivers are cross-polarised to the transmitter")
     assert warnings(rx_polarization="both") == warnings(rx_polarization="V") == []
+
+
+def test_a_constant_is_detected_where_the_only_path_has_no_gain():
+    # The specular point of plain ground is right below the radar, where a patch that looks ahead hears nothing.
+    radar = rc.Radar(WAVE, antenna=rc.CosineAntenna(60.0, 30.0), impairments=rc.Impairments(dc_offset_dbm=-40.0))
+    result = rc.simulate(rc.Scene([rc.Body("ground", shape="ground")], radar=radar, model={"max_bounces": 1}))
+    assert len(result.paths.delay) and not result.paths.amplitude.any()
+    assert [why.label for why in result.provenance] == ["dc"]
+    entry = result.ledger["intra-frame motion"]
+    assert (entry.level_db, entry.kind, entry.how) == ("none", "exact", "no path")
