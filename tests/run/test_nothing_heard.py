@@ -39,3 +39,9 @@ def test_a_constant_is_detected_where_the_only_path_has_no_gain():
     assert [why.label for why in result.provenance] == ["dc"]
     entry = result.ledger["intra-frame motion"]
     assert (entry.level_db, entry.kind, entry.how) == ("none", "exact", "no path")
+
+
+def test_a_transmitter_beside_its_position_is_refused_of_an_interferer():
+    aside = rc.Radar(WAVE, tx_elements=[[0.0, 0.9, 0.0]])
+    with pytest.raises(ValueError, match=r"tx_elements = \[\[0\.0, 0\.9, 0\.0\]\] m: \[\[0, 0, 0\]\] is wanted"):
+        rc.Interferer(aside)
