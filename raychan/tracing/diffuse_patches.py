@@ -31,6 +31,7 @@ Excess = Callable[[Lines, Ints], Floats]
 _MOST = 400_000  # patches of a body: beyond, they grow; each takes a ray and some 300 bytes (not measured)
 _GROWTH = np.sqrt(2.0)  # of their sides, until there are no more: about half as many at a time
 _ACROSS = np.sqrt(6.0)  # times as far as along the range: across it (R^2)^-k differs by k x^2 / 12, and k is at least 2
+_THIN = 0.1  # height of a triangle over its longest side (not measured)
 _TOUCH = 1e-3  # of the distance: a hit this near the middle of a patch is the patch
 
 _NONE = Patches(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0))
@@ -129,7 +130,11 @@ def _triangles(geometry: Geometry, end: Floats, rows: Ints, size: PatchSize) -> 
         middle = np.maximum(away[1], size.nearest)
         long = sizes(lines[2] - lines[0])
         near = np.maximum(np.abs(away[2] - away[0]), long / _ACROSS) / (size.share * middle)
-        return np.maximum(np.maximum(near, long / size.range), _spread(lines, on, f, end, size))
+        over = np.maximum(np.maximum(near, long / size.range), _spread(lines, on, f, end, size))
+        # Thin ones are halved along their longest side: where rates turn fast others may halve without end.
+        longest, (a, b, _) = long.max(axis=1, keepdims=True), np.moveaxis(lines[2] - lines[0], 1, 0)
+        thin = sizes(np.cross(a, b))[:, None] < _THIN * longest**2
+        return np.where(thin, over.max(axis=1, keepdims=True) * long / longest, over)
 
     return _small(Triangles(corners[kept]), rows[kept], geometry.area[rows[kept]], end, size.farthest, excess)
 

@@ -130,6 +130,14 @@ def test_what_moves_past_a_radar_is_cut_as_what_a_radar_moves_past(body):
     assert len(one[1]) > 1.2 * len(patches_of(standing, body((0.0, 0.0, 0.0)))[1])
 
 
+def test_a_wall_that_a_radar_all_but_touches_returns_the_same_power_at_any_speed():
+    passed = wall(20.0, position=(0.0, 0.1, 0.0))
+    still, fast = (made(bandwidth=75e6, samples=16, chirps=128, velocity=v * AHEAD) for v in (0.0, 20.0))
+    power = [returned(radar, *patches_of(radar, passed))[2] for radar in (still, fast)]
+    assert db(power[1].sum(), power[0].sum()) == pytest.approx(0.0, abs=0.01)
+    assert len(power[0]) < len(power[1]) < 100_000
+
+
 def test_more_patches_than_there_may_be_grow_and_a_line_tells_by_how_much(monkeypatch):
     monkeypatch.setattr(diffuse_patches, "_MOST", 8000)
     narrow = made(rc.ArrayAntenna(100, 2, 0.5, 0.5), bandwidth=75e6, samples=32)
