@@ -17,7 +17,8 @@ class Interferer:
 
     Args: radar, whose receiver and samples do not matter; start [s] of its first ramp after the victim's; locked:
     whether its ramps keep their phase to the victim's from ramp to ramp, else each begins at a phase of its own.
-    Raises: ValueError for another type, a start that is not finite, several transmitters or a waveform of one's own.
+    Raises: ValueError for another type, a start that is not finite, a waveform of one's own, several transmitters or
+    one beside the radar's position.
     """
 
     radar: Radar
@@ -32,6 +33,9 @@ class Interferer:
         check_type("Interferer.name", self.name, str)
         if len(self.radar.tx_elements) > 1 or isinstance(self.radar.waveform, OwnWaveform):
             raise ValueError("Interferer.radar: one transmitter of linear ramps wanted")
+        if self.radar.tx_elements.any():
+            at = self.radar.tx_elements[0].tolist()
+            raise ValueError(f"Interferer.radar.tx_elements = [{at}] m: [[0, 0, 0]] is wanted; it sends from position")
 
     def at(self, time: float) -> Interferer:
         """Return the interferer where its velocity has brought it at a time [s]; each frame meets the same timing."""

@@ -7,23 +7,29 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from raychan.channel.diffuse import diffuse_paths
 from raychan.channel.paths import nothing
 from raychan.em.diffuse import Diffuse
+from raychan.radar.pattern import characteristics
 from raychan.radar.radar import Radar
 from raychan.records import Facets, Paths
-from raychan.tracing.diffuse_patches import PatchSize, visible_patches
+from raychan.tracing.diffuse_patches import Apart, PatchSize, visible_patches
 from raychan.units import C0, undb
 from raychan.world.errors import SceneError
 from raychan.world.geometry import Geometry
 
+Floats = NDArray[np.float64]
+
 _RANGE_CELLS = 0.5  # side of a patch in range cells: a share of sinc^2(0.25), 0.9 dB, is smeared (not measured)
-_RATE_CELLS = 0.5  # the same across, of what the radar's own motion spreads over a patch
-_WIDEST = math.radians(2.0)  # of a patch seen from a radar at rest
+_RATE_CELLS = 0.5  # the same of what motion spreads over a patch
+_ARRAY_CELLS = 0.25  # wavelengths by which the ways from its ends to those of the array differ (not measured)
+_WIDEST = math.radians(2.0)  # sector of the ground, before motion, array and beam ask for less
 _MIDDLE_DB = 0.05  # of a patch's mean return: by so much it may differ from that by law and distance at its middle
 _LEAST_SHARE = 0.02  # of the distance: without it ground of a lobe of exponent 50 has 400,000 patches, not 100,000
 _OF_ROUGHNESS = 4  # power of the cosine in the law of a slight roughness: of Lambert's law, and of the share lost
+_TOLD = 1.1  # times as large as asked for: of patches so large a line tells (not measured)
 _BEYOND = 1.0  # of the unambiguous range: what lies farther folds, and is left out; the ledger says with what level
 
 
@@ -43,15 +49,16 @@ def laws_of(facets: Facets) -> tuple[Diffuse | None, ...]:
     return tuple(law if isinstance(law, Diffuse) else None for law in stated)
 
 
-def clutter_of(geometry: Geometry, radar: Radar, model: Any, rng: np.random.Generator) -> Paths:
-    """Return the diffuse returns of a scene for a monostatic radar, none where no material scatters diffusely.
+def clutter_of(geometry: Geometry, radar: Radar, model: Any, rng: np.random.Generator) -> tuple[Paths, tuple[str, ...]]:
+    """Return the diffuse returns of a scene for a monostatic radar, none where no material scatters diffusely, and
+    lines on patches that are too large.
 
     Only what the radar sees directly returns: no wave reaches a rough surface over a mirror or through a layer.
     Raises: SceneError for receivers elsewhere.
     """
     which = scatters_diffusely(geometry.facets, model)
     if not which.any():
-        return nothing(geometry.facets, radar)
+        return nothing(geometry.facets, radar), ()
     if radar.rx_position is not None:
         raise SceneError(
             "diffuse returns to receivers elsewhere",
@@ -62,7 +69,14 @@ def clutter_of(geometry: Geometry, radar: Radar, model: Any, rng: np.random.Gene
     laws = laws_of(geometry.facets)
     size = patch_size(radar, share_of_distance(laws, which))
     patches = visible_patches(geometry, np.asarray(radar.position, float), which, size)
-    return diffuse_paths(patches, geometry.facets, geometry.normal, radar, radar.waveform.middle, laws, rng)
+    paths = diffuse_paths(patches, geometry.facets, geometry.normal, radar, radar.waveform.middle, laws, rng)
+    if patches.grown < _TOLD:
+        return paths, ()
+    line = (
+        f"clutter: too many patches; some are {patches.grown:.2g} times as large as range cell, rate, array and beam "
+        "ask for, and single cells may be off (radar.waveform, radar.antenna)"
+    )
+    return paths, (line,)
 
 
 def share_of_distance(laws: Sequence[Diffuse | None], which: np.ndarray[Any, np.dtype[np.bool_]]) -> float:
@@ -79,12 +93,24 @@ def share_of_distance(laws: Sequence[Diffuse | None], which: np.ndarray[Any, np.
 
 
 def patch_size(radar: Radar, share: float) -> PatchSize:
-    """Return the size of patches that a radar does not resolve: by range, by rate when it moves, by its array; share of
-    their distance that they extend over at most."""
-    wave = radar.waveform
-    speed = float(np.linalg.norm(radar.velocity))
-    angle = _WIDEST if speed == 0.0 else min(_WIDEST, _RATE_CELLS * wave.rate_resolution / speed)
-    span = float(np.ptp(radar.virtual_elements, axis=0).max())
-    if span > 0.0:
-        angle = min(angle, 0.25 * C0 / wave.carrier / span)
-    return PatchSize(_RANGE_CELLS * wave.range_resolution, max(angle, 1e-3), _BEYOND * wave.unambiguous_range, share)
+    """Return the size of patches that a radar does not resolve: by range, by rate where it or they move, by its array,
+    and over which its gain is even; share of their distance that they extend over at most."""
+    wave, span = radar.waveform, np.ptp(radar.virtual_elements, axis=0)
+    cosines = np.divide(_ARRAY_CELLS * C0 / wave.carrier, span, out=np.full(3, np.inf), where=span > 0.0)
+    velocity = np.asarray(radar.velocity, float)
+    apart = Apart(radar.axes, velocity, _RATE_CELLS * wave.rate_resolution, cosines, even_gain(radar))
+    return PatchSize(_RANGE_CELLS * wave.range_resolution, _WIDEST, _BEYOND * wave.unambiguous_range, share, apart)
+
+
+def even_gain(radar: Radar) -> Floats:
+    """Return over which angles (2,) [rad], along theta and phi of the antenna, patches may extend for its gain.
+
+    A beam of half-power width b is about exp(-4 ln 2 x^2 / b^2): the product g of both antennas' has at its peak
+    g" / g = 8 ln 2 (1 / b_t^2 + 1 / b_r^2), and its mean over x differs from its middle by g" x^2 / 24.
+    """
+    known = radar.kept.setdefault(even_gain, [])
+    if not known:
+        beams = [characteristics(antenna) for antenna in {id(x): x for x in (radar.tx, radar.rx)}.values()]
+        widths = np.radians([[beam.hpbw_v_deg, beam.hpbw_h_deg] for beam in (beams[0], beams[-1])])
+        known.append(np.sqrt(3.0 * (undb(_MIDDLE_DB) - 1.0) / np.log(2.0) / (widths**-2.0).sum(axis=0)))
+    return np.asarray(known[0])

@@ -26,9 +26,10 @@ def intra_frame(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     of sight half the acceleration of its length; amplitudes fall as the length L of a path grows: those of its middle
     differ from their mean by (L' T / L)^2 / 4, those of its start by L' T / L."""
     frame = radar.waveform.frame_duration
-    if not len(paths.delay):
-        return Entry(NOTHING, "exact", "no path")
     size = np.abs(paths.amplitude)
+    # What the antenna does not hear at all (the ground right below a patch) is no path.
+    if not size.any():
+        return Entry(NOTHING, "exact", "no path")
     # A line of sight may be far stronger than all echoes.
     echo = np.asarray((~np.isin(paths.trajectories.kind, _PASSED)).any(axis=1))[paths.trajectory]
     strong = np.flatnonzero(size > _STRONG * (size[echo] if echo.any() else size).max())

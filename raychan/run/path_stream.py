@@ -35,6 +35,9 @@ class Launched:
     known: Cube | None = None
     """Samples of all paths, where only these are known already."""
 
+    said: tuple[str, ...] = ()
+    """What else a user should know of them."""
+
     @cached_property
     def quiet(self) -> Cube:
         """The samples of all receivers and chirps, without noise."""
@@ -55,11 +58,10 @@ class Launched:
         return len(self.paths.delay) == self.count
 
     def notes(self) -> list[str]:
-        """Return what to tell of a launch that had more paths than a result can hold."""
-        if self.whole:
-            return []
+        """Return what to tell of a launch, such as that it had more paths than a result can hold."""
         kept = len(self.paths.delay)
-        return [f"{self.count:,} paths: all are in the samples, the {kept:,} strongest are kept to explain them"]
+        many = f"{self.count:,} paths: all are in the samples, the {kept:,} strongest are kept to explain them"
+        return list(self.said) if self.whole else [*self.said, many]
 
     def moved(self, shift: NDArray[np.float64]) -> Launched:
         """Return the same for a scene that has moved on as one, by a shift (3,) [m]."""

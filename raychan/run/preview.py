@@ -14,8 +14,10 @@ import numpy as np
 from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, paths_of
 from raychan.parallel import run_pair
+from raychan.poses import sizes
 from raychan.radar.radar import Radar
 from raychan.records import MapError, Paths, Points, RangeDoppler
+from raychan.run.clutter import scatters_diffusely
 from raychan.run.ledger import UNKNOWN, Entry
 from raychan.run.path_stream import Launched
 from raychan.run.preview_launch import preview_routes
@@ -98,6 +100,16 @@ def preview_notes() -> tuple[str, ...]:
     )
 
 
-def preview_ledger() -> dict[str, Entry]:
-    """Return the ledger of a preview: one entry, without an estimate."""
-    return {"preview": Entry(UNKNOWN, "none", f"left out: {LEFT_OUT}")}
+def preview_ledger(geometry: Geometry, radar: Radar, model: Any) -> dict[str, Entry]:
+    """Return the ledger of a preview, without estimates: what any leaves out, and what this scene has that settings
+    leave out, by the names of a fine run."""
+    f, reach = geometry.facets, radar.waveform.unambiguous_range
+    found = {"preview": Entry(UNKNOWN, "none", f"left out: {LEFT_OUT}")}
+    if model.max_transmissions == 0 and (f.materials.thickness[f.material] > 0.0).any():
+        how = "model.max_transmissions is 0: what stands behind thin layers is not traced"
+        found["transmission"] = Entry(UNKNOWN, "none", how)
+    rough = scatters_diffusely(f, model)[f.material]
+    if (sizes(f.vertices[rough] - radar.position) > reach).any():
+        how = f"returns of rough surfaces beyond the unambiguous range of {reach:.4g} m would fold in"
+        found["diffuse scattering"] = Entry(UNKNOWN, "none", how)
+    return found

@@ -30,12 +30,12 @@ def realized(
     radar = scene.radar
     factors = drawn(scene, radar.waveform.n_chirps, seed)
     quiet, launched = fluctuated(quiet, launched, factors)
-    clutter = clutter_of(geometry, radar, model, stream(seed, Stage.CLUTTER))
+    clutter, said = clutter_of(geometry, radar, model, stream(seed, Stage.CLUTTER))
     count = len(clutter.delay)
     if not count:
         return quiet, launched
     samples = (quiet.samples + synthesize(clutter, launched.radar).samples).astype(np.complex64)
     profile = launched.response + response(clutter, radar.waveform, radar.power, launched.window)
     paths = join([launched.paths, clutter])
-    found = replace(launched, paths=paths, count=launched.count + count, sums=(samples, profile))
+    found = replace(launched, paths=paths, count=launched.count + count, sums=(samples, profile), said=said)
     return Cube(samples=samples, noise_power=0.0), found

@@ -155,7 +155,7 @@ def _explained(
 
     own = own_signals(cube, rdmap, error.power, radar, settings)
     if model.mode == PREVIEW:
-        return all_named(explained(), found, own), preview_ledger()
+        return all_named(explained(), found, own), preview_ledger(channel.geometry, radar, model)
     reasons, left_out = run_pair(
         explained,
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),

@@ -1,38 +1,68 @@
 """Patches of rough surfaces that the radar sees: where diffuse scattering starts.
 
-The ground is cut into sectors of rings about the foot of the radar, rings of half a range cell; other bodies into their
-facets, and these into triangles of half a range cell. Near the radar both are finer: over a plane the law of scattering
-changes with the range alone. One ray tells whether the middle of a patch is seen.
+The ground is cut into sectors of rings about the foot of the radar, rings of half a range cell; other bodies into
+triangles of their facets, halved down to half a range cell. Near the radar both are finer: over a plane the law of
+scattering changes with the range alone. Both are halved on as long as a radar tells their ends apart by rate, by its
+array, or by the gain of its antenna. One ray tells whether the middle of a patch is seen.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.patches import Patches
-from raychan.records import MIRROR
+from raychan.poses import sizes
+from raychan.records import MIRROR, Facets
+from raychan.tracing.pieces import Pieces, Sectors, Triangles
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Lines = tuple[Floats, Floats, Floats]
+"""Starts, middles and ends (n, k, 3) [m] of the lines along which pieces may be halved."""
+Excess = Callable[[Lines, Ints], Floats]
 
 _MOST = 400_000  # patches of a body: beyond, they grow; each takes a ray and some 300 bytes (not measured)
+_GROWTH = np.sqrt(2.0)  # of their sides, until there are no more: about half as many at a time
+_ACROSS = np.sqrt(6.0)  # times as far as along the range: across it (R^2)^-k differs by k x^2 / 12, and k is at least 2
+_THIN = 0.1  # height of a triangle over its longest side (not measured)
 _TOUCH = 1e-3  # of the distance: a hit this near the middle of a patch is the patch
+
+_NONE = Patches(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Apart:
+    """What a radar tells apart, of which a patch may extend over at most so much.
+
+    Args: axes (3, 3) of the antenna, to the world; velocity (3,) [m/s] of the radar; rate [m/s], range rates; cosines
+    (3,) of the direction along the antenna's axes, by the array; beam (2,) [rad] of the direction along theta and phi
+    of the antenna, by its gain. Infinite where it tells nothing.
+    """
+
+    axes: Floats
+    velocity: Floats
+    rate: float
+    cosines: Floats
+    beam: Floats
 
 
 @dataclass(frozen=True)
 class PatchSize:
-    """How large patches may be: along the range [m], across it [rad], how far away they may be [m], and which share of
-    their distance they may extend along the range."""
+    """How large patches may be: along the range [m], across it on the ground [rad], how far away they may be [m], which
+    share of their distance they may extend along the range, and over how much of what a radar tells apart."""
 
     range: float
     angle: float
     farthest: float
     share: float
+    apart: Apart | None = None
 
     @property
     def nearest(self) -> float:
@@ -45,13 +75,12 @@ def visible_patches(geometry: Geometry, end: Floats, materials: Bools, size: Pat
     f = geometry.facets
     rough = materials[f.material] & (geometry.area > 0.0) if len(f.material) else np.zeros(0, bool)
     ground = rough & (f.role[f.body] == MIRROR)
-    parts = [_rings(geometry, end, body, size) for body in np.unique(f.body[ground])]
+    parts = [_sectors(geometry, end, body, size) for body in np.unique(f.body[ground])]
     parts.append(_triangles(geometry, end, np.flatnonzero(rough & ~ground), size))
-    found = Patches(*(np.concatenate(x) for x in zip(*((p.point, p.facet, p.area) for p in parts), strict=True)))
-    return _seen(geometry, end, found)
+    return _seen(geometry, end, _joined(parts))
 
 
-def _rings(geometry: Geometry, end: Floats, body: int, size: PatchSize) -> Patches:
+def _sectors(geometry: Geometry, end: Floats, body: int, size: PatchSize) -> Patches:
     """Return sectors of rings on the plane of a ground body, about the foot of `end`."""
     f = geometry.facets
     rows = np.flatnonzero(f.body == body)
@@ -60,20 +89,21 @@ def _rings(geometry: Geometry, end: Floats, body: int, size: PatchSize) -> Patch
     foot = end - ((end - first) @ normal) * normal
     reach = float(np.linalg.norm(f.vertices[rows] - foot, axis=2).max())
     farthest = min(size.farthest, float(np.hypot(reach, height)))
-    sectors = max(int(np.ceil(2.0 * np.pi / size.angle)), 8)
+    count = max(int(np.ceil(2.0 * np.pi / size.angle)), 8)
     if farthest <= height:
-        return Patches(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0))
-    edges = np.sqrt(np.maximum(_ranges(height, farthest, size, max(_MOST // sectors, 1)) ** 2 - height**2, 0.0))
-    # The middle of area: half of a ring lies on either side.
-    radius = np.sqrt(0.5 * (edges[1:] ** 2 + edges[:-1] ** 2))
-    angle = 2.0 * np.pi * (np.arange(sectors) + 0.5) / sectors
+        return _NONE
+    edges = _ranges(height, farthest, size, max(_MOST // count, 1))
+    squares = np.maximum(edges**2 - height**2, 0.0)
+    angles = np.linspace(0.0, 2.0 * np.pi, count + 1)
+    ring, turn = (np.stack([x[:-1], x[1:]], axis=1) for x in (squares, angles))
     along = np.eye(3)[np.argmin(np.abs(normal))]
     x = along - (along @ normal) * normal
     x /= np.linalg.norm(x)
-    y = np.cross(normal, x)
-    point = foot + np.einsum("i,jk->ijk", radius, np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y))
-    area = np.repeat(np.pi / sectors * np.diff(edges**2), sectors)
-    return Patches(point.reshape(-1, 3), np.full(len(area), rows[0], np.int64), area)
+    bounds = np.stack([np.repeat(ring, count, axis=0), np.tile(turn, (len(ring), 1))], axis=1)
+    sectors = Sectors(bounds, np.stack([foot, x, np.cross(normal, x)]))
+    facet = np.full(len(bounds), rows[0], np.int64)
+    found = _small(sectors, facet, sectors.area, end, farthest, lambda lines, on: _spread(lines, on, f, end, size))
+    return replace(found, grown=max(found.grown, float(np.diff(edges).max()) / size.range))
 
 
 def _ranges(height: float, farthest: float, size: PatchSize, most: int) -> Floats:
@@ -91,48 +121,91 @@ def _ranges(height: float, farthest: float, size: PatchSize, most: int) -> Float
 
 def _triangles(geometry: Geometry, end: Floats, rows: Ints, size: PatchSize) -> Patches:
     """Return triangles of facets (n,) that face `end` or are lit from both sides."""
-    v = geometry.facets.vertices[rows]
-    middle = v.mean(axis=1)
-    faces = np.einsum("ij,ij->i", end - middle, geometry.normal[rows]) > 0.0
-    near = np.linalg.norm(middle - end, axis=1) < size.farthest
-    kept = (faces | geometry.both_sides[rows]) & near
-    rows, v = rows[kept], v[kept]
-    longest = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    step = max(size.range, float(np.sqrt(geometry.area[rows].sum() / _MOST)))
-    splits = np.maximum(np.ceil(longest / step), 1).astype(np.int64)
-    corners, facet, area = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
-    for n in np.unique(splits):
-        some = np.flatnonzero(splits == n)
-        corners.append(_cut(v[some], int(n)))
-        facet.append(np.repeat(rows[some], n**2))
-        area.append(np.repeat(geometry.area[rows[some]] / n**2, n**2))
-    return _finer(np.concatenate(corners), np.concatenate(facet), np.concatenate(area), end, size)
+    f, corners = geometry.facets, geometry.facets.vertices[rows].astype(float)
+    faces = np.einsum("ij,ij->i", end - corners[:, 0], geometry.normal[rows]) > 0.0
+    kept = faces | geometry.both_sides[rows]
+
+    def excess(lines: Lines, on: Ints) -> Floats:
+        away = [sizes(at - end) for at in lines]
+        middle = np.maximum(away[1], size.nearest)
+        long = sizes(lines[2] - lines[0])
+        near = np.maximum(np.abs(away[2] - away[0]), long / _ACROSS) / (size.share * middle)
+        over = np.maximum(np.maximum(near, long / size.range), _spread(lines, on, f, end, size))
+        # Thin ones are halved along their longest side: where rates turn fast others may halve without end.
+        longest, (a, b, _) = long.max(axis=1, keepdims=True), np.moveaxis(lines[2] - lines[0], 1, 0)
+        thin = sizes(np.cross(a, b))[:, None] < _THIN * longest**2
+        return np.where(thin, over.max(axis=1, keepdims=True) * long / longest, over)
+
+    return _small(Triangles(corners[kept]), rows[kept], geometry.area[rows[kept]], end, size.farthest, excess)
 
 
-def _finer(corners: Floats, facet: Ints, area: Floats, end: Floats, size: PatchSize) -> Patches:
-    """Return triangles of corners (n, 3, 3) as patches, cut into four as long as they extend over more than a share of
-    their distance along the range, and are not too many."""
-    done, count = [], len(corners)
-    while True:
-        middle = corners.mean(axis=1)
-        away = np.linalg.norm(np.concatenate([corners, middle[:, None]], axis=1) - end, axis=2)
-        wide = np.ptp(away, axis=1) > size.share * np.maximum(away[:, 3], size.nearest)
-        count += 3 * int(wide.sum())
-        wide &= count <= _MOST
-        done.append(Patches(middle[~wide], facet[~wide], area[~wide]))
-        if not wide.any():
-            return Patches(*(np.concatenate(x) for x in zip(*((p.point, p.facet, p.area) for p in done), strict=True)))
-        corners, facet, area = _cut(corners[wide], 2), np.repeat(facet[wide], 4), np.repeat(0.25 * area[wide], 4)
+def _spread(lines: Lines, facet: Ints, facets: Facets, end: Floats, size: PatchSize) -> Floats:
+    """Return over how many times what the radar tells apart lines (n, k) on facets (n,) extend, (n, k)."""
+    told = size.apart
+    if told is None:
+        return np.zeros(lines[0].shape[:2])
+    body, rates, looks = facets.body[facet, None], [], []
+    moves, spin, origin = facets.velocity[body] - told.velocity, facets.spin[body], facets.origin[body]
+    for at in lines:
+        way = at - end
+        # Directions within `nearest` count for less, so that halving ends where the radar touches the surface.
+        look = way / np.maximum(sizes(way), size.nearest)[..., None]
+        there = moves + np.cross(spin, at - origin) if spin.any() else np.broadcast_to(moves, look.shape)
+        rates.append(np.einsum("nkc,nkc->nk", there, look))
+        looks.append(np.einsum("nkc,cd->nkd", look, told.axes))
+    changed, (x, y, _) = looks[2] - looks[0], np.moveaxis(looks[1], -1, 0)
+    turned = np.abs(x * changed[..., 1] - y * changed[..., 0]) / np.maximum(np.hypot(x, y), 1e-9)
+    raised = np.sqrt(np.maximum(np.einsum("nkc,nkc->nk", changed, changed) - turned**2, 0.0))
+    gain = np.hypot(raised / told.beam[0], turned / told.beam[1])
+    array = (np.abs(changed[..., c]) / told.cosines[c] for c in range(3))
+    return reduce(np.maximum, array, np.maximum(_between(rates) / told.rate, gain))
 
 
-def _cut(corners: Floats, n: int) -> Floats:
-    """Return the corners (m n^2, 3, 3) of triangles (m, 3, 3) cut into n^2 equal ones each."""
-    i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
-    at = np.stack([i, j], axis=1)[:, None]
-    up, down = at + np.array([[0, 0], [1, 0], [0, 1]]), at + np.array([[1, 1], [0, 1], [1, 0]])
-    at = np.concatenate([up[i + j < n], down[i + j < n - 1]])
-    bary = np.concatenate([at, n - at.sum(axis=2, keepdims=True)], axis=2) / n
-    return np.einsum("kjc,mcx->mkjx", bary, corners).reshape(-1, 3, 3)
+def _between(three: Sequence[Floats]) -> Floats:
+    """Return by how much three values (n, k) differ at most."""
+    return np.asarray(reduce(np.maximum, three) - reduce(np.minimum, three))
+
+
+def _small(pieces: Pieces, facet: Ints, area: Floats, end: Floats, farthest: float, excess: Excess) -> Patches:
+    """Return pieces as patches no farther away than so far, halved until none is too large, or larger than that by a
+    factor if they were too many."""
+    grown = 1.0
+    while (found := _halved(pieces, facet, area, end, farthest, excess, grown)) is None:
+        grown *= _GROWTH
+    return found
+
+
+def _halved(
+    pieces: Pieces, facet: Ints, area: Floats, end: Floats, farthest: float, excess: Excess, grown: float
+) -> Patches | None:
+    """Return pieces halved along the axis over which they are largest, until none is larger than `grown` times its
+    size; None if they become too many. Args: as for `_small`."""
+    done, count, most = [_NONE], 0, max(_MOST, len(facet))
+    while len(facet):
+        middle, axes = pieces.middle, pieces.axes
+        away = sizes(middle - end)
+        start, stop = axes[:, :, 0], axes[:, :, 1]
+        over = excess((start, 0.5 * (start + stop), stop), facet)
+        axis = over.argmax(axis=1)
+        large = over[np.arange(len(axis)), axis] > grown
+        # What lies beyond in part is halved until its middle tells.
+        reach = np.zeros(len(away))
+        reach[large] = sizes(axes[large] - middle[large, None, None]).max(axis=(1, 2))
+        near = away < farthest + reach
+        small, rows = np.flatnonzero(near & ~large), np.flatnonzero(near & large)
+        done.append(Patches(middle[small], facet[small], area[small], grown))
+        count += len(small)
+        if count + 2 * len(rows) > most:
+            return None
+        pieces, facet = pieces.take(rows).halved(axis[rows]), np.tile(facet[rows], 2)
+        area = np.tile(0.5 * area[rows], 2)
+    return _joined(done)
+
+
+def _joined(parts: Sequence[Patches]) -> Patches:
+    """Return the patches of all parts, of which there is one at least."""
+    point, facet, area = (np.concatenate(x) for x in zip(*((p.point, p.facet, p.area) for p in parts), strict=True))
+    return Patches(point, facet, area, max(p.grown for p in parts))
 
 
 def _seen(geometry: Geometry, end: Floats, patches: Patches) -> Patches:
@@ -147,4 +220,4 @@ def _seen(geometry: Geometry, end: Floats, patches: Patches) -> Patches:
     of = geometry.facets.body
     same = (hit >= 0) & (of[np.maximum(hit, 0)] == of[patches.facet])
     rows = np.flatnonzero(same & (np.abs(at - distance) < _TOUCH * distance))
-    return Patches(patches.point[rows], hit[rows].astype(np.int64), patches.area[rows])
+    return replace(patches.take(rows), facet=hit[rows].astype(np.int64))

@@ -134,7 +134,7 @@ def test_clutter_ends_at_each_element_by_the_length_of_its_own_way():
     elements = np.array([[0, -0.1, 0], [0, 0.02, 0.05]])
     radar = rc.Radar(WAVE, (0, 0, 1.0), elements=elements, noise=False)
     scene = rc.Scene([road(Diffuse("gamma", -10.0))], radar=radar)
-    clutter = clutter_of(geometry_of(scene), radar, scene.model, np.random.default_rng(1))
+    clutter, _ = clutter_of(geometry_of(scene), radar, scene.model, np.random.default_rng(1))
     fronts, spots = fronts_of(clutter), clutter.trajectories.vertices[:, 0].astype(float)
     for element in elements:
         there = np.linalg.norm(spots - radar.position - element, axis=1)

@@ -29,3 +29,19 @@ def test_point_targets_that_crossed_receivers_cannot_hear_are_told(pose):
     (said,) = warnings(rx_polarization="H", **pose)
     assert said.startswith("no body is heard: receivers are cross-polarised to the transmitter")
     assert warnings(rx_polarization="both") == warnings(rx_polarization="V") == []
+
+
+def test_a_constant_is_detected_where_the_only_path_has_no_gain():
+    # The specular point of plain ground is right below the radar, where a patch that looks ahead hears nothing.
+    radar = rc.Radar(WAVE, antenna=rc.CosineAntenna(60.0, 30.0), impairments=rc.Impairments(dc_offset_dbm=-40.0))
+    result = rc.simulate(rc.Scene([rc.Body("ground", shape="ground")], radar=radar, model={"max_bounces": 1}))
+    assert len(result.paths.delay) and not result.paths.amplitude.any()
+    assert [why.label for why in result.provenance] == ["dc"]
+    entry = result.ledger["intra-frame motion"]
+    assert (entry.level_db, entry.kind, entry.how) == ("none", "exact", "no path")
+
+
+def test_a_transmitter_beside_its_position_is_refused_of_an_interferer():
+    aside = rc.Radar(WAVE, tx_elements=[[0.0, 0.9, 0.0]])
+    with pytest.raises(ValueError, match=r"tx_elements = \[\[0\.0, 0\.9, 0\.0\]\] m: \[\[0, 0, 0\]\] is wanted"):
+        rc.Interferer(aside)

@@ -192,3 +192,25 @@ def test_posts_half_hidden_by_the_beam_before_them_return_as_in_a_fine_run():
     rail = rc.Body("rail", shape="guard_rail", position=(24.73, 5.97, 0.0), yaw_deg=192.4)
     modes = {"max_bounces": 1, "tolerance_db": 1.0}, {"mode": "preview"}
     check(*(rc.simulate(rc.Scene(bodies=[rail], radar=radar, model=model)) for model in modes), apart=1)
+
+
+def test_the_ledger_of_a_preview_names_thin_layers_that_are_closed_and_clutter_from_beyond_the_unambiguous_range():
+    stone = rc.Material(eps_r=4.0, diffuse=rc.Diffuse("gamma", -10.0))
+    pane = rc.Body("pane", shape="plate", params={"width": 3.0}, position=(8.0, 0.0, 1.0), material="car_glass")
+
+    def named(body, reach=1.0, **model):
+        wave = rc.Waveform(77e9, 150e6, 3e-5, n_chirps=8, n_samples=int(32 * reach))
+        made = rc.Scene([body], radar=rc.Radar(wave), model={"mode": "preview", **model})
+        return {name: entry.how for name, entry in rc.simulate(made).ledger.items() if name != "preview"}
+
+    def ground(**of):
+        return rc.Body("ground", shape="ground", params={"size": 80.0}, **of)
+
+    assert named(pane) == named(ground()) == named(ground(material=stone), diffuse="off") == {}
+    assert named(pane, max_transmissions=0) == {
+        "transmission": "model.max_transmissions is 0: what stands behind thin layers is not traced"
+    }
+    beyond = "returns of rough surfaces beyond the unambiguous range of 31.98 m would fold in"
+    # Corners of the ground are 57 m away.
+    assert named(ground(material=stone)) == {"diffuse scattering": beyond}
+    assert named(ground(material=stone), reach=2.0) == {}
