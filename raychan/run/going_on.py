@@ -41,9 +41,10 @@ def going_on(paths: Paths, geometry: Geometry, last: Bools) -> Bools:
 
 
 def shorter(paths: Paths, goes: Bools) -> Bools:
-    """Return which paths (n,) meet the bodies of paths that go on (n,), all but the first or all but the last.
+    """Return which paths (n,) meet the bodies of paths that go on (n,), all but the first or all but the last, where
+    these meet them.
 
-    Mirrors alone are none: a foot point below the radar, of whatever level, tells nothing of what stands aside.
+    The radar's foot point on a wall, of whatever level, tells nothing of what stands aside; mirrors alone never do.
     """
     first, chain = alike(paths)
     body, kind = paths.trajectories.body[first], paths.trajectories.kind[first]
@@ -53,7 +54,30 @@ def shorter(paths: Paths, goes: Bools) -> Bools:
     ]
     parts = {part for c in np.unique(chain[goes]) for part in (met[c][1:], met[c][:-1])}
     own = np.array([m in parts for m in met], bool) & ((kind == SCATTER) | (kind == POINT)).any(axis=1)
-    return np.asarray(own[chain])
+    found = np.asarray(own[chain])
+    found[found] = _among(paths, paths.trajectory[found], paths.trajectory[goes])
+    return found
+
+
+def _among(paths: Paths, ways: NDArray[np.int32], others: NDArray[np.int32]) -> Bools:
+    """Return which trajectories (n,) scatter within the box of the places where others (m,) meet the same body."""
+    kind, body, at = (getattr(paths.trajectories, name) for name in ("kind", "body", "vertices"))
+    low, high = (np.full((len(paths.body_names), 3), end) for end in (np.inf, -np.inf))
+    others = np.unique(others)
+    # Slot by slot and sorted by body, for speed.
+    for slot in range(kind.shape[1]):
+        others = others[kind[others, slot] != NONE]
+        if not len(others):
+            break
+        rows = others[np.argsort(body[others, slot], kind="stable")]
+        first = np.flatnonzero(np.diff(body[rows, slot], prepend=-1))
+        for box, end in ((low, np.minimum), (high, np.maximum)):
+            met = body[rows[first], slot]
+            box[met] = end(box[met], end.reduceat(at[rows, slot], first))
+    each, back = np.unique(ways, return_inverse=True)
+    slot = np.argmax((kind[each] == SCATTER) | (kind[each] == POINT), axis=1)
+    met, place = body[each, slot], at[each, slot]
+    return np.asarray(((place >= low[met]) & (place <= high[met])).all(axis=1)[back])
 
 
 def _mirrored(paths: Paths, geometry: Geometry, way: Ints) -> Ints:

@@ -35,6 +35,17 @@ def test_what_a_third_bounce_changes_of_a_corner_over_ground_is_told_beside_the_
     assert short.ledger["further bounces"].level_db == pytest.approx(0.0, abs=6.0)
 
 
+def test_what_a_wall_shows_of_a_ball_at_both_ends_is_told_beside_the_echo_of_the_wall():
+    """The radar's foot point on the wall is 23 dB stronger, and not where waves to the ball meet the wall."""
+    ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.3}, position=(7.0, 0.3, 1.2))
+    wall = rc.Body(name="wall", shape="wall", params={"length": 12.0}, position=(6.0, -2.5, 0.0))
+    short, whole = (run([ball, wall], n) for n in (2, 3))
+    assert short.detections.snr[0] > short.detections.snr[1] + 20.0
+    levels, at = short.rdmap.power, tuple(whole.detections.cell[-1])
+    assert whole.detections.snr[-1] > 25.0 and whole.rdmap.power[at] > 4.0 * levels[at]
+    assert told(short) and -10.0 < short.ledger["further bounces"].level_db < 3.0
+
+
 def test_an_echo_that_meets_nothing_else_does_not_change_the_estimate():
     """A plate square on above the radar returns its own echo alone, 30 dB over the corner's."""
     aside = rc.Body(
