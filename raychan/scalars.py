@@ -76,6 +76,8 @@ def shown(value: Any) -> str:
         text = repr(value)
     except ValueError:  # Python writes no whole number of more than 4300 digits
         return "a number of thousands of digits"
+    if hasattr(value, "isoformat"):
+        text = value.isoformat()  # a date, as it stands in a file
     if hasattr(value, "shape"):
         text = " ".join(text.split())
     return text if len(text) <= _LONGEST else f"{text[:_CUT]}... ({len(text)} characters)"

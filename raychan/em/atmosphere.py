@@ -68,7 +68,7 @@ class Atmosphere:
         """
         if not is_one_of(polarization, tuple(_RAIN)):
             raise ValueError(f"polarization = {shown(polarization)}: must be V or H{meant(polarization, _RAIN)}")
-        ghz = frequency * 1e-9
+        ghz = frequency / 1e9  # times 1e-9, 1000 GHz is a hair above
         return {
             "gas": gas(ghz, self.temperature_c + 273.15, self.pressure_hpa, self.vapour_gm3),
             "rain": rain(ghz, self.rain_mmh, polarization),

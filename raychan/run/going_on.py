@@ -1,41 +1,83 @@
-"""Waves of the last order of bounces that meet a surface more: only of these can further bounces be told."""
+"""Waves of the last order of bounces that meet a surface more, and those of one bounce less: only by these can further
+bounces be told."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import REFLECT, SCATTER, Paths, Vectors
+from raychan.records import NONE, POINT, REFLECT, SCATTER, TRANSMIT, Paths
 from raychan.run.labels import alike
-from raychan.run.mirrored_rays import NARROW, followed, meets, of_each
-from raychan.tracing.legs import legs_over, reachable
+from raychan.run.mirrored_rays import followed, of_each
+from raychan.tracing.legs import legs_over
 from raychan.world.geometry import Geometry
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
 def going_on(paths: Paths, geometry: Geometry, last: Bools) -> Bools:
-    """Return which paths (n,), of those of the `last` order (n,), are of chains of which a wave meets a surface more.
+    """Return which paths (n,), of those of the `last` order (n,), are of chains of which a wave, mirrored at its last
+    surface, meets another.
 
-    It is mirrored at its last surface and meets another, or a mirror shows one end of its way to the receiver, or to
-    the transmitter. Rays of each chain tell it; targets of given RCS, and what they are seen over, are taken to go on.
+    Rays of each chain tell it. Targets of given RCS send waves everywhere: these go on where there are mirrors. What
+    only mirrors at both ends show is none of them: a wall over ground has two ways over it, but no third.
     """
+    if not last.any():
+        return last
     rows = np.flatnonzero(last)
     chain = alike(paths)[1][rows]
     some = of_each(chain)
     way = paths.trajectory[rows[some]].astype(np.int64)
-    goes = np.zeros(int(chain.max(initial=0)) + 1, bool)
+    goes = np.zeros(int(chain.max()) + 1, bool)
     own = chain[some]
-    goes[own[(paths.trajectories.kind[way] != SCATTER).all(axis=1)]] = True
+    given = (paths.trajectories.kind[way] == POINT).any(axis=1)
+    if given.any() and len(legs_over(geometry, paths.tx, 1)) > 1:
+        goes[own[given]] = True
     goes[own[_mirrored(paths, geometry, way)]] = True
-    for end, slot in ((paths.tx, np.zeros(len(way), np.int64)), (paths.rx, _last(paths, way))):
-        left = np.flatnonzero(~goes[own])
-        goes[own[left[_over_mirrors(geometry, end, paths.trajectories.vertices[way[left], slot[left]])]]] = True
     found = last.copy()
     found[rows] = goes[chain]
     return found
+
+
+def shorter(paths: Paths, goes: Bools) -> Bools:
+    """Return which paths (n,) meet the bodies of paths that go on (n,), all but the first or all but the last, where
+    these meet them.
+
+    The radar's foot point on a wall, of whatever level, tells nothing of what stands aside; mirrors alone never do.
+    """
+    first, chain = alike(paths)
+    body, kind = paths.trajectories.body[first], paths.trajectories.kind[first]
+    met = [
+        tuple(b for b, k in zip(*row, strict=True) if k not in (NONE, TRANSMIT))
+        for row in zip(body.tolist(), kind.tolist(), strict=True)
+    ]
+    parts = {part for c in np.unique(chain[goes]) for part in (met[c][1:], met[c][:-1])}
+    own = np.array([m in parts for m in met], bool) & ((kind == SCATTER) | (kind == POINT)).any(axis=1)
+    found = np.asarray(own[chain])
+    found[found] = _among(paths, paths.trajectory[found], paths.trajectory[goes])
+    return found
+
+
+def _among(paths: Paths, ways: NDArray[np.int32], others: NDArray[np.int32]) -> Bools:
+    """Return which trajectories (n,) scatter within the box of the places where others (m,) meet the same body."""
+    kind, body, at = (getattr(paths.trajectories, name) for name in ("kind", "body", "vertices"))
+    low, high = (np.full((len(paths.body_names), 3), end) for end in (np.inf, -np.inf))
+    others = np.unique(others)
+    # Slot by slot and sorted by body, for speed.
+    for slot in range(kind.shape[1]):
+        others = others[kind[others, slot] != NONE]
+        if not len(others):
+            break
+        rows = others[np.argsort(body[others, slot], kind="stable")]
+        first = np.flatnonzero(np.diff(body[rows, slot], prepend=-1))
+        for box, end in ((low, np.minimum), (high, np.maximum)):
+            met = body[rows[first], slot]
+            box[met] = end(box[met], end.reduceat(at[rows, slot], first))
+    each, back = np.unique(ways, return_inverse=True)
+    slot = np.argmax((kind[each] == SCATTER) | (kind[each] == POINT), axis=1)
+    met, place = body[each, slot], at[each, slot]
+    return np.asarray(((place >= low[met]) & (place <= high[met])).all(axis=1)[back])
 
 
 def _mirrored(paths: Paths, geometry: Geometry, way: Ints) -> Ints:
@@ -59,20 +101,3 @@ def _mirrored(paths: Paths, geometry: Geometry, way: Ints) -> Ints:
         # On its way back a wave meets all layers that it passed: not as a mirror.
         on.append(some[followed(geometry, before[some], known[some, slot[some]], more + 1, split=more).row])
     return np.concatenate([np.zeros(0, np.int64), *on])
-
-
-def _last(paths: Paths, way: Ints) -> Ints:
-    """Return the last slot used (w,) of trajectories (w,)."""
-    used = paths.trajectories.kind[way] > 0
-    return np.asarray(used.shape[1] - 1 - np.argmax(used[:, ::-1], axis=1))
-
-
-def _over_mirrors(geometry: Geometry, end: Floats, points: Vectors) -> Ints:
-    """Return the rows of points (n, 3) that an end (3,) of the link sees, and over a mirror too."""
-    seen = followed(geometry, end, points.astype(float), 1, split=0)
-    at, piece, on = seen.at[:, 0], geometry.piece[seen.facet[:, 0]], np.zeros(len(seen.row), bool)
-    for leg in legs_over(geometry, end, 1)[1:]:
-        left = np.flatnonzero(~on & reachable(geometry, leg)[piece])
-        over = followed(geometry, at[left], leg.mirror_points(at[left])[:, 0], 1, split=0)
-        on[left[over.row[meets(geometry, over, end, np.full(len(over.row), NARROW))]]] = True
-    return seen.row[on]

@@ -16,9 +16,9 @@ SEEN = "seen"
 
 @dataclass(frozen=True)
 class Entry:
-    """One effect: `level_db` [dB] against the weakest detection, 'unknown' where there is no estimate, 'none' where
-    there is no effect; `kind` 'estimate', 'bound', 'exact', 'seen' where the effect is there, of unknown level, or
-    'none'; `how` it was found."""
+    """One effect: `level_db` [dB] against the weakest detection (of none, the weakest possible), 'unknown' where there
+    is no estimate, 'none' where there is no effect; `kind` 'estimate', 'bound', 'exact', 'seen' where the effect is
+    there, of unknown level, or 'none'; `how` it was found."""
 
     level_db: float | str
     kind: str

@@ -172,13 +172,14 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
         within = n - over - stated["not_converged"]
         worst = f"; the largest error stated is {stated['reached_db']:.1f} dB" if over else ""
         said.append(f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{worst}")
+    least = "the weakest detection" if n else "the weakest detection possible"
     if above := _listed(ledger, _LEAST_DB, math.inf):
-        said.append(f"left out, above the weakest detection: {above} (see left_out in summary.json of raychan run)")
+        said.append(f"left out, above {least}: {above} (see left_out in summary.json of raychan run)")
     said += [f"left out, of unknown level: {name}: {e.how}" for name, e in ledger.items() if e.kind == SEEN]
     # What adds in phase to the weakest detection moves it by so much.
     moves_db = 20.0 * math.log10(10.0 ** (tolerance_db / 20.0) - 1.0) if tolerance_db < math.inf else math.inf
-    if n and (below := _listed(ledger, moves_db, _LEAST_DB)):
-        said.append(f"left out, below the weakest detection but may move it by over {tolerance_db:g} dB: {below}")
+    if below := _listed(ledger, moves_db, _LEAST_DB):
+        said.append(f"left out, below {least} but may move {'it' if n else 'one'} by over {tolerance_db:g} dB: {below}")
     return said
 
 

@@ -15,10 +15,10 @@ from raychan.radar.radar import Radar
 from raychan.records import Facets, Paths, Points
 from raychan.run.clutter import laws_of, scatters_diffusely, share_of_distance
 from raychan.run.coming_back import coming_back
-from raychan.run.going_on import going_on
+from raychan.run.going_on import going_on, shorter
 from raychan.run.intra_frame import intra_frame
 from raychan.run.ledger import NOTHING, SEEN, UNKNOWN, Entry
-from raychan.run.mechanisms import interactions, layers, layers_at_once, peak
+from raychan.run.mechanisms import interactions, layers, layers_at_once, least_detection, peak
 from raychan.run.solver import paths_over_wedges
 from raychan.run.tessellation import coarsest, strongest_bend
 from raychan.run.unmodelled_waves import creeping_waves, over_band
@@ -41,7 +41,8 @@ def ledger(
     weakest: float,
     bodies: Collection[Body] = (),
 ) -> dict[str, Entry]:
-    """Return the unmodelled effects by name, each against the weakest detection's power [W].
+    """Return the unmodelled effects by name, each against the weakest detection's power [W]; where nothing was detected
+    (0), further bounces against that of the weakest detection possible, and the others as unknown.
 
     Args: settings, the scene's processing; model, what was modelled; bodies of the scene.
     """
@@ -51,8 +52,11 @@ def ledger(
         if weakest > 0.0:
             # A receiver elsewhere hears the transmitter all the same.
             found["intra-frame motion"] = intra_frame(paths, geometry.facets, radar)
-        # A corner whose last bounce is left out may be all that a scene has.
-        return found | {"further bounces": _returning(paths, geometry, radar, model) or found["further bounces"]}
+        if len(geometry.facets.vertices):
+            # A corner whose last bounce is left out may be all that a scene has.
+            least = least_detection(radar, settings)
+            found["further bounces"] = _further(paths, geometry, radar, settings, model, least)
+        return found
     # Those that take longest first: at the end threads wait for the last one.
     entries: dict[str, Callable[[], Entry]] = {
         "further bounces": lambda: _further(paths, geometry, radar, settings, model, weakest),
@@ -120,23 +124,22 @@ def _returning(paths: Paths, geometry: Geometry, radar: Radar, model: Any) -> En
 
 def _by_ratio(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
     met = interactions(paths)
-    if bounces == 1:
-        # The line of sight to a receiver elsewhere tells nothing of bounces.
-        return Entry(UNKNOWN, "none", "one bounce is modelled: nothing to extrapolate from")
-    orders = bounces - 1, bounces
-    before, last = (peak(paths, met == n, radar, settings) for n in orders)
-    if empty := [str(n) for n, level in zip(orders, (before, last), strict=True) if level == 0.0]:
-        return Entry(UNKNOWN, "none", f"no path has {' or '.join(empty)} interactions: nothing to extrapolate from")
-    ratio = min(last / before, 1.0)
     goes = going_on(paths, geometry, met == bounces)
     if not goes.any():
-        alone = f"no ray of {bounces} interactions meets a surface more: nothing to extrapolate from"
-        return Entry(UNKNOWN, "none", alone)
-    if goes.sum() < (met == bounces).sum():
-        last = peak(paths, goes, radar, settings)
+        return Entry(UNKNOWN, "none", f"no wave of {bounces} interactions meets a surface more")
+    if bounces == 1:
+        how = "waves meet a second surface, but one bounce is modelled (model.max_bounces): nothing to extrapolate from"
+        return Entry(UNKNOWN, SEEN, how)
+    last, before = (peak(paths, rows, radar, settings) for rows in (goes, shorter(paths, goes)))
+    if before == 0.0:
+        how = f"no path has {bounces - 1} interactions over the same bodies: nothing to extrapolate from"
+        return Entry(UNKNOWN, "none", how)
+    if not weakest > 0.0:
+        return Entry(UNKNOWN, "none", "nothing was detected, and without noise nothing says what may be")
+    ratio = min(last / before, 1.0)
     how = (
         f"strongest cell of waves of {bounces} interactions that meet a surface more ({db(last / weakest):.0f} dB) "
-        f"times the ratio of {bounces} interactions to {bounces - 1} ({db(ratio):.0f} dB)"
+        f"times their ratio to those of {bounces - 1} over the same bodies ({db(ratio):.0f} dB)"
     )
     return Entry(float(db(last * ratio / weakest)), "estimate", how)
 

@@ -23,7 +23,7 @@ from raychan.world.limbs import LimbMotion, limbs_of
 from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
-from raychan.world.mesh_io import from_trimesh, load, matrix_of, oddities
+from raychan.world.mesh_io import check_crease, from_trimesh, load, matrix_of, oddities
 from raychan.world.motion import Motion
 from raychan.world.read_only import kept, listed
 
@@ -90,6 +90,7 @@ class Body:
             if isinstance(self.mesh, (str, Path)):
                 return load(self.mesh, self.unit, self.up, self.forward, self.scale, self.crease_deg)
             # Without effect on a shape or a Mesh, but no less wrong beside them.
+            check_crease(self.crease_deg)
             turn = matrix_of(self.unit, self.up, self.forward, self.scale)
             if self.shape is not None:
                 try:

@@ -77,7 +77,9 @@ def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = No
     Args: like another table and its body, which is returned if both tables are equal, and whose mesh is shared if they
     describe the same shape.
     """
-    if like is not None and t == like[0]:
+    # true equals 1.0, but is no length.
+    same = like is not None and repr(t.params) == repr(like[0].params)
+    if like is not None and same and t == like[0]:
         return like[1]
     body = Body(
         name=t.name,
@@ -103,7 +105,7 @@ def body_of(t: BodyTable, folder: Path, like: tuple[BodyTable, Body] | None = No
         scale=t.scale,
         crease_deg=t.crease_deg,
     )
-    if like is not None and all(getattr(t, name) == getattr(like[0], name) for name in _FORM):
+    if like is not None and same and all(getattr(t, name) == getattr(like[0], name) for name in _FORM):
         body.__dict__["geometry"] = like[1].geometry
     return body
 

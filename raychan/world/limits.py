@@ -54,6 +54,7 @@ DBC_HZ = Limit(-250.0, 0.0, "dBc/Hz", "below, quantum noise is higher; above, no
 IMBALANCE_DB = Limit(-20.0, 20.0, "dB", "beyond, a mixer has one branch")
 BITS = Limit(1, 24, "", "converters of more bits are not made")
 RCS_DBSM = Limit(-100.0, 100.0, "dBsm", "from a grain of dust to more than any ship seen broadside")
+SWERLING = Limit(0, 4, "", "0 steady, 1 and 3 from frame to frame, 2 and 4 from chirp to chirp")
 GAIN_DBI = Limit(-60.0, 80.0, "dBi", "from leakage to the largest dishes")
 LEVEL_DB = Limit(-400.0, 400.0, "dB", "levels beyond are not physical")
 WAVELENGTHS = Limit(0.01, 100.0, "wavelengths", "closer elements couple; farther ones make no array")

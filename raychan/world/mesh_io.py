@@ -13,7 +13,7 @@ import numpy as np
 
 from raychan.scalars import plain
 from raychan.world.errors import SceneError, nearest, shown
-from raychan.world.limits import SCALE, WIDTH
+from raychan.world.limits import CREASE, SCALE, WIDTH
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh, make_mesh
 from raychan.world.obj_lines import missing_vertex
 from raychan.world.plain_obj import plain_text, read_by
@@ -53,6 +53,7 @@ def load(
     if file.suffix.lower() not in SUFFIXES:
         raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
     matrix = matrix_of(unit, up, forward, scale, file)
+    check_crease(crease_deg, file)
     if not file.stat().st_size:
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
     unread = checked(file)
@@ -115,13 +116,22 @@ def matrix_of(unit: str, up: str | None, forward: str | None, scale: float, file
         raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
     if SCALE.problem(scale):
         raise SceneError(f"{shown(scale)} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
-    return _turn(*axes_taken(file or "", up, forward), file) * (UNITS[unit] * plain(scale))
+    taken, ahead = axes_taken(file or "", up, forward)
+    return _turn(taken, ahead, file, forward is None) * (UNITS[unit] * plain(scale))
+
+
+def check_crease(crease_deg: float, file: Path | None = None) -> None:
+    """Raise SceneError for a crease angle [deg] that is none, of a file or of an object."""
+    if CREASE.problem(crease_deg):
+        problem = f"{shown(crease_deg)} is not possible"
+        raise SceneError(problem, file=file, key="crease_deg", value=crease_deg, allowed=f"a number {CREASE.allowed}")
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:
     """Return which of a file's axes are taken as up and as forward."""
-    taken = up or ("y" if Path(path).suffix.lower() in (".glb", ".gltf") else "z")
-    return taken, forward or ("z" if taken.endswith("y") else "x")
+    usual = "y" if Path(path).suffix.lower() in (".glb", ".gltf") else "z"
+    taken = usual if up is None else up
+    return taken, ("z" if taken.endswith("y") else "x") if forward is None else forward
 
 
 def _unit_hint(size: float, unit: str, key: str) -> str:
@@ -227,8 +237,8 @@ def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
     return found
 
 
-def _turn(up: str, forward: str, file: Path | None) -> Floats:
-    """Return the rotation that brings the file's forward to +x and its up to +z."""
+def _turn(up: str, forward: str, file: Path | None, usual: bool) -> Floats:
+    """Return the rotation that brings the file's forward, which may be the usual one, to +x and its up to +z."""
     axes = []
     for key, word in (("up", up), ("forward", forward)):
         name = word if word[:1] in "+-" else "+" + word
@@ -237,7 +247,8 @@ def _turn(up: str, forward: str, file: Path | None) -> Floats:
         axes.append(_AXES[name])
     z, x = axes
     if abs(z @ x) > 0.5:
-        raise SceneError(
-            f"'{forward}' lies along up", file=file, key="forward", value=forward, allowed=f"an axis across up = '{up}'"
-        )
+        # The one that is given is wrong, not what is usual beside it.
+        key, word, other, across = ("up", up, "forward", forward) if usual else ("forward", forward, "up", up)
+        allowed = f"an axis across {other} = '{across}'"
+        raise SceneError(f"'{word}' lies along {other}", file=file, key=key, value=word, allowed=allowed)
     return np.stack([x, np.cross(z, x), z])

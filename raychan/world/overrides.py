@@ -16,8 +16,9 @@ from raychan.world.mesh_io import SUFFIXES
 LATER = "# later by [s]: "
 """Begins the line in a scene's text that says at which later time the scene is taken."""
 
-_XYZ = ("x", "y", "z")
-_VECTORS = ("position", "velocity_mps", "rcs_point")
+XYZ = ("x", "y", "z")
+VECTORS = ("position", "velocity_mps", "rx_position", "rx_velocity_mps", "rcs_point", "spin_dps")
+"""Keys of three numbers, of which each goes by its letter."""
 
 
 def refuse_mesh(file: Path) -> None:
@@ -69,11 +70,11 @@ def changed(data: Mapping[str, Any], changes: Sequence[str], file: Any = None) -
         for i, word in enumerate(words[:-1]):
             at = _step(at, word, ".".join(words[: i + 1]), file)
         if _is_vector(at):
-            if words[-1] not in _XYZ:
+            if words[-1] not in XYZ:
                 raise SceneError(f"no number '{words[-1]}'", file=file, key=key, value=at, allowed="one of x, y, z")
-            at[_XYZ.index(words[-1])] = _value(value.strip())
+            at[XYZ.index(words[-1])] = _value(value.strip())
             continue
-        if words[-2:-1] and words[-2] in _VECTORS:
+        if words[-2:-1] and words[-2] in VECTORS:
             where, allowed = ".".join(words[:-1]), "all three numbers, as [0, 0, 0.5]; then each by its letter"
             raise SceneError("is not set", file=file, key=where, allowed=allowed)
         if isinstance(at, list) and any(isinstance(one, dict) for one in at):

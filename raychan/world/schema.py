@@ -36,6 +36,7 @@ from raychan.world.quantities import (
     Spin,
     Stagger,
     Start,
+    Swerling,
     Switch,
     Tolerance,
     Tracings,
@@ -266,7 +267,7 @@ class BodyTable(PlacedBodyTable):
     """Makes the body a point target: a number, or [azimuth_deg, dBsm] pairs relative to its heading."""
     rcs_point: Place | None = None
     """Place of the point target, body frame [m]; default the middle of the body."""
-    swerling: Literal[0, 1, 2, 3, 4] = 0
+    swerling: Swerling = 0
     """How that RCS fluctuates: 0 steady, 1 and 3 from frame to frame, 2 and 4 from chirp to chirp."""
     role: Literal["scatterer", "mirror", "blocker"] | None = None
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from raychan.scalars import meant, tabled
 from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.overrides import VECTORS, XYZ
 
 
 def checked(kind: type[Any], data: Any, file: Any = None, key: str = "") -> Any:
@@ -50,6 +51,8 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
         )
     if found["type"] == "missing":
         return SceneError("key is missing", file=file, key=key, allowed="a value")
+    if found["type"] == "value_error" and not isinstance(value, dict):
+        return SceneError(_allowed(found), file=file, key=key, value=value)
     if found["type"] == "value_error":
         return SceneError("keys do not fit together", file=file, key=key, value=value, allowed=_allowed(found))
     # A key that takes several types has an error for each.
@@ -90,13 +93,15 @@ def _tables_in(annotation: Any) -> list[type[BaseModel]]:
 
 
 def _dotted(loc: tuple[Any, ...], data: Any, whole: bool) -> str:
-    """Return the key as people write it: bodies by name, no branches of unions; `whole` if its end may be absent."""
+    """Return the key as people write it: bodies by name, numbers of a vector by x, y, z, no branches of unions; `whole`
+    if its end may be absent."""
     words: list[str] = []
     for step in loc:
         if isinstance(data, list) and isinstance(step, int) and step < len(data):
             data = data[step]
             name = data.get("name") if isinstance(data, dict) else None
-            words.append(name if isinstance(name, str) and name and name.isprintable() else str(step))
+            number = XYZ[step] if words and words[-1] in VECTORS and step < len(XYZ) else str(step)
+            words.append(name if isinstance(name, str) and name and name.isprintable() else number)
         elif isinstance(data, dict) and (step in data or (whole and step == loc[-1])):
             data = data.get(step)
             words.append(str(step))

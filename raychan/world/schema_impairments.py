@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator, model_validator
 
 from raychan.world.quantities import (
     Angle,
@@ -48,13 +48,21 @@ class ImpairmentsTable(BaseModel):
     def _fits(self) -> Self:
         if (self.adc_bits is None) != (self.adc_full_scale_dbm is None):
             raise ValueError("adc_bits and adc_full_scale_dbm together")
+        return self
+
+    @field_validator("chirp_error_us_khz", "phase_noise_hz_dbc")
+    @classmethod
+    def _rises(cls, rows: Any, info: ValidationInfo) -> Any:
         from raychan.radar.impairments import ChirpError, PhaseNoise
 
-        if self.phase_noise_hz_dbc is not None:
-            PhaseNoise(self.phase_noise_hz_dbc)
-        if self.chirp_error_us_khz is not None:
-            ChirpError(self.chirp_error_us_khz)
-        return self
+        kind, name = (PhaseNoise, "mask") if info.field_name == "phase_noise_hz_dbc" else (ChirpError, "table")
+        try:
+            if rows is not None:
+                kind(rows)
+        except ValueError as e:
+            # Of the class, whose name no file has.
+            raise ValueError(str(e).removeprefix(f"{kind.__name__}.{name}").removeprefix(": ").strip()) from None
+        return rows
 
 
 class AtmosphereTable(BaseModel):

@@ -88,6 +88,12 @@ def test_causes_add_and_a_field_falls_by_half_the_decibels_of_its_power():
     assert 20.0 * np.log10(np.exp(-alpha * 1000.0)) == pytest.approx(-sum(causes.values()))
 
 
+def test_the_ends_of_what_is_known_are_known():
+    for frequency in (1e9, 1e12):
+        assert Atmosphere().attenuation(frequency) > 0.0
+    assert Atmosphere(fog_gm3=0.1).attenuation(200e9) > Atmosphere().attenuation(200e9)
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [(lambda: gas(0.5, 288.0, 1013.0, 7.5), "1 to 1000 GHz"), (lambda: fog(300.0, 1.0, 288.0), "1 to 200 GHz")],

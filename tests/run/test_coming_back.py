@@ -70,7 +70,7 @@ def test_bodies_that_send_nothing_back_are_not_told(bounces):
 
 def test_a_dihedral_with_one_bounce_is_told_as_it_comes_back_by_two():
     assert "over corner come back by 2 interactions" in told(run("dihedral", 1, height=0.5, size=0.2))[0]
-    assert told(run("plate", 1)) == told(run("sphere", 1)) == []
+    assert told(run("plate", 1, alone=True)) == told(run("sphere", 1, alone=True)) == []
 
 
 def beside(shape, bounces, **params):

@@ -1,9 +1,6 @@
 """What the ledger says of thin layers that a run may not pass."""
 
-import numpy as np
-
 import raychan as rc
-from raychan.run.mechanisms import interactions
 
 _PANE = rc.Body(
     name="pane",
@@ -52,25 +49,3 @@ def test_mode_auto_counts_layers_by_stretch_as_the_limit_does():
     result, _ = _entry(mode="auto", max_transmissions=2)
     assert result.ledger["model"].transmissions == 1
     assert any("thin layers on a stretch" in line for line in result.ledger["model"].why)
-
-
-def test_what_cannot_be_extrapolated_names_the_order_that_has_no_path():
-    """Between two panes a wave turns twice or not at all: a point behind both returns by 1, 3, 5 interactions."""
-    across = np.array([np.cos(0.6), np.sin(0.6), 0.0])
-    panes = [
-        rc.Body(
-            name=f"pane{i}",
-            shape="plate",
-            params={"width": 6.0, "height": 6.0},
-            material=rc.Material(6.0, thickness=3e-3),
-            position=np.array([1.3, 0.0, 1.0]) + 0.1 * i * across,
-            yaw_deg=np.degrees(0.6),
-        )
-        for i in range(2)
-    ]
-    point = rc.Body(name="p", shape="sphere", params={"radius": 0.01}, position=(9.0, 0.0, 1.0), rcs_dbsm=40.0)
-    radar = rc.Radar(rc.Waveform(77e9, 150e6, 30e-6, n_chirps=4, n_samples=128), position=(0.0, 0.0, 1.0))
-    found = rc.simulate(rc.Scene(bodies=[*panes, point], radar=radar, model={"max_bounces": 5}))
-    met = interactions(found.paths)
-    assert (met == 5).any() and not (met == 4).any()
-    assert found.ledger["further bounces"].how == "no path has 4 interactions: nothing to extrapolate from"

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 import raychan as rc
 from raychan.world.mesh import make_mesh
@@ -78,3 +79,12 @@ def test_a_part_whose_name_has_brackets_is_meant_by_its_name():
     assert body.part_materials() == ["glass", "pec"]
     assert "parts rx is taken" in " ".join(body.notes())
     assert rc.Body("b", mesh=mesh, materials={"[r]*": "glass"}).part_materials() == ["pec", "glass"]
+
+
+@pytest.mark.parametrize("angle", [float("nan"), -1.0, 400.0, "x", True, None])
+@pytest.mark.parametrize("made", [{"shape": "box"}, {"mesh": trimesh.creation.box()}, {"mesh": "box.stl"}])
+def test_a_crease_angle_that_is_none_is_refused_by_a_body_outside_a_scene(angle, made, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box().export("box.stl")
+    with pytest.raises(rc.SceneError, match=r"b\.crease_deg: .* allowed: a number between 0 and 180 deg"):
+        _ = rc.Body("b", crease_deg=angle, **made).geometry

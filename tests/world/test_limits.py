@@ -74,10 +74,10 @@ def test_a_limit_keeps_its_ends_and_says_why(name):
         ("processing.pad=[1000000,1]", "processing.pad.0", "between 1 and 64"),
         ("processing.guard=[-1,0]", "processing.guard.0", "between 0 and 1000"),
         ("processing.train=[1,1001]", "processing.train.1", "between 0 and 1000"),
-        ("radar.position=[1e30,0,0]", "radar.position.0", "1e+06 m"),
-        ("bodies.sign.position.y=-1e30", "bodies.sign.position.1", "1e+06 m"),
-        ("bodies.sign.velocity_mps=[1e308,0,0]", "bodies.sign.velocity_mps.0", "100000 m/s"),
-        ("bodies.sign.velocity_mps=[9e18,0,0]", "bodies.sign.velocity_mps.0", "100000 m/s"),
+        ("radar.position=[1e30,0,0]", "radar.position.x", "1e+06 m"),
+        ("bodies.sign.position.y=-1e30", "bodies.sign.position.y", "1e+06 m"),
+        ("bodies.sign.velocity_mps=[1e308,0,0]", "bodies.sign.velocity_mps.x", "100000 m/s"),
+        ("bodies.sign.velocity_mps=[9e18,0,0]", "bodies.sign.velocity_mps.x", "100000 m/s"),
         ("bodies.sign.rcs_dbsm=4000", "bodies.sign.rcs_dbsm", "100 dBsm"),
         ("bodies.sign.rcs_dbsm=[[0,4000],[9,1]]", "bodies.sign.rcs_dbsm.0.1", "100 dBsm"),
         ("radar.power_dbm=4000", "radar.power_dbm", "100 dBm"),
@@ -97,12 +97,26 @@ def test_a_limit_keeps_its_ends_and_says_why(name):
         ("model.tolerance_db=1e9", "model.tolerance_db", "40 dB"),
         ("materials.x={eps_r=1e9}", "materials.x.eps_r", "10000"),
         ("bodies.sign.params.width=1e9", "bodies.sign.params.width", "positive number"),
+        ("bodies.sign.params.width=1e-9", "bodies.sign.params.width", "at least 1e-08 m, 1e-08 of its height"),
+        ("bodies.sign.swerling=true", "bodies.sign.swerling", "a whole number between 0 and 4: 0 steady"),
+        ("bodies.sign.up=x", "bodies.sign.up", "'x' lies along forward; allowed: an axis across forward = 'x'"),
+        ("bodies.sign.forward=-z", "bodies.sign.forward", "'-z' lies along up"),
+        ("bodies.sign.up=''", "bodies.sign.up", "allowed: x, y, z, -x"),
+        ("bodies.sign.forward=''", "bodies.sign.forward", "allowed: x, y, z, -x"),
+        ("radar.power_dbm=1979-05-27", "radar.power_dbm", ": 1979-05-27 is not possible"),
+        ("radar.elements_mm=[[0,0,nan]]", "radar.elements_mm.0.2", "nan is not possible"),
     ],
 )
 def test_figures_beyond_limits_are_refused_by_key_with_what_is_allowed(scene, change, key, says):
     with pytest.raises(SceneError) as caught:
         rc.Scene.load(scene).override([change])
     assert caught.value.key == key and says in str(caught.value)
+
+
+def test_true_is_no_length_though_it_equals_one(scene):
+    one = rc.Scene.load(scene).override(["bodies.sign.params.width=1.0"])
+    with pytest.raises(SceneError, match=r"bodies\.sign\.params\.width: True is not a number"):
+        one.override(["bodies.sign.params.width=true"])
 
 
 PAIRS = [
@@ -118,6 +132,21 @@ def test_a_list_of_pairs_is_refused_with_the_pair_that_is_allowed(scene, name, e
         with pytest.raises(SceneError) as caught:
             rc.Scene.load(scene).override([f"{key}={given}"])
         assert caught.value.key == key + at and str(caught.value).endswith(f"is not possible; allowed: {says}")
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "says"),
+    [
+        ("chirp_error_us_khz", "[[1,2],[1,3]]", "the first number must rise from row to row"),
+        ("phase_noise_hz_dbc", "[[9,-90],[1,-91]]", "the first number must rise from row to row"),
+        ("phase_noise_hz_dbc", "[[1,-90],[9,-80]]", "rises from -90 dBc/Hz at 1 Hz to -80 dBc/Hz at 9 Hz"),
+    ],
+)
+def test_pairs_that_do_not_go_together_are_told_by_their_key_alone(scene, name, rows, says):
+    with pytest.raises(SceneError, match="^[^:]*: radar.impairments") as caught:
+        rc.Scene.load(scene).override([f"radar.impairments.{name}={rows}"])
+    assert caught.value.key == f"radar.impairments.{name}" and f"{name}: {says}" in str(caught.value)
+    assert "ChirpError" not in str(caught.value) and "PhaseNoise" not in str(caught.value)
 
 
 def refusals():

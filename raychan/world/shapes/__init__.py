@@ -30,6 +30,7 @@ RIGID: dict[str, Callable[..., Mesh]] = {make.__name__: make for make in _ALL}
 """Shapes in one piece."""
 SHAPES: dict[str, Callable[..., Mesh | Skeleton]] = {**RIGID, **SKELETONS}
 _LIMITS = {"max_sag": SAG, "hoops": HOOPS, "speed": WALK, "phase": PHASE}
+_THINNEST = 1e-8  # of a shape's largest size: corners nearer than 1e-9 of it to each other are one (pieces of surface)
 _WANTED: dict[type, str] = {bool: "true or false", str: "a text", list: "a list"}
 
 
@@ -72,12 +73,23 @@ def _made(name: str, params: dict[str, Any] | None) -> Mesh | Skeleton:
             raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a whole number")
         if not number and not isinstance(value, type(default)):
             raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=_WANTED[type(default)])
+    _check_sizes({key: given.get(key, p.default) for key, p in known.items()}, given)
     try:
         return make(**given)
     except SceneError:
         raise
     except (ValueError, TypeError, ArithmeticError, IndexError, StopIteration) as e:
         raise SceneError(f"'{name}' cannot be built with these sizes ({e})", key="shape", value=given) from e
+
+
+def _check_sizes(sizes: dict[str, Any], given: dict[str, Any]) -> None:
+    """Raise SceneError where a size given [m] is next to nothing beside the largest: its faces would have no area."""
+    lengths = {k: v for k, v in sizes.items() if k not in _LIMITS and isinstance(v, float | int) and v > 0.0}
+    largest = max(lengths, key=lambda key: lengths[key], default="")
+    for key in lengths.keys() & given.keys():
+        if lengths[key] < _THINNEST * lengths[largest]:
+            allowed = f"at least {_THINNEST * lengths[largest]:g} m, {_THINNEST:g} of its {largest}"
+            raise SceneError(f"{shown(given[key])} is not possible", key=key, value=given[key], allowed=allowed)
 
 
 __all__ = ["RIGID", "SHAPES", "SKELETONS", "build", "skeleton"]
