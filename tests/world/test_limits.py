@@ -143,7 +143,7 @@ def test_a_list_of_pairs_is_refused_with_the_pair_that_is_allowed(scene, name, e
     ],
 )
 def test_pairs_that_do_not_go_together_are_told_by_their_key_alone(scene, name, rows, says):
-    with pytest.raises(SceneError, match="^[^:]*: radar.impairments") as caught:
+    with pytest.raises(SceneError, match=r"^[^:]*: radar.impairments") as caught:
         rc.Scene.load(scene).override([f"radar.impairments.{name}={rows}"])
     assert caught.value.key == f"radar.impairments.{name}" and f"{name}: {says}" in str(caught.value)
     assert "ChirpError" not in str(caught.value) and "PhaseNoise" not in str(caught.value)
