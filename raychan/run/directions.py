@@ -83,22 +83,23 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
                 (one.arrival[way], radar.rx_axes, radar.elements),
             )
         )
-        sent = _in_channels(radar, sent, paths.range_rate[some] - found.rate[row])
-        return np.asarray(((sent @ found.beam[row].reshape(sent.shape[1], -1)) * seen).sum(axis=1))
+        weights = found.beam[row].reshape(-1, len(radar.elements))
+        held = _in_slots(radar, len(weights), sent, paths.range_rate[some] - found.rate[row])
+        return np.asarray(((held @ weights) * seen).sum(axis=1))
 
     return Beams(passed, range_spread(found, radar)[0])
 
 
-def _in_channels(radar: Radar, sent: Complexes, off: Floats) -> Complexes:
-    """Return what the channels of transmitters (n, t) hold of paths (n,) sent by them, whose rates are so far off (n,)
-    [m/s] the rate for which the transmitters are told apart: by time division turned, by Doppler division, beyond half
-    a fold, those of others."""
-    wave, slots, count = radar.waveform, radar.slots, np.arange(sent.shape[1])
+def _in_slots(radar: Radar, many: int, sent: Complexes, off: Floats) -> Complexes:
+    """Return what so many slots hold (n, s) of paths sent (n, t), whose rates are so far off (n,) [m/s] the rate for
+    which the transmitters are told apart: by time division turned, by Doppler division, beyond half a fold, in other
+    slots. Older files have beams of the transmitters' slots only."""
+    wave, slots, count = radar.waveform, radar.slots, np.arange(many)
     turns = 2.0 * wave.middle / C0 * wave.repetition * off[:, None]  # a ramp
     if radar.multiplexing == "ddm":
         whose = (count + np.rint(turns * slots).astype(np.int64)) % slots
-        held = np.take_along_axis(sent, np.minimum(whose, len(count) - 1), axis=1)
-        return np.where(whose < len(count), held, 0.0)
+        held = np.take_along_axis(sent, np.minimum(whose, sent.shape[1] - 1), axis=1)
+        return np.where(whose < sent.shape[1], held, 0.0)
     return sent * np.exp(-2j * np.pi * turns * count)
 
 
