@@ -297,4 +297,4 @@ class Detections(Record):
     snr: Floats = column("n", unit="dB")
     power: Floats = column("n", unit="W")
     cell: NDArray[np.int32] = column("n 2", np.int32, doc="map indices (rate, range) of the peak")
-    beam: Complexes = column("n a", np.complex128, doc="antennas' weights in its beam; none where no array allows it")
+    beam: Complexes = column("n a", np.complex128, doc="weights of antennas, or slots, in its beam; none without")

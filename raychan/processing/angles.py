@@ -1,7 +1,8 @@
 """The echoes within one cell of a map: how many, from which directions, how strong, and each one's own peak.
 
 Directions are sought for one echo, then for one more as long as the strongest beam of what is left exceeds the
-detector's threshold. Each echo then has a beam of its own, with nulls towards the others of the cell.
+detector's threshold. Each echo then has a beam of its own, with nulls towards the others of the cell. By several
+transmitters echoes may be folded differently: each is a wave in what the slots hold under its own fold.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing.doa import amplitudes, estimate
+from raychan.processing.slots import LONE, Slots
 from raychan.radar.aperture import Aperture
 
 Floats = NDArray[np.float64]
@@ -23,6 +25,8 @@ _MOST = 8  # echoes in a cell
 _FLOOR = 1e-4  # of a cell's strongest echo: what a wave that is no plane one to rounding and side lobes leaves
 _APART = 0.05  # beam widths: nearer echoes share their power at the noise's whim (not measured)
 _UNTOLD = 0.01  # of an echo's power: waves that were not told apart, weaker than this, move its level by 0.9 dB at most
+_ROUNDS = 20  # of seeking the echoes of different folds by turns (not measured)
+_STILL = 1e-4  # beam widths: echoes of different folds that move less have arrived (not measured)
 _SAFETY = 4.0  # on the power that a plane wave cannot fit (not measured)
 
 
@@ -54,9 +58,11 @@ class Scan:
         shifts = np.stack([x.ravel() for x in np.meshgrid(*axes)], axis=1)
         return np.asarray(self.aperture.steering(direction + shifts).conj() / len(self.aperture.elements))
 
-    def through(self, weights: Complexes, directions: Floats, distances: Floats) -> Floats:
-        """Return the greatest power that beams of weights (s, a) let through of echoes (n,), over that in their own."""
-        share = (np.abs(weights @ self.aperture.steering(directions).T) ** 2).max(axis=0)
+    def through(self, weights: Complexes, waves: Complexes, directions: Floats, distances: Floats) -> Floats:
+        """Return the greatest power that beams of weights (b, a) let through of echoes (n,), over that in their own.
+
+        Args: waves (n, a) of the echoes in the antennas that the beams weigh; as for `misfit`."""
+        share = (np.abs(weights @ waves.T) ** 2).max(axis=0)
         return np.maximum(share, self.misfit(directions, distances))
 
 
@@ -69,11 +75,22 @@ class CellEchoes:
     power: Floats
     """(k,) [W]"""
     weights: Complexes
-    """Beams (k, a): times the cell's snapshot (a,) the echoes' waves."""
+    """Beams (k, s * a): times the cell's snapshot (s * a,) the echoes' waves."""
+    fold: Ints
+    """(k,) how many times more than the snapshot is read."""
     rest: float = 0.0
     """Power [W] of the strongest beam of what they leave: more than noise where two echoes were not told apart."""
     least: float = 0.0
-    """Power [W] below which what they leave is noise, or what of the strongest is no plane wave."""
+    """Power [W] below which what they leave is noise, or what of them is no plane wave."""
+
+    @property
+    def explained(self) -> bool:
+        """Whether they leave noise, or what of them is no plane wave."""
+        return self.rest <= self.least
+
+    def by_fold(self) -> dict[int, Floats]:
+        """Return the directions of the echoes of each fold, first that of the strongest."""
+        return {h: self.direction[self.fold == h] for h in dict.fromkeys(self.fold.tolist())}
 
     @property
     def noise_gain(self) -> Floats:
@@ -83,47 +100,147 @@ class CellEchoes:
     def unsure(self, aperture: Aperture) -> NDArray[np.bool_]:
         """Return which directions (k,) may be wrong by more than a beam width: where side lobes are high, those of sums
         of waves that were not told apart."""
-        untold = aperture.table is None and self.rest > self.least
+        untold = aperture.table is None and not self.explained
         return np.asarray(untold & (self.rest > _UNTOLD * self.power))
 
 
-def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float) -> CellEchoes:
-    """Return the echoes of a cell's snapshot (a,).
+def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float, slots: Slots = LONE) -> CellEchoes:
+    """Return the echoes of a cell's snapshot (s * a,), of what its slots hold.
 
-    Args: least, power [W] below which a beam is noise; distance [m] of the cell. Two echoes are told apart where both
-    exceed `least` in their beams and the misfit of the stronger; by Bartlett's beams only a beam width apart.
-    """
-    data = snapshot[None, :].astype(np.complex128)
-    aperture = scan.aperture
-    found = _told(data, aperture, estimate(data, aperture, "bartlett", 1))
-    least = max(least, float(scan.misfit(found.direction[:1], np.array([distance]))[0] * found.power[0]))
-    count = len(aperture.elements)
-    for k in range(1, min(_MOST, count // 2) + 1):
-        rest = data - amplitudes(data, aperture, found.direction) @ aperture.steering(found.direction)
-        found = replace(
-            found, least=least, rest=float(_told(rest, aperture, estimate(rest, aperture, "bartlett", 1)).power[0])
+    Args: least, power [W] below which a beam is noise; distance [m] of the cell; slots of transmitters. Two echoes are
+    told apart where both exceed `least` in their beams and what of both is no plane wave; by Bartlett's beams those of
+    one fold only a beam width apart."""
+    cell = _Cell(snapshot[None, :].astype(np.complex128), scan, slots, least, distance)
+    most = min(_MOST, len(scan.aperture.elements) // 2)
+    found = cell.grown(slots.folds[:1], most)
+    # Of several folds fewer echoes must explain what is explained.
+    fewer = len(found.power) - 1 if found.explained else most
+    return found if fewer < 2 or len(slots.folds) == 1 else cell.better(found, cell.grown(slots.folds, fewer))
+
+
+@dataclass(frozen=True, eq=False)
+class _Cell:
+    """A cell in which echoes are sought."""
+
+    data: Complexes
+    """(1, s * a)"""
+    scan: Scan
+    slots: Slots
+    least: float
+    """[W]"""
+    distance: float
+    """[m]"""
+
+    def sought(self, data: Complexes, h: int, method: str, count: int) -> Floats:
+        """Return the cosines (k, 2) of at most `count` echoes folded h times in data (1, s * a)."""
+        return estimate(self._channels(data, h), self.scan.aperture, method, count)
+
+    def _channels(self, data: Complexes, h: int) -> Complexes:
+        """Return what the transmitters' channels (1, t * a) hold of data (1, s * a) if echoes are folded h times."""
+        return self.slots.read_under(data[0], h)[None, : len(self.scan.aperture.elements)]
+
+    def told(self, directions: dict[int, Floats]) -> CellEchoes:
+        """Return the echoes from directions (k, 2) by their folds, by least squares."""
+        towards = np.concatenate(list(directions.values()))
+        fold = np.repeat(list(directions), [len(x) for x in directions.values()])
+        weights = np.linalg.pinv(self._waves(directions)).T
+        power = np.abs(weights @ self.data[0]) ** 2
+        order = np.argsort(-power, kind="stable")
+        misfit = self.scan.misfit(towards, np.full(len(towards), self.distance))
+        least = max(self.least, float(misfit @ power))
+        return CellEchoes(towards[order], power[order], weights[order], fold[order], least=least)
+
+    def beams_left(self, found: CellEchoes) -> Floats:
+        """Return the power (h,) of the strongest beam of what echoes leave, by folds."""
+        rest = self._left(found.by_fold())
+        beams = [self._channels(rest, h) for h in self.slots.folds]
+        own = self.scan.aperture
+        return np.array([_amplitude(x, own, estimate(x, own, "bartlett", 1)) ** 2 for x in beams])
+
+    def grown(self, folds: range, most: int) -> CellEchoes:
+        """Return at most so many echoes of some folds: the strongest, and one more as long as they leave more than
+        noise, or than what of them is no plane wave, and all are told apart."""
+        found, count = self.told({0: self.sought(self.data, 0, "bartlett", 1)}), len(self.scan.aperture.elements)
+        for k in range(1, max(most, 1) + 1):
+            left = self.beams_left(found)
+            found = replace(found, rest=float(left.max()))
+            if found.explained or k >= most:
+                break
+            more = self._one_more(found, int(left[: len(folds)].argmax()))
+            if more is None or (more.power <= found.least * count * more.noise_gain).any():
+                break
+            found = more
+        return found
+
+    def better(self, found: CellEchoes, mixed: CellEchoes) -> CellEchoes:
+        """Return echoes of one fold, or those of several, `mixed`, if as many beams of one, told apart or not, leave
+        clearly more."""
+        if found.explained and not mixed.explained:
+            return found
+        count = len(mixed.power) if mixed.explained else max(len(found.power), len(mixed.power))
+        one = self._by_turns({0: count})
+        return (
+            found if one is None or self._energy(one) <= self._energy(mixed.by_fold()) + self._clear(found) else mixed
         )
-        if found.rest <= least or k == min(_MOST, count // 2):
-            break
-        directions = estimate(data, aperture, scan.method, k + 1)
-        if len(directions) <= k or _nearest(directions, aperture) < (1.0 if scan.method == "bartlett" else _APART):
-            break
-        more = _told(data, aperture, directions)
-        if (more.power <= least * count * more.noise_gain).any():
-            break
-        found = more
-    return found
+
+    def _one_more(self, found: CellEchoes, other: int) -> CellEchoes | None:
+        """Return echoes, one more than found: of a fold that found ones have, or of another if it explains clearly
+        more; None where they are not told apart."""
+        known = found.by_fold()
+        counts = {h: len(x) for h, x in known.items()}
+        tried = [counts | {h: counts.get(h, 0) + 1} for h in dict.fromkeys([*known, other])]
+        ways = [way for more in tried if (way := self._by_turns(more))]
+        if not ways:
+            return None
+        left = [self._energy(way) for way in ways]
+        way = next(way for way, rest in zip(ways, left, strict=True) if rest <= min(left) + self._clear(found))
+        apart = 1.0 if self.scan.method == "bartlett" else _APART
+        near = any(_nearest(x, self.scan.aperture) < apart for x in way.values())
+        return None if near else self.told(way)
+
+    def _energy(self, directions: dict[int, Floats]) -> float:
+        """Return the power in all channels of what echoes leave."""
+        return float((np.abs(self._left(directions)) ** 2).sum())
+
+    def _clear(self, found: CellEchoes) -> float:
+        """Return the power in all channels of an echo that a beam tells from noise."""
+        return found.least * len(self.scan.aperture.elements)
+
+    def _by_turns(self, counts: dict[int, int]) -> dict[int, Floats] | None:
+        """Return the cosines (k, 2) of as many echoes of each fold as are counted, those of each fold sought by turns
+        in what the others leave; None where the method finds fewer."""
+        found: dict[int, Floats] = {}
+        for _ in range(_ROUNDS if len(counts) > 1 else 1):
+            before = dict(found)
+            for h, count in counts.items():
+                rest = self._left(found, h) if found else self.data
+                found[h] = self.sought(rest, h, self.scan.method, count)
+                if len(found[h]) < count:
+                    return None
+            width = self.scan.aperture
+            if before and all(width.apart(found[h], before[h]).max() < _STILL for h in counts):
+                break
+        return found
+
+    def _left(self, directions: dict[int, Floats], but: int | None = None) -> Complexes:
+        """Return what echoes leave of the data (1, s * a), fitted by least squares; those of one fold are left too."""
+        waves = self._waves(directions)
+        parts = self.data @ np.linalg.pinv(waves)
+        fold = np.repeat(list(directions), [len(x) for x in directions.values()])
+        return np.asarray(self.data - np.where(fold == but, 0.0, parts) @ waves)
+
+    def _waves(self, directions: dict[int, Floats]) -> Complexes:
+        """Return what the slots hold (k, s * a) of waves from directions by their folds."""
+        held = [self.slots.waves(self.scan.aperture.steering(x), [h] * len(x)) for h, x in directions.items()]
+        return np.concatenate(held)
 
 
-def _told(data: Complexes, aperture: Aperture, directions: Floats) -> CellEchoes:
-    """Return the echoes from directions (k, 2) in a snapshot (1, a), by least squares."""
-    weights = np.linalg.pinv(aperture.steering(directions)).T
-    power = np.abs(weights @ data[0]) ** 2
-    order = np.argsort(-power, kind="stable")
-    return CellEchoes(directions[order], power[order], weights[order])
+def _amplitude(data: Complexes, aperture: Aperture, direction: Floats) -> float:
+    """Return the amplitude of a wave from one direction (1, 2) in a snapshot (1, a)."""
+    return float(np.abs(amplitudes(data, aperture, direction)[0, 0]))
 
 
 def _nearest(directions: Floats, aperture: Aperture) -> float:
-    """Return the least distance of two directions (k, 2), in beam widths."""
+    """Return the least distance of two directions (k, 2), in beam widths; infinite of one."""
     apart = aperture.apart(directions[:, None], directions[None])
-    return float(apart[np.triu_indices(len(apart), 1)].min())
+    return float(apart[np.triu_indices(len(apart), 1)].min(initial=np.inf))

@@ -14,6 +14,7 @@ from raychan.processing.cfar import Grid
 from raychan.processing.line_lobes import LineLobes
 from raychan.processing.main_lobe import PeakShape
 from raychan.processing.peaks import MARGIN, SideLobes, together
+from raychan.processing.slots import LONE, Slots
 from raychan.processing.staggered import ResolvedMap
 from raychan.records import RangeDoppler
 
@@ -25,7 +26,6 @@ _LITTLE = 1e-3  # of a peak's power: what an echo may show there without its dir
 _HIDDEN = (
     10.0  # on what echoes leave in their cell: the fit takes some of an echo that was not told apart (not measured)
 )
-_STEPS = ((-1, 0), (1, 0)), ((0, -1), (0, 1))  # to the map cells beside one, along rate and range
 _SAME_BEAM = 0.5  # beam widths: nearer directions of neighbouring peaks are one echo (not measured)
 
 
@@ -75,7 +75,10 @@ class Echoes(Found):
     unsure: NDArray[np.bool_]
     """(n,) whether the direction may be that of a side lobe: waves in the cell were not told apart"""
     weights: Complexes
-    """Beams (n, a) that the echoes are seen in, with nulls towards the others of their cells."""
+    """Beams (n, s * a) that the echoes are seen in, of what slots hold under their folds, with nulls towards the others
+    of their cells."""
+    fold: Ints
+    """(n,) by how many spans of rates they are folded in their cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,13 +95,15 @@ class Row:
     """Share of the power that is no plane wave: an echo that was not told apart from it, seen by all beams."""
     unsure: bool
     weights: Complexes
-    """(a,) of its beam, with nulls towards the others of the cell."""
+    """(s * a,) of its beam, of what slots hold under its fold, with nulls towards the others of the cell."""
+    fold: int
+    """By how many spans of rates it is folded in its cell."""
     shown: float
     """[W] power in its cell."""
     beside: bool
     """Whether it peaks a resolution cell or more from that peak."""
     crest: bool
-    """Whether its beam shows no more in the map cells around its own."""
+    """Whether its beam shows no more in the map cells around that peak's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +130,13 @@ class Splitter:
         kept: list[Row] = []
         beside: list[Row] = []
         for i in range(len(peaks.cells)):
-            beams = partial(self.scan.conventional, peaks.direction[i]) if self.coherent else None
-            clear = self._clear(float(peaks.shown[i]), peaks.cells[i], peaks.shift[i], kept, peaks, beams)
-            if not (clear and self.lines.own(peaks.cells[i])):
+            beams = partial(self._beams_at, peaks.direction[i]) if self.coherent else None
+            place = peaks.cells[i], peaks.shift[i], self._fold(peaks.cells[i])
+            if not (self._clear(float(peaks.shown[i]), *place, kept, peaks, beams) and self.lines.own(peaks.cells[i])):
                 continue
             v, r = peaks.cells[i]
-            snapshot = self.map.spectrum[:, v, r]
-            held = echoes_in(snapshot, self.scan, float(peaks.least[i]), float(self.map.range[r]))
+            snapshot, distance = self._read(v, r, self._fold(peaks.cells[i])), float(self.map.range[r])
+            held = echoes_in(snapshot, self.scan, float(peaks.least[i]), distance, self.slots)
             rows = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k))]
             beside += [row for row in rows if row.beside]
             found = [rows[0], *(row for row in rows[1:] if not row.beside and self._own(row, kept, peaks))]
@@ -146,17 +151,45 @@ class Splitter:
             if not any(self._same(row, other) for other in kept) and self._own(row, kept, peaks):
                 kept.append(row)
         kept.sort(key=lambda row: -row.power)
-        names = ("cell", "shift", "power", "noise", "direction", "unsure", "weights")
+        names = ("cell", "shift", "power", "noise", "direction", "unsure", "weights", "fold")
         if not kept:
             none, pairs, weights = np.zeros(0), np.zeros((0, 2)), np.zeros((0, len(self.map.spectrum)), complex)
-            return Echoes(pairs.astype(np.int64), pairs, none, none, pairs, none.astype(bool), weights)
+            whole = pairs.astype(np.int64)
+            return Echoes(whole, pairs, none, none, pairs, none.astype(bool), weights, whole[:, 0])
         return Echoes(*(np.array([getattr(row, name) for row in kept]) for name in names))
 
-    def _clear(self, power: float, cell: Ints, shift: Floats, kept: list[Row], peaks: Peaks, beams: Any) -> bool:
+    @property
+    def slots(self) -> Slots:
+        """How transmitters are told apart."""
+        return self.map.slots if isinstance(self.map, ResolvedMap) else LONE
+
+    def _fold(self, cell: Ints) -> int:
+        """Return by how many spans a map cell (2,) is held to be folded."""
+        return int(self.map.fold[tuple(cell)]) if isinstance(self.map, ResolvedMap) else 0
+
+    def _read(self, rows: Any, columns: Any, folds: Any) -> Complexes:
+        """Return what the slots of map cells (...) hold, (s * a, ...), read under folds (...)."""
+        if isinstance(self.map, ResolvedMap):
+            return self.map.read(rows, columns, folds)
+        return np.asarray(self.map.spectrum[:, rows, columns])
+
+    def _fold_at(self, row: Row, cell: Ints) -> int:
+        """Return by how many spans an echo is folded in a map cell (2,): over the end of the rates by one more or less,
+        as true rates go on there."""
+        return row.fold + round(float(row.cell[0] - cell[0]) / len(self.map.rate))
+
+    def _beams_at(self, direction: Floats) -> Complexes:
+        """Return the weights (b, s * a) of beams towards cosines (2,) and beside it, of what slots hold."""
+        beams = self.scan.conventional(direction)
+        return self.slots.waves(beams, [0] * len(beams))
+
+    def _clear(
+        self, power: float, cell: Ints, shift: Floats, fold: int, kept: list[Row], peaks: Peaks, beams: Any
+    ) -> bool:
         """Return whether a power in a cell (2,) that peaks beside it exceeds what the side lobes of echoes may show.
 
-        Args: shift (2,) [map cells] of the peak; beams, None or a function that gives the weights (s, a) of those in
-        which the place is seen."""
+        Args: shift (2,) [map cells] of the peak; fold of what is seen; beams, None or a function that gives the weights
+        (b, s * a) of those in which the place is seen."""
         if not kept:
             return True
         pad = np.array(self.grid.pad)
@@ -175,24 +208,17 @@ class Splitter:
         much = shown > _LITTLE * power
         some, rest = [kept[k] for k in np.flatnonzero(much)], rest + MARGIN * float(shown[~much].sum())
         distances = self.map.range[[row.cell[1] for row in some]]
-        through = self.scan.through(beams(), np.array([row.direction for row in some]).reshape(-1, 2), distances)
+        directions = np.array([row.direction for row in some]).reshape(-1, 2)
+        waves = self.slots.waves(
+            self.scan.aperture.steering(directions), [self._fold_at(row, cell) - fold for row in some]
+        )
+        through = self.scan.through(beams(), waves, directions, distances)
         through = np.maximum(through, [row.misfit for row in some])
-        # Under another fold an echo is no plane wave.
-        through[[self._folded_otherwise(row.cell, cell) for row in some]] = 1.0
         return bool(power > rest + float(together(np.sort(shown[much] * through)[::-1])))
-
-    def _folded_otherwise(self, one: Ints, other: Ints) -> bool:
-        """Return whether two map cells (2,) are held to be folded differently; over the end of the rates by one more or
-        less, as true rates go on there."""
-        if not isinstance(self.map, ResolvedMap):
-            return False
-        tested = round(self.map.resolved_rate / self.map.unambiguous_rate)
-        turned = round(float(one[0] - other[0]) / len(self.map.rate))
-        return bool((int(self.map.fold[tuple(one)]) - int(self.map.fold[tuple(other)]) + turned) % tested)
 
     def _own(self, row: Row, kept: list[Row], peaks: Peaks) -> bool:
         """Return whether an echo is above what the side lobes of others show where it peaks."""
-        return self._clear(row.shown, row.cell, row.shift, kept, peaks, lambda: row.weights[None])
+        return self._clear(row.shown, row.cell, row.shift, row.fold, kept, peaks, lambda: row.weights[None])
 
     def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int) -> Row | None:
         """Return echo k in the cell of peak i where its own beam peaks; None for what is none.
@@ -205,38 +231,38 @@ class Splitter:
             *(c + np.arange(-n, n + 1) for c, n in zip(peaks.cells[i], reach, strict=True)), indexing="ij"
         )
         v, r = self.shape.cells_at(near[0], near[1], shape)
-        level = np.abs(np.tensordot(held.weights[k], self.map.spectrum[:, v, r], 1)) ** 2
+        turns, fold = np.floor_divide(near[0], shape[0]), self._fold(peaks.cells[i])
+        # Over the end of the rates an echo is folded once more.
+        level = np.abs(np.tensordot(held.weights[k], self._read(v, r, fold + turns), 1)) ** 2
         # Along an axis of two cells there is nothing to compare with.
         fixed = np.array(shape) <= 2
-        at = reach if k == 0 else _top(level, reach, np.where(fixed, 0, pad), np.where(fixed, 0, reach))
+        at = _top(level, reach, np.where(fixed | (k == 0), 0, pad), np.where(fixed, 0, reach))
         if not (np.abs(at - reach) < reach).all():
-            return None
+            if k:
+                return None
+            at = reach
         cell = np.array([v[tuple(at)], r[tuple(at)]])
-        beside = np.array([[self._next(level, v, r, at, step) for step in axis] for axis in _STEPS])
+        beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
         shift, power = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
         unsure, shown = bool(held.unsure(self.scan.aperture)[k]), float(level[at[0], at[1]])
         aside = not bool((np.abs(at - reach) < pad).all())
-        crest = bool(level[at[0] - 1 : at[0] + 2, at[1] - 1 : at[1] + 2].max() <= shown)
-        fit = misfit, unsure, held.weights[k], shown
+        crest = bool(level[reach[0] - 1 : reach[0] + 2, reach[1] - 1 : reach[1] + 2].max() <= shown)
+        more = int(held.fold[k])
+        own = fold + more + int(turns[tuple(at)])
+        # The beam of what slots hold under the echo's own fold.
+        weights = self.slots.read_under(held.weights[k].conj(), more).conj()
+        fit = misfit, unsure, weights, own, shown
         return Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], *fit, aside, crest)
-
-    def _next(self, level: Floats, v: Ints, r: Ints, at: Ints, step: tuple[int, int]) -> float:
-        """Return the level a step beside `at` (2,), of map cells v, r (k, l) with levels (k, l) in a beam."""
-        here, there = tuple(at), tuple(at + step)
-        own, other = (v[here], r[here]), (v[there], r[there])
-        if not self._folded_otherwise(np.array(other), np.array(own)):
-            return float(level[there])
-        # Held under another fold: the mean over antennas tells by how much less is there.
-        return float(level[here] * min(1.0, self.map.power[other] / self.map.power[own]))
 
     def _same(self, one: Row, other: Row) -> bool:
         """Return whether echoes of neighbouring peaks are one."""
         apart = np.abs(one.cell - other.cell)
         apart = np.minimum(apart, np.array(self.map.power.shape) - apart)
         turn = self.scan.aperture.apart(one.direction, other.direction)
-        return bool((apart <= np.array(self.grid.pad)).all() and turn < _SAME_BEAM)
+        folds = (self._fold_at(one, other.cell) - other.fold) % self.slots.tested
+        return bool((apart <= np.array(self.grid.pad)).all() and turn < _SAME_BEAM and not folds)
 
 
 def _top(level: Floats, middle: Ints, pad: Ints, reach: Ints) -> Ints:

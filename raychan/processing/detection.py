@@ -193,10 +193,11 @@ def _aperture(map: RangeDoppler, waveform: Waveform | None, elements: Floats | N
     return aperture if any(aperture.scans) else None
 
 
-def _rate(map: RangeDoppler, grid: Grid, place: Floats) -> Floats:
-    """Return the unambiguous rates [m/s] at places (n, 2) in map cells."""
+def _rate(map: RangeDoppler, grid: Grid, place: Floats, fold: Ints) -> Floats:
+    """Return the rates [m/s] at places (n, 2) in map cells, folded so many times (n,), within those told apart."""
+    limit = map.resolved_rate if isinstance(map, ResolvedMap) else map.unambiguous_rate
     rate: Floats = map.rate[0] + place[:, 0] * (map.rate_resolution / grid.pad[0])
-    limit = map.unambiguous_rate
+    rate = rate + 2.0 * map.unambiguous_rate * fold
     return np.where(np.abs(rate) <= limit, rate, (rate + limit) % (2.0 * limit) - limit)
 
 
@@ -222,7 +223,10 @@ def _reported(
     beam over `looks`."""
     # A peak belongs to its cell: one a fraction before the first is at range 0, not at the far end, an ambiguity away.
     place = np.maximum(found.place, (-np.inf, 0.0))
-    rate = _rate(map, grid, place)
+    fold = np.zeros(len(place), np.int64)
+    if isinstance(map, ResolvedMap):
+        fold = found.fold if isinstance(found, Echoes) else map.fold[tuple(found.cells.T)].astype(np.int64)
+    rate = _rate(map, grid, place, fold)
     angles = np.full((2, len(rate)), np.nan)
     ambiguous, beam = np.zeros(len(rate), bool), np.zeros((len(rate), 0), complex)
     if aperture is not None and isinstance(found, Echoes):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.fold_beams import WEAK, Beams, squared
 from raychan.processing.peaks import AROUND
+from raychan.processing.slots import Slots
 from raychan.processing.staggered import CLEAR, fold_range, least_power, noise_of
 from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
@@ -37,18 +38,12 @@ _UPHILL = 12  # map cells along a slope: main lobes padded four times are hardly
 _BATCH = 1 << 14  # cells times elements at once: takes 0.2 to 0.7 of the time of 1 << 22 (12 and 96 elements)
 
 
-def under(channels: Complexes, h: int, radar: Radar) -> Complexes:
-    """Return channels (t, a, ...) if the echo is folded h times, from what the cells hold (t or slots, a, ...)."""
-    many, slots = len(radar.tx_elements), radar.slots
-    if radar.multiplexing == "ddm":
-        return np.asarray(channels[(np.arange(many) - h) % slots])
-    turn = np.exp(2j * np.pi * (h * np.arange(many) % slots) / slots).astype(np.complex64)
-    return np.asarray(channels * turn.reshape(-1, *[1] * (channels.ndim - 1)))
-
-
-def folds(channels: Complexes, radar: Radar, map: RangeDoppler) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+def folds(
+    channels: Complexes, radar: Radar, slots: Slots, map: RangeDoppler
+) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
     """Return by how many spans the strongest echo of each cell is folded, and whether another fold explains the cell as
-    well (v, r): of equal ones that of the echo on whose slope the cell is, or the slowest."""
+    well (v, r), by the channels of slots (s, a, v, r): of equal ones that of the echo on whose slope the cell is, or
+    the slowest."""
     level, power = least_power(map, len(radar.virtual_elements)), squared(channels).mean(axis=(0, 1))
     at = np.argwhere(power > level)
     beams, tried = Beams.of(radar), np.array(fold_range(radar.slots))
@@ -56,7 +51,7 @@ def folds(channels: Complexes, radar: Radar, map: RangeDoppler) -> tuple[NDArray
     noise = noise_of(map) * len(beams.places)
     for some in np.array_split(np.arange(len(at)), max(1, len(at) * len(beams.places) // _BATCH)):
         cells = channels[:, :, *at[some].T]
-        held = [under(cells, h, radar).reshape(len(beams.places), -1) for h in tried]
+        held = [slots.under(cells, h)[: slots.senders].reshape(len(beams.places), -1) for h in tried]
         total = len(beams.places) * squared(cells).sum(axis=(0, 1))
         explained, clear = _explained(beams, held, total, noise, channels.shape[0] * channels.shape[1])
         chosen[some], alike[:, some] = _judged(explained, clear)

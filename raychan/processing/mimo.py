@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.processing.folds import folds, under
+from raychan.processing.folds import folds
 from raychan.processing.own_waveform import map_by_waveform
 from raychan.processing.range_doppler import mean_power
+from raychan.processing.slots import Slots
 from raychan.processing.staggered import doppler, hypotheses, resolved, staggered_map
 from raychan.radar.radar import Radar
 from raychan.records import Cube, RangeDoppler
@@ -54,12 +55,13 @@ def virtual_range_doppler(
     if not resolve:
         return replace(plain, spectrum=channels[:many].reshape(-1, *channels.shape[2:]))
     fold, open_ = np.zeros(plain.power.shape, np.int8), None
-    if hypotheses(radar) > 1:
-        fold, open_ = folds(channels, radar, plain)
-    spectrum = channels[:many].copy()
+    slots = Slots.of(radar, hypotheses(radar))
+    if slots.tested > 1:
+        fold, open_ = folds(channels, radar, slots, plain)
     for cells, h in _groups(fold):
-        spectrum[:, :, *cells] = under(channels[:, :, *cells], h, radar)
-    return resolved(plain, spectrum.reshape(-1, *spectrum.shape[2:]), fold, plain.noise, hypotheses(radar), open_)
+        channels[:, :, *cells] = slots.under(channels[:, :, *cells], h)
+    spectrum, spare = (x.reshape(-1, *x.shape[2:]) for x in (channels[:many], channels[many:]))
+    return resolved(plain, spectrum, fold, plain.noise, slots, open_, spare)
 
 
 def _by_time(cube: Cube, radar: Radar, given: Any) -> tuple[RangeDoppler, Complexes]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from raychan.columns import column
 from raychan.processing.own_waveform import map_by_waveform
+from raychan.processing.slots import Slots
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform
 from raychan.radar.windows import window
@@ -41,8 +42,21 @@ class ResolvedMap(RangeDoppler):
     open: NDArray[np.bool_] = column(
         "v r", np.bool_, doc="several transmitters: whether another fold explains the cell as well; staggered: False"
     )
+    spare: Complexes = column(
+        "s v r", np.complex64, unit="sqrt(W)", doc="Doppler division: what slots hold that are empty under this fold"
+    )
+    slots: Slots
     resolved_rate: float
     """Range rates between plus and minus this are told apart by the folds [m/s]."""
+
+    def read(self, rows: Any, columns: Any, folds: Any) -> Complexes:
+        """Return what the slots of cells (...) hold, (s * a, ...), if their echoes are folded so many times (...)."""
+        held = np.concatenate([self.spectrum[:, rows, columns], self.spare[:, rows, columns]])
+        more = (np.asarray(folds) - self.fold[rows, columns]) % self.slots.count
+        by_slot = held.reshape(self.slots.count, -1, *more.shape)
+        for h in np.unique(more[more > 0]):
+            by_slot[:, :, more == h] = self.slots.under(by_slot[:, :, more == h], int(h))
+        return by_slot.reshape(held.shape)
 
 
 def resolved(
@@ -50,16 +64,19 @@ def resolved(
     spectrum: Complexes,
     fold: NDArray[np.int8],
     noise: float,
-    tested: int,
+    slots: Slots,
     alike: NDArray[np.bool_] | None = None,
+    spare: Complexes | None = None,
 ) -> ResolvedMap:
-    """Return a map with another spectrum (channels, v, r), its folds (v, r) of so many tested, its noise [W] a cell,
-    and where another fold is alike (v, r), nowhere if None."""
+    """Return a map with another spectrum (channels, v, r), its folds (v, r), its noise [W] a cell, where another fold
+    is alike (v, r), nowhere if None, and what spare slots hold (channels, v, r), none if None."""
     held = {name: getattr(map, name) for name in RangeDoppler.__dataclass_fields__}
     power = (spectrum.real.astype(np.float64) ** 2 + spectrum.imag.astype(np.float64) ** 2).mean(axis=0)
     held |= {"spectrum": spectrum, "power": power, "noise": noise}
     alike = np.zeros(fold.shape, bool) if alike is None else alike
-    return ResolvedMap(**held, fold=fold, open=alike, resolved_rate=tested * map.unambiguous_rate)
+    spare = np.zeros((0, *fold.shape), np.complex64) if spare is None else spare
+    limit = slots.tested * map.unambiguous_rate
+    return ResolvedMap(**held, fold=fold, open=alike, spare=spare, slots=slots, resolved_rate=limit)
 
 
 def fold_range(count: int) -> list[int]:
@@ -121,7 +138,7 @@ def staggered_map(cube: Cube, radar: Radar, given: Any, resolve: bool = True) ->
         better = np.flatnonzero(power > best + (clear if h else 0.0))
         best[better], fold[rows[better], columns[better]] = power[better], h
         sums[:, rows[better], columns[better]] = total[:, better]
-    return resolved(map, sums, fold, map.noise / count, hypotheses(radar))
+    return resolved(map, sums, fold, map.noise / count, Slots.of(radar, hypotheses(radar)))
 
 
 def wrong_fold(snr: float, radar: Radar) -> float:
@@ -173,20 +190,14 @@ def _straddled(taper: NDArray[np.float64], pad: int) -> float:
 
 
 def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:
-    """Return detections with the true rates, speeds and ranges that the folds of a ResolvedMap give, ambiguous where
-    another fold explains their cell as well. A folded rate leaves part of its Doppler shift in the beat frequency,
-    which is taken off the range; of any map that is so of a peak beyond the last row, whose cell is the first."""
+    """Return detections with the true ranges that their rates give, ambiguous where another fold explains their cell as
+    well. A folded rate leaves part of its Doppler shift in the beat frequency, which is taken off the range; of any map
+    that is so of a peak beyond the last row, whose cell is the first."""
     if not len(found.rate):
         return found
-    span, (rows, columns) = 2.0 * map.unambiguous_rate, found.cell.T
-    # A peak between two cells may lie beyond the end of the axis that its own cell is on; that cell's shift is undone.
-    beyond = np.rint((map.rate[rows] - found.rate) / span)
-    folds = beyond + (map.fold[rows, columns] if isinstance(map, ResolvedMap) else 0)
-    # Folds as many as are tested apart look alike.
-    tested = hypotheses(radar) if isinstance(map, ResolvedMap) else 1
-    folds -= tested * np.rint((found.rate + span * folds) / (span * tested))
-    more, left, waveform = span * folds, span * (folds - beyond), radar.waveform
+    span, (rows, columns), waveform = 2.0 * map.unambiguous_rate, found.cell.T, radar.waveform
+    # The shift of the row that a cell is in is undone.
+    left = span * np.rint((found.rate - map.rate[rows]) / span)
     shift = 0.0 if isinstance(waveform, OwnWaveform) else left * waveform.middle / waveform.slope
     ambiguous = found.ambiguous | (map.open[rows, columns] if isinstance(map, ResolvedMap) else False)
-    moved = {"rate": found.rate + more, "speed": found.speed + more, "range": found.range - shift}
-    return found.replace(**moved, ambiguous=ambiguous)
+    return found.replace(range=found.range - shift, ambiguous=ambiguous)

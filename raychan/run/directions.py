@@ -22,6 +22,7 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 Complexes = NDArray[np.complex128]
 
 _LITTLE = 1e-3  # of a detection's amplitude: largest sum of the paths left out of a beam (not measured)
@@ -61,8 +62,9 @@ def angles_in(result: Result) -> RangeAzimuth | None:
 class Beams:
     """The beams of an array in which its detections are seen, with nulls towards the others of their cells."""
 
-    passed: Callable[[int, Ints], Complexes]
-    """What the beam of a detection (row) passes of paths (n,), rows of all, as factors of their waves."""
+    passed: Callable[[int, Ints, Bools], Complexes]
+    """What the beam of a detection (row) passes of paths (n,), rows of all, as factors of their waves; of some, as
+    told, it sees the mirror images of real sampling."""
     spread: Floats
     """Range cells (d,) by which the range of each detection differs over the array."""
 
@@ -73,7 +75,7 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
         return None
     turn = 2j * np.pi * radar.waveform.middle / C0
 
-    def passed(row: int, some: Ints) -> Complexes:
+    def passed(row: int, some: Ints, mirrored: Bools) -> Complexes:
         # A path over several bodies leaves and arrives in different directions.
         one, way = paths.trajectories, paths.trajectory[some]
         sent, seen = (
@@ -83,22 +85,28 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
                 (one.arrival[way], radar.rx_axes, radar.elements),
             )
         )
-        sent = _in_channels(radar, sent, paths.range_rate[some] - found.rate[row])
-        return np.asarray(((sent @ found.beam[row].reshape(sent.shape[1], -1)) * seen).sum(axis=1))
+        weights = found.beam[row].reshape(-1, len(radar.elements))
+        # An image is the conjugate of its path, at minus its rate; so is what it brings to a cell.
+        sent, seen = (np.where(mirrored[:, None], x.conj(), x) for x in (sent, seen))
+        sign = np.where(mirrored, -1, 1)
+        held = _in_slots(radar, len(weights), sent, sign * paths.range_rate[some] - found.rate[row], sign)
+        beam = ((held @ weights) * seen).sum(axis=1)
+        return np.asarray(np.where(mirrored, beam.conj(), beam))
 
     return Beams(passed, range_spread(found, radar)[0])
 
 
-def _in_channels(radar: Radar, sent: Complexes, off: Floats) -> Complexes:
-    """Return what the channels of transmitters (n, t) hold of paths (n,) sent by them, whose rates are so far off (n,)
-    [m/s] the rate for which the transmitters are told apart: by time division turned, by Doppler division, beyond half
-    a fold, those of others."""
-    wave, slots, count = radar.waveform, radar.slots, np.arange(sent.shape[1])
+def _in_slots(radar: Radar, many: int, sent: Complexes, off: Floats, sign: Ints) -> Complexes:
+    """Return what so many slots hold (n, s) of paths sent (n, t), whose rates are so far off (n,) [m/s] the rate for
+    which the transmitters are told apart: by time division turned, by Doppler division, beyond half a fold, in other
+    slots, of images, of sign -1 (n,), in those to the other side. Older files have beams of the transmitters' slots
+    only."""
+    wave, slots, count = radar.waveform, radar.slots, np.arange(many)
     turns = 2.0 * wave.middle / C0 * wave.repetition * off[:, None]  # a ramp
     if radar.multiplexing == "ddm":
-        whose = (count + np.rint(turns * slots).astype(np.int64)) % slots
-        held = np.take_along_axis(sent, np.minimum(whose, len(count) - 1), axis=1)
-        return np.where(whose < len(count), held, 0.0)
+        whose = sign[:, None] * (count + np.rint(turns * slots).astype(np.int64)) % slots
+        held = np.take_along_axis(sent, np.minimum(whose, sent.shape[1] - 1), axis=1)
+        return np.where(whose < sent.shape[1], held, 0.0)
     return sent * np.exp(-2j * np.pi * turns * count)
 
 
@@ -121,10 +129,19 @@ def wave_in_beam(
     middle = response.in_cell(paths.amplitude, *place)[0]
     near = np.flatnonzero(np.abs(middle) * len(middle) > _LITTLE * at[2])
     wave = np.zeros_like(paths.amplitude)
-    wave[near] = paths.amplitude[near] * beams.passed(row, near)
+    wave[near] = paths.amplitude[near] * beams.passed(row, near, _mirrored(paths, response, near, at))
     seen = response.in_cell(wave, *place)[0].sum()
     other = unexplained(seen, power[1], receiver) and not unexplained(middle.sum(), power[0], receiver)
     return None if other else wave
+
+
+def _mirrored(paths: Paths, response: PointSpread, some: Ints, at: Floats) -> Bools:
+    """Return which paths, rows of all (n,), a cell shows by their mirror images. Args: at, range [m] and rate [m/s]."""
+    if not response.mirrors:
+        return np.zeros(len(some), bool)
+    given = paths.amplitude[some], paths.delay[some], paths.range_rate[some]
+    own, image = (np.abs(response.image_in_cell(*given, s * float(at[0]), s * float(at[1]))[0]) for s in (1.0, -1.0))
+    return np.asarray(image > own)
 
 
 def unexplained(wave: complex, power: float, receiver: Receiver) -> bool:

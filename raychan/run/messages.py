@@ -66,7 +66,20 @@ def warned(
             f"number {first + 1} is at {true}, shown at {shown}"
         )
     said += unsure(found, rdmap)
-    return said if radar is None else said + lost(found, radar)
+    return said if radar is None else said + mirrored(found, rdmap, radar) + lost(found, radar)
+
+
+def mirrored(found: ExplainedDetections, rdmap: RangeDoppler, radar: Radar) -> list[str]:
+    """Return a line if an array's detections are mirror images of real sampling, whose directions are not their own."""
+    spans = np.floor(np.nan_to_num(found.true_range) / rdmap.unambiguous_range)
+    rows = found.folded & (spans % 2 == 1) & (np.isfinite(found.azimuth) | np.isfinite(found.elevation))
+    if radar.waveform.complex_sampling or not rows.any():
+        return []
+    slots = ", and by Doppler division in several wrong directions" if radar.multiplexing == "ddm" else ""
+    return [
+        f"{_of(rows)} {_verb(rows)} mirrored ({_numbers(rows)}): with real sampling echoes beyond "
+        f"{rdmap.unambiguous_range:.4g} m show at minus their rates and on the other side of boresight{slots}"
+    ]
 
 
 def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:

@@ -50,6 +50,8 @@ _FORMER = {"length": ("delay", C0), "length_rate": ("range_rate", 2.0)}
 """Columns that files of format 2 have instead, and the factor on them."""
 _ADDED = {"elevation": np.nan, "ambiguous": False}
 """Columns that older files of format 3 do not have, and what stands for them."""
+_NOT_STORED = ("spare", "slots")
+"""Of a map: what the detector alone asks for."""
 _BEAMS = "beams"
 """Group of the beams of an array's detections: beside these, so that a table of detections has a row each."""
 _UNITS = {"sqrt(W)": "V"}
@@ -167,6 +169,8 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
     record = getattr(result, name)
     wave = result.receiver.waveform
     for f in columns(type(record)):
+        if f.name in _NOT_STORED:
+            continue
         value = record.trajectories.vertices[record.trajectory] if f.name == "vertices" else getattr(record, f.name)
         if "axes" in f.metadata:
             if f.name == "beam" or (f.name == "aside" and not value.size):

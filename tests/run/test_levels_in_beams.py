@@ -94,3 +94,21 @@ def test_echoes_of_one_cell_and_other_folds_have_the_levels_of_their_paths(multi
     )
     away = np.abs(np.concatenate([folded(multiplexing, *case) for case in cases]))
     assert len(away) >= 6 and away.max() < 0.1
+
+
+@pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
+def test_mirror_images_of_real_sampling_have_the_levels_of_their_paths_and_are_said_to_be_such(multiplexing):
+    wave = rc.Waveform(77e9, 300e6, 20e-6, repetition=25e-6, n_chirps=96, n_samples=64, complex_sampling=False)
+    lines = [[(0.0, k * step * wave.wavelength, 0.0) for k in range(n)] for n, step in ((2, 2.0), (4, 0.5))]
+    radar = rc.Radar(
+        wave, position=(0.0, 0.0, 1.0), power=1.0, noise=False, elements=lines[1], tx_elements=lines[0],
+        multiplexing=multiplexing, antenna=rc.IsotropicAntenna(),
+    )  # fmt: skip
+    way = np.array([np.cos(0.4), -np.sin(0.4), 0.0])
+    body = rc.Body(
+        "t", shape="sphere", params={"radius": 0.01}, position=tuple(20.2 * way + (0.0, 0.0, 1.0)),
+        velocity=tuple(-4.3 * way), rcs_dbsm=10.0,
+    )  # fmt: skip
+    result = rc.simulate(rc.Scene(bodies=[body], radar=radar, model={"max_bounces": 1}))
+    assert np.abs(off(result)).max() < 0.5
+    assert any("mirrored" in line for line in result.warnings)
