@@ -58,24 +58,34 @@ class Images:
         return self.planes[geometry.plane[before]] & moved
 
 
-def turning(leg: Leg, out: Leg) -> int:
-    """Return the facet of the mirror of `leg` where a wave over it that leaves over `out` has turned and is on its way
-    back over the mirrors that it came by: it scatters where it turns. -1 if on none."""
-    there, back = leg.chain.facet.tolist(), out.chain.facet.tolist()
+def scattering(geometry: Geometry, leg: Leg) -> list[int]:
+    """Return the facets of the mirrors of a leg that scatter too, as grounds do not, end's side first."""
+    role = geometry.facets.role
+    return [m.facet for m in leg.mirrors if role[m.body] != MIRROR]
+
+
+def turning(there: list[int], back: list[int]) -> int:
+    """Return the facet of the mirror where a wave that came over the mirrors `there`, and leaves over those `back`, has
+    turned and is on its way back over the mirrors that it came by: it scatters where it turns. -1 if on none.
+
+    Args: facets of mirrors that scatter (see `scattering`).
+    """
     if len(there) <= len(back):
         return -1
     on = there[len(back)]
     way = [*there, on, *back[::-1]]
-    return int(on) if way == way[::-1] else -1
+    return on if way == way[::-1] else -1
 
 
 def without_turned(geometry: Geometry, leg: Leg, outs: list[Leg], pieces: Bools) -> Bools:
     """Return pieces (p,) without those of mirrors of `leg` from which no wave returns, over none of `outs`, but by the
     way that it came by."""
-    role, ok = geometry.facets.role, pieces
-    plain = [out for out in outs if out.alike(leg) or all(role[m.body] == MIRROR for m in out.mirrors)]
+    if len(leg.mirrors) < 2:
+        return pieces
+    there, ok = scattering(geometry, leg), pieces
+    ways = [back for back in (scattering(geometry, out) for out in outs) if not back or back == there]
     for facet in dict.fromkeys(m.facet for m in leg.mirrors[:-1]):
-        if all(turning(leg, out) == facet for out in plain):
+        if all(turning(there, back) == facet for back in ways):
             ok = ok.copy()
             ok[geometry.piece[facet]] = False
     return ok

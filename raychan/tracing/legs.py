@@ -87,10 +87,6 @@ class Leg:
         object.__setattr__(self, "chain", chain)
         object.__setattr__(self, "_circles", (centre, np.array([m.radius for m in self.mirrors])))
 
-    def alike(self, other: Leg) -> bool:
-        """Tell whether this leg leads over the same mirrors as another, which may start from another end."""
-        return self is other or (len(self.mirrors) > 0 and np.array_equal(self.chain.facet, other.chain.facet))
-
     def pieces(self, geometry: Geometry) -> Ints:
         """Return the pieces (m,) of the mirrors."""
         return geometry.piece[[m.facet for m in self.mirrors]]

@@ -13,6 +13,7 @@ from raychan.parallel import parallel_for
 from raychan.records import MIRROR
 from raychan.tracing.cache import cache_of
 from raychan.tracing.image_paths import each_may_leave
+from raychan.tracing.images import scattering, turning
 from raychan.tracing.legs import Leg, reachable
 from raychan.tracing.radiation import radiates
 from raychan.tracing.tubes import Tubes
@@ -62,9 +63,8 @@ class Leaving:
     """Which tubes may leave over each of some legs.
 
     Args: outs all legs; wanted numbers of those that are asked for; scatter (n,) tubes that return; twice (n,) those
-    that legs over mirrors carry, but_plain: but over a leg without a mirror that scatters or over the mirrors that they
-    came by; which of them radiate (see `tracing.radiation`), no matter which over mirrors like those of the leg
-    `came_by`."""
+    that legs over mirrors carry, but_plain: but over a leg without a mirror that scatters or over those that they came
+    by; which of them radiate (see `tracing.radiation`), no matter which over those of the leg `came_by`."""
 
     def __init__(
         self,
@@ -78,10 +78,13 @@ class Leaving:
         which: int,
         came_by: Leg | None,
     ) -> None:
-        legs = cache_of(geometry).newest("outgoing legs", tuple(outs), _SETS_KEPT, lambda: _packed(geometry, outs))
+        known = cache_of(geometry).newest("outgoing legs", tuple(outs), _SETS_KEPT, lambda: _known(geometry, outs))
+        legs, self._back = known
+        self._there = [] if came_by is None else scattering(geometry, came_by)
         given = _LeavingTubes(tubes.points, tubes.k, tubes.normals, tubes.facet, scatter, twice, but_plain)
         numbers = np.array(wanted, np.int64)
-        every = np.array([came_by is not None and outs[i].alike(came_by) for i in wanted], bool)
+        alike = (len(self._there) > 0 and self._back[i] == self._there for i in wanted)
+        every = np.array([same or outs[i] is came_by for i, same in zip(wanted, alike, strict=True)], bool)
         self._rows: dict[int, Rows] = {}
 
         def some(part: slice) -> None:
@@ -99,6 +102,16 @@ class Leaving:
     def any_over(self, i: int) -> bool:
         """Tell whether any tube may leave over leg i."""
         return len(self._rows[i]) > 0
+
+    def turned(self, i: int) -> int:
+        """Return the facet of the mirror from which tubes leave over leg i by the way that they came by, past where
+        they turned (see `images.turning`); -1 if from none."""
+        return turning(self._there, self._back[i])
+
+
+def _known(geometry: Geometry, outs: list[Leg]) -> tuple[_OutgoingLegs, list[list[int]]]:
+    """Return legs as kernels read them, and the mirrors of each that scatter."""
+    return _packed(geometry, outs), [scattering(geometry, out) for out in outs]
 
 
 def _packed(geometry: Geometry, outs: list[Leg]) -> _OutgoingLegs:

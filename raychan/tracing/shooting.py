@@ -15,7 +15,7 @@ from raychan.poses import sizes
 from raychan.records import MIRROR, Routes
 from raychan.tracing.bounce import bounce
 from raychan.tracing.contributions import Contributions, amplitudes
-from raychan.tracing.images import Images, turning, without_turned
+from raychan.tracing.images import Images, without_turned
 from raychan.tracing.launch import OBLIQUE_SHARE, launch, seeds_of
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.outgoing import Leaving
@@ -169,7 +169,7 @@ class _Wave(Generic[T]):
         rows, way = leaving.over(i), self._exchanged(depth, i)
         if way < 0:
             rows = rows[twice[rows]]
-        if depth == 1 and (turned := turning(self.leg, self.outs[i])) >= 0:
+        if depth == 1 and (turned := leaving.turned(i)) >= 0:
             rows = rows[self.geometry.piece[tubes.facet[rows]] != self.geometry.piece[turned]]
         made, some = list[T](), tubes.only(rows)
         if self.way is not None and depth == 1:

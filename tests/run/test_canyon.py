@@ -189,6 +189,31 @@ def test_a_large_plate_seen_over_a_wall_returns_as_its_image_behind_the_wall_wou
     assert amplitude("wall>plate>wall", wall, plate) == pytest.approx(amplitude("plate", image), rel=0.02)
 
 
+@pytest.mark.parametrize("chain", ["plate>ground", "ground>plate"])
+@pytest.mark.parametrize("width", [0.69, 0.73])
+def test_a_plate_over_a_wall_and_the_ground_returns_as_its_image_over_the_ground_does(width: float, chain: str) -> None:
+    """Just smaller than what counts as a mirror, and just larger; the ways over the wall alone are those above."""
+    wave = rc.Waveform(carrier=24e9, bandwidth=150e6, chirp_duration=30e-6, n_chirps=16, n_samples=128)
+    radar = rc.Radar(wave, position=(0.0, 0.0, 1.0), antenna=rc.IsotropicAntenna())
+    ground = rc.Body("ground", shape="ground", params={"size": 80.0}, material="pec")
+
+    def amplitude(chains: list[str], *bodies: rc.Body) -> complex:
+        model = {"max_bounces": 4, "tolerance_db": 0.3}
+        paths = rc.simulate(rc.Scene(bodies=[ground, *bodies], radar=radar, model=model)).paths
+        names = np.array([">".join(x for x in row if x) for row in paths.bodies])
+        return complex(paths.amplitude[np.isin(names, chains)].sum())
+
+    size, up = {"width": width, "height": 0.7}, np.radians(-50.0)
+    place = np.array([8.0 + 4.0 * np.cos(up + np.pi), 4.0 * np.sin(up + np.pi), 0.35])
+    wall = rc.Body("wall", shape="plate", params={"width": 14.0, "height": 8.0}, position=(8, 0, 4), yaw_deg=155.0)
+    plate = rc.Body("plate", shape="plate", params=size, position=place, yaw_deg=np.degrees(up))
+    image = rc.Body("plate", shape="plate", params=size, position=(12.0, 0.0, 0.35), yaw_deg=180.0)
+    # The wave meets the ground before the wall or behind it.
+    near = {"plate>ground": "wall>plate>wall>ground", "ground>plate": "ground>wall>plate>wall"}[chain]
+    both = amplitude([f"wall>{chain}>wall", near], wall, plate)
+    assert both == pytest.approx(amplitude([chain], image), rel=0.03)
+
+
 @pytest.mark.parametrize("count", [48, 49])
 def test_faces_beyond_those_that_are_taken_as_mirrors_are_told(count: int) -> None:
     side = np.ceil(np.sqrt(count))
