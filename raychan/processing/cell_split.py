@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, Self
 
@@ -126,7 +126,8 @@ class Splitter:
 
         A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain, or those of what
         is stronger in its row or column. An echo that peaks beside its cell may have a peak of its own there, or none,
-        as a stronger one has it: it counts where no other peak gives it."""
+        as a stronger one has it: it counts where no other peak gives it. In the end echoes are dropped that
+        side lobes of stronger ones explain, whenever these were found."""
         kept: list[Row] = []
         beside: list[Row] = []
         for i in range(len(peaks.cells)):
@@ -150,7 +151,7 @@ class Splitter:
         for row in sorted(beside, key=lambda row: -row.power):
             if not any(self._same(row, other) for other in kept) and self._own(row, kept, peaks):
                 kept.append(row)
-        kept.sort(key=lambda row: -row.power)
+        kept = self._without_lobes(kept, peaks)
         names = ("cell", "shift", "power", "noise", "direction", "unsure", "weights", "fold")
         if not kept:
             none, pairs, weights = np.zeros(0), np.zeros((0, 2)), np.zeros((0, len(self.map.spectrum)), complex)
@@ -219,6 +220,15 @@ class Splitter:
     def _own(self, row: Row, kept: list[Row], peaks: Peaks) -> bool:
         """Return whether an echo is above what the side lobes of others show where it peaks."""
         return self._clear(row.shown, row.cell, row.shift, row.fold, kept, peaks, lambda: row.weights[None])
+
+    def _without_lobes(self, found: list[Row], peaks: Peaks) -> list[Row]:
+        """Return echoes, strongest first, without side lobes of stronger ones that may have been found after them."""
+        kept: list[Row] = []
+        for row in sorted(found, key=lambda row: -row.power):
+            # What stronger ones hide in their cells may be this very echo: it counts where they were found before.
+            if self._own(row, [replace(other, misfit=0.0) for other in kept], peaks):
+                kept.append(row)
+        return kept
 
     def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int) -> Row | None:
         """Return echo k in the cell of peak i where its own beam peaks; None for what is none.
