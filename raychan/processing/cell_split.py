@@ -210,10 +210,11 @@ class Splitter:
         some, rest = [kept[k] for k in np.flatnonzero(much)], rest + MARGIN * float(shown[~much].sum())
         distances = self.map.range[[row.cell[1] for row in some]]
         directions = np.array([row.direction for row in some]).reshape(-1, 2)
-        waves = self.slots.waves(
-            self.scan.aperture.steering(directions), [self._fold_at(row, cell) - fold for row in some]
-        )
-        through = self.scan.through(beams(), waves, directions, distances)
+        waves, turns = self.scan.aperture.steering(directions), [self._fold_at(row, cell) - row.fold for row in some]
+        own = np.array([row.fold + turn - fold for row, turn in zip(some, turns, strict=True)])
+        shares = self.lobes.by_fold(place[0] - at[much, 0], np.array(turns))
+        held = [share[:, None] * self.slots.waves(waves, own + h) for h, share in enumerate(shares)]
+        through = self.scan.through(beams(), np.array(held), directions, distances)
         through = np.maximum(through, [row.misfit for row in some])
         return bool(power > rest + float(together(np.sort(shown[much] * through)[::-1])))
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from support.echoes import echoes, make_radar
 
-from raychan.radar.array import mimo_array
+from raychan.processing.cfar import Grid
+from raychan.processing.peaks import SideLobes
+from raychan.radar.array import mimo_array, uniform_array
 from raychan.radar.processing import Processing
 from raychan.radar.waveform import Waveform
 from raychan.run.receiver import detections_in, map_of
@@ -15,6 +17,7 @@ from raychan.units import C0, db
 
 WAVE = Waveform(77e9, 436.8e6, 20e-6, repetition=25e-6, n_chirps=48, n_samples=128)
 STEP = 0.5 * C0 / WAVE.middle
+PLANE = {"elements": uniform_array(6, STEP), "tx_elements": uniform_array(2, STEP, "z")}
 
 
 def made(array, multiplexing, pad=(2, 2)):
@@ -46,3 +49,22 @@ def test_side_lobes_in_the_cell_of_a_peak_judged_before_their_own_echo_are_no_de
     seen, places = found(made(array, multiplexing, pad), reach, rate, levels, [-29.0, -10.0])
     assert seen.range == pytest.approx(places[:, 0], abs=0.05 * WAVE.range_resolution)
     assert db(seen.power) == pytest.approx(levels, abs=0.1)
+
+
+def test_what_an_echo_leaks_into_slots_of_doppler_division_is_no_echo_of_another_fold():
+    args = [0.2, 0.65], [0.4, 1.53], [-95.0, -103.0], [11.6, -35.5], [8.5, 15.8]
+    seen, places = found(made(PLANE, "ddm"), *args)
+    assert seen.range == pytest.approx(places[:, 0], abs=0.05 * WAVE.range_resolution)
+    assert db(seen.power) == pytest.approx([-95.0, -103.0], abs=0.1)
+
+
+@pytest.mark.parametrize("off", [-7.3, -2.3, 0.4, 1.7, 6.6])
+def test_shares_of_side_lobes_by_folds_bound_the_response_of_the_whole_frame(off):
+    # Rates of all slots follow on one another: so many spans further, the response of all 48 chirps.
+    lobes, away = SideLobes(Grid((1, 1), (16, 128)), ("rect", "rect"), 48), off + 16 * np.arange(3)
+    exact = np.abs(np.sinc(away) / np.sinc(away / 48.0))
+    bound = np.sqrt(lobes.at(np.array([off, 0.0]), np.zeros((1, 2)), 1.0, 0.0))
+    share = lobes.by_fold(np.array([off]), np.array([0]))[:, 0]
+    assert (share * bound >= exact).all()
+    far = np.minimum(np.abs(away), 48 - np.abs(away)) > 4.0
+    assert (share * bound <= 2.0 * (1.0 / (48.0 * np.sin(np.pi * np.abs(away) / 48.0))))[far].all()
