@@ -61,8 +61,9 @@ class Scan:
     def through(self, weights: Complexes, waves: Complexes, directions: Floats, distances: Floats) -> Floats:
         """Return the greatest power that beams of weights (b, a) let through of echoes (n,), over that in their own.
 
-        Args: waves (n, a) of the echoes in the antennas that the beams weigh; as for `misfit`."""
-        share = (np.abs(weights @ waves.T) ** 2).max(axis=0)
+        Args: waves (h, n, a) of the echoes in the antennas that the beams weigh, each in parts that may be in phase; as
+        for `misfit`."""
+        share = np.abs(weights @ waves.transpose(0, 2, 1)).sum(axis=0).max(axis=0) ** 2
         return np.maximum(share, self.misfit(directions, distances))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, Self
 
@@ -126,7 +126,8 @@ class Splitter:
 
         A peak is dropped that the side lobes of the echoes found before, in stronger peaks, explain, or those of what
         is stronger in its row or column. An echo that peaks beside its cell may have a peak of its own there, or none,
-        as a stronger one has it: it counts where no other peak gives it."""
+        as a stronger one has it: it counts where no other peak gives it. In the end echoes are dropped that
+        side lobes of stronger ones explain, whenever these were found."""
         kept: list[Row] = []
         beside: list[Row] = []
         for i in range(len(peaks.cells)):
@@ -150,7 +151,7 @@ class Splitter:
         for row in sorted(beside, key=lambda row: -row.power):
             if not any(self._same(row, other) for other in kept) and self._own(row, kept, peaks):
                 kept.append(row)
-        kept.sort(key=lambda row: -row.power)
+        kept = self._without_lobes(kept, peaks)
         names = ("cell", "shift", "power", "noise", "direction", "unsure", "weights", "fold")
         if not kept:
             none, pairs, weights = np.zeros(0), np.zeros((0, 2)), np.zeros((0, len(self.map.spectrum)), complex)
@@ -209,16 +210,26 @@ class Splitter:
         some, rest = [kept[k] for k in np.flatnonzero(much)], rest + MARGIN * float(shown[~much].sum())
         distances = self.map.range[[row.cell[1] for row in some]]
         directions = np.array([row.direction for row in some]).reshape(-1, 2)
-        waves = self.slots.waves(
-            self.scan.aperture.steering(directions), [self._fold_at(row, cell) - fold for row in some]
-        )
-        through = self.scan.through(beams(), waves, directions, distances)
+        waves, turns = self.scan.aperture.steering(directions), [self._fold_at(row, cell) - row.fold for row in some]
+        own = np.array([row.fold + turn - fold for row, turn in zip(some, turns, strict=True)])
+        shares = self.lobes.by_fold(place[0] - at[much, 0], np.array(turns))
+        held = [share[:, None] * self.slots.waves(waves, own + h) for h, share in enumerate(shares)]
+        through = self.scan.through(beams(), np.array(held), directions, distances)
         through = np.maximum(through, [row.misfit for row in some])
         return bool(power > rest + float(together(np.sort(shown[much] * through)[::-1])))
 
     def _own(self, row: Row, kept: list[Row], peaks: Peaks) -> bool:
         """Return whether an echo is above what the side lobes of others show where it peaks."""
         return self._clear(row.shown, row.cell, row.shift, row.fold, kept, peaks, lambda: row.weights[None])
+
+    def _without_lobes(self, found: list[Row], peaks: Peaks) -> list[Row]:
+        """Return echoes, strongest first, without side lobes of stronger ones that may have been found after them."""
+        kept: list[Row] = []
+        for row in sorted(found, key=lambda row: -row.power):
+            # What stronger ones hide in their cells may be this very echo: it counts where they were found before.
+            if self._own(row, [replace(other, misfit=0.0) for other in kept], peaks):
+                kept.append(row)
+        return kept
 
     def _placed(self, peaks: Peaks, i: int, held: CellEchoes, k: int) -> Row | None:
         """Return echo k in the cell of peak i where its own beam peaks; None for what is none.

@@ -66,6 +66,7 @@ class SideLobes:
         self.mirrors, self._period, self._skew = mirrors, (rates, samples), skew
         self._standing = (rates * grid.pad[0] // 2) / grid.pad[0]
         self._envelopes = SideLobeEnvelope(windows[0], weighed, weighed // rates), SideLobeEnvelope(windows[1], samples)
+        self._of_all_rates = SideLobeEnvelope(windows[0], weighed)
         self._migrating = migrating
         self._sizes = windows, (weighed, samples), weighed // rates
 
@@ -104,6 +105,17 @@ class SideLobes:
         windows, count, slots = self._sizes
         envelope = migrating(windows, count, moved, slots)
         return envelope(*np.maximum(away - envelope.off, 0.0).T)
+
+    def by_fold(self, off: Floats, turns: Ints) -> Floats:
+        """Return the shares (h, n) of the amplitude that `at` bounds that fall on an echo's own fold, on the next, and
+        so on: by Doppler division its side lobes go on over the rates of all slots, and fall on one cell.
+
+        Args: off (n,) [resolution cells] from the echoes along rate; turns (n,) of the rates that this leaves out."""
+        rates, (_, (whole, _), slots) = self._period[0], self._sizes
+        far = np.abs(off + rates * (turns + np.arange(slots)[:, None])) % whole
+        each = self._of_all_rates(np.maximum(np.minimum(far, whole - far) - _SLACK, 0.0))
+        most = self._envelopes[0](np.maximum(np.abs(off + rates * turns) - _SLACK, 0.0))
+        return np.sqrt(np.minimum(np.divide(each, most, out=np.ones_like(each), where=each < most), 1.0))
 
     def of_images(self, places: Floats, place: Floats, power: Any, smear: Any) -> Floats:
         """Return what the mirror images of peaks show; args as for `at`."""
