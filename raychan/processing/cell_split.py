@@ -226,8 +226,10 @@ class Splitter:
         """Return echoes, strongest first, without side lobes of stronger ones that may have been found after them."""
         kept: list[Row] = []
         for row in sorted(found, key=lambda row: -row.power):
-            # What stronger ones hide in their cells may be this very echo: it counts where they were found before.
-            if self._own(row, [replace(other, misfit=0.0) for other in kept], peaks):
+            # Those of one peak were told apart from each other. What stronger ones hide in their cells may be this very
+            # echo: it counts where they were found before.
+            others = [replace(other, misfit=0.0) for other in kept if other.peak != row.peak]
+            if self._own(row, others, peaks):
                 kept.append(row)
         return kept
 

@@ -119,3 +119,14 @@ def test_a_beam_loses_what_is_told_of_ranges_that_differ_over_the_elements(sende
 def found_level(result):
     """Return the level [dB] of the strongest detection."""
     return 10.0 * np.log10(result.detections.power.max())
+
+
+def test_a_weaker_echo_told_apart_in_the_cell_of_a_near_one_is_no_side_lobe_of_it():
+    place, azimuths = 4.03, np.radians([-8.0, 9.6])
+    _, radar = run(place, elements=uniform_array(64, STEP))
+    bodies = [
+        rc.Body(f"target_{k}", shape="box", rcs_dbsm=level_dbsm, position=place * np.array([np.cos(a), np.sin(a), 0.0]))
+        for k, (a, level_dbsm) in enumerate(zip(azimuths, (0.0, -4.8), strict=True))
+    ]
+    found = rc.simulate(rc.Scene(bodies, radar=radar)).detections
+    assert np.sort(found.azimuth) == pytest.approx(azimuths, abs=0.01)
