@@ -114,7 +114,7 @@ def judged(made: RandomScene) -> Judged:
     result = rc.simulate(made.scene(), seed=made.seed)
     found = Judged(made, seconds=process_time() - start, rays=int(result.stats["rays"]), warnings=result.warnings)
     silent, settings = replace(made.radar, noise=False), result.scene.processing
-    samples, spectra, told = truth(made)
+    samples, spectra, told = truth(made, result.traced_at)
     own = _spectrum(synthesize(result.paths, silent), silent, settings)
     for i, why in enumerate(result.provenance):
         if not why.contributions:
@@ -132,20 +132,23 @@ def judged(made: RandomScene) -> Judged:
     return found
 
 
-def truth(made: RandomScene) -> tuple[rc.Cube, list[Any], bool]:
+def truth(made: RandomScene, time: float) -> tuple[rc.Cube, list[Any], bool]:
     """Return the samples of the finest launch, the spectra (a, v, r) of the two finest, and whether all their tubes are
-    cut at shadows: one whose budget for that was spent (seed 10183: 5 dB off) tells no truth."""
-    scene, silent = made.scene(), replace(made.radar, noise=False)
+    cut at shadows: one whose budget for that was spent (seed 10183: 5 dB off) tells no truth.
+
+    Args: time [s] from the frame's start at which it is traced."""
+    scene = made.scene().at(time)
+    radar, silent = scene.radar, replace(made.radar, noise=False)
     spectra, cast, told = list[Any](), 0, True
-    geometry, points = geometry_of(scene, made.tolerance_db * 0.5 ** _STEPS[-1]), scene.points(0.0)
+    geometry, points = geometry_of(scene, made.tolerance_db * 0.5 ** _STEPS[-1], time), scene.points(0.0)
     for step in _STEPS:
-        rule, stats = step_rule(made.radar, scene.processing, scene.model, step), Stats()
+        rule, stats = step_rule(radar, scene.processing, scene.model, step), Stats()
         batches = launch_routes(geometry, points, rule, stats)
-        parts = [paths_of(b, geometry.facets, made.radar, made.radar.waveform.carrier) for b in batches]
+        parts = [paths_of(b, geometry.facets, radar, radar.waveform.carrier) for b in batches]
         if len(spectra) == 2 and stats.uncut.any():
             break
         told &= not stats.uncut.any()
-        samples = synthesize(join([nothing(geometry.facets, made.radar), *parts]), silent)
+        samples = synthesize(join([nothing(geometry.facets, radar), *parts]), silent)
         spectra = [*spectra, _spectrum(samples, silent, scene.processing)][-2:]
         cast += stats.rays
         if len(spectra) == 2 and cast > _RAYS:
