@@ -20,7 +20,7 @@ from raychan.run.folding import Shown, peaks_of, truth
 from raychan.run.point_spread import PointSpread
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, SIDELOBE, Contribution, Explanation, Receiver
 from raychan.run.side_lobes import Cell, is_side_lobe
-from raychan.run.turns import Turns, turns_of
+from raychan.run.turns import Turns, added, turns_of
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -106,7 +106,7 @@ def _explained(
         return Explanation(*place, cell.power, predicted, error_db, CLUTTER, ())
     shares /= shares.sum()
     # The ground beside a target adds to its return: the leading target is that of the largest sum over all its chains.
-    leading = np.argmax(np.abs(_sums(known.targets, summed, int(known.targets.max()) + 1)))
+    leading = np.argmax(np.abs(added(known.targets, summed, int(known.targets.max()) + 1)))
     paths_in, size, ranges, rates = sizes
     # A chain and its reverse differ by rounding only; among these the order of chains decides.
     order = np.argsort(-shares.round(_DIGITS), kind="stable")
@@ -251,10 +251,6 @@ def _add_links(
     slot[kind[at] == 0] = 0
     code[at] *= width
     code[at] += slot
-
-
-def _sums(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
-    return np.bincount(index, values.real, count) + 1j * np.bincount(index, values.imag, count)
 
 
 def _name(paths: Paths, body: int, part: int, kind: int) -> str:

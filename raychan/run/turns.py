@@ -36,8 +36,8 @@ class Turns:
         whole = abs(summed.sum())
         if not several.any() or not whole > 0.0:
             return 0.0
-        wave = _sums(self.turn, summed, len(self.way))
-        mean = (_sums(self.way, wave, len(self.count)) / self.count)[self.way]
+        wave = added(self.turn, summed, len(self.way))
+        mean = (added(self.way, wave, len(self.count)) / self.count)[self.way]
         # All by one turn are `count` times what it brings, in place of the sum over turns; ways are not related.
         off = self.count[self.way] * np.abs(wave - mean) ** 2
         return float(2.0 * db(1.0 + np.sqrt(off[several].sum()) / whole))
@@ -45,7 +45,7 @@ class Turns:
 
 def turns_of(names: Sequence[tuple[str, ...]], kinds: NDArray[np.int8], one_end: bool) -> Turns:
     """Return the turns of chains of parts with interactions (g, d); one_end: a chain and its reverse are one."""
-    ways: dict[tuple[str, ...], int] = {}
+    ways: dict[tuple[tuple[str, ...], bool], int] = {}
     turns: dict[tuple[int, int], int] = {}
     found = []
     for name, kind in zip(names, kinds, strict=True):
@@ -55,11 +55,13 @@ def turns_of(names: Sequence[tuple[str, ...]], kinds: NDArray[np.int8], one_end:
         place = int(at[0]) if len(at) == 1 else -1
         if one_end and place >= 0:
             plain, place = min((plain, place), (plain[::-1], len(plain) - 1 - place))
-        way = ways.setdefault(plain, len(ways))
+        # What scatters diffusely, at points or wedges, is another wave, not another turn of this one.
+        way = ways.setdefault((plain, place >= 0), len(ways))
         found.append(turns.setdefault((way, place), len(turns)))
     way_of = np.array([way for way, _ in turns], np.int64)
     return Turns(np.array(found, np.int64), way_of, np.bincount(way_of, minlength=len(ways)))
 
 
-def _sums(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
+def added(index: Ints, values: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
+    """Return the sums (count,) of values (n,) by their numbers (n,)."""
     return np.bincount(index, values.real, count) + 1j * np.bincount(index, values.imag, count)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from raychan.compile.jit import njit
 from raychan.parallel import parallel_for
-from raychan.records import MIRROR
 from raychan.tracing.cache import cache_of
 from raychan.tracing.image_paths import each_may_leave
 from raychan.tracing.images import scattering, turning
@@ -117,11 +116,10 @@ def _known(geometry: Geometry, outs: list[Leg]) -> tuple[_OutgoingLegs, list[lis
 def _packed(geometry: Geometry, outs: list[Leg]) -> _OutgoingLegs:
     """Return legs as kernels read them."""
     k, m = len(outs), max((len(out.mirrors) for out in outs), default=0)
-    role = geometry.facets.role
     legs = _OutgoingLegs(
         mirrors=np.array([len(out.mirrors) for out in outs], np.int64),
         pieces=np.array([reachable(geometry, out) for out in outs]).reshape(k, len(geometry.piece_role)),
-        over=np.array([any(role[x.body] != MIRROR for x in out.mirrors) for out in outs], bool),
+        over=np.array([len(scattering(geometry, out)) > 0 for out in outs], bool),
         far=np.array([out.far for out in outs], bool),
         images=np.zeros((k, m + 1, 3)),
         at=np.zeros((k, m, 3)),

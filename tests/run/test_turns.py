@@ -7,7 +7,7 @@ import pytest
 from truth.corner import corner
 
 import raychan as rc
-from raychan.records import REFLECT, SCATTER, TRANSMIT
+from raychan.records import DIFFUSE, REFLECT, SCATTER, TRANSMIT
 from raychan.run.turns import turns_of
 from raychan.units import C0
 
@@ -39,6 +39,10 @@ def test_layers_on_the_way_make_no_other_way():
     names = [("(pane)", "a", "b"), ("b", "a")]
     kinds = [[TRANSMIT, REFLECT, SCATTER], [REFLECT, SCATTER, 0]]
     assert _off(names, kinds, [0.3, 0.3]) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_clutter_of_a_wall_is_no_other_turn_of_its_echo():
+    assert _off([("wall",), ("wall",)], [[SCATTER], [DIFFUSE]], [1.0, 0.3j]) == 0.0
 
 
 @pytest.mark.parametrize(("opening_deg", "turn_deg"), [(90.0, 10.0), (90.8, -19.2)])
