@@ -8,10 +8,12 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.box import SIMPLE_HEAD
+from rich.cells import cell_len
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -25,6 +27,8 @@ _LONG = 3.0  # s: compiling for longer prints a line where there is no progress 
 _SOME = ("azimuth deg", "elevation deg", "error dB", "folded: true m", "true m/s")
 # columns shown only where a row has a value
 _WIDE = 150  # columns of output to a file or pipe: no table line is cut
+_FOLDED = 24  # columns to which text in a table is folded at most; figures are never cut, lines run over instead
+_LONGEST = 1000  # columns of a line that runs over
 
 
 class Interrupted(Exception):
@@ -59,6 +63,17 @@ class _Console(Console):
     def on_broken_pipe(self) -> None:
         """Raise the error for the command line; rich would end the process with code 1."""
         raise BrokenPipeError
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print; lines of a table that needs more columns than the terminal has run over: rich would cut figures."""
+        room = self.options.update(max_width=_LONGEST)
+        needs = (Measurement.get(self, room, made).minimum for made in objects if isinstance(made, Table))
+        fixed = self._width
+        self.width = max(self.width, *needs, 0)
+        try:
+            super().print(*objects, **options)
+        finally:
+            self._width = fixed
 
 
 def console() -> Console:
@@ -120,9 +135,13 @@ def warn(warnings: Iterable[str]) -> None:
 def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]], left: Iterable[int] = (0,)) -> Table:
     """Return a table; columns in `left` are set flush left, the others right."""
     made = Table(title=title or None, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
-    flush = set(left)
+    flush, rows = set(left), list(rows)
     for i, head in enumerate(heads):
-        made.add_column(head, justify="left" if i in flush else "right", no_wrap=i not in flush, overflow="fold")
+        longest = max([cell_len(head), *(cell_len(row[i]) for row in rows)])
+        if i in flush:
+            made.add_column(head, justify="left", overflow="fold", min_width=min(longest, _FOLDED))
+        else:
+            made.add_column(head, justify="right", no_wrap=True, min_width=longest)
     for row in rows:
         made.add_row(*(Text(cell) for cell in row))
     return made

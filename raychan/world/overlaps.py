@@ -24,6 +24,7 @@ _DEPTH = 1e-3  # m: bodies that only touch, within rounding, do not overlap
 _INSIDE = 0.75  # winding number: 1 inside a closed body, 1/2 on its surface, 0 outside
 _SAME = 0.75  # share of each surface inside the other: two equal boxes have it up to a tenth of their length apart
 _CROSSED = 1e-9  # of a whole wave: what rounding leaves of crossed ones
+_NAMED = 10  # pairs told by name
 _BEAM = 1e-6  # of the two-way peak gain, -60 dB: below, a body is outside the beam
 
 
@@ -49,7 +50,8 @@ def _sample(mesh: Mesh, count: int, depth: float) -> Floats:
 
 
 def overlaps(bodies: Sequence[Body], opaque: Sequence[bool], kept: Kept | None = None) -> list[str]:
-    """Return a line for each pair of bodies that overlap, and for each body hidden inside another.
+    """Return a line for each pair of bodies that overlap, and for each body hidden inside another; where these are
+    many, for the first, and one that counts the others.
 
     Args: opaque: which bodies let no wave through. A body wholly inside one that lets waves in is intended; two that
     fill nearly the same space are not. kept: what was found of the same bodies at another time.
@@ -63,6 +65,9 @@ def overlaps(bodies: Sequence[Body], opaque: Sequence[bool], kept: Kept | None =
             continue
         if _meet(*(_found(kept, (bodies[j],), lambda b: _box(b, b.geometry.vertices)) for j in (i, k))):
             said += _found(kept, (bodies[i], bodies[k]), lambda a, b, i=i, k=k: _told(a, b, opaque[i], opaque[k]))
+    if len(said) > _NAMED:
+        others = len(said) - _NAMED
+        said[_NAMED:] = [f"{others} more pairs of bodies overlap, are copies or lie in one another (bodies)"]
     return said
 
 

@@ -177,3 +177,10 @@ def test_info_takes_unit_and_up_of_meshes_and_of_nothing_else(tmp_path, capsys):
     assert "is not a mesh file" in capsys.readouterr().err
     assert invoke(["info", str(file), "--unit", "parsec"]) == 2
     assert "parsec" in capsys.readouterr().err
+
+
+def test_of_many_overlapping_bodies_ten_are_named_and_the_others_counted():
+    """Eight boxes about one place overlap in 28 pairs."""
+    told = rc.Scene([solid(f"box{i}", 5.0 + 0.1 * i) for i in range(8)]).warnings
+    named = [w for w in told if "overlap" in w or "fill nearly" in w]
+    assert len(named) == 11 and named[-1].startswith("18 more pairs of bodies overlap")
