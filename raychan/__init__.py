@@ -138,6 +138,12 @@ _TRIED = {
     "chirp": "Waveform",
     "fmcw": "Waveform",
     "patchantenna": "CosineAntenna",
+    "micro_doppler": "spectrogram",
+    "microdoppler": "spectrogram",
+    "fresnel": "Material",
+    "noise_figure": "Radar",
+    "path_loss": "specular_paths",
+    "delay_spread": "Paths",
 }
 """Names that people try, in small letters, and what stands here for them."""
 

@@ -41,7 +41,7 @@ def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:
     if trouble is None:
         return []
     plain.picture(drawing, path)
-    return [f"scene picture drawn by matplotlib, as OpenGL is not available ({trouble})"]
+    return [f"scene picture drawn by matplotlib, as pyvista drew none ({trouble})"]
 
 
 def _rendered(drawing: Drawing, path: Path) -> str | None:

@@ -31,7 +31,16 @@ def test_a_word_in_capitals_or_with_a_slip_is_refused_with_the_right_one(make, m
 
 @pytest.mark.parametrize(
     ("name", "meant"),
-    [("load_scene", "Scene.load"), ("music", "doa"), ("simulat", "simulate"), ("scene", "Scene"), ("FMCW", "Waveform")],
+    [
+        ("load_scene", "Scene.load"),
+        ("music", "doa"),
+        ("simulat", "simulate"),
+        ("scene", "Scene"),
+        ("FMCW", "Waveform"),
+        ("fresnel", "Material"),
+        ("micro_doppler", "spectrogram"),
+        ("path_loss", "specular_paths"),
+    ],
 )
 def test_a_name_that_is_none_of_raychans_is_refused_with_the_nearest(name, meant):
     with pytest.raises(AttributeError, match=rf"has no attribute '{name}'; did you mean '{meant}'\?"):
