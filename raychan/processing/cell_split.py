@@ -75,8 +75,8 @@ class Echoes(Found):
     unsure: NDArray[np.bool_]
     """(n,) whether the direction may be that of a side lobe: waves in the cell were not told apart"""
     weights: Complexes
-    """Beams (n, s * a) that the echoes are seen in, of what slots hold under their folds, with nulls towards the others
-    of their cells."""
+    """Beams (n, s * a) that the echoes are seen in, of what slots hold under their folds and at their rates, with nulls
+    towards the others of their cells."""
     fold: Ints
     """(n,) by how many spans of rates they are folded in their cells."""
 
@@ -95,7 +95,7 @@ class Row:
     """Share of the power that is no plane wave: an echo that was not told apart from it, seen by all beams."""
     unsure: bool
     weights: Complexes
-    """(s * a,) of its beam, of what slots hold under its fold, with nulls towards the others of the cell."""
+    """(s * a,) of its beam, of what slots hold under its fold and at its rate, nulls towards others of the cell."""
     fold: int
     """By how many spans of rates it is folded in its cell."""
     shown: float
@@ -136,7 +136,7 @@ class Splitter:
             if not (self._clear(float(peaks.shown[i]), *place, kept, peaks, beams) and self.lines.own(peaks.cells[i])):
                 continue
             v, r = peaks.cells[i]
-            snapshot, distance = self._read(v, r, self._fold(peaks.cells[i])), float(self.map.range[r])
+            snapshot, distance = self._read(v, r, self._spans(peaks, i, v)), float(self.map.range[r])
             held = echoes_in(snapshot, self.scan, float(peaks.least[i]), distance, self.slots)
             rows = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k))]
             beside += [row for row in rows if row.beside]
@@ -167,6 +167,10 @@ class Splitter:
     def _fold(self, cell: Ints) -> int:
         """Return by how many spans a map cell (2,) is held to be folded."""
         return int(self.map.fold[tuple(cell)]) if isinstance(self.map, ResolvedMap) else 0
+
+    def _spans(self, peaks: Peaks, i: int, rows: Any) -> Any:
+        """Return by how many spans and parts of one the rate of a peak is folded in rows (...) of the map."""
+        return self._fold(peaks.cells[i]) + (peaks.place[i, 0] - rows) / len(self.map.rate)
 
     def _read(self, rows: Any, columns: Any, folds: Any) -> Complexes:
         """Return what the slots of map cells (...) hold, (s * a, ...), read under folds (...)."""
@@ -210,9 +214,9 @@ class Splitter:
         some, rest = [kept[k] for k in np.flatnonzero(much)], rest + MARGIN * float(shown[~much].sum())
         distances = self.map.range[[row.cell[1] for row in some]]
         directions = np.array([row.direction for row in some]).reshape(-1, 2)
-        waves, turns = self.scan.aperture.steering(directions), [self._fold_at(row, cell) - row.fold for row in some]
-        own = np.array([row.fold + turn - fold for row, turn in zip(some, turns, strict=True)])
-        shares = self.lobes.by_fold(place[0] - at[much, 0], np.array(turns))
+        waves, own = self.scan.aperture.steering(directions), np.array([row.fold for row in some]) - fold
+        turns = np.rint((at[much, 0] - place[0]) / self.grid.count[0])
+        shares, own = self.lobes.by_fold(place[0] - at[much, 0], turns), own + turns
         held = [share[:, None] * self.slots.waves(waves, own + h) for h, share in enumerate(shares)]
         through = self.scan.through(beams(), np.array(held), directions, distances)
         through = np.maximum(through, [row.misfit for row in some])
@@ -244,9 +248,7 @@ class Splitter:
             *(c + np.arange(-n, n + 1) for c, n in zip(peaks.cells[i], reach, strict=True)), indexing="ij"
         )
         v, r = self.shape.cells_at(near[0], near[1], shape)
-        turns, fold = np.floor_divide(near[0], shape[0]), self._fold(peaks.cells[i])
-        # Over the end of the rates an echo is folded once more.
-        level = np.abs(np.tensordot(held.weights[k], self._read(v, r, fold + turns), 1)) ** 2
+        level = np.abs(np.tensordot(held.weights[k], self._read(v, r, self._spans(peaks, i, v)), 1)) ** 2
         # Along an axis of two cells there is nothing to compare with.
         fixed = np.array(shape) <= 2
         at = _top(level, reach, np.where(fixed | (k == 0), 0, pad), np.where(fixed, 0, reach))
@@ -262,10 +264,12 @@ class Splitter:
         unsure, shown = bool(held.unsure(self.scan.aperture)[k]), float(level[at[0], at[1]])
         aside = not bool((np.abs(at - reach) < pad).all())
         crest = bool(level[reach[0] - 1 : reach[0] + 2, reach[1] - 1 : reach[1] + 2].max() <= shown)
-        more = int(held.fold[k])
-        own = fold + more + int(turns[tuple(at)])
-        # The beam of what slots hold under the echo's own fold.
-        weights = self.slots.read_under(held.weights[k].conj(), more).conj()
+        row, more = int(near[0][tuple(at)]), int(held.fold[k])
+        # Over the end of the rates an echo is folded once more.
+        own = self._fold(peaks.cells[i]) + more + row // shape[0]
+        # The beam of what slots hold under the echo's own fold, at its own rate.
+        away = (row + shift[0, 0] - peaks.place[i, 0]) / shape[0]
+        weights = self.slots.read_under(held.weights[k].conj(), more + away).conj()
         fit = misfit, unsure, weights, own, shown
         return Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], *fit, aside, crest)
 

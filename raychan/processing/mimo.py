@@ -55,7 +55,7 @@ def virtual_range_doppler(
     if not resolve:
         return replace(plain, spectrum=channels[:many].reshape(-1, *channels.shape[2:]))
     fold, open_ = np.zeros(plain.power.shape, np.int8), None
-    slots = Slots.of(radar, hypotheses(radar))
+    slots = Slots.of(radar, hypotheses(radar), rate_window)
     if slots.tested > 1:
         fold, open_ = folds(channels, radar, slots, plain)
     for cells, h in _groups(fold):

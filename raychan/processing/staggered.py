@@ -50,12 +50,13 @@ class ResolvedMap(RangeDoppler):
     """Range rates between plus and minus this are told apart by the folds [m/s]."""
 
     def read(self, rows: Any, columns: Any, folds: Any) -> Complexes:
-        """Return what the slots of cells (...) hold, (s * a, ...), if their echoes are folded so many times (...)."""
+        """Return what the slots of cells (...) hold, (s * a, ...), if their echoes are folded so many times (...), by
+        parts of a span more than a whole number at rates beside those of the cells."""
         held = np.concatenate([self.spectrum[:, rows, columns], self.spare[:, rows, columns]])
         more = (np.asarray(folds) - self.fold[rows, columns]) % self.slots.count
         by_slot = held.reshape(self.slots.count, -1, *more.shape)
         for h in np.unique(more[more > 0]):
-            by_slot[:, :, more == h] = self.slots.under(by_slot[:, :, more == h], int(h))
+            by_slot[:, :, more == h] = self.slots.under(by_slot[:, :, more == h], float(h))
         return by_slot.reshape(held.shape)
 
 
@@ -138,7 +139,7 @@ def staggered_map(cube: Cube, radar: Radar, given: Any, resolve: bool = True) ->
         better = np.flatnonzero(power > best + (clear if h else 0.0))
         best[better], fold[rows[better], columns[better]] = power[better], h
         sums[:, rows[better], columns[better]] = total[:, better]
-    return resolved(map, sums, fold, map.noise / count, Slots.of(radar, hypotheses(radar)))
+    return resolved(map, sums, fold, map.noise / count, Slots.of(radar, hypotheses(radar), given[1]))
 
 
 def wrong_fold(snr: float, radar: Radar) -> float:

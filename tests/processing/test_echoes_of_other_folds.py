@@ -66,7 +66,7 @@ def test_four_echoes_of_a_cell_and_of_one_fold_keep_it(slots):
 
 @pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
 def test_slots_read_under_one_fold_more_after_another_are_read_under_their_sum(multiplexing):
-    slots = Slots.of(made(3, 4, multiplexing), 3)
+    slots = Slots.of(made(3, 4, multiplexing), 3, "hann")
     rng = np.random.default_rng(2)
     wave = (rng.normal(size=(1, 12)) + 1j * rng.normal(size=(1, 12))).astype(complex)
     for more in range(slots.count):
