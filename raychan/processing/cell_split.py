@@ -215,8 +215,10 @@ class Splitter:
         distances = self.map.range[[row.cell[1] for row in some]]
         directions = np.array([row.direction for row in some]).reshape(-1, 2)
         waves, own = self.scan.aperture.steering(directions), np.array([row.fold for row in some]) - fold
-        turns = np.rint((at[much, 0] - place[0]) / self.grid.count[0])
-        shares, own = self.lobes.by_fold(place[0] - at[much, 0], turns), own + turns
+        spans = (at[much, 0] - place[0]) / self.grid.count[0]
+        # By time division side lobes are turned as their echo is; by Doppler division they fall on several slots.
+        own = own + (np.rint(spans) if self.slots.shifted else spans)
+        shares = self.lobes.by_fold(place[0] - at[much, 0], np.rint(spans))
         held = [share[:, None] * self.slots.waves(waves, own + h) for h, share in enumerate(shares)]
         through = self.scan.through(beams(), np.array(held), directions, distances)
         through = np.maximum(through, [row.misfit for row in some])

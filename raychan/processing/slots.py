@@ -79,11 +79,13 @@ class Slots:
 
     def waves(self, waves: Complexes, folds: Any) -> Complexes:
         """Return what slots hold (n, s * a) of waves in the transmitters' channels (n, t * a) that are folded so many
-        times (n,) more than the slots are read."""
+        times (n,) more than the slots are read, by Doppler division a whole number of times."""
         count, receivers = len(waves), waves.shape[1] // self.senders
         held = np.zeros((self.count, count, receivers), waves.dtype)
         held[: self.senders] = np.moveaxis(waves.reshape(count, self.senders, receivers), 1, 0)
-        for h in {float(x) % self.count for x in folds} - {0.0}:
+        if not self.shifted:
+            held *= np.exp(-2j * np.pi / self.count * np.multiply.outer(np.arange(self.count), folds))[:, :, None]
+        for h in {int(x) % self.count for x in folds} - {0} if self.shifted else ():
             rows = np.asarray(folds) % self.count == h
             held[:, rows] = self.under(held[:, rows], -h)
         return np.moveaxis(held, 0, 1).reshape(count, self.count * receivers)

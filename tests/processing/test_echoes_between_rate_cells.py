@@ -1,4 +1,4 @@
-"""Strong echoes between the rate cells of several transmitters' maps: plane waves at their own rates, seen once."""
+"""Strong echoes beside the rate cells of several transmitters' maps: plane waves at their own rates, seen once."""
 
 from __future__ import annotations
 
@@ -60,3 +60,9 @@ def test_a_lone_strong_echo_is_seen_once_from_its_direction_wherever_it_lies_bet
     for seed in range(14):
         found, azimuth = lone(radar, seed)
         assert np.degrees(found.azimuth - azimuth) == pytest.approx([0.0], abs=0.06)
+
+
+def test_side_lobes_along_rate_by_time_division_are_turned_as_their_echo_is():
+    radar = made(2, 4, "tdm", "taylor(40)", 2)
+    for seed in range(26, 42):
+        assert len(lone(radar, seed)[0].range) == 1
