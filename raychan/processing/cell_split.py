@@ -198,7 +198,7 @@ class Splitter:
         if not kept:
             return True
         pad = np.array(self.grid.pad)
-        place = (cell + shift) / pad
+        place = (cell + np.clip(shift, -0.5, 0.5)) / pad  # the power is that of the cell
         at = np.array([row.cell + row.shift for row in kept]) / pad
         smear = peaks.smear[[row.peak for row in kept]]
         powers = np.array([row.power for row in kept])

@@ -142,7 +142,7 @@ def detect(
     smears = _smears(map, waveform)
     smear, lines = smears[tuple(cells.T)], LineLobes(seen, SideLobes(grid, windows, chirps), grid.pad, smears)
     if aperture is None or bank is None:
-        place = (cells + shift) / np.array(grid.pad)
+        place = (cells + np.clip(shift, -0.5, 0.5)) / np.array(grid.pad)
         kept = lobes.own(place, power, smear, shown, besides=lambda i: lines.own(cells[i]))
         return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
     towards = bank.directions[bank.towards(map.spectrum, cells)]

@@ -32,6 +32,9 @@ class MainLobe:
         top, above, below = self(shift), self(shift - 1.0), self(shift + 1.0)
         self._shift, self._gain = shift, -top
         self._near, self._far = np.exp(0.5 * (above - top)), np.exp(0.5 * (below - top))
+        self._past = np.linspace(-1.0, 0.5, 3 * _KNOTS)
+        # Beyond the null of the main lobe ratios say nothing more.
+        self._ratio = np.minimum.accumulate((self(self._past - 1.0) - self(self._past))[::-1])[::-1]
         bend = below - 2.0 * top + above
         self.flat = bool(bend.max() >= -1e-9)  # of one sample: all cells are equal
         self.deep = bool((below - top).min() < -_STEEP)
@@ -73,6 +76,11 @@ class MainLobe:
             fit * np.sign(above - below) * lone + (1.0 - fit) * shift,
             fit * np.interp(lone, self._shift, self._gain) + (1.0 - fit) * gain,
         )
+
+    def beyond(self, top: Floats, over: Floats) -> tuple[Floats, Floats]:
+        """Return what `between` does of lone peaks nearer to a neighbour, `over`, than to the cell, upwards."""
+        past = np.interp(top - over, self._ratio, self._past)
+        return 1.0 - past, over - top - self(past)
 
 
 class PeakShape:
@@ -125,13 +133,17 @@ class PeakShape:
         shift[inner, 1], gain[inner] = self.lobes[1].between(reach[0, inner], top[inner], reach[1, inner])
         if shape[0] > 2:
             here, rest = self.lobes[1](shift[:, 1]), self._turn(shape) - round(self._turn(shape))
-            below, above = (
-                x - np.maximum(self.lobes[1](shift[:, 1] + step * (rest * ends - self._skew)) - here, -_STEEP) * inner
-                for x, step, ends in zip(
-                    rate, (-1.0, 1.0), (cells[:, 0] == 0, cells[:, 0] == shape[0] - 1), strict=True
-                )
-            )
-            shift[:, 0], more = self.lobes[0].between(below, top, above)
+            ends = cells[:, 0] == 0, cells[:, 0] == shape[0] - 1
+            sides = [
+                x - np.maximum(self.lobes[1](shift[:, 1] + step * (rest * end - self._skew)) - here, -_STEEP) * inner
+                for x, step, end in zip(rate, (-1.0, 1.0), ends, strict=True)
+            ]
+            shift[:, 0], more = self.lobes[0].between(sides[0], top, sides[1])
+            for x, side, step, end in zip(rate, sides, (-1.0, 1.0), ends, strict=True):
+                # Over the end of the rates an echo lies elsewhere between range cells, which may hide its peak.
+                over = end & (x <= top) & (side > top)
+                away, more[over] = self.lobes[0].beyond(top[over], side[over])
+                shift[over, 0] = step * away
             gain += more
             shift[inner, 1] -= self._skew * shift[inner, 0]
         return shift, np.exp(top + gain)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from raychan.radar.processing import Processing
 from raychan.radar.waveform import Waveform
 from raychan.run.receiver import detections_in, map_of
 from raychan.signal.baseband import synthesize
-from raychan.units import C0
+from raychan.units import C0, db
 
 WAVE = Waveform(77e9, 436.8e6, 20e-6, repetition=25e-6, n_chirps=48, n_samples=128)
 NARROW = replace(WAVE, bandwidth=4e6)
@@ -66,3 +67,22 @@ def test_side_lobes_along_rate_by_time_division_are_turned_as_their_echo_is():
     radar = made(2, 4, "tdm", "taylor(40)", 2)
     for seed in range(26, 42):
         assert len(lone(radar, seed)[0].range) == 1
+
+
+@pytest.mark.parametrize(
+    ("stagger", "window", "pad"),
+    [((40e-6, 50e-6, 60e-6), "taylor(60)", 3), ((), "rect", 2), ((), "hann", 3)],
+)
+def test_an_echo_over_the_end_of_the_rates_has_the_level_and_rate_of_one_beside_it(stagger, window, pad):
+    settings = Processing(range_window="rect", rate_window=window, pad=(1, pad))
+    array = {} if stagger else {**mimo_array(2, 3, STEP), "multiplexing": "tdm"}
+    wave = replace(WAVE, repetition=None if stagger else 40e-6, stagger=stagger)
+    radar = make_radar(wave, **array, processing=settings, noise=True)
+    cells, level = radar.channel_waveform, radar.noise_power / (WAVE.n_chirps * WAVE.n_samples) * 10.0**6
+    for over, place in product(np.linspace(-1.5, 0.5, 9), 10.0 + WAVE.range_resolution * np.array([0.0, 0.5, 0.7])):
+        rate = cells.unambiguous_rate + over * cells.rate_resolution
+        sent = echoes(place - rate * wave.centre, rate, np.sqrt(level), 0.2)
+        map = map_of(synthesize(sent, radar, np.random.default_rng(1)), radar, radar.processing)
+        found = detections_in(map, radar, radar.processing)
+        assert db(found.power / level) == pytest.approx([0.0], abs=0.02)
+        assert (found.rate - rate) / cells.rate_resolution == pytest.approx([0.0], abs=0.02)
