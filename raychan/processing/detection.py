@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from raychan.processing import twins
 from raychan.processing.angles import Scan
 from raychan.processing.beams import BeamBank
-from raychan.processing.cell_split import Echoes, Found, Peaks, Splitter
+from raychan.processing.cell_split import Splitter
 from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, training
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
+from raychan.processing.found import Echoes, Found, Peaks
 from raychan.processing.line_lobes import LineLobes
 from raychan.processing.main_lobe import PeakShape
 from raychan.processing.peaks import SideLobes
