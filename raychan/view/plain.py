@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import collections, figure, save, style
+from raychan.report.canvas import collections, figure, save, style, verbatim
 from raychan.view.drawing import Drawing
 
 _DASH = 0.015  # length of a dash over the scene's diagonal
@@ -49,13 +49,13 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
         axes.plot(*drawing.radar[:, None], marker=">", ms=9, color="#d62728", ls="none", zorder=3)
         axes.text(*drawing.radar, f"  {drawing.observer}", fontsize=8, zorder=4)
         for name, (x, y, z) in drawing.targets:
-            axes.text(x, y, z + 0.3, name, fontsize=8, ha="center", zorder=4)
+            axes.text(x, y, z + 0.3, verbatim(name), fontsize=8, ha="center", zorder=4)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x [m]", ylabel="y [m]")
         axes.set_box_aspect(high - low, zoom=1.25)
         axes.locator_params(axis="y", nbins=4)
         axes.locator_params(axis="z", nbins=3)
         axes.view_init(elev=28.0, azim=-132.0)
         axes.set_zlabel("z [m]")
-        made.suptitle(drawing.title)
+        made.suptitle(verbatim(drawing.title))
         made.text(0.02, 0.93, drawing.note, fontsize=8)
         return save(made, path)

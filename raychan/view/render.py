@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from raychan.view.drawing import Drawing
+from raychan.report.canvas import font_file, legible
+from raychan.view.drawing import Drawing, Ray
 
 _SIZE = (2000, 1125)  # pixels
 _MAP = "plasma"
@@ -35,7 +36,7 @@ def window(drawing: Drawing) -> None:
 
 def _tell(mesh: Any) -> None:
     if mesh is not None and "what" in mesh.field_data:
-        print(mesh.field_data["what"][0])
+        print(bytes(mesh.field_data["what"]).decode())
 
 
 def _plotter(drawing: Drawing, off_screen: bool) -> Any:
@@ -58,15 +59,16 @@ def _plotter(drawing: Drawing, off_screen: bool) -> Any:
     tip = drawing.radar + scale * drawing.boresight
     cone = pv.Cone(center=tip, direction=-drawing.boresight, height=2 * scale, radius=scale, resolution=40)
     plotter.add_mesh(cone, color="#d62728")
-    names = [name for name, _ in drawing.targets] + [drawing.observer]
+    names = [legible(name) for name, _ in drawing.targets] + [drawing.observer]
     places = [(x, y, z + 1.5 * scale) for _, (x, y, z) in drawing.targets]
     places.append((drawing.radar[0], drawing.radar[1], drawing.radar[2] + 2.5 * scale))
     plotter.add_point_labels(
         np.array(places), names, font_size=22, text_color="#1a1a1a", shape_color="white", shape_opacity=0.75,
-        show_points=False, always_visible=True, margin=4,
+        show_points=False, always_visible=True, margin=4, font_file=font_file(),
     )  # fmt: skip
     if drawing.caption:
-        plotter.add_text(f"{drawing.title}\n{drawing.caption}", position="upper_right", font_size=12, color="#1a1a1a")
+        text = legible(f"{drawing.title}\n{drawing.caption}")
+        plotter.add_text(text, position="upper_right", font_size=12, color="#1a1a1a", font_file=font_file())
     _look(plotter, drawing)
     plotter.enable_anti_aliasing("ssaa")
     return plotter
@@ -110,11 +112,8 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
     # A whole number of dB from label to label, as labels have no decimals.
     limits = [low, low + steps * max(1.0, np.ceil((max(powers) - low) / steps))]
     for ray in drawing.rays:
-        tube = pv.merge([pv.lines_from_points(line).tube(radius=radius) for line in ray.strokes(_DASH * radius)])
-        tube.field_data["what"] = [ray.text]
-        tube[_POWER] = np.full(tube.n_points, ray.power)
         plotter.add_mesh(
-            tube, scalars=_POWER, cmap=_MAP, clim=limits, show_scalar_bar=False, lighting=False,
+            _tube(ray, radius, pv), scalars=_POWER, cmap=_MAP, clim=limits, show_scalar_bar=False, lighting=False,
         )  # fmt: skip
     bar = plotter.add_scalar_bar(
         _POWER, vertical=False, position_x=0.03, position_y=0.86, width=0.28, height=0.1, color="#1a1a1a",
@@ -123,6 +122,13 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
     if drawing.note:
         plotter.add_text(drawing.note, position=(0.03, 0.82), viewport=True, font_size=12, color="#1a1a1a")
     bar.SetTextPositionToPrecedeScalarBar()  # below it; above it the title sits on the labels
+
+
+def _tube(ray: Ray, radius: float, pv: Any) -> Any:
+    tube = pv.merge([pv.lines_from_points(line).tube(radius=radius) for line in ray.strokes(_DASH * radius)])
+    tube.field_data["what"] = np.frombuffer(ray.text.encode(), np.uint8)  # pyvista takes texts in ASCII only
+    tube[_POWER] = np.full(tube.n_points, ray.power)
+    return tube
 
 
 def _look(plotter: Any, drawing: Drawing) -> None:
