@@ -12,6 +12,7 @@ from raychan.report.canvas import collections, figure, save, style, verbatim
 from raychan.view.drawing import Drawing
 
 _DASH = 0.015  # length of a dash over the scene's diagonal
+_SMALLEST = 0.006  # side over the scene's diagonal: smaller bodies are marked, with points
 _MOST = 6000  # triangles drawn of a shape: matplotlib sorts and paints them one by one (not measured)
 
 
@@ -46,6 +47,8 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
             lines.set_array(np.array([power for _, power in strokes]))
             axes.add_collection3d(lines)
             made.colorbar(lines, cax=made.add_axes((0.91, 0.2, 0.015, 0.6)), label="received power [dBm]")
+        for place, colour in drawing.specks(_SMALLEST * float(np.linalg.norm(high - low))):
+            axes.plot(*np.array(place)[:, None], marker="o", ms=4, color=colour, ls="none", zorder=3)
         axes.plot(*drawing.radar[:, None], marker=">", ms=9, color="#d62728", ls="none", zorder=3)
         axes.text(*drawing.radar, f"  {drawing.observer}", fontsize=8, zorder=4)
         for name, (x, y, z) in drawing.targets:
