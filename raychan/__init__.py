@@ -123,29 +123,38 @@ __all__ = [*_HOME, "__version__"]
 
 
 _TRIED = {
-    "load_scene": "Scene.load",
+    "loadscene": "Scene.load",
     "load": "Scene.load",
     "run": "simulate",
     "music": "doa",
     "esprit": "doa",
     "capon": "doa",
     "mvdr": "doa",
+    "beamform": "doa",
+    "beamforming": "doa",
     "cfar": "detect",
     "target": "Body",
     "pointtarget": "Body",
+    "scatterer": "Body",
     "transmitter": "Radar",
     "receiver": "Radar",
     "chirp": "Waveform",
     "fmcw": "Waveform",
     "patchantenna": "CosineAntenna",
-    "micro_doppler": "spectrogram",
     "microdoppler": "spectrogram",
     "fresnel": "Material",
-    "noise_figure": "Radar",
-    "path_loss": "specular_paths",
-    "delay_spread": "Paths",
+    "noisefigure": "Radar",
+    "linkbudget": "Radar.link_budget",
+    "pathloss": "specular_paths",
+    "kfactor": "specular_paths",
+    "delayspread": "Paths",
+    "powerdelayprofile": "Result.profile",
+    "pdp": "Result.profile",
+    "kalman": "raychan.dynamics.kalman",
+    "laser": "raychan.sensors.laser",
+    "lidar": "raychan.sensors.laser",
 }
-"""Names that people try, in small letters, and what stands here for them."""
+"""Names that people try, in small letters without underscores, and what stands here, or in a module, for them."""
 
 
 def _hint(name: str) -> str:
@@ -155,7 +164,9 @@ def _hint(name: str) -> str:
     from difflib import get_close_matches
 
     small = {known.lower(): known for known in _HOME}
-    near = _TRIED.get(name.lower()) or next((small[x] for x in get_close_matches(name.lower(), small, n=1)), "")
+    near = _TRIED.get(name.lower().replace("_", "")) or next(
+        (small[x] for x in get_close_matches(name.lower(), small, n=1)), ""
+    )
     return f"; did you mean {near!r}?" if near else ""
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +108,43 @@ def drawn_as(made: Any, suffix: str, flat: bool = False) -> memoryview:
     return drawn.getbuffer()
 
 
+FONT = "DejaVu Sans"
+"""Comes with matplotlib; of Latin, Greek, Cyrillic, Arabic and other letters."""
+
+
+@cache
+def font_file(family: str = FONT) -> str | None:
+    """Return the file of a family of fonts, or None where it is not installed."""
+    from matplotlib.font_manager import FontProperties, findfont
+
+    try:
+        return str(findfont(FontProperties(family=[family]), fallback_to_default=False))
+    except ValueError:
+        return None
+
+
+@cache
+def _letters(family: str) -> frozenset[int]:
+    from matplotlib.font_manager import get_font
+
+    file = font_file(family)
+    return frozenset() if file is None else frozenset(get_font(file).get_charmap())
+
+
+def legible(text: str, families: Iterable[str] = (FONT,)) -> str:
+    r"""Return a text in which each character that no font of `families` draws is written out, as \u65e5."""
+    drawn = frozenset({ord("\n")}).union(*map(_letters, families))
+    return "".join(c if ord(c) in drawn else c.encode("unicode_escape").decode() for c in text)
+
+
+def verbatim(text: str) -> str:
+    """Return a name or title so that matplotlib draws it as it stands, without warnings of what its font lacks:
+    no part of it is mathematics."""
+    import matplotlib
+
+    return legible(text, matplotlib.rcParams["font.family"]).replace("$", r"\$")
+
+
 def outlined(width: float = 2.0, colour: str = "black") -> list[Any]:
     """Return path effects that put an outline round text or lines, so that they are legible on any background."""
     from matplotlib import patheffects
@@ -145,7 +184,14 @@ class Placer:
 
         line = {"arrowstyle": "-", "lw": 0.6, "shrinkA": 0, "shrinkB": 3, "color": style.get("color", "black")}
         note = self.axes.annotate(
-            text, (x, y), xytext=(0, 0), textcoords="offset points", ha="center", va="center", arrowprops=line, **style
+            verbatim(text),
+            (x, y),
+            xytext=(0, 0),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            arrowprops=line,
+            **style,
         )
         renderer = self.axes.figure.canvas.get_renderer()
         inside = self.axes.get_window_extent(renderer).extents

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from raychan.processing.detection_theory import Detector, detection_probability, simulated
-from raychan.report.canvas import PALETTE, drawn_as, figure, style
+from raychan.report.canvas import PALETTE, drawn_as, figure, style, verbatim
 from raychan.run.target_links import TargetLink
 
 _STEPS = 141  # points of a curve
@@ -36,10 +36,15 @@ def detection_picture(detector: Detector, links: Sequence[TargetLink], title: st
         for k, link in enumerate(links):
             at, shift = (link.snr, link.probability), (5, 4 - 9 * (k % 4))
             axes.plot(*at, "o", color="black", fillstyle="none")
-            axes.annotate(link.name, at, xytext=shift, textcoords="offset points")
+            axes.annotate(verbatim(link.name), at, xytext=shift, textcoords="offset points")
         if links:
             axes.plot([], [], "o", color="black", fillstyle="none", label="targets of the scene")
-        axes.set(xlabel="mean SNR of one look [dB]", ylabel="probability of detection", ylim=(-0.02, 1.05), title=title)
+        axes.set(
+            xlabel="mean SNR of one look [dB]",
+            ylabel="probability of detection",
+            ylim=(-0.02, 1.05),
+            title=verbatim(title),
+        )
         axes.grid(alpha=0.3)
         made.legend(loc="outside right upper")
         return drawn_as(made, suffix)

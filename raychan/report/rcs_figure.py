@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import PALETTE, drawn_as, figure, style
+from raychan.report.canvas import PALETTE, drawn_as, figure, style, verbatim
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def _figure(made: Any, azimuth: float, elevation: float, dbsm: float, error: flo
     """Write the cross-section at one angle."""
     axes = made.add_subplot()
     axes.set_axis_off()
-    axes.set_title(title)
+    axes.set_title(verbatim(title))
     error_text = "error unknown" if np.isnan(error) else f"± {error:.2g} dB"
     large = f"{dbsm:.2f} dBsm" if np.isfinite(dbsm) else "no return"
     small = f"{error_text}\n{10.0 ** (0.1 * dbsm):.4g} m²\nazimuth {azimuth:g} deg, elevation {elevation:g} deg"
@@ -62,7 +62,7 @@ def _cuts(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Fl
     if polar and len(angle) > 2 and np.isclose(abs(2.0 * angle[-1] - angle[-2] - angle[0]), 360.0):
         angle, dbsm, error = (np.concatenate([x, x[..., :1]], axis=-1) for x in (angle, dbsm, error))  # a full turn
     axes = made.add_subplot(projection="polar" if polar else None)
-    axes.set_title(title)
+    axes.set_title(verbatim(title))
     low, high = _limits(dbsm, error)
     for i, fixed in enumerate(other):
         label = f"{names[1]} {fixed:g} deg" if len(other) > 1 else "RCS"
@@ -118,7 +118,7 @@ def _line(axes: Any, angle: Floats, dbsm: Floats, error: Floats, colour: str, la
 def _map(made: Any, azimuth: Floats, elevation: Floats, dbsm: Floats, error: Floats, title: str) -> None:
     """Draw RCS over both angles, with contours of a stated error of 1 dB; angles without a return stay white."""
     axes = made.add_subplot()
-    axes.set_title(title)
+    axes.set_title(verbatim(title))
     shown = np.where(np.isfinite(dbsm), dbsm, np.nan)
     image = axes.pcolormesh(azimuth, elevation, shown, cmap="viridis", shading="nearest", rasterized=True)
     made.colorbar(image, ax=axes, label="RCS [dBsm]", pad=0.01, aspect=30)

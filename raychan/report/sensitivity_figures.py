@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from raychan.report.canvas import PALETTE, figure, save, style
+from raychan.report.canvas import PALETTE, figure, save, style, verbatim
 from raychan.study.detection_tracks import NOISE
 from raychan.study.sensitivity import ERROR, INTERMITTENT, SPECKLE, STEADY, VERDICTS, Moves, Sensitivity
 
@@ -57,7 +57,7 @@ def sensitivity_picture(done: Sensitivity, path: Path) -> Path:
         rest = f"; the strongest {_MOST} of {len(done.moves)}" if len(done.moves) > _MOST else ""
         g = done.given
         tolerances = f"turns of {g.turn_deg:g} deg, shifts of {g.shift_mm:g} mm (rms), {g.draws} draws{rest}"
-        axes.set_title(f"{done.title}\n{tolerances}" if done.title else tolerances, fontsize=9)
+        axes.set_title(f"{verbatim(done.title)}\n{tolerances}" if done.title else tolerances, fontsize=9)
         made.legend(loc="outside lower center", ncols=3)
         return save(made, path, flat=True)
 
@@ -65,4 +65,4 @@ def sensitivity_picture(done: Sensitivity, path: Path) -> Path:
 def _name(row: int, m: Moves) -> str:
     first = m.track.first
     bodies = first.bodies if len(first.bodies) <= _LONGEST else f"{first.bodies[: _LONGEST - 3]}..."
-    return f"{bodies}  {first.range:.1f} m  {first.rate:+.1f} m/s  #{row + 1}"
+    return f"{verbatim(bodies)}  {first.range:.1f} m  {first.rate:+.1f} m/s  #{row + 1}"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import PALETTE, Placer, figure, save, style
+from raychan.report.canvas import PALETTE, Placer, figure, save, style, verbatim
 from raychan.run.ship_files import COLUMNS, ShipLog
 from raychan.run.ship_scene import ShipScene
 from raychan.sensors.laser import NO_BODY, SEA
@@ -48,7 +48,7 @@ def scan_picture(scene: ShipScene, log: ShipLog, path: str | Path) -> Path:
         ranges.set_facecolor(_GREY)
         made.colorbar(image, ax=ranges, label="range [m]", pad=0.01, aspect=18)
         every = "" if log.stride == 1 else f": one scan of {log.stride} shown"
-        ranges.set(ylabel="beam [deg]\nstarboard < 0 < port", title=f"{scene.title or 'Scans'}{every}")
+        ranges.set(ylabel="beam [deg]\nstarboard < 0 < port", title=verbatim(f"{scene.title or 'Scans'}{every}"))
         _what(scene, log, met, extent)
         _motion(log, motion)
         motion.set_xlim(extent[:2])
@@ -66,7 +66,7 @@ def _what(scene: ShipScene, log: ShipLog, axes: Any, extent: Any) -> None:
     axes.imshow(image.swapaxes(0, 1), origin="lower", aspect="auto", extent=extent, interpolation="nearest")
     axes.set(ylabel="beam [deg]")
     for b in found[:_NAMED]:
-        axes.plot([], [], "s", ms=8, color=shades[b], label=_short(names[b]))
+        axes.plot([], [], "s", ms=8, color=shades[b], label=verbatim(_short(names[b])))
     if found:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
@@ -116,7 +116,7 @@ def motion_picture(scene: ShipScene, log: ShipLog, path: str | Path) -> Path:
             axes.set_ylabel(label)
             axes.grid(alpha=0.3)
             axes.margins(x=0.0)
-        made.axes[0].set_title(scene.title or "Voyage")
+        made.axes[0].set_title(verbatim(scene.title or "Voyage"))
         made.axes[-1].set_xlabel("time [s]")
         return save(made, path, flat=True)
 
@@ -138,14 +138,14 @@ def track_picture(scene: ShipScene, log: ShipLog, path: str | Path) -> Path:
         for b in found:
             mine = log.hits[log.hit_body == b]
             size, layer = (1.2, 2) if b == SEA else (4.0, 3)
-            label = _short(names[b]) if len(found) <= _NAMED else None
+            label = verbatim(_short(names[b])) if len(found) <= _NAMED else None
             axes.plot(
                 -mine[:, 1], mine[:, 0], ".", ms=size, color=shades[b], rasterized=True, zorder=layer, label=label
             )
         axes.plot(east, north, color="black", lw=1.2, zorder=4, label="track")
         _arrows(axes, log, east, north)
         axes.annotate("start", (east[0], north[0]), xytext=(6, -3), textcoords="offset points", fontsize=8)
-        axes.set(xlabel="east [m]", ylabel="north [m]", title=scene.title or "Track", aspect="equal")
+        axes.set(xlabel="east [m]", ylabel="north [m]", title=verbatim(scene.title or "Track"), aspect="equal")
         axes.grid(alpha=0.3)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), markerscale=3.0)
         _mark_small(axes, scene, east, north)

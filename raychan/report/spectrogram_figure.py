@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from raychan.report.canvas import drawn_as, figure, style
+from raychan.report.canvas import drawn_as, figure, style, verbatim
 from raychan.run.spectrogram import Spectrogram
 from raychan.units import dbm, watt
 
@@ -30,5 +30,5 @@ def draw_spectrogram(found: Spectrogram, axes: Any, title: str = "Spectrogram") 
         found.time, found.rate, power, vmin=min(low, top - 1.0), vmax=top, cmap="viridis", shading="nearest",
         rasterized=True,
     )  # fmt: skip
-    axes.set(xlabel="time [s]", ylabel="range rate [m/s]   (receding is positive)", title=title)
+    axes.set(xlabel="time [s]", ylabel="range rate [m/s]   (receding is positive)", title=verbatim(title))
     axes.figure.colorbar(image, ax=axes, label="received power [dBm]", pad=0.01, aspect=30)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import PALETTE, figure, save, style
+from raychan.report.canvas import PALETTE, figure, save, style, verbatim
 from raychan.run.result import CLUTTER, DC, DIRECT, IMAGE, MULTIPATH, SIDELOBE
 from raychan.study.sweep import Sweep
 from raychan.study.visibility import DIFFRACTED, WAYS
@@ -26,6 +26,10 @@ def sweep_picture(done: Sweep, path: Path) -> Path:
     return _maps(done, path) if len(done.axes) == 2 else _lines(done, path)
 
 
+def _title(done: Sweep) -> str:
+    return verbatim(f"{done.title}: {done.target}" if done.title else done.target)
+
+
 def _lines(done: Sweep, path: Path) -> Path:
     x = np.array([s.values[0] for s in done.steps]) if done.axes else np.zeros(1)
     order = np.argsort(x, kind="stable")
@@ -34,12 +38,12 @@ def _lines(done: Sweep, path: Path) -> Path:
         top, bottom = made.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
         _levels(top, done, x, order)
         _hidden(bottom, done, x, order)
-        bottom.set_xlabel(done.axes[0].label if done.axes else "the scene as it is")
+        bottom.set_xlabel(verbatim(done.axes[0].label) if done.axes else "the scene as it is")
         if not done.axes:
             bottom.set_xticks([])
         if len(x) == 1:
             bottom.set_xlim(x[0] - 1.0, x[0] + 1.0)
-        top.set_title(f"{done.title}: {done.target}" if done.title else done.target)
+        top.set_title(_title(done))
         for axes in (top, bottom):
             axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
         return save(made, path)
@@ -99,7 +103,7 @@ def _hidden(axes: Any, done: Sweep, x: Floats, order: NDArray[np.int64]) -> None
             shares.setdefault(name, np.zeros(len(x)))[i] = 100.0 * part
     names = sorted(shares, key=lambda n: -float(shares[n].sum()))
     stack = [shares[n] for n in names]
-    labels = [f"behind {n}" for n in names]
+    labels = [verbatim(f"behind {n}") for n in names]
     colours = [PALETTE[(4 + i) % len(PALETTE)] for i in range(len(names))]
     layers = np.array([100.0 * (s.found.occlusion.behind_layers or 0.0) for s in done.steps])
     if layers.any():
@@ -130,7 +134,7 @@ def _maps(done: Sweep, path: Path) -> Path:
         left.set_title("Detected (grey: not)")
         right.set_title("Blocked")
         _marks(left, done)
-        made.suptitle(f"{done.title}: {done.target}" if done.title else done.target, fontsize=11, fontweight="bold")
+        made.suptitle(_title(done), fontsize=11, fontweight="bold")
         return save(made, path)
 
 
@@ -140,7 +144,7 @@ def _map(made: Any, axes: Any, done: Sweep, values: Floats, label: str, colours:
     image = axes.pcolormesh(_edges(x), _edges(y), values, cmap=colours, vmin=limits[0], vmax=limits[1])
     if np.isfinite(values).any():
         made.colorbar(image, ax=axes, label=label, pad=0.02, aspect=30)
-    axes.set(xlabel=done.axes[1].label, ylabel=done.axes[0].label)
+    axes.set(xlabel=verbatim(done.axes[1].label), ylabel=verbatim(done.axes[0].label))
 
 
 def _marks(axes: Any, done: Sweep) -> None:

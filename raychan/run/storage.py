@@ -95,7 +95,9 @@ def load_result(path: str | Path) -> Result:
     path = Path(path)
     file = path / "result.nc" if path.is_dir() else path
     if not file.is_file():
-        raise StoreError(f"{file}: no such file; `raychan run` and rc.save_result write it")
+        problem = "a directory without a result.nc" if path.is_dir() else "no such file or directory"
+        allowed = "a directory that `raychan run` or rc.save_result wrote, or the result.nc in it"
+        raise StoreError(f"{path}: {problem}; allowed: {allowed}")
     try:
         with xr.open_dataset(file, engine="h5netcdf") as root:
             attrs = dict(root.attrs)

@@ -102,6 +102,26 @@ class Drawing:
         every = np.concatenate([*solid, *(r.points for r in self.rays), self.radar[None]])
         return every.min(axis=0), every.max(axis=0)
 
+    def floor(self) -> tuple[Floats, Floats]:
+        """Return the lowest and highest corner of the ground, or where there is none of a level under the scene."""
+        for shape in self.shapes:
+            if shape.name == "ground":
+                corners = shape.triangles.reshape(-1, 3)
+                return corners.min(axis=0), corners.max(axis=0)
+        low, high = self.bounds()
+        room = max(2.0, 0.05 * float((high - low)[:2].max())) * np.array([1.0, 1.0, 0.0])
+        return low - room, np.array([*high[:2], low[2]]) + room
+
+    def specks(self, size: float) -> list[tuple[tuple[float, float, float], str]]:
+        """Return place and colour of the named bodies whose largest side is below a size [m], points among them."""
+        found = []
+        for name, place in self.targets:
+            own = [s for s in self.shapes if s.name == name]
+            corners = np.concatenate([np.array([place]), *(s.triangles.reshape(-1, 3) for s in own)])
+            if np.ptp(corners, axis=0).max() < size:
+                found.append((place, own[0].colour if own else _NAMED["black"]))
+        return found
+
     def save(self, path: str | Path) -> None:
         """Write the drawing to an .npz file, for another process to render."""
         arrays = {f"t{i}": s.triangles for i, s in enumerate(self.shapes)}
@@ -237,9 +257,7 @@ def _body(link: str) -> str:
 
 
 def _with_ground(made: Drawing, height: float) -> Drawing:
-    low, high = made.bounds()
-    room = max(2.0, 0.05 * float((high - low)[:2].max()))
-    (x0, y0), (x1, y1) = low[:2] - room, high[:2] + room
+    (x0, y0, _), (x1, y1, _) = made.floor()
     a, b, c, d = ([x, y, height] for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
     ground = Shape("ground", np.array([[a, b, c], [a, c, d]]), GROUND)
     return replace(made, shapes=(ground, *made.shapes))

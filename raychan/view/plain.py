@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import collections, figure, save, style
+from raychan.report.canvas import collections, figure, save, style, verbatim
 from raychan.view.drawing import Drawing
 
 _DASH = 0.015  # length of a dash over the scene's diagonal
+_SMALLEST = 0.006  # side over the scene's diagonal: smaller bodies are marked, with points
 _MOST = 6000  # triangles drawn of a shape: matplotlib sorts and paints them one by one (not measured)
 
 
@@ -46,16 +47,18 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
             lines.set_array(np.array([power for _, power in strokes]))
             axes.add_collection3d(lines)
             made.colorbar(lines, cax=made.add_axes((0.91, 0.2, 0.015, 0.6)), label="received power [dBm]")
+        for place, colour in drawing.specks(_SMALLEST * float(np.linalg.norm(high - low))):
+            axes.plot(*np.array(place)[:, None], marker="o", ms=4, color=colour, ls="none", zorder=3)
         axes.plot(*drawing.radar[:, None], marker=">", ms=9, color="#d62728", ls="none", zorder=3)
         axes.text(*drawing.radar, f"  {drawing.observer}", fontsize=8, zorder=4)
         for name, (x, y, z) in drawing.targets:
-            axes.text(x, y, z + 0.3, name, fontsize=8, ha="center", zorder=4)
+            axes.text(x, y, z + 0.3, verbatim(name), fontsize=8, ha="center", zorder=4)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x [m]", ylabel="y [m]")
         axes.set_box_aspect(high - low, zoom=1.25)
         axes.locator_params(axis="y", nbins=4)
         axes.locator_params(axis="z", nbins=3)
         axes.view_init(elev=28.0, azim=-132.0)
         axes.set_zlabel("z [m]")
-        made.suptitle(drawing.title)
+        made.suptitle(verbatim(drawing.title))
         made.text(0.02, 0.93, drawing.note, fontsize=8)
         return save(made, path)

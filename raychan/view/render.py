@@ -10,13 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from raychan.view.drawing import Drawing
+from raychan.report.canvas import font_file, legible
+from raychan.view.drawing import Drawing, Ray
+from raychan.view.scale import arcs, axes
 
 _SIZE = (2000, 1125)  # pixels
 _MAP = "plasma"
 _POWER = "received power in dBm"  # VTK draws square brackets round
 _DASH = 8.0  # length of a dash, and of the gap after it, in radii of a ray
 _LABELS = 5  # of the colour scale
+_PAD = 8  # pixels by which labels and title of the colour scale keep off it, or the labels touch it
+_OF_FILE = 4  # VTK's number for a font that comes from a file
+_SMALLEST = 0.6  # of the radar's size: smaller bodies are drawn as balls of it
 
 
 def screenshot(drawing: Drawing, path: str | Path) -> None:
@@ -35,7 +40,7 @@ def window(drawing: Drawing) -> None:
 
 def _tell(mesh: Any) -> None:
     if mesh is not None and "what" in mesh.field_data:
-        print(mesh.field_data["what"][0])
+        print(bytes(mesh.field_data["what"]).decode())
 
 
 def _plotter(drawing: Drawing, off_screen: bool) -> Any:
@@ -53,52 +58,37 @@ def _plotter(drawing: Drawing, off_screen: bool) -> Any:
         )
     low, high = drawing.bounds()
     scale = max(0.05, 0.011 * float(np.linalg.norm(high - low)))
+    for place, colour in drawing.specks(_SMALLEST * scale):
+        plotter.add_mesh(pv.Sphere(0.5 * _SMALLEST * scale, place), color=colour)
     _rings(drawing, plotter, pv)
     _rays(drawing, plotter, pv, 0.09 * scale)
     tip = drawing.radar + scale * drawing.boresight
     cone = pv.Cone(center=tip, direction=-drawing.boresight, height=2 * scale, radius=scale, resolution=40)
     plotter.add_mesh(cone, color="#d62728")
-    names = [name for name, _ in drawing.targets] + [drawing.observer]
+    names = [legible(name) for name, _ in drawing.targets] + [drawing.observer]
     places = [(x, y, z + 1.5 * scale) for _, (x, y, z) in drawing.targets]
     places.append((drawing.radar[0], drawing.radar[1], drawing.radar[2] + 2.5 * scale))
     plotter.add_point_labels(
         np.array(places), names, font_size=22, text_color="#1a1a1a", shape_color="white", shape_opacity=0.75,
-        show_points=False, always_visible=True, margin=4,
+        show_points=False, always_visible=True, margin=4, font_file=font_file(),
     )  # fmt: skip
     if drawing.caption:
-        plotter.add_text(f"{drawing.title}\n{drawing.caption}", position="upper_right", font_size=12, color="#1a1a1a")
+        text = legible(f"{drawing.title}\n{drawing.caption}")
+        plotter.add_text(text, position="upper_right", font_size=12, color="#1a1a1a", font_file=font_file())
     _look(plotter, drawing)
     plotter.enable_anti_aliasing("ssaa")
     return plotter
 
 
 def _rings(drawing: Drawing, plotter: Any, pv: Any) -> None:
-    """Draw arcs of equal range on the ground as a scale."""
-    ground = [s for s in drawing.shapes if s.name == "ground"]
-    if not ground:
-        return
-    corners = ground[0].triangles.reshape(-1, 3)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    reach = float(np.hypot(*(np.maximum(abs(low), abs(high)) - abs(drawing.radar))[:2]))
-    step = next(s for s in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, reach) if reach <= 12.0 * s)
-    places, names = [], []
-    for radius in np.arange(step, reach, step):
-        turn = np.linspace(-np.pi, np.pi, 721)
-        arc = drawing.radar + radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
-        arc[:, 2] = low[2] + 0.01
-        inside = ((arc[:, :2] > low[:2]) & (arc[:, :2] < high[:2])).all(axis=1)
-        runs = np.split(np.flatnonzero(inside), np.flatnonzero(np.diff(np.flatnonzero(inside)) > 1) + 1)
-        for run in runs:
-            if len(run) > 2:
-                plotter.add_mesh(pv.lines_from_points(arc[run]), color="#8d8a80", line_width=1.5)
-        right = arc[inside][np.argmin(arc[inside][:, 1])] if inside.any() else None
-        if right is not None and right[0] > drawing.radar[0]:
-            places.append(right)
-            names.append(f"{radius:g} m")
-    if names:
+    """Draw arcs of equal range as a scale."""
+    drawn = arcs(drawing)
+    for line in (line for arc in drawn for line in arc.lines):
+        plotter.add_mesh(pv.lines_from_points(line), color="#8d8a80", line_width=1.5)
+    if drawn:
         plotter.add_point_labels(
-            np.array(places), names, font_size=18, text_color="#6b685f", shape=None, show_points=False, bold=False,
-            always_visible=True,
+            np.array([arc.label for arc in drawn]), [f"{arc.range:.0f} m" for arc in drawn], font_size=18,
+            text_color="#6b685f", shape=None, show_points=False, bold=False, always_visible=True, font_file=font_file(),
         )  # fmt: skip
 
 
@@ -110,28 +100,36 @@ def _rays(drawing: Drawing, plotter: Any, pv: Any, radius: float) -> None:
     # A whole number of dB from label to label, as labels have no decimals.
     limits = [low, low + steps * max(1.0, np.ceil((max(powers) - low) / steps))]
     for ray in drawing.rays:
-        tube = pv.merge([pv.lines_from_points(line).tube(radius=radius) for line in ray.strokes(_DASH * radius)])
-        tube.field_data["what"] = [ray.text]
-        tube[_POWER] = np.full(tube.n_points, ray.power)
         plotter.add_mesh(
-            tube, scalars=_POWER, cmap=_MAP, clim=limits, show_scalar_bar=False, lighting=False,
+            _tube(ray, radius, pv), scalars=_POWER, cmap=_MAP, clim=limits, show_scalar_bar=False, lighting=False,
         )  # fmt: skip
     bar = plotter.add_scalar_bar(
         _POWER, vertical=False, position_x=0.03, position_y=0.86, width=0.28, height=0.1, color="#1a1a1a",
         title_font_size=24, label_font_size=22, fmt="%.0f", n_labels=_LABELS,
     )  # fmt: skip
     if drawing.note:
-        plotter.add_text(drawing.note, position=(0.03, 0.82), viewport=True, font_size=12, color="#1a1a1a")
+        plotter.add_text(
+            drawing.note, position=(0.03, 0.82), viewport=True, font_size=12, color="#1a1a1a", font_file=font_file()
+        )
     bar.SetTextPositionToPrecedeScalarBar()  # below it; above it the title sits on the labels
+    for text, off in ((bar.GetLabelTextProperty(), _PAD), (bar.GetTitleTextProperty(), 2 * _PAD)):
+        text.SetLineOffset(off)
+        text.SetFontFamily(_OF_FILE)
+        text.SetFontFile(font_file())
+
+
+def _tube(ray: Ray, radius: float, pv: Any) -> Any:
+    tube = pv.merge([pv.lines_from_points(line).tube(radius=radius) for line in ray.strokes(_DASH * radius)])
+    tube.field_data["what"] = np.frombuffer(ray.text.encode(), np.uint8)  # pyvista takes texts in ASCII only
+    tube[_POWER] = np.full(tube.n_points, ray.power)
+    return tube
 
 
 def _look(plotter: Any, drawing: Drawing) -> None:
     """Look from behind the radar and to its right, down on the scene, close enough to fill the picture."""
     low, high = drawing.bounds()
     focus = 0.5 * (low + high)
-    ahead = drawing.boresight * [1.0, 1.0, 0.0]
-    ahead = ahead / (np.linalg.norm(ahead) or 1.0)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    ahead, right = axes(drawing)
     away = -0.75 * ahead + 0.85 * right + 0.62 * np.array([0.0, 0.0, 1.0])
     plotter.camera_position = [focus + 10.0 * away, focus, (0.0, 0.0, 1.0)]
     plotter.reset_camera(bounds=(low[0], high[0], low[1], high[1], low[2], high[2]))

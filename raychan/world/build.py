@@ -47,21 +47,24 @@ def scene_text(path: str | Path, known: Sequence[str] = ()) -> tuple[str, Path]:
     if "\0" in str(path):
         raise SceneError(f"{shown(str(path))} is not possible", value=str(path), allowed="a name without a zero byte")
     if not str(path).strip() or str(path) == ".":  # Path("") is the current directory
-        raise SceneError("no scene file is named", value=str(path), allowed=_near(Path("?"), known))
+        problem = "no scene file is named: '.', or an empty name, is the current folder"
+        raise SceneError(problem, value=str(path), allowed=_near(Path("?"), known))
     file = bundled.found(path)
     overrides.refuse_mesh(file)
     try:
         if file.exists() and not file.is_file():
-            raise SceneError("is not a file", file=file, allowed="a text file in TOML")
+            problem = "is a folder" if file.is_dir() else "is not a file"
+            raise SceneError(problem, file=file, allowed="a scene file, which is a text in TOML")
         if file.exists() and file.stat().st_size > _LARGEST:
             raise SceneError("is too large for a scene file", file=file, allowed=f"at most {_LARGEST >> 20} MB")
         # Some editors begin a text with a byte order mark.
         return file.read_text(encoding="utf-8-sig"), file
     except FileNotFoundError:
         raise SceneError("file not found: there is none of that name", file=file, allowed=_near(file, known)) from None
-    except (OSError, UnicodeDecodeError) as e:
-        reason = getattr(e, "strerror", None) or e
-        raise SceneError(f"cannot be read ({reason})", file=file, allowed="a text file in TOML") from e
+    except UnicodeDecodeError as e:
+        raise overrides.no_toml(e, file) from e
+    except OSError as e:
+        raise SceneError(f"cannot be read ({e.strerror or e})", file=file, allowed="a text in TOML") from e
 
 
 def refuse_ship(data: object, file: Path | None) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from raychan.scalars import shown
 
-__all__ = ["SceneError", "nearest", "shown"]
+__all__ = ["SceneError", "nearest", "shown", "shown_in_table"]
 
 
 class SceneError(ValueError):
@@ -35,6 +35,26 @@ class SceneError(ValueError):
         return SceneError(
             self.problem, file=self.file or file, key=path, value=self.value, allowed=self.allowed, line=self.line
         )
+
+
+class _Word(str):
+    """A text that shows without quotes."""
+
+    __slots__ = ()
+    __repr__ = str.__str__
+
+
+def _with_words(value: object) -> object:
+    if isinstance(value, bool):
+        return _Word(str(value).lower())
+    if isinstance(value, list):
+        return [_with_words(one) for one in value]
+    return {key: _with_words(one) for key, one in value.items()} if isinstance(value, dict) else value
+
+
+def shown_in_table(value: object) -> str:
+    """Return a value of a table as messages show it, true and false in TOML's letters."""
+    return shown(_with_words(value))
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

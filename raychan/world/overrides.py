@@ -28,6 +28,14 @@ def refuse_mesh(file: Path) -> None:
         raise SceneError("is a mesh, not a scene", file=file, allowed=takes)
 
 
+def no_toml(reason: object, file: Any, line: int = 0) -> SceneError:
+    """Return the error for a file that is no TOML; another ending than .toml may be that of a mesh that is not read."""
+    if file is None or Path(file).suffix.lower() in ("", ".toml"):
+        return SceneError(f"not valid TOML: {reason}", file=file, line=line, allowed="a text in TOML 1.0")
+    allowed = f"a scene file (.toml), in which a body may name a mesh; meshes are {', '.join(SUFFIXES)}"
+    return SceneError(f"neither a text in TOML nor a mesh that can be read ({reason})", file=file, allowed=allowed)
+
+
 def parsed(text: str, file: Any = None) -> dict[str, Any]:
     """Return the tables of TOML text; SceneError with the line where it is broken."""
     if not isinstance(text, str):
@@ -39,9 +47,9 @@ def parsed(text: str, file: Any = None) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as e:
         found = re.search(r"line (\d+)", str(e))
         line = int(found[1]) if found else len(text.splitlines())
-        raise SceneError(f"not valid TOML: {e}", file=file, line=line, allowed="TOML 1.0") from None
+        raise no_toml(e, file, line) from None
     except ValueError as e:  # a number of too many digits, a date that is none
-        raise SceneError(f"not valid TOML: {e}", file=file, allowed="TOML 1.0") from None
+        raise no_toml(e, file) from None
     except RecursionError:
         raise SceneError("tables or lists nested too deep", file=file, allowed="a few levels") from None
 

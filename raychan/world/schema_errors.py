@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from raychan.scalars import meant, tabled
-from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.errors import SceneError, nearest, shown_in_table
 from raychan.world.overrides import VECTORS, XYZ
 
 
@@ -60,7 +60,7 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
     allowed = " or ".join(dict.fromkeys(map(_allowed, alike)))
     if len(alike) == 1 and found["type"] == "literal_error":
         allowed += meant(value, re.findall("'(.*?)'", found["ctx"]["expected"]))
-    return SceneError(f"{shown(value)} is not possible", file=file, key=key, value=value, allowed=allowed)
+    return SceneError(f"{shown_in_table(value)} is not possible", file=file, key=key, value=value, allowed=allowed)
 
 
 def _allowed(found: Any) -> str:

@@ -47,7 +47,17 @@ def test_a_file_in_the_place_of_a_directory_is_told_before_the_start(command, tm
         (["hil", "--scanner", " "], "--scanner: the name is empty: name a serial port, or leave the option out"),
         (["hil", "--origin", "91,0"], "--origin: '91,0': latitude is 91.0 deg; allowed: -89.9 to 89.9"),
         (["hil", "--origin", "5"], "--origin: '5': two numbers, latitude and longitude in degrees, as 54.0,8.0"),
-        (["run", "", "--out", "o"], "no scene file is named; allowed: a scene file that exists, or one of clutter"),
+        (
+            ["run", "", "--out", "o"],
+            "an empty name, is the current folder; allowed: a scene file that exists, or one of",
+        ),
+        (["run", ".", "--out", "o"], "no scene file is named: '.', or an empty name, is the current folder; allowed"),
+        (["run", "..", "--out", "o"], "..: is a folder; allowed: a scene file, which is a text in TOML"),
+        (
+            ["explain", "nodir", "--detection", "1"],
+            "nodir: no such file or directory; allowed: a directory that `raych",
+        ),
+        (["explain", "..", "--detection", "1"], "..: a directory without a result.nc; allowed: a directory that `rayc"),
         (["view", "urban", "--html", "s.png"], "--html s.png: the name must end in .html"),
         (["view", "urban", "--screenshot", "s.html"], "--screenshot s.html: the name must end in .png"),
     ],
@@ -78,3 +88,12 @@ def test_a_mesh_is_told_once(tmp_path, capsys):
     assert invoke(["info", str(tmp_path / "box.stl")]) == 0
     said = capsys.readouterr().out
     assert said.count("vertices") == 1 and "faces" not in said and "(1.0" not in said
+
+
+@pytest.mark.parametrize("held", [b"1 2 3\n", b"\x00\xff"])
+def test_a_mesh_of_a_kind_that_is_not_read_is_told_with_those_that_are(held, tmp_path, capsys):
+    file = tmp_path / "good.xyz"
+    file.write_bytes(held)
+    said = told(["info", str(file)], capsys)
+    assert "good.xyz: neither a text in TOML nor a mesh that can be read (" in said
+    assert "allowed: a scene file (.toml), in which a body may name a mesh; meshes are .glb, .gltf, .obj" in said

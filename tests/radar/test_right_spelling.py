@@ -1,5 +1,7 @@
 """Words in capitals or with a slip, and names that are none of raychan's, are refused with the right one."""
 
+from importlib import import_module
+
 import pytest
 
 import raychan as rc
@@ -40,11 +42,24 @@ def test_a_word_in_capitals_or_with_a_slip_is_refused_with_the_right_one(make, m
         ("fresnel", "Material"),
         ("micro_doppler", "spectrogram"),
         ("path_loss", "specular_paths"),
+        ("link_budget", "Radar.link_budget"),
+        ("kalman", "raychan.dynamics.kalman"),
+        ("PDP", "Result.profile"),
     ],
 )
 def test_a_name_that_is_none_of_raychans_is_refused_with_the_nearest(name, meant):
     with pytest.raises(AttributeError, match=rf"has no attribute '{name}'; did you mean '{meant}'\?"):
         getattr(rc, name)
+
+
+@pytest.mark.parametrize("meant", sorted(set(rc._TRIED.values())))
+def test_what_is_proposed_for_a_name_exists(meant):
+    if meant.startswith("raychan."):
+        assert import_module(meant).__doc__
+    else:
+        name, _, member = meant.partition(".")
+        home = getattr(rc, name)
+        assert not member or member in dir(home) or member in home.__annotations__
 
 
 def test_a_name_near_to_none_is_refused_alone():

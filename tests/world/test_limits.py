@@ -115,7 +115,7 @@ def test_figures_beyond_limits_are_refused_by_key_with_what_is_allowed(scene, ch
 
 def test_true_is_no_length_though_it_equals_one(scene):
     one = rc.Scene.load(scene).override(["bodies.sign.params.width=1.0"])
-    with pytest.raises(SceneError, match=r"bodies\.sign\.params\.width: True is not a number"):
+    with pytest.raises(SceneError, match=r"bodies\.sign\.params\.width: true is not a number"):
         one.override(["bodies.sign.params.width=true"])
 
 

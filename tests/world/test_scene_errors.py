@@ -62,6 +62,9 @@ def test_override_changes_keys_and_keeps_the_file():
             (f"model.speckle={x}", "model.speckle", "allowed: true or false")
             for x in ("yes", "1", "on", "True", '"true"')
         ),
+        ("model.tolerance_db=true", "model.tolerance_db", ": true is not possible"),
+        ("bodies.suv.rcs_dbsm=[[false, 1]]", "bodies.suv.rcs_dbsm.0.0", ": false is not possible"),
+        ("radar=[true, {noise=true}]", "radar", ": [true, {'noise': true}] is not possible"),
         ("radar.noise=off", "radar.noise", "allowed: true or false"),
         ("radar.waveform.iq=0", "radar.waveform.iq", "allowed: true or false"),
         ("scene.title.x=1", "scene.title", "table"),

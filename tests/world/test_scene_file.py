@@ -18,8 +18,8 @@ def test_a_byte_order_mark_is_no_part_of_a_scene(tmp_path):
 def test_what_is_no_file_is_refused_at_once(tmp_path):
     pipe = tmp_path / "pipe.toml"
     os.mkfifo(pipe)
-    for place in (pipe, "/dev/zero", tmp_path):
-        with pytest.raises(rc.SceneError, match="is not a file"):
+    for place, what in ((pipe, "not a file"), ("/dev/zero", "not a file"), (tmp_path, "a folder")):
+        with pytest.raises(rc.SceneError, match=f"is {what}"):
             rc.Scene.load(place)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from raychan.scalars import plain
-from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.errors import SceneError, nearest, shown_in_table
 from raychan.world.limits import HOOPS, LENGTH, PHASE, SAG, WALK
 from raychan.world.mesh import Mesh
 from raychan.world.shapes.basic import box, cylinder, dihedral, ground, plate, sphere, trihedral
@@ -63,16 +63,20 @@ def _made(name: str, params: dict[str, Any] | None) -> Mesh | Skeleton:
         number = (isinstance(default, (int, float)) and not isinstance(default, bool)) or default is None
         if number and (isinstance(value, bool) or not isinstance(value, (int, float))):
             raise SceneError(
-                f"{shown(value)} is not a number", key=key, value=value, allowed=f"a number [{limit.unit or 1}]"
+                f"{shown_in_table(value)} is not a number",
+                key=key,
+                value=value,
+                allowed=f"a number [{limit.unit or 1}]",
             )
         may_be_none = value == 0.0 and (default == 0.0 or key == "arm")
         if number and not may_be_none and not limit.allows(value):
             allowed = f"a positive number, {limit.allowed}"
-            raise SceneError(f"{shown(value)} is not possible", key=key, value=value, allowed=allowed)
+            raise SceneError(f"{shown_in_table(value)} is not possible", key=key, value=value, allowed=allowed)
         if isinstance(default, int) and not isinstance(default, bool) and not isinstance(value, int):
-            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed="a whole number")
+            raise SceneError(f"{shown_in_table(value)} is not possible", key=key, value=value, allowed="a whole number")
         if not number and not isinstance(value, type(default)):
-            raise SceneError(f"{value!r} is not possible", key=key, value=value, allowed=_WANTED[type(default)])
+            allowed = _WANTED[type(default)]
+            raise SceneError(f"{shown_in_table(value)} is not possible", key=key, value=value, allowed=allowed)
     _check_sizes({key: given.get(key, p.default) for key, p in known.items()}, given)
     try:
         return make(**given)
@@ -89,7 +93,9 @@ def _check_sizes(sizes: dict[str, Any], given: dict[str, Any]) -> None:
     for key in lengths.keys() & given.keys():
         if lengths[key] < _THINNEST * lengths[largest]:
             allowed = f"at least {_THINNEST * lengths[largest]:g} m, {_THINNEST:g} of its {largest}"
-            raise SceneError(f"{shown(given[key])} is not possible", key=key, value=given[key], allowed=allowed)
+            raise SceneError(
+                f"{shown_in_table(given[key])} is not possible", key=key, value=given[key], allowed=allowed
+            )
 
 
 __all__ = ["RIGID", "SHAPES", "SKELETONS", "build", "skeleton"]
