@@ -24,8 +24,8 @@ Ints = NDArray[np.int32]
 
 _PARALLEL_FROM = 4096  # facets from which on a second thread pays; not measured
 NEAR = 0.5
-"""Of its distance: what a facet that is bounded by its middle may measure. Larger ones may be much nearer elsewhere, and
-seen by the beam there alone; not measured."""
+"""Of its distance: what a facet that is bounded by its middle may measure. Larger ones may be much nearer elsewhere,
+and seen by the beam there alone; not measured."""
 _UNBOUNDED = 1e6  # 1/m: more than anything scatters
 
 
