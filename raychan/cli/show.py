@@ -65,15 +65,30 @@ class _Console(Console):
         raise BrokenPipeError
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print; lines of a table that needs more columns than the terminal has run over: rich would cut figures."""
-        room = self.options.update(max_width=_LONGEST)
-        needs = (Measurement.get(self, room, made).minimum for made in objects if isinstance(made, Table))
-        fixed = self._width
-        self.width = max(self.width, *needs, 0)
+        """Print; heads of a table that needs more columns than the terminal has are folded, and where that does not
+        help its lines run over: rich would cut figures."""
+        tables, fixed = [made for made in objects if isinstance(made, Table)], self._width
+        for made in tables:
+            if self._needs(made) > self.width:
+                _fold_heads(made)
+        self.width = max(self.width, *map(self._needs, tables), 0)
         try:
             super().print(*objects, **options)
         finally:
             self._width = fixed
+
+    def _needs(self, made: Table) -> int:
+        """Return how many columns a table takes at least."""
+        return Measurement.get(self, self.options.update(max_width=_LONGEST), made).minimum
+
+
+def _fold_heads(made: Table) -> None:
+    """Write the heads of columns of figures a word a line."""
+    for column in made.columns:
+        if column.no_wrap:
+            words = str(column.header).split()
+            column.header = "\n".join(words)
+            column.min_width = max(cell_len(str(part)) for part in (*words, *column.cells))
 
 
 def console() -> Console:

@@ -27,6 +27,7 @@ class OtherWays:
     def __init__(self, launch: Launch) -> None:
         self._launch = launch
         self._found: list[tuple[Sources, Sources]] = []
+        self._told = np.zeros(0, np.int64)
 
     def add(self, source: Sources, last: Facets) -> None:
         """Note routes of sources (n,) that scatter on facets `last` (n,)."""
@@ -38,7 +39,10 @@ class OtherWays:
         self._found.append((source, self._launch.turned_round(source, last)))
 
     def missing(self, wanted: Sources) -> Sources:
-        """Return the sources, of no route, of the routes of some sources (s,), in order, the other way round."""
+        """Return the sources, of no route, of the routes of some sources (s,), in order, the other way round; each is
+        returned once."""
         own, turned = (np.concatenate(x) for x in zip(*self._found, strict=True))
         new = np.unique(turned[held_in(wanted, own)])
-        return new[~held_in(np.unique(own), new)]
+        new = new[~held_in(np.union1d(own, self._told), new)]
+        self._told = np.union1d(self._told, new)
+        return new

@@ -16,13 +16,17 @@ from raychan.tracing.image_paths import weight
 from raychan.tracing.legs import Leg
 from raychan.tracing.radiation import PhaseFacets
 from raychan.tracing.tubes import slices
-from raychan.vectors import length_to
+from raychan.vectors import distance, length_to
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 _PARALLEL_FROM = 4096  # facets from which on a second thread pays; not measured
+NEAR = 0.5
+"""Of its distance: what a facet that is bounded by its middle may measure. Larger ones may be much nearer elsewhere,
+and seen by the beam there alone; not measured."""
+_UNBOUNDED = 1e6  # 1/m: more than anything scatters
 
 
 class _Lit(NamedTuple):
@@ -39,7 +43,8 @@ def facet_bounds(
     geometry: Geometry, leg: Leg, outs: list[Leg], facet: Ints, wavenumber: float
 ) -> list[tuple[Floats, Floats]]:
     """Return, for each leg out, the bound (n,) [1/m] on what whole facets (n,) that a leg lights may scatter, and the
-    length (n,) [m] of the two-way path: those of `radiation.phases_of` for tubes as large as facets.
+    length (n,) [m] of the two-way path: those of `radiation.phases_of` for tubes as large as facets. What measures more
+    than `NEAR` of its distance is not bounded: it gets more than anything scatters.
 
     Args: no leg is far; wavenumber [rad/m].
     """
@@ -100,6 +105,8 @@ def light(facet, facets, normals, leg, wavenumber, out):  # type: ignore[no-unty
         size[i] = wavenumber / (4.0 * math.pi) * abs(across) * gain[i] / there
         if facets.lossy[f]:
             size[i] *= _reflection(f, facets, normals, k, wavenumber)
+        if max(distance(v[0], v[1]), distance(v[1], v[2]), distance(v[2], v[0])) > NEAR * there:
+            size[i] = _UNBOUNDED
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -111,11 +118,12 @@ def bounds(facet, vertices, lit, out, same, wavenumber, bound, length):  # type:
     middle, lengths, gain, size = lit
     image, look = out[0][len(out[2])], np.empty(3)
     for i in range(len(facet)):
-        v, p = vertices[facet[i]], middle[i]
+        v, p, bounded = vertices[facet[i]], middle[i], size[i] < _UNBOUNDED
         low, high, whole = np.inf, -np.inf, 0.0
         for c in range(3):
             way = lengths[i, c] + (lengths[i, c] if same else length_to(v[c], image, False))
             low, high, whole = min(low, way), max(high, way), whole + way
         length[i] = whole / 3.0
         back = gain[i] if same else weight(p, *out, look)
-        bound[i] = size[i] * back / length_to(p, image, False) / (1.0 + 0.5 * wavenumber * (high - low))
+        most = size[i] * back / length_to(p, image, False) / (1.0 + 0.5 * wavenumber * (high - low))
+        bound[i] = most if bounded else _UNBOUNDED

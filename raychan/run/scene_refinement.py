@@ -52,9 +52,6 @@ Bools = NDArray[np.bool_]
 
 _MARGIN_DB = 9.0  # below the least SNR of a detection: what refinement may bring above it (see `rules._FAN`)
 _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
-# Steps that trace routes the other way round, too: of the first launch, and of facets beside its own. All steps take
-# 30 % more rays of an urban frame at 3 dB; with the first alone a corner of the living street is 1.3 dB off of 0.5.
-_TURNED = 2
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
 
 
@@ -217,8 +214,7 @@ class SceneRefinement:
         budget, rings, steps, ended = Budget(self.model, self.stats), Rings(self.geometry), 0, ""
         while len(wanted) and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
-            alone = self._ways.missing(wanted) if steps < _TURNED else wanted[:0]
-            again = self._again(launch, held, wanted, alone, rays, rings)
+            again = self._again(launch, held, wanted, self._ways.missing(wanted), rays, rings)
             own, sums = held.sums_of(*again, response, cells.place)
             _each(sums, lambda i, change, own=own: cells.changed(i, own, change))  # type: ignore[misc]
             if not steps:
@@ -239,12 +235,12 @@ class SceneRefinement:
     def _again(
         self, launch: Launch, held: SourcedPaths, wanted: Sources, alone: Sources, rays: SourceRays, rings: Rings
     ) -> tuple[Paths, Sources]:
-        """Trace sources again, each half as coarse as before, and others `alone` with the first of them; return what
-        that changes, as `SourcedPaths.replace`."""
+        """Trace sources again, each half as coarse as before, and others `alone` as a first step does; return what that
+        changes, as `SourcedPaths.replace`."""
         step, asked = rays.next_step(wanted), list[Further]()
-        steps = np.unique(step).tolist()
+        steps = np.unique(np.append(step, np.ones(min(len(alone), 1), np.int64))).tolist()
         for k in steps:
-            by = list(rings.with_those_beside(wanted[step == k], alone if k == steps[0] else alone[:0]))
+            by = list(rings.with_those_beside(wanted[step == k], alone if k == 1 else alone[:0]))
             rule = step_rule(self.radar, self.settings, self.model, k).refinement
             asked.append(Further(replace(rule, least=k), by))
         changed = list[tuple[Paths, Sources]]()

@@ -30,6 +30,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+# Of the prune threshold: from there on a coarse launch looks at hidden tubes where others of their facets are seen, as
+# several may be seen in part: without, an echo over a bench's legs is 2.2 dB off of 0.3 stated. Of levels of 26 random
+# streets at 1 and 0.5 dB 196 of 202 lie within what is stated, without 193, for 28.8 and 31.9 million rays (both with
+# what `other_ways` brings; no command).
+_HIDDEN = 0.3
 OBLIQUE_SHARE = 0.1  # of their sum in phase that tubes facing away from an end are taken to add up to; not measured
 
 
@@ -170,8 +175,9 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
     found.add(ph.take(view.seen))
     ready = geometry.convex_alone or found.budget.spent(geometry)
     # A coarse launch leaves what hidden tubes carry to those that follow it.
-    carries = more and rule.coarse == 1.0
-    matters = ((ph.in_phase if carries else ph.bound) > found.prune_threshold(ph.length)) & (not ready)
+    carries, cut = more and rule.coarse == 1.0, 1.0 if rule.coarse == 1.0 else _HIDDEN
+    least = np.where(_beside_seen(geometry, tubes, view), cut, 1.0) * found.prune_threshold(ph.length)
+    matters = ((ph.in_phase if carries else ph.bound) > least) & (not ready)
     take_seen(view, view.seen & ~matters)
     rows = np.flatnonzero(matters)
     known: View | None = view.take(rows)
@@ -185,8 +191,15 @@ def _clip_at_shadows(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes, found
         rows = np.flatnonzero(split)
         tubes, _ = subdivide(geometry, leg, tubes, rows, s.side, True, rule.jitter)
         ph = phases_of(geometry, leg, out, tubes, rule)
-        known, matters = None, (ph.in_phase if carries else ph.bound) > found.prune_threshold(ph.length)
+        known, matters = None, (ph.in_phase if carries else ph.bound) > cut * found.prune_threshold(ph.length)
     return Tubes.join(parts)
+
+
+def _beside_seen(geometry: Geometry, tubes: Tubes, view: View) -> Bools:
+    """Return which tubes (n,) are hidden while others of their facets are seen."""
+    in_part = np.zeros(len(geometry.plane), bool)
+    in_part[tubes.facet[view.seen]] = True
+    return ~view.seen & in_part[tubes.facet]
 
 
 def write_leg(geometry: Geometry, tubes: Tubes, leg: Leg, corners: Floats, passed: Ints, rule: Refinement) -> None:

@@ -89,6 +89,19 @@ def test_a_plate_larger_than_tubes_returns_as_in_a_fine_run():
     assert 10.0 * np.log10(coarse.detections.power[0] / fine.detections.power[0]) == pytest.approx(0.0, abs=0.5)
 
 
+@pytest.mark.parametrize(("size", "yaw"), [(40.0, 180.0), (400.0, 180.0), (2000.0, 180.0), (2000.0, 168.0)])
+def test_a_plane_face_of_any_size_mirrors_the_radar_from_its_foot_point(size, yaw):
+    """A face many Fresnel zones wide returns as the image of the radar behind it: sigma = pi d^2."""
+    plate = rc.Body("plate", shape="plate", params={"width": size, "height": size}, position=(9, 0, 1), yaw_deg=yaw)
+    scene = scene_with(plate)
+    found, turn = rc.simulate(scene).detections, np.deg2rad(180.0 - yaw)
+    d, look = 9.0 * np.cos(turn), np.array([[np.cos(turn), -np.sin(turn), 0.0]])
+    gain = np.linalg.norm(scene.radar.tx_field(look)) ** 2
+    power = undb(20.0) * 1e-3 * gain**2 * (scene.radar.waveform.wavelength / (8.0 * np.pi * d)) ** 2
+    assert found.range[0] == pytest.approx(d, abs=0.1)
+    assert 10.0 * np.log10(found.power[0] / power) == pytest.approx(0.0, abs=1.0)
+
+
 def test_a_target_given_by_its_rcs_returns_over_the_ground_as_in_a_fine_run():
     """Its routes are exact in both, all four: straight or over the ground, out and back."""
     bodies = [
