@@ -18,7 +18,7 @@ from raychan.units import dbm, watt
 Floats = NDArray[np.float64]
 
 _DYNAMIC_DB = 90.0  # largest span drawn below the peak
-_LABELS = 12  # most detections that are named
+_LABELS, _NUMBERS = 12, 40  # most detections that are named, and that are numbered
 _PEAKS = 10  # most peaks of the profile that are named
 
 
@@ -148,6 +148,8 @@ def _mark_detections(result: Result, axes: Any) -> None:
 
 
 def _name_detections(result: Result, axes: Any) -> None:
+    """Label detections by number, body, range and SNR; those near another one of their name, and the weakest of many,
+    by their number alone."""
     d, (ranges, rates) = result.detections, _in_map(result)
     placer = Placer(axes)
     placer.prepare()
@@ -156,14 +158,15 @@ def _name_detections(result: Result, axes: Any) -> None:
     if (legend := axes.get_legend()) is not None:
         placer.spare(legend)
     named: list[tuple[str, float, float]] = []
-    for i, why in enumerate(result.provenance):
+    for i, why in enumerate(result.provenance[:_NUMBERS]):
         name = _short(why)
         near = any(n == name and abs(r - ranges[i]) < 3.0 and abs(v - rates[i]) < 1.0 for n, r, v in named)
-        if near or len(named) >= _LABELS:
-            continue
-        named.append((name, float(ranges[i]), float(rates[i])))
         unfolded = "" if rates[i] == d.rate[i] else f"\nunfolded to {d.rate[i]:+.1f} m/s"
-        text = f"{name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB{unfolded}{_true_place(why)}"
+        text = f"{i + 1}: {name}\n{d.range[i]:.2f} m, {d.snr[i]:.0f} dB{unfolded}{_true_place(why)}"
+        if near or len(named) >= _LABELS:
+            text = f"{i + 1}"
+        else:
+            named.append((name, float(ranges[i]), float(rates[i])))
         look: dict[str, Any] = {
             "color": MARKS[why.label][1],
             "fontsize": 7,

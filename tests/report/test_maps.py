@@ -40,6 +40,14 @@ def test_a_detection_whose_rate_is_unfolded_is_marked_at_its_cell():
     assert any(f"unfolded to {-7.0 - span:.1f} m/s" in t.get_text() for t in axes.texts)
 
 
+def test_every_detection_has_its_number_also_beside_another_one_of_its_body():
+    pair = paths([9.0, 10.5], [3.0, 3.2], [3e-5, 1e-5], [[(1, SCATTER)], [(1, SCATTER)]])
+    axes = _drawn(result(pair, [(9.0, 3.0, 1e-9), (10.5, 3.2, 1e-10)]))
+    heads = [t.get_text().splitlines()[0].split(":")[0] for t in axes.texts if t.get_text()[:1].isdigit()]
+    assert heads == ["1", "2"]
+    assert axes.texts[-1].get_text() == "2"
+
+
 def test_the_map_of_one_chirp_is_drawn_without_a_word():
     whole = _result()
     m, d = whole.rdmap, whole.detections
