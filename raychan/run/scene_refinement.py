@@ -135,7 +135,7 @@ class SceneRefinement:
         parts, sources, count = [nothing(self.geometry.facets, self.radar)], [np.zeros(0, np.int64)], 0
         kept: list[Batch] = []
         for (batch, last, paths), source in batches:
-            self._ways.add(source, last)
+            self._ways.add(source, last, paths)
             count += len(source)
             if count > most:
                 return None
