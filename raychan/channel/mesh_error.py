@@ -3,6 +3,7 @@ fully known, and physical optics has no creeping waves."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -28,7 +29,8 @@ _HALVED = 4.0 / 3.0  # of the change by halving the facets: the limit of a serie
 CUBIC = 0.01  # rad of phase: cubic edges that deviate less from the quadratic ones are not computed
 _EDGES_DB = 1.2  # of the change in dB by taking the uncertain folds as edges
 _PARTLY = 0.5  # of the field's change: only some of the uncertain folds may be edges
-_CREEPING = 2.3  # of x^(4/3) exp(-2.2 x^(1/3)) / k: upper bound of the creeping wave of a sphere of k a = x
+# Of x^(4/3) exp(-_DECAY x^(1/3) arc) / k: upper bound of the creeping wave of a sphere of k a = x along an arc [rad].
+_CREEPING, _DECAY = 2.3, 2.2 / math.pi
 _RESONANCE = 6.0  # k a: below it the creeping wave falls again, but the error of physical optics does not
 
 
@@ -123,14 +125,17 @@ def has_edges(geometry: Geometry) -> bool:
     return bool(pieces(a, b, len(f.body)).any())
 
 
-def creeping(geometry: Geometry, wavenumber: float, rows: Rows | None = None) -> tuple[float, float]:
+def creeping(
+    geometry: Geometry, wavenumber: float, rows: Rows | None = None, apart: float = 0.0
+) -> tuple[float, float]:
     """Return bounds on what waves creeping around a body add to its amplitude: absolute [m] and relative to it.
 
     Both are those of the PEC sphere as wide as the smallest extent of each connected piece: Mie's series less physical
     optics over k a = 0.3 to 300; infinite cylinders of both polarisations lie below. Of several pieces those count by
     the roots of their areas, as echoes of unrelated phase do. 0 for pieces without curved sides, which have no creeping
     wave, and for open sheets, for which no bound is known.
-    Args: rows (n,) the facets of the body, if there are others.
+    Args: rows (n,) the facets of the body, if there are others; apart [rad] of the directions to both ends: waves creep
+    less far, and reflection is stronger or weaker than physical optics by second order.
     Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
     """
     every = np.arange(len(geometry.area)) if rows is None else rows
@@ -143,7 +148,10 @@ def creeping(geometry: Geometry, wavenumber: float, rows: Rows | None = None) ->
     for piece in np.split(order, np.flatnonzero(np.diff(geometry.piece[order])) + 1) if len(order) else ():
         size = wavenumber * 0.5 * _thinnest(geometry.facets.vertices[piece], geometry.area[piece])
         x = max(size, _RESONANCE)
-        wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-2.2 * np.cbrt(x))
+        wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-_DECAY * np.cbrt(x) * (math.pi - apart))
+        # Backwards the waves all round add up in phase; aside those do that creep within the plane of both ends.
+        wave *= min(1.0, math.sqrt(2.0 / (math.pi * x * max(math.sin(apart), 1e-12))))
+        wave += min(0.25 * (math.cos(0.5 * apart) ** -3 - 1.0), 0.5 * size)
         around.append(float(wave / wavenumber))
         share += (2.0 * wave / max(size, 1e-300)) ** 2 * float(geometry.area[piece].sum()) / whole
     return float(np.linalg.norm(around)), float(np.sqrt(share))

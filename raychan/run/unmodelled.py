@@ -101,7 +101,6 @@ _MONOSTATIC = (
     "diffraction",
     "diffraction to point targets",
     "diffuse scattering",
-    "creeping waves",
 )
 """Effects whose estimates take the way back to be the way out."""
 

@@ -41,19 +41,22 @@ def creeping_waves(
     """
     f, wave = geometry.facets, radar.waveform
     k = 2.0 * np.pi * wave.middle / C0
+    ends = np.array([radar.position, radar.position if radar.rx_position is None else radar.rx_position], float)
     best, which, left = 0.0, "", ""
     for body in np.setdiff1d(f.body[geometry.curved & (f.role[f.body] == SCATTERER)], points.body):
         rows = np.flatnonzero(f.body == body)
         if (geometry.curved & geometry.both_sides)[rows].any():
             left = left or f.body_names[body]
-        around, share = creeping(geometry, k, rows)
+        away = f.vertices[rows].mean(axis=(0, 1)) - ends
+        r = np.linalg.norm(away, axis=1)
+        look = away / r[:, None]
+        apart = float(np.arccos(np.clip(look[0] @ look[1], -1.0, 1.0)))
+        around, share = creeping(geometry, k, rows, apart)
         if around == 0.0:
             continue
-        away = f.vertices[rows].mean(axis=(0, 1)) - np.asarray(radar.position)
-        r = float(np.linalg.norm(away))
-        look = (away / r)[None]
-        gain = np.prod([(np.abs(field(look)) ** 2).sum() for field in (radar.tx_field, radar.rx_field)])
-        power = radar.power * gain * (C0 / wave.middle) ** 2 * 4.0 * np.pi * around**2 / ((4.0 * np.pi) ** 3 * r**4)
+        fields = radar.tx_field(look[:1]), radar.rx_field(look[1:])
+        gain = np.prod([(np.abs(x) ** 2).sum() / one**2 for x, one in zip(fields, r, strict=True)])
+        power = radar.power * gain * (C0 / wave.middle) ** 2 * 4.0 * np.pi * around**2 / (4.0 * np.pi) ** 3
         if share > _THICK:
             own = (paths.trajectories.body == body).any(axis=1)[paths.trajectory]
             power = max(power, share**2 * peak(paths, own, radar, settings))

@@ -36,6 +36,18 @@ def _mean_cosine(normal, k, back):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
+def _healed_cosine(normal, k, back):  # type: ignore[no-untyped-def]
+    """Return the harmonic mean of the cosines of incidence from both ends, waves travelling along k and back (3,): it
+    is that of `_mean_cosine` where a smooth surface mirrors, and ends at the terminators of both ends, where light ends
+    softly; the mean of a receiver elsewhere would end with what it has there."""
+    one = two = 0.0
+    for c in range(3):
+        one -= normal[c] * k[c]
+        two -= normal[c] * back[c]
+    return 2.0 * one * two / (one + two) if one * two > 0.0 else 0.0
+
+
+@njit(cache=True, forceinline=True)
 def _back(p, image, far, k):  # type: ignore[no-untyped-def]
     """Write the unit direction in which a wave from the end travels at p (3,), and return its length [m]."""
     if far:
@@ -109,7 +121,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
             if bent and curved[f]:
                 _place_of(bary[i], j, at)
                 element_of(vertices[f], edge_curvature[f], at, element)
-                strength = _mean_cosine(element, k[i, j], back_k[j]) * math.copysign(0.5 * share / least, side)
+                strength = _healed_cosine(element, k[i, j], back_k[j]) * math.copysign(0.5 * share / least, side)
             else:
                 # Where the curved surface turns away from the flat footprint it has more area.
                 turned = 0.0

@@ -134,19 +134,26 @@ def unseen(bodies: Sequence[Body], radar: Any) -> list[str]:
     if not things:
         return ["no body is in view: the scene has none but ground and the radar's own car (bodies)"]
     if unseen not in radar.kept:
-        radar.kept[unseen] = float(np.max(_two_way(radar, _around() @ radar.axes.T)))
+        looks = _around() @ radar.axes.T, _around() @ radar.rx_axes.T
+        apart = radar.rx_position is not None
+        gains = _gain(radar.tx_field, looks[0]), _gain(radar.rx_field, looks[1])
+        radar.kept[unseen] = float(gains[0].max() * gains[1].max() if apart else (gains[0] * gains[1]).max())
     if lost := _cross_polarized(things, radar):
         return lost
     peak, limit = radar.kept[unseen], radar.waveform.unambiguous_range
+    ends = np.array([radar.position, radar.position if radar.rx_position is None else radar.rx_position], float)
+    boresights = np.stack([radar.boresight, radar.rx_axes[:, 0]])
     gain, nearest, ahead = 0.0, np.inf, False
     for body in things:
         points = surface_sample(body)
         if body.rcs_dbsm is not None:
             points = np.concatenate([points, body.motion.to_world(body.target_point())[None]])
-        way = points - radar.position
-        far = np.linalg.norm(way, axis=1)
-        gain = max(gain, float(_two_way(radar, way[far > 0.0] / far[far > 0.0, None]).max(initial=0.0)))
-        nearest, ahead = min(nearest, float(far.min())), ahead or bool((way @ radar.boresight > 0.0).any())
+        ways = points - ends[:, None]
+        far = np.maximum(np.linalg.norm(ways, axis=2), 1e-12)
+        looks = ways / far[..., None]
+        gain = max(gain, float((_gain(radar.tx_field, looks[0]) * _gain(radar.rx_field, looks[1])).max(initial=0.0)))
+        nearest = min(nearest, float(far.mean(axis=0).min()))
+        ahead = ahead or bool((np.einsum("enc,ec->en", ways, boresights) > 0.0).all(axis=0).any())
         if gain > _BEAM * peak and nearest <= limit:
             return []
     if not gain > 0.0 and not ahead:
@@ -176,9 +183,8 @@ def _cross_polarized(things: Sequence[Body], radar: Any) -> list[str]:
     ]
 
 
-def _two_way(radar: Any, look: Floats) -> Floats:
-    ends = (np.linalg.norm(f(look), axis=1) ** 2 for f in (radar.tx_field, radar.rx_field))
-    return np.asarray(np.prod(list(ends), axis=0))
+def _gain(field: Callable[[Floats], Any], look: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(field(look), axis=1) ** 2)
 
 
 def _around() -> Floats:
