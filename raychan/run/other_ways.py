@@ -66,7 +66,7 @@ class OtherWays:
         return new
 
     def _most(self) -> _Pairs:
-        """Return the sources and last facets (n,) of all routes noted, in order, and the most that one launch brings."""
+        """Return the sources and last facets (n,) of all routes noted, in order, and the most one launch brings."""
         source, last, amplitude = (np.concatenate([x[i] for x in self._known] or [_NONE[i]]) for i in range(3))
         order = np.lexsort((-amplitude, last, source))
         order = order[_first(source[order], last[order])]
