@@ -93,18 +93,18 @@ def explain(
     Raises: ValueError for another type, outside the map, on a number that no detection has, or if nothing or both are
     asked for.
     """
-    if (range is None) == (detection is None):
-        raise ValueError("either a range or the number of a detection is wanted")
-    if detection is not None and (speed is not None or cell):
-        raise ValueError("the number of a detection stands alone, without a speed or the cell")
     check_type("result", result, Result, str, PathLike)
-    check_type("range", range, float, or_none=True)
-    check_type("speed", speed, float, or_none=True)
-    check_type("cell", cell, bool)
     if not isinstance(result, Result):
         from raychan.run.storage import load_result
 
         result = load_result(result)
+    if (range is None) == (detection is None):
+        raise ValueError("either a range or the number of a detection is wanted")
+    if detection is not None and (speed is not None or cell):
+        raise ValueError("the number of a detection stands alone, without a speed or the cell")
+    check_type("range", range, float, or_none=True)
+    check_type("speed", speed, float, or_none=True)
+    check_type("cell", cell, bool)
     near: list[int] = []
     place = None
     if detection is not None:

@@ -25,6 +25,7 @@ from raychan.scalars import shown
 from raychan.units import dbm
 
 FORMAT = 3
+_HDF5 = b"\x89HDF\r\n\x1a\n"  # how a file of HDF5, and so of netCDF-4, begins
 _READS = (2, FORMAT)  # format 2 has delay and range rate of paths instead of length and its rate
 PICTURES = ("scene.png", "profile.png", "rdmap.png")
 ARRAY_PICTURES = ("range_azimuth.png", "beams.png")
@@ -36,6 +37,7 @@ CONTENTS = Contents(
     begins={"summary.json": b'{"scene":'},
 )
 """What `raychan run` writes into its folder; a sequence has a folder of the same for each frame."""
+_ALLOWED = "a directory that `raychan run` or rc.save_result wrote, or the result.nc in it"
 _CHANGED = "# changed: "  # how a scene notes overridden keys below its text
 COLUMNS = (
     "range_m",
@@ -96,9 +98,11 @@ def load_result(path: str | Path) -> Result:
     file = path / "result.nc" if path.is_dir() else path
     if not file.is_file():
         problem = "a directory without a result.nc" if path.is_dir() else "no such file or directory"
-        allowed = "a directory that `raychan run` or rc.save_result wrote, or the result.nc in it"
-        raise StoreError(f"{path}: {problem}; allowed: {allowed}")
+        raise StoreError(f"{path}: {problem}; allowed: {_ALLOWED}")
     try:
+        with file.open("rb") as stream:
+            if not stream.read(len(_HDF5)) == _HDF5:
+                raise StoreError(f"{file}: cannot be read: it is not a raychan result; allowed: {_ALLOWED}")
         with xr.open_dataset(file, engine="h5netcdf") as root:
             attrs = dict(root.attrs)
         if int(attrs.get("format", 0)) not in _READS:
@@ -107,7 +111,8 @@ def load_result(path: str | Path) -> Result:
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, StoreError):
             raise
-        raise StoreError(f"{file}: cannot be read as a raychan result: {error}") from error
+        why = getattr(error, "strerror", None) or error
+        raise StoreError(f"{file}: cannot be read as a raychan result: {why}; allowed: {_ALLOWED}") from error
     held = {name: json.loads(attrs[name]) for name in _JSON}
     receiver = held["receiver"] | {"waveform": Waveform(**held["receiver"]["waveform"])}
     receiver["background"] = tuple(receiver["background"])

@@ -1,9 +1,10 @@
 """Patches of rough surfaces that the radar sees: where diffuse scattering starts.
 
-The ground is cut into sectors of rings about the foot of the radar, rings of half a range cell; other bodies into
-triangles of their facets, halved down to half a range cell. Near the radar both are finer: over a plane the law of
-scattering changes with the range alone. Both are halved on as long as a radar tells their ends apart by rate, by its
-array, or by the gain of its antenna. One ray tells whether the middle of a patch is seen.
+The ground is cut into sectors of rings about the foot of the radar, rings of half a range cell; facets of other bodies
+that are larger into wedges about its foot on their planes, halved down to half a range cell along the range and to an
+angle across it. Near the radar both are finer: over a plane the law of scattering changes with the range alone. Both
+are halved on as long as a radar tells their ends apart by rate, by its array, or by the gain of its antenna. One ray
+tells whether the middle of a patch is seen.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from raychan.geometry.patches import Patches
 from raychan.poses import sizes
 from raychan.records import MIRROR, Facets
-from raychan.tracing.pieces import Pieces, Sectors, Triangles
+from raychan.tracing.pieces import Pieces, Sectors
+from raychan.tracing.wedges import wedges
 from raychan.world.geometry import Geometry
 
 Floats = NDArray[np.float64]
@@ -30,8 +32,6 @@ Excess = Callable[[Lines, Ints], Floats]
 
 _MOST = 400_000  # patches of a body: beyond, they grow; each takes a ray and some 300 bytes (not measured)
 _GROWTH = np.sqrt(2.0)  # of their sides, until there are no more: about half as many at a time
-_ACROSS = np.sqrt(6.0)  # times as far as along the range: across it (R^2)^-k differs by k x^2 / 12, and k is at least 2
-_THIN = 0.1  # height of a triangle over its longest side (not measured)
 _TOUCH = 1e-3  # of the distance: a hit this near the middle of a patch is the patch
 
 _NONE = Patches(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0))
@@ -55,8 +55,9 @@ class Apart:
 
 @dataclass(frozen=True)
 class PatchSize:
-    """How large patches may be: along the range [m], across it on the ground [rad], how far away they may be [m], which
-    share of their distance they may extend along the range, and over how much of what a radar tells apart."""
+    """How large patches may be: along the range [m], across it (on the ground, about the foot of the radar) [rad], how
+    far away they may be [m], which share of their distance they may extend along the range, and over how much of what a
+    radar tells apart."""
 
     range: float
     angle: float
@@ -76,7 +77,7 @@ def visible_patches(geometry: Geometry, end: Floats, materials: Bools, size: Pat
     rough = materials[f.material] & (geometry.area > 0.0) if len(f.material) else np.zeros(0, bool)
     ground = rough & (f.role[f.body] == MIRROR)
     parts = [_sectors(geometry, end, body, size) for body in np.unique(f.body[ground])]
-    parts.append(_triangles(geometry, end, np.flatnonzero(rough & ~ground), size))
+    parts.append(_facets(geometry, end, np.flatnonzero(rough & ~ground), size))
     return _seen(geometry, end, _joined(parts))
 
 
@@ -102,7 +103,7 @@ def _sectors(geometry: Geometry, end: Floats, body: int, size: PatchSize) -> Pat
     bounds = np.stack([np.repeat(ring, count, axis=0), np.tile(turn, (len(ring), 1))], axis=1)
     sectors = Sectors(bounds, np.stack([foot, x, np.cross(normal, x)]))
     facet = np.full(len(bounds), rows[0], np.int64)
-    found = _small(sectors, facet, sectors.area, end, farthest, lambda lines, on: _spread(lines, on, f, end, size))
+    found = _small(sectors, facet, end, farthest, lambda lines, on: _spread(lines, on, f, end, size))
     return replace(found, grown=max(found.grown, float(np.diff(edges).max()) / size.range))
 
 
@@ -119,24 +120,33 @@ def _ranges(height: float, farthest: float, size: PatchSize, most: int) -> Float
     return edges
 
 
-def _triangles(geometry: Geometry, end: Floats, rows: Ints, size: PatchSize) -> Patches:
-    """Return triangles of facets (n,) that face `end` or are lit from both sides."""
+def _facets(geometry: Geometry, end: Floats, rows: Ints, size: PatchSize) -> Patches:
+    """Return patches of facets (n,) that face `end` or are lit from both sides: the facets that are small enough, and
+    pieces of the others."""
     f, corners = geometry.facets, geometry.facets.vertices[rows].astype(float)
     faces = np.einsum("ij,ij->i", end - corners[:, 0], geometry.normal[rows]) > 0.0
     kept = faces | geometry.both_sides[rows]
+    corners, rows = corners[kept], rows[kept]
 
     def excess(lines: Lines, on: Ints) -> Floats:
         away = [sizes(at - end) for at in lines]
-        middle = np.maximum(away[1], size.nearest)
-        long = sizes(lines[2] - lines[0])
-        near = np.maximum(np.abs(away[2] - away[0]), long / _ACROSS) / (size.share * middle)
-        over = np.maximum(np.maximum(near, long / size.range), _spread(lines, on, f, end, size))
-        # Thin ones are halved along their longest side: where rates turn fast others may halve without end.
-        longest, (a, b, _) = long.max(axis=1, keepdims=True), np.moveaxis(lines[2] - lines[0], 1, 0)
-        thin = sizes(np.cross(a, b))[:, None] < _THIN * longest**2
-        return np.where(thin, over.max(axis=1, keepdims=True) * long / longest, over)
+        middle, farther = (np.maximum(x, size.nearest) for x in (away[1], np.maximum(away[0], away[2])))
+        along = _between(away) / np.minimum(size.share * middle, size.range)
+        squared = ((lines[2] - lines[0]) ** 2).sum(axis=-1) - (away[2] - away[0]) ** 2
+        across = np.sqrt(np.maximum(squared, 0.0)) / (size.angle * farther)
+        return np.maximum(np.maximum(along, across), _spread(lines, on, f, end, size))
 
-    return _small(Triangles(corners[kept]), rows[kept], geometry.area[rows[kept]], end, size.farthest, excess)
+    def large(starts: Floats, stops: Floats, on: Ints) -> Bools:
+        return np.asarray(excess((starts, 0.5 * (starts + stops), stops), on).max(axis=1) > 1.0)
+
+    cut = large(corners, np.roll(corners, -1, axis=1), rows)
+    middle = corners[~cut].mean(axis=1)
+    whole = Patches(middle, rows[~cut], geometry.area[rows[~cut]]).take(sizes(middle - end) < size.farthest)
+    rows = rows[cut]
+    pieces, of = wedges(
+        corners[cut], end, size.angle, lambda quads, on: large(quads[:, :, 0], quads[:, :, 1], rows[on])
+    )
+    return _joined([whole, _small(pieces, rows[of], end, size.farthest, excess)])
 
 
 def _spread(lines: Lines, facet: Ints, facets: Facets, end: Floats, size: PatchSize) -> Floats:
@@ -166,18 +176,16 @@ def _between(three: Sequence[Floats]) -> Floats:
     return np.asarray(reduce(np.maximum, three) - reduce(np.minimum, three))
 
 
-def _small(pieces: Pieces, facet: Ints, area: Floats, end: Floats, farthest: float, excess: Excess) -> Patches:
+def _small(pieces: Pieces, facet: Ints, end: Floats, farthest: float, excess: Excess) -> Patches:
     """Return pieces as patches no farther away than so far, halved until none is too large, or larger than that by a
     factor if they were too many."""
     grown = 1.0
-    while (found := _halved(pieces, facet, area, end, farthest, excess, grown)) is None:
+    while (found := _halved(pieces, facet, end, farthest, excess, grown)) is None:
         grown *= _GROWTH
     return found
 
 
-def _halved(
-    pieces: Pieces, facet: Ints, area: Floats, end: Floats, farthest: float, excess: Excess, grown: float
-) -> Patches | None:
+def _halved(pieces: Pieces, facet: Ints, end: Floats, farthest: float, excess: Excess, grown: float) -> Patches | None:
     """Return pieces halved along the axis over which they are largest, until none is larger than `grown` times its
     size; None if they become too many. Args: as for `_small`."""
     done, count, most = [_NONE], 0, max(_MOST, len(facet))
@@ -193,12 +201,11 @@ def _halved(
         reach[large] = sizes(axes[large] - middle[large, None, None]).max(axis=(1, 2))
         near = away < farthest + reach
         small, rows = np.flatnonzero(near & ~large), np.flatnonzero(near & large)
-        done.append(Patches(middle[small], facet[small], area[small], grown))
+        done.append(Patches(middle[small], facet[small], pieces.area[small], grown))
         count += len(small)
         if count + 2 * len(rows) > most:
             return None
         pieces, facet = pieces.take(rows).halved(axis[rows]), np.tile(facet[rows], 2)
-        area = np.tile(0.5 * area[rows], 2)
     return _joined(done)
 
 

@@ -1,5 +1,4 @@
-"""Pieces of surfaces that can be halved along several axes: triangles of facets, and sectors of rings on a plane. Both
-halves of a piece have the same area."""
+"""Pieces of surfaces that can be halved along two axes: quadrilaterals of facets, and sectors of rings on a plane."""
 
 from __future__ import annotations
 
@@ -8,38 +7,57 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.poses import sizes
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Rows = NDArray[np.generic]
 
 
 @dataclass(frozen=True)
-class Triangles:
-    """Triangles of corners (n, 3, 3) [m], halved along their edges."""
+class Quads:
+    """Plane, convex pieces of corners (n, 2, 2, 3) [m], from near to far and from start to stop of a turn, halved along
+    the lines between the middles of opposite sides; two corners may be one."""
 
     corners: Floats
 
     @property
     def middle(self) -> Floats:
         """Middle of area (n, 3) [m]."""
-        return np.asarray(self.corners.mean(axis=1))
+        c = self.corners
+        first, second = c[:, 0, 1], c[:, 1, 0]
+        weights = np.stack(self._triangles, axis=1)
+        share = weights / weights.sum(axis=1, keepdims=True)
+        return np.asarray((c[:, 0, 0] + c[:, 1, 1] + share[:, :1] * first + share[:, 1:] * second) / 3.0)
 
     @property
     def axes(self) -> Floats:
         """Lines (n, k, 2, 3) [m] along which a piece may be halved, from end to end."""
-        return np.stack([self.corners, np.roll(self.corners, -1, axis=1)], axis=2)
+        return np.stack([self.corners.mean(axis=2), self.corners.mean(axis=1)], axis=1)
 
-    def take(self, rows: Rows) -> Triangles:
+    @property
+    def area(self) -> Floats:
+        """Area (n,) [m^2]."""
+        return np.asarray(sum(self._triangles))
+
+    def take(self, rows: Rows) -> Quads:
         """Return some of the pieces."""
-        return Triangles(self.corners[rows])
+        return Quads(self.corners[rows])
 
-    def halved(self, axis: Ints) -> Triangles:
+    def halved(self, axis: Ints) -> Quads:
         """Return the first, then the second halves (2 n) of the pieces, each along its axis (n,)."""
-        rows, after = np.arange(len(axis)), (axis + 1) % 3
-        half = 0.5 * (self.corners[rows, axis] + self.corners[rows, after])
-        first, second = self.corners.copy(), self.corners.copy()
-        first[rows, after] = second[rows, axis] = half
-        return Triangles(np.concatenate([first, second]))
+        first, second, turned = self.corners.copy(), self.corners.copy(), axis == 1
+        for on, x, y in ((~turned, first[:, 1], second[:, 0]), (turned, first[:, :, 1], second[:, :, 0])):
+            x[on] = y[on] = 0.5 * (x[on] + y[on])
+        return Quads(np.concatenate([first, second]))
+
+    @property
+    def _triangles(self) -> tuple[Floats, Floats]:
+        """Areas (n,) [m^2] on either side of the diagonal from the near start to the far stop."""
+        c = self.corners
+        across = c[:, 1, 1] - c[:, 0, 0]
+        first, second = (0.5 * sizes(np.cross(across, x - c[:, 0, 0])) for x in (c[:, 0, 1], c[:, 1, 0]))
+        return first, second
 
 
 @dataclass(frozen=True)
@@ -93,4 +111,4 @@ class Sectors:
         return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1) @ self.plane[1:] + self.plane[0]
 
 
-Pieces = Triangles | Sectors
+Pieces = Quads | Sectors

@@ -57,6 +57,7 @@ def test_a_file_in_the_place_of_a_directory_is_told_before_the_start(command, tm
             ["explain", "nodir", "--detection", "1"],
             "nodir: no such file or directory; allowed: a directory that `raych",
         ),
+        (["explain", "nodir"], "nodir: no such file or directory; allowed: a directory that `raychan run`"),
         (["explain", "..", "--detection", "1"], "..: a directory without a result.nc; allowed: a directory that `rayc"),
         (["view", "urban", "--html", "s.png"], "--html s.png: the name must end in .html"),
         (["view", "urban", "--screenshot", "s.html"], "--screenshot s.html: the name must end in .png"),
@@ -64,6 +65,40 @@ def test_a_file_in_the_place_of_a_directory_is_told_before_the_start(command, tm
 )
 def test_what_is_wrong_and_what_is_allowed_is_told(argv, words, capsys):
     assert words in told(argv, capsys)
+
+
+@pytest.mark.parametrize("held", [b"", b"no result", b"\x89PNG\r\n\x1a\n"], ids=["empty", "text", "picture"])
+def test_a_file_that_is_no_result_is_told_as_that_with_what_is_allowed(held, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x.nc").write_bytes(held)
+    for argv in (["explain", "x.nc", "--range", "5"], ["explain", "x.nc"], ["view", "x.nc", "--html", "x.html"]):
+        said = told(argv, capsys)
+        assert "x.nc: cannot be read: it is not a raychan result; allowed: a directory that `raychan run` or" in said
+
+
+def test_a_result_that_may_not_be_read_is_told_in_plain_words(tmp_path, capsys, monkeypatch):
+    (tmp_path / "x.nc").write_bytes(b"\x89HDF")
+
+    def refused(*args, **options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.open", refused)
+    said = told(["explain", str(tmp_path / "x.nc"), "--range", "5"], capsys)
+    assert "x.nc: cannot be read as a raychan result: Permission denied; allowed: a directory" in said
+
+
+def test_view_names_results_beside_scenes_where_there_is_no_such_file(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = told(["view", "nodir", "--html", "x.html"], capsys)
+    assert (
+        "nodir: no such file or directory; allowed: a directory that `raychan run` wrote, its result.nc, or a sc"
+        in said
+    )
+    (tmp_path / "mesh.toml").write_text(
+        PLATE.replace("[[bodies]]", '[[bodies]]\nname = "m"\nmesh = "no.stl"\n[[bodies]]', 1)
+    )
+    said = told(["view", "mesh.toml", "--html", "x.html"], capsys)
+    assert "no.stl" in said and "raychan run" not in said
 
 
 def test_only_names_that_are_near_are_proposed(tmp_path, capsys, monkeypatch):

@@ -123,7 +123,7 @@ def test_a_wall_beside_a_driving_radar_returns_the_integral_at_each_rate():
 
 @pytest.mark.parametrize("body", [lambda v: wall(8.0, v), lambda v: ground(20.0, v)], ids=["wall", "ground"])
 def test_what_moves_past_a_radar_is_cut_as_what_a_radar_moves_past(body):
-    driving, standing = (made(chirps=128, velocity=speed * AHEAD) for speed in (15.0, 0.0))
+    driving, standing = (made(chirps=512, velocity=speed * AHEAD) for speed in (15.0, 0.0))
     one, other = patches_of(driving, body((0.0, 0.0, 0.0))), patches_of(standing, body(-15.0 * AHEAD))
     np.testing.assert_allclose(one[0], other[0], atol=1e-9)
     np.testing.assert_allclose(one[1], other[1], rtol=1e-12)

@@ -124,9 +124,14 @@ def half_outline(length: float, width: float, rear: End, front: End, sag: float)
 
 
 def split_at(half: Curve, x: float) -> tuple[Curve, int]:
-    """Return the half outline with an added point of its flank at x [m], on the true arc, and the point's index."""
+    """Return the half outline with an added point of its flank at x [m], on the true arc, and the point's index.
+
+    Raises: ValueError where the flank does not reach so far.
+    """
     p, n = half.points, half.normals
     flank = np.flatnonzero(np.abs(n[:, 1]) > 0.7)
+    if x > p[flank[-1], 0]:
+        raise ValueError(f"at {x:.3g} m from the tail, where a door or a window ends, is no flank")
     i = int(flank[np.searchsorted(p[flank, 0], x)])
     turn = float(np.arctan2(n[i - 1, 0] * n[i, 1] - n[i - 1, 1] * n[i, 0], n[i - 1] @ n[i]))
     share = (x - p[i - 1, 0]) / (p[i, 0] - p[i - 1, 0])
@@ -134,7 +139,10 @@ def split_at(half: Curve, x: float) -> tuple[Curve, int]:
     if turn > 1e-9:
         radius = float(np.linalg.norm(p[i] - p[i - 1])) / (2.0 * np.sin(0.5 * turn))
         centre = p[i] - radius * n[i]
-        normal = np.array([(x - centre[0]) / radius, -np.sqrt(1.0 - ((x - centre[0]) / radius) ** 2)])
+        along = (x - centre[0]) / radius
+        if abs(along) > 1.0:
+            raise ValueError(f"at {x:.3g} m from the tail, where a door or a window ends, is no flank")
+        normal = np.array([along, -np.sqrt(1.0 - along**2)])
         at = centre + radius * normal
     return Curve(np.insert(p, i, at, axis=0), np.insert(n, i, normal, axis=0)), i
 

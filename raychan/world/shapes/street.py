@@ -16,7 +16,8 @@ def lamp_post(
 ) -> Mesh:
     """Return a street lamp: pole of `radius`, arm of length `arm` towards +x (0: none), luminaire; height overall [m].
 
-    Origin: foot of the pole on the ground, on its axis. Parts: pole, base, arm, luminaire.
+    Origin: foot of the pole on the ground, on its axis. Allowed: `height` above 0.47 m + 0.6 `radius`, without an arm
+    above 0.37 m. Parts: pole, base, arm, luminaire.
     Raises: SceneError where the luminaire, or the arm, does not begin above the base.
     """
     made = Assembly()
@@ -39,8 +40,8 @@ def lamp_post(
 def guard_rail(length: float = 8.0, height: float = 0.75, material: str = "metal", max_sag: float = SAG) -> Mesh:
     """Return a W-beam guard rail along x on posts every 2 m; faces -y (the road); length and height [m] overall.
 
-    Origin: middle of the rail's line on the ground, posts on +y. Parts: beam, posts. Beam: two waves, 0.31 m tall,
-    0.08 m deep, sheet of 3 mm (after EN 1317 systems in common use).
+    Origin: middle of the rail's line on the ground, posts on +y. Allowed: `length` up to 10 km. Parts: beam, posts.
+    Beam: two waves, 0.31 m tall, 0.08 m deep, sheet of 3 mm (after EN 1317 systems in common use).
     """
     made = Assembly()
     deep, tall, sheet = 0.08, 0.31, 3e-3
@@ -130,7 +131,7 @@ def bike_rack(
 ) -> Mesh:
     """Return a row of upside-down U hoops along x, each `width` across y, of tube 48 mm; sizes [m] overall.
 
-    Origin: centre of the row on the ground. Part: hoop_1, hoop_2, ...
+    Origin: centre of the row on the ground. Allowed: `hoops` up to 1000. Part: hoop_1, hoop_2, ...
     """
     made = Assembly()
     r, bend = 0.024, 0.15

@@ -25,6 +25,7 @@ def truck(
 
     Args: tail_bottom height to which the flat tail reaches down; front_axle its distance from the tail (default 0.66 of
     the length); lock_bars four upright bars on the tail. Origin: centre of the footprint; front = +x.
+    Allowed: `front_axle` from 0.22 `length` + 0.96 m to `length` - 0.48 m.
     Parts: tail, lock_bars, box, frame, cab, windscreen, window_*, mirror_*, tyre_front_*, tyre_rear_*, rim_*, plate.
     Raises: SceneError for a front axle of which the wheels stand ahead of the body or run into the rear ones.
     """

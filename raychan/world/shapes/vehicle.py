@@ -20,9 +20,11 @@ def car(
 ) -> Mesh:
     """Return a four-door saloon; sizes [m] are overall, without the mirrors; `metal` names the bodywork's material.
 
-    Origin: centre of the footprint on the ground; front = +x. Parts: tail, rear_bumper, front, front_bumper, hood,
-    boot, roof, pillars, quarter_*, rear_door_* and front_door_* (with seams and handles), fender_*, window_*,
-    windscreen, mirror_*, tyre_*, rim_*, plate, floor, cabin, seats. Defaults: a European C-segment saloon.
+    Origin: centre of the footprint on the ground; front = +x.
+    Allowed: `length` 2.8 to 66 m and `width` 0.72 to 2.38 m, each with the other sizes as they are.
+    Parts: tail, rear_bumper, front, front_bumper, hood, boot, roof, pillars, quarter_*, rear_door_* and front_door_*
+    (with seams and handles), fender_*, window_*, windscreen, mirror_*, tyre_*, rim_*, plate, floor, cabin, seats.
+    Defaults: a European C-segment saloon.
     """
     x, z = length / 4.4, height / 1.45
     form = Form(
@@ -39,7 +41,9 @@ def suv(
 ) -> Mesh:
     """Return an SUV; sizes [m] are overall, without the mirrors; `metal` names the bodywork's material.
 
-    Origin: centre of the footprint on the ground; front = +x. Parts as `car`. Defaults: a European mid-size SUV.
+    Origin: centre of the footprint on the ground; front = +x.
+    Allowed: `length` 3.25 to 73 m and `width` 0.69 to 2.45 m, each with the other sizes as they are.
+    Parts as `car`. Defaults: a European mid-size SUV.
     """
     x, z = length / 4.7, height / 1.75
     form = Form(
@@ -56,8 +60,9 @@ def van(
 ) -> Mesh:
     """Return a panel van; sizes [m] are overall, without the mirrors; `metal` names the bodywork's material.
 
-    Origin: centre of the footprint on the ground; front = +x. Parts as `car`; only the front doors and the rear have
-    windows. Defaults: a European large van with a high roof.
+    Origin: centre of the footprint on the ground; front = +x.
+    Allowed: `length` 3.1 to 80 m and `width` 0.71 to 2.9 m, each with the other sizes as they are.
+    Parts as `car`; only the front doors and the rear have windows. Defaults: a European large van with a high roof.
     """
     x, z = length / 5.9, height / 2.6
     form = Form(

@@ -25,6 +25,7 @@ _SIDES = {"left": 1.0, "right": -1.0}
 class Walker:
     """A person of `height` [m] who walks along +x at `speed` [m/s], at `phase` of the cycle at time 0.
 
+    Allowed: `speed` of 0.053 to 1.59 times `height` a second.
     Raises: ValueError for a speed that nobody of that height walks at.
     """
 
