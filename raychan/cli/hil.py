@@ -152,13 +152,13 @@ def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: 
 def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
     """Run and return the numbers of the run."""
     from raychan.hil.instruments import ScannedShip
-    from raychan.hil.lms import STREAM
+    from raychan.hil.lms import STREAM, check_sendable
     from raychan.hil.session import Session
     from raychan.hil.summary import summary
     from raychan.run.ship_scene import read_ship_scene
 
     loaded = read_ship_scene(wishes.scene, wishes.changes)
-    show.warn(loaded.warnings)
+    show.warn(loaded.warnings + check_sendable(loaded.scanner))
     with show.progress(kernels="ship"):
         session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate)
     if wishes.stream:

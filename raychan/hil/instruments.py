@@ -63,9 +63,9 @@ class ScannedShip(ShipLoop):
 
     def scan_with(self, scanner: Scanner) -> None:
         """Go on with another scanner from the scan that follows; ship, time and noise stay."""
-        steered, turns, noise = self._steered, self._k, self._ranges
+        steered, steps, noise = self._steered, self._k, self._ranges
         super().__init__(replace(self.scene, scanner=scanner))
-        self._steered, self._k, self._ranges = steered, turns, noise
+        self._steered, self._k, self._ranges = steered, steps, noise
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from raychan.hil.scans import DISTANCE_BITS, UNITS_M, ScanValues, encode_scan
+from raychan.hil.scans import DISTANCE_BITS, MOST_BEAMS, UNITS_M, ScanValues, encode_scan
 from raychan.hil.telegrams import ACK, HOST_TO_SCANNER, NAK, Telegram, frame
+from raychan.sensors.laser import Scanner as Laser
+from raychan.world.errors import SceneError
 
 BAUD_CODES = {0x42: 9600, 0x41: 19200, 0x40: 38400, 0x48: 500000}
 INSTALLATION, STREAM, ON_REQUEST, SUBRANGE, TURNS = 0x00, 0x24, 0x25, 0x27, 0x2A
@@ -31,7 +33,24 @@ STATUS_BYTE = 0x10
 VARIANTS = {90: (25, 50, 100), 100: (25, 50, 100), 180: (25, 50, 100)}
 """Fans [deg], and the steps [deg/100] that each allows. The real scanner has no 180 deg in steps of 0.25 deg."""
 _DIVIDED_HZ = 1e6
+_MOST_TURNS = 0xFFFF  # a minute, of a mirror: what two bytes tell
 _SET_LENGTH, _LEAST_SET = 34, 7
+
+
+def check_sendable(scanner: Laser) -> list[str]:
+    """Return lines on what the telegrams cannot tell of a scene's scanner. Raises: SceneError where a scan has more
+    beams than a telegram holds."""
+    if scanner.count > MOST_BEAMS:
+        problem = f"a scan of {scanner.count:,} beams is longer than a telegram of the scanner"
+        most = (MOST_BEAMS - 1) * scanner.step_deg
+        allowed = f"a fan of {most:g} deg at most in steps of {scanner.step_deg:g} deg, or larger scanner.step_deg"
+        raise SceneError(problem, key="scanner.fan_deg", value=scanner.fan_deg, allowed=allowed)
+    said, whole = [], round(scanner.fan_deg)
+    if whole != scanner.fan_deg:
+        said.append(f"telegrams tell whole degrees: a fan of {whole} for {scanner.fan_deg:g} (scanner.fan_deg)")
+    if 60.0 * scanner.mirror_hz > _MOST_TURNS:
+        said.append(f"the status tells {_MOST_TURNS:,} turns of the mirror a minute at most (scanner.mirror_hz)")
+    return said
 
 
 def refuse_variant(fan_deg: int, step_deg: float) -> bool:
@@ -45,7 +64,8 @@ class Scanner:
 
     Fields: latest returns the last scan, of which range and flags count; angle_deg and step_deg of its fan; unit 0 (cm)
     or 1 (mm); baud of the line; refused telegrams that it answered with NAK; set_variant (fan [deg], step [deg]) tells
-    whether the fan changed so; mode of operation; starting whether STARTED is still to be sent after a restart.
+    whether the fan changed so; mirror_hz, turns of the mirror a second; mode of operation; starting whether STARTED is
+    still to be sent after a restart.
     """
 
     latest: Callable[[], ScanValues]
@@ -55,6 +75,7 @@ class Scanner:
     baud: int = 9600
     refused: int = 0
     set_variant: Callable[[int, float], bool] = refuse_variant
+    mirror_hz: float = 75.0
     mode: int = ON_REQUEST
     measuring_mode: int = 0
     starting: bool = False
@@ -180,7 +201,7 @@ class Scanner:
         p = bytearray(STATUS_LENGTH)
         p[1:8] = b"V01.00 "
         p[8] = self.mode
-        p[67:69] = (75 * 60).to_bytes(2, "little")  # mirror [turns/min]
+        p[67:69] = min(round(60.0 * self.mirror_hz), _MOST_TURNS).to_bytes(2, "little")  # mirror [turns/min]
         p[102] = self.measuring_mode
         p[107:111] = self._fan()
         p[116:118] = (0x8000 | int(_DIVIDED_HZ / self.baud) - 1).to_bytes(2, "little")

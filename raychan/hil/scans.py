@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.hil.telegrams import TelegramError
+from raychan.hil.telegrams import LONGEST, TelegramError
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +24,8 @@ NO_ECHO = 0x1FFF
 ALL_VALUES, SUBRANGE = 0xB0, 0xB7
 """Commands of telegrams that hold scans: all beams of a scan or of a turn of the mirror; some neighbouring beams."""
 _COUNT, _TURN, _PARTIAL = 0x3FF, 11, 0x2000
+MOST_BEAMS = (LONGEST - 8) // 2
+"""Beams of a scan that the longest telegram holds, also as a part of them."""
 
 
 @dataclass(frozen=True)

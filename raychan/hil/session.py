@@ -85,8 +85,9 @@ class Session:
         self._whole = self._older = self._newer = self.loop.step_scan()
         fan, baud = self.loop.scene.scanner, self.channels[SCANNER].line.baud
         self.scanner = Scanner(
-            lambda: scan_values(self._whole), round(fan.fan_deg), fan.step_deg, baud=baud, set_variant=self._set_fan
-        )
+            lambda: scan_values(self._whole), round(fan.fan_deg), fan.step_deg, baud=baud, set_variant=self._set_fan,
+            mirror_hz=fan.mirror_hz,
+        )  # fmt: skip
         self._heard_at = self._look_at = -math.inf
         self._restart_at = math.inf
         self._gave_back = False

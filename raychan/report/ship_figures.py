@@ -15,7 +15,7 @@ from raychan.sensors.laser import NO_BODY, SEA
 
 Floats = NDArray[np.float64]
 
-SEA_COLOUR = "#66b2d6"
+SEA_COLOUR = "#c3dbe8"
 _GREY = "#f2f2f2"
 _NAMED = 12  # bodies that a legend lists
 _LETTERS = 24  # of a name in a legend

@@ -1,4 +1,4 @@
-"""The bridge of a ship: plant, autopilot, programme and sensors of its scene, carried one mirror turn at a time."""
+"""The bridge of a ship: plant, autopilot, programme and sensors of its scene, carried one step at a time."""
 
 from __future__ import annotations
 

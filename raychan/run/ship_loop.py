@@ -11,7 +11,7 @@ from raychan.poses import rotation
 from raychan.run.ship_bodies import ShipBodies
 from raychan.run.ship_bridge import Steered, hermite, pose_and_rates
 from raychan.run.ship_places import lost_in
-from raychan.run.ship_scene import ShipScene
+from raychan.run.ship_scene import ShipScene, step_of
 from raychan.run.ship_schema import WavesTable
 from raychan.sensors.laser import NO_BODY, LaserScan, Scanner, SensorPoses, noisy, scan
 from raychan.sensors.laser import beams as directions
@@ -85,12 +85,13 @@ class ShipLoop:
         self.scene, scanner = scene, scene.scanner
         sensors, sea, self._ranges, swell = np.random.default_rng(scene.tables.run.seed).spawn(4)
         self._steered = None if scene.bridge is None else Steered(scene.bridge, (sensors, sea))
-        self._turn, self._turns = 1.0 / scanner.mirror_hz, round(scanner.duration * scanner.mirror_hz)
+        self._step = step_of(scanner)
+        self._steps = round(scanner.duration / self._step)
         self._k = 0
         self._times = scanner.times
-        in_turn = np.minimum((self._times / self._turn).astype(int), self._turns - 1)
-        self._of_turn = [np.flatnonzero(in_turn == turn) for turn in range(self._turns)]
-        self._weights = hermite(self._times / self._turn - in_turn, self._turn)
+        in_step = np.minimum((self._times / self._step).astype(int), self._steps - 1)
+        self._of_step = [np.flatnonzero(in_step == step) for step in range(self._steps)]
+        self._weights = hermite(self._times / self._step - in_step, self._step)
         water = scene.tables.sea
         self._sea = 0.0 if water is None else water.reflectivity
         self._waves = None if water is None or water.waves is None else _waves(water.waves, swell)
@@ -103,17 +104,17 @@ class ShipLoop:
     @property
     def now(self) -> float:
         """Time [s] to which the loop has come."""
-        return self._k * self._turn
+        return self._k * self._step
 
     @property
     def scans(self) -> int:
         """Whole scans in the scene's duration."""
-        return int(self.scene.duration / (self._turns * self._turn) + 1e-9)
+        return int(self.scene.duration / (self._steps * self._step) + 1e-9)
 
     @property
     def done(self) -> bool:
         """Whether the scene's duration holds no other scan."""
-        return self._k >= self.scans * self._turns
+        return self._k >= self.scans * self._steps
 
     @property
     def steerable(self) -> bool:
@@ -185,12 +186,12 @@ class ShipLoop:
         """Return the poses (n, 6) of the ship at each beam, with the ship carried over the scan."""
         poses = np.empty((len(self._times), 6))
         before = pose_and_rates(ship.state)
-        for beams in self._of_turn:
+        for beams in self._of_step:
             ship.step()
             after = pose_and_rates(ship.state)
             poses[beams] = self._weights[beams] @ np.concatenate([before, after])
             before = after
-        self._k += self._turns
+        self._k += self._steps
         return poses
 
     def _replayed(self) -> Array:
@@ -198,7 +199,7 @@ class ShipLoop:
         assert logged is not None
         if start + float(self._times[-1]) > logged.duration:
             raise ValueError(f"the logged poses end at {logged.duration:g} s")
-        self._k += self._turns
+        self._k += self._steps
         return logged.at(start + self._times)
 
     def _mounted(self, poses: Array) -> SensorPoses:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from raychan.world.scene import Scene
 from raychan.world.schema_errors import checked
 
 Floats = NDArray[np.float64]
+_STEP = 1.0 / 75.0  # s: so often rudder and autopilot act at least, however slow the mirror
 _REFLECTIVITY = 0.5  # of a body without a material: between wood and paper
 
 
@@ -95,7 +97,7 @@ def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipSc
         scanner = _scanner(tables.scanner)
         bridge = poses = None
         if tables.replay is None:
-            bridge = bridge_of(tables, 1.0 / scanner.mirror_hz)
+            bridge = bridge_of(tables, step_of(scanner))
         elif tables.avoidance is not None:
             raise SceneError("keys do not fit together", key="avoidance", allowed="avoidance without replay")
         else:
@@ -120,6 +122,12 @@ def _poses(file: Path, max_gap: float, scan: float) -> PoseFile:
         problem = f"the log lasts {poses.duration:g} s from its first row to its last"
         raise SceneError(problem, file=file, value=poses.duration, allowed=allowed)
     return poses
+
+
+def step_of(scanner: Scanner) -> float:
+    """Return the step [s] of a loop: a turn of the mirror, or, where that takes longer than _STEP, a part of it."""
+    turn = 1.0 / scanner.mirror_hz
+    return turn / max(1, math.ceil(turn / _STEP - 1e-9))
 
 
 def _scanner(t: ScannerTable) -> Scanner:

@@ -236,6 +236,14 @@ def test_wrong_options_are_said_with_code_2(scene, capsys, options, word):
     assert word in capsys.readouterr().err
 
 
+def test_a_fan_that_no_telegram_holds_is_said_before_ports_are_named(tmp_path, capsys):
+    wide = ["--set", "scanner.fan_deg=360", "--set", "scanner.step_deg=0.25", "--duration", "0.1"]
+    assert invoke(["hil", *wide, "--ports", "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr()
+    assert "scanner.fan_deg: a scan of 1,441 beams" in said.err and not said.out
+    assert not list(tmp_path.rglob("track.csv"))
+
+
 def test_a_full_disk_ends_the_track_and_not_the_run(scene, tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "track.csv").symlink_to("/dev/full")

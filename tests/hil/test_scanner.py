@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from raychan.hil.lms import NAME, ON_REQUEST, STATUS_BYTE, STREAM, VARIANTS, Scanner
-from raychan.hil.scans import DISTANCE_BITS, ScanValues, decode_scan, encode_scan
+from raychan.hil.lms import NAME, ON_REQUEST, STATUS_BYTE, STREAM, VARIANTS, Scanner, check_sendable
+from raychan.hil.scans import DISTANCE_BITS, MOST_BEAMS, ScanValues, decode_scan, encode_scan
 from raychan.hil.telegrams import ACK, HOST_TO_SCANNER, NAK, Telegram, TelegramError, TelegramReader, unframe
+from raychan.sensors.laser import Scanner as Laser
+from raychan.world.errors import SceneError
 
 INSTALL = "20 00 53 49 43 4B 5F 4C 4D 53"
 
@@ -155,3 +157,26 @@ def test_a_distance_has_the_bits_of_its_measuring_mode(mode, bits):
 def test_a_mode_with_a_byte_too_many_is_refused_and_changes_nothing(scanner, payload):
     assert ask(scanner, payload) is None
     assert (scanner.baud, scanner.mode) == (9600, ON_REQUEST)
+
+
+@pytest.mark.parametrize(("mirror_hz", "turns"), [(75.0, 4500), (50.0, 3000), (10_000.0, 65_535)])
+def test_the_status_tells_the_turns_of_the_mirror(mirror_hz, turns):
+    status = ask(Scanner(values, mirror_hz=mirror_hz), "31")
+    assert int.from_bytes(status[67:69], "little") == turns
+
+
+def test_what_telegrams_cannot_tell_of_a_scanner_is_said():
+    assert not check_sendable(Laser(180.0, 0.25))
+    assert "46 for 45.5" in check_sendable(Laser(45.5, 0.5))[0]
+    assert "65,535" in check_sendable(Laser(180.0, 1.0, 2000.0))[0]
+
+
+def test_the_widest_fan_fits_into_telegrams_whole_and_in_part_and_a_wider_one_is_refused():
+    widest = Scanner(lambda: values(MOST_BEAMS))
+    assert len(decode_scan(unframe(widest.scan()).payload).range_m) == MOST_BEAMS
+    assert ask(widest, "20 27 01 00 " + MOST_BEAMS.to_bytes(2, "little").hex()) is not None
+    assert len(decode_scan(unframe(widest.scan()).payload).range_m) == MOST_BEAMS
+    fan = (MOST_BEAMS - 1) * 0.25
+    assert not [x for x in check_sendable(Laser(fan, 0.25)) if "beams" in x]
+    with pytest.raises(SceneError, match=r"scanner\.fan_deg: a scan of 1,021 beams"):
+        check_sendable(Laser(fan + 0.25, 0.25))

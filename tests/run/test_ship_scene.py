@@ -5,7 +5,7 @@ import pytest
 
 import raychan as rc
 from raychan.dynamics.ship import KNOT, PHI, PSI, U
-from raychan.run.ship_bridge import Steered
+from raychan.run.ship_bridge import Steered, bridge_of
 from raychan.run.ship_loop import ShipLoop
 from raychan.run.ship_scene import read_ship_scene, ship_scene
 from raychan.run.ship_schema import ShipFile
@@ -93,8 +93,8 @@ def test_the_printed_ship_sails_with_its_printed_gain_and_its_heading_never_chan
 
 def test_lqg_knows_its_own_error_in_the_loop():
     # The estimate's error about the disturbed ship has the covariance that the filter states.
-    tables = {"ship": {"model": "yacht"}, "steering": {"controller": "lqg"}, "scanner": {"mirror_hz": 5.0}}
-    bridge = ship_scene(tables).bridge
+    tables = {"ship": {"model": "yacht"}, "steering": {"controller": "lqg"}}
+    bridge = bridge_of(ship_scene(tables).tables, 0.2)
     ship = Steered(bridge, tuple(np.random.default_rng(5).spawn(2)))
     off = []
     for _ in range(20000):
