@@ -157,7 +157,7 @@ class _Tubes:
             strong |= bound > _STRONG * rule.floor
         parted = np.zeros(len(geometry.plane), bool)
         parted[facet[strong]] = ~geometry.curved[facet[strong]]
-        facet, bary = _cut(geometry, leg, outs, facet[counts], nothing)
+        facet, bary = _cut(geometry, leg, outs, facet[counts], nothing, apart)
         tubes, view = _seen_parts(geometry, leg, launch_tubes(geometry, leg, facet, bary), parted, rule)
         write_leg(geometry, tubes, leg, view.corners, view.passed, rule)
         straight = None
@@ -249,9 +249,11 @@ def _seen_parts(geometry: Geometry, leg: Leg, tubes: Tubes, parted: Bools, rule:
     return Tubes.join(parts), View.join(views)
 
 
-def _cut(geometry: Geometry, leg: Leg, outs: list[Leg], facet: Ints, nothing: Contributions) -> tuple[Ints, Floats]:
-    """Return facets (n,) and corners (n, 3, 3) of tubes over facets, cut until their phase is quadratic; of parts of
-    large facets those that may count over one of `outs`."""
+def _cut(
+    geometry: Geometry, leg: Leg, outs: list[Leg], facet: Ints, nothing: Contributions, apart: RateClasses
+) -> tuple[Ints, Floats]:
+    """Return facets (n,) and corners (n, 3, 3) of tubes over facets, cut until their phase is quadratic and they have
+    one rate; of parts of large facets those that may count over one of `outs`."""
     f, rule, out = geometry.facets, nothing.rule, outs[0]
     shape = f.vertices, f.normals, geometry.edge_curvature
     limits = rule.wavenumber, rule.phase, rule.turn, rule.max_edge, MOST_BEND, rule.widest, True, 0.0, rule.near
@@ -259,6 +261,7 @@ def _cut(geometry: Geometry, leg: Leg, outs: list[Leg], facet: Ints, nothing: Co
     bary = np.broadcast_to(np.eye(3), (len(facet), 3, 3)).copy()
     for level in range(_CUTS + 1):
         edge = edge_to_cut(facet, bary, *shape, leg.image, leg.far, out.image, out.far, *limits)
+        edge = np.where(edge < 0, apart.edge_to_cut(facet, bary), edge)
         more = (edge >= 0) & (level < _CUTS)
         done.append((facet[~more], bary[~more]))
         if not more.any():
