@@ -30,3 +30,18 @@ def test_a_turning_rod_has_the_rate_of_the_foot_point_on_its_axis():
     strongest = np.argmax(seen.detections.power)
     cell = seen.scene.radar.channel_waveform.rate_resolution
     assert seen.detections.rate[strongest] == pytest.approx(turn * foot, abs=0.1 * cell)
+
+
+@pytest.mark.parametrize(("carrier", "radius", "height"), [(24e9, 0.3, 2.3), (77e9, 0.06, 2.3), (77e9, 0.06, 3.0)])
+def test_a_rod_hidden_up_to_its_foot_point_scatters_half_its_amplitude(carrier, radius, height):
+    """The Fresnel integral over the half that is seen is half of that over all."""
+    level = 0.8
+    plate = {"width": 2.0, "height": 2.0}
+    screen = rc.Body(
+        "screen", shape="plate", params=plate, material="metal", position=(3.0, 0.0, level - 1.0), yaw_deg=180.0
+    )
+    powers = []
+    for before in ([], [screen]):
+        found = preview_of(rod(radius, height), *before, carrier=carrier, height=level, chirps=16).detections
+        powers.append(found.power[np.abs(found.range - (6.0 - radius)) < 0.5].max())
+    assert 10.0 * np.log10(powers[1] / powers[0]) == pytest.approx(20.0 * np.log10(0.5), abs=1.2)
