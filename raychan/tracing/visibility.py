@@ -60,14 +60,16 @@ def centre_visibility(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool, r
 
 
 def corner_visibility(
-    geometry: Geometry, leg: Leg, tubes: Tubes, corners: Bools, rule: Refinement
+    geometry: Geometry, leg: Leg, tubes: Tubes, corners: Bools, level: int, rule: Refinement
 ) -> tuple[View, Bools]:
     """Return how the centres of tubes on their first surface are seen over a leg, and of which tubes (n,), of those
-    whose `corners` (n,) are tested too, a part only is seen."""
-    rays, none = ShadowRays.room(len(tubes), len(leg.mirrors), rule.layers), np.zeros(len(tubes), bool)
-    tested = Tested(corners & (not geometry.convex_alone), True, none, none, NONE_AWAY)
+    whose `corners` (n,) are tested too, a part only is seen, or may be through a gap; level how often they were
+    subdivided."""
+    rays = ShadowRays.room(len(tubes), len(leg.mirrors), rule.layers)
+    corners = corners & (not geometry.convex_alone)
+    tested = Tested(corners, True, corners, _gaps(geometry, tubes, level), NONE_AWAY)
     cast_shadow_rays(geometry, leg.chain, rays, tested, _drawn(geometry, tubes, True))
-    return View.of(rays), rays.mixed
+    return View.of(rays), rays.mixed | (rays.search & ~rays.some)
 
 
 def tube_visibility(
@@ -93,8 +95,8 @@ def tube_visibility(
     rays = ShadowRays.room(n, len(leg.mirrors), rule.layers)
     if centre is not None:
         rays = rays._replace(seen=centre.seen, blocker=centre.blocker, corners=centre.corners, passed=centre.passed)
-    gaps = np.where(geometry.curved[tubes.facet], level < 1, level < _GAP_LEVELS)
-    tested, drawn = Tested(corners, centre is None, matters, gaps, away), _drawn(geometry, tubes, first)
+    tested = Tested(corners, centre is None, matters, _gaps(geometry, tubes, level), away)
+    drawn = _drawn(geometry, tubes, first)
     if not geometry.hides_nothing and away.any():
         cast_shadow_rays(geometry, leg.chain, rays, tested, drawn, cast=False)
         _leave_bodies(geometry, leg, rays, tested)
@@ -108,6 +110,11 @@ def tube_visibility(
     if leg.mirrors:
         edges_of_light(tubes.points, corners, rays, leg.edges_of_mirrors, side)
     return Visibility(View.of(rays) if centre is None else centre, rays.some, rays.mixed, side)
+
+
+def _gaps(geometry: Geometry, tubes: Tubes, level: int) -> Bools:
+    """Return of which hidden tubes (n,), subdivided `level` times, a part is looked for that is seen through a gap."""
+    return np.where(geometry.curved[tubes.facet], level < 1, level < _GAP_LEVELS)
 
 
 def _drawn(geometry: Geometry, tubes: Tubes, first: bool) -> TubesToSee:

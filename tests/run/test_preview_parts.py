@@ -1,0 +1,47 @@
+"""Previews of what is seen in part, and of what turns: cylinders against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import raychan as rc
+
+
+def preview_of(*bodies: rc.Body, carrier: float, height: float, chirps: int) -> rc.Result:
+    wave = rc.Waveform(
+        carrier=carrier, bandwidth=300e6, chirp_duration=30e-6, repetition=80e-6, n_chirps=chirps, n_samples=64
+    )
+    radar = rc.Radar(wave, position=(0.0, 0.0, height), power=1.0)
+    return rc.simulate(rc.Scene(bodies=bodies, radar=radar, model={"mode": "preview", "max_bounces": 1}), seed=0)
+
+
+def rod(radius: float, height: float, **more: object) -> rc.Body:
+    sizes = {"radius": radius, "height": height}
+    return rc.Body("rod", shape="cylinder", params=sizes, material="metal", position=(6.0, 0.0, 0.0), **more)
+
+
+def test_a_turning_rod_has_the_rate_of_the_foot_point_on_its_axis():
+    """At a turn rate w the foot point, s from the pivot along the axis, comes or goes at w s."""
+    turn, height, chirps = np.radians(150.0), 0.55, 128
+    seen = preview_of(rod(0.06, 1.6, spin_dps=(0.0, 150.0, 0.0)), carrier=77e9, height=height, chirps=chirps)
+    lean = turn * 0.5 * chirps * 80e-6  # in the middle of the frame
+    foot = height * np.cos(lean) - 6.0 * np.sin(lean)
+    strongest = np.argmax(seen.detections.power)
+    cell = seen.scene.radar.channel_waveform.rate_resolution
+    assert seen.detections.rate[strongest] == pytest.approx(turn * foot, abs=0.1 * cell)
+
+
+@pytest.mark.parametrize(("carrier", "radius", "height"), [(24e9, 0.3, 2.3), (77e9, 0.06, 2.3), (77e9, 0.06, 3.0)])
+def test_a_rod_hidden_up_to_its_foot_point_scatters_half_its_amplitude(carrier, radius, height):
+    """The Fresnel integral over the half that is seen is half of that over all."""
+    level = 0.8
+    plate = {"width": 2.0, "height": 2.0}
+    screen = rc.Body(
+        "screen", shape="plate", params=plate, material="metal", position=(3.0, 0.0, level - 1.0), yaw_deg=180.0
+    )
+    powers = []
+    for before in ([], [screen]):
+        found = preview_of(rod(radius, height), *before, carrier=carrier, height=level, chirps=16).detections
+        powers.append(found.power[np.abs(found.range - (6.0 - radius)) < 0.5].max())
+    assert 10.0 * np.log10(powers[1] / powers[0]) == pytest.approx(20.0 * np.log10(0.5), abs=1.2)
