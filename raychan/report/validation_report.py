@@ -197,11 +197,14 @@ def _ablations(made: Sequence[Ablation], figures: dict[str, str]) -> list[str]:
 def _ghosts(done: Validation, ghosts: Sequence[Ghost]) -> list[str]:
     rows = [
         (done.study.runs[g.run].title, f"{g.range:.2f}", f"{g.snr:.1f}", g.text, f"{g.range - g.path:+.3f}",
-         f"{g.cell:.4f}", "yes" if g.explained else "no")
+         f"{g.cell:.4f}", "yes" if g.explained else "no" if g.converged else "not converged")
         for g in ghosts
     ]  # fmt: skip
     heads = ("run", "range m", "SNR dB", "leading path", "detected less path m", "range bin m", "explained")
-    intro = "All multipath detections of all runs, and the path whose length explains the range of each."
+    intro = (
+        "All multipath detections of all runs, and the path whose length explains the range of each. Of one that is "
+        "not converged the level is not known, and so not whether it is there."
+    )
     return ["## Every ghost and its path", "", intro, "", *table(heads, rows)]
 
 

@@ -81,6 +81,8 @@ class Ghost:
     """Range bin c/2B of the run's waveform [m]."""
     snr: float
     text: str
+    converged: bool
+    """Whether an error of its level is known: else it may not be there."""
 
     @property
     def explained(self) -> bool:
@@ -96,7 +98,8 @@ def ghosts(bench: Bench) -> list[Ghost]:
         for why, snr in zip(result.provenance, result.detections.snr, strict=True):
             if why.label == MULTIPATH:
                 first = why.contributions[0]
-                made.append(Ghost(run, why.range, first.range, cell, float(snr), first.text()))
+                known = bool(np.isfinite(why.error_db))
+                made.append(Ghost(run, why.range, first.range, cell, float(snr), first.text(), known))
     return made
 
 
