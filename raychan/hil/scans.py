@@ -25,7 +25,7 @@ ALL_VALUES, SUBRANGE = 0xB0, 0xB7
 """Commands of telegrams that hold scans: all beams of a scan or of a turn of the mirror; some neighbouring beams."""
 _COUNT, _TURN, _PARTIAL = 0x3FF, 11, 0x2000
 MOST_BEAMS = (LONGEST - 8) // 2
-"""Beams of a scan that the longest telegram holds, also as a part of them."""
+"""Beams of a scan that the longest telegram holds, also beside the 8 bytes that a part of a scan (B7) takes."""
 
 
 @dataclass(frozen=True)

@@ -36,10 +36,12 @@ def _mean_cosine(normal, k, back):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, forceinline=True)
-def _healed_cosine(normal, k, back):  # type: ignore[no-untyped-def]
-    """Return the harmonic mean of the cosines of incidence from both ends, waves travelling along k and back (3,): it
-    is that of `_mean_cosine` where a smooth surface mirrors, and ends at the terminators of both ends, where light ends
-    softly; the mean of a receiver elsewhere would end with what it has there."""
+def _harmonic_cosine(normal, k, back):  # type: ignore[no-untyped-def]
+    """Return the harmonic mean of the cosines of incidence from both ends, waves travelling along k and back (3,).
+
+    Where a smooth surface mirrors it equals `_mean_cosine`. At the terminator of either end it falls to zero, as light
+    does there; the plain mean would end abruptly, and its end would scatter.
+    """
     one = two = 0.0
     for c in range(3):
         one -= normal[c] * k[c]
@@ -83,9 +85,10 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
     or (n, 0, 3) once they left their first facet and all are flat; middle (n, 3, 3) [m] of the
     edges and length there half_way (n, 3) [m]; facets: normal (f, 3),
     vertices and edge curvature (f, 3, 3), curved (f,); image of the end of the leg out, or the direction to it when
-    far; out: points (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): the mean
-    obliquity times spreading at corners over that at the centre, for areas of the flat footprints, zero beyond the
-    terminator, scaled to the mean over the footprint; area (n,) and length (n,) [m] of the leg out.
+    far; out: points (n, 6, 3), lengths (n, 6) through them and through the centre (n,), taper (n, 3): obliquity
+    times spreading at corners over the mean one at the centre, which the coupling has, for areas of the flat
+    footprints, zero beyond the terminator, scaled to the mean over the footprint; area (n,) and length (n,) [m] of the
+    leg out.
     """
     points, k, normals, length, facet, bary = tubes
     facing, vertices, edge_curvature, curved = facets
@@ -121,7 +124,7 @@ def footprints(tubes, middle, half_way, facets, image, far, out):  # type: ignor
             if bent and curved[f]:
                 _place_of(bary[i], j, at)
                 element_of(vertices[f], edge_curvature[f], at, element)
-                strength = _healed_cosine(element, k[i, j], back_k[j]) * math.copysign(0.5 * share / least, side)
+                strength = _harmonic_cosine(element, k[i, j], back_k[j]) * math.copysign(0.5 * share / least, side)
             else:
                 # Where the curved surface turns away from the flat footprint it has more area.
                 turned = 0.0
