@@ -147,9 +147,8 @@ class ExactTrajectories(Trajectories):
 class PropagationPaths(Record):
     """What all paths have, simulated or specular; a row a path, d the most interactions.
 
-    `length` and `length_rate` are of the whole path from transmitter to receiver; half of them, `range` and
-    `range_rate`, is what a monostatic radar reads. Paths over corners of a footprint share a row of `trajectories`,
-    whose vertices are over its centre.
+    `length` and `length_rate` are of the whole path; half of them, `range` and `range_rate`, is what a monostatic radar
+    reads. Paths over corners of a footprint share a row of `trajectories`, whose vertices are over its centre.
     """
 
     length: Floats = column("n", unit="m", doc="from transmitter to receiver, the whole path")
