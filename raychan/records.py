@@ -147,8 +147,8 @@ class ExactTrajectories(Trajectories):
 class PropagationPaths(Record):
     """What all paths have, simulated or specular; a row a path, d the most interactions.
 
-    `length` and `length_rate` are of the whole path from transmitter to receiver; half of them, `range` and
-    `range_rate`, is what a monostatic radar reads. Paths over corners of a footprint share a row of `trajectories`.
+    `length` and `length_rate` are of the whole path; half of them, `range` and `range_rate`, is what a monostatic radar
+    reads. Paths over corners of a footprint share a row of `trajectories`: its vertices are over the centre instead.
     """
 
     length: Floats = column("n", unit="m", doc="from transmitter to receiver, the whole path")
@@ -207,7 +207,7 @@ class PropagationPaths(Record):
 
     @property
     def vertices(self) -> Vectors:
-        """Vertices (n, d + 2, 3) [m] from transmitter to receiver; unused slots repeat the receiver."""
+        """Vertices (n, d + 2, 3) [m], tx to rx, over the centre of footprints, not corners; unused slots repeat rx."""
         inner = self.trajectories.vertices[self.trajectory]
         first, last = (np.broadcast_to(x.astype(inner.dtype), (len(inner), 1, 3)) for x in (self.tx, self.rx))
         return np.concatenate([first, inner, last], axis=1)
