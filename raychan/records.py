@@ -207,7 +207,7 @@ class PropagationPaths(Record):
 
     @property
     def vertices(self) -> Vectors:
-        """Vertices (n, d + 2, 3) [m] from transmitter to receiver; unused slots repeat the receiver."""
+        """Vertices (n, d + 2, 3) [m], tx to rx, over the centre of footprints, not corners; unused slots repeat rx."""
         inner = self.trajectories.vertices[self.trajectory]
         first, last = (np.broadcast_to(x.astype(inner.dtype), (len(inner), 1, 3)) for x in (self.tx, self.rx))
         return np.concatenate([first, inner, last], axis=1)

@@ -14,7 +14,7 @@ from raychan.processing.cfar import Grid
 from raychan.processing.fold_beside import judged_beside
 from raychan.processing.found import Echoes, Peaks, Row
 from raychan.processing.line_lobes import LineLobes
-from raychan.processing.main_lobe import PeakShape
+from raychan.processing.peak_shape import PeakShape
 from raychan.processing.peaks import MARGIN, SideLobes, together
 from raychan.processing.slots import LONE, Slots
 from raychan.processing.staggered import CLEAR, ResolvedMap, noise_of

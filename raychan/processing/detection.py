@@ -16,7 +16,7 @@ from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, 
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
 from raychan.processing.found import Echoes, Found, Peaks
 from raychan.processing.line_lobes import LineLobes
-from raychan.processing.main_lobe import PeakShape
+from raychan.processing.peak_shape import PeakShape
 from raychan.processing.peaks import SideLobes
 from raychan.processing.staggered import ResolvedMap
 from raychan.radar.aperture import Aperture
@@ -131,7 +131,7 @@ def detect(
     over = seen.power[tuple(cells.T)] > bar.factor * local
     cells, local = cells[over], local[over]
     shape = PeakShape.of(grid, windows, waveform, chirps)
-    shift, power = shape.refine(seen.power, cells)
+    shift, power = _refined(map, seen, shape, cells, aperture)
     noise = bar.noise(local)
     # The SNR of an echo with a direction is known when that is found; here it may be the dip lower.
     strong = np.flatnonzero(db(power / np.maximum(noise, _TINY)) >= min_snr_db + (db(seen.dip) if aperture else 0.0))
@@ -178,7 +178,7 @@ def least_power(
     grid = Grid.of(map)
     bar = _Bar.of(seen, pfa, method, training(grid, guard, train, windows))
     local = bar.local(cells)
-    _, peak = PeakShape.of(grid, windows, waveform, chirps).refine(seen.power, cells)
+    _, peak = _refined(map, seen, PeakShape.of(grid, windows, waveform, chirps), cells, aperture)
     above = peak / np.maximum(bar.seen.power[tuple(cells.T)], _TINY)
     loud = float(undb(min_snr_db)) * bar.noise(local) * (bar.seen.dip if aperture else 1.0) / above
     return np.asarray(np.maximum(bar.factor * local, loud))
@@ -192,6 +192,17 @@ def _aperture(map: RangeDoppler, waveform: Waveform | None, elements: Floats | N
     if len(aperture.elements) != len(map.spectrum):
         raise ValueError(f"elements: {len(aperture.elements)} given for a map of {len(map.spectrum)} receivers")
     return aperture if any(aperture.scans) else None
+
+
+def _refined(
+    map: RangeDoppler, seen: DetectorMap, shape: PeakShape, cells: Ints, aperture: Aperture | None
+) -> tuple[Floats, Floats]:
+    """Return the offsets (c, 2) in cells and the power (c,) of the peaks at map cells (c, 2); with an aperture those of
+    lone echoes."""
+    lone = shape.refine(seen.power, cells)
+    if aperture:
+        return lone
+    return shape.among(lambda v, r: map.spectrum[:, v, r], len(map.spectrum), cells, lone, seen.power.shape)
 
 
 def _rate(map: RangeDoppler, grid: Grid, place: Floats, fold: Ints) -> Floats:
