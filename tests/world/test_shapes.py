@@ -178,6 +178,7 @@ def test_corners_open_to_plus_x():
         ("trihedral", {"square": "yes"}, "square"),
         ("lamp_post", {"height": 0.5, "radius": 2.0}, "height"),
         ("lamp_post", {"height": 0.36, "arm": 0.0}, "height"),
+        ("lamp_post", {"radius": 2.08}, "radius"),
         ("truck", {"front_axle": 20.0}, "front_axle"),
         ("truck", {"front_axle": 2.7}, "front_axle"),
     ],
@@ -190,7 +191,13 @@ def test_bad_parameters_are_named(name, params, key):
 
 @pytest.mark.parametrize(
     ("name", "params"),
-    [("lamp_post", {"height": 0.52}), ("truck", {"front_axle": 2.73}), ("truck", {"front_axle": 7.51})],
+    [
+        ("lamp_post", {"height": 0.52}),
+        ("lamp_post", {"radius": 2.07}),
+        ("bike_rack", {"max_sag": 0.1}),
+        ("truck", {"front_axle": 2.73}),
+        ("truck", {"front_axle": 7.51}),
+    ],
 )
 def test_shapes_at_the_ends_of_what_is_allowed_stand_on_the_ground(name, params):
     mesh = build(name, params)

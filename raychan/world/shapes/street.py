@@ -6,7 +6,7 @@ import numpy as np
 
 from raychan.world.errors import SceneError
 from raychan.world.mesh import Floats, Mesh
-from raychan.world.shapes.curve import Curve
+from raychan.world.shapes.curve import Curve, steps
 from raychan.world.shapes.piece import SAG, Assembly, Piece, grid, join, polygon
 from raychan.world.shapes.solid import block, capsule, pillar, rounded_block
 
@@ -18,7 +18,8 @@ def lamp_post(
 
     Origin: foot of the pole on the ground, on its axis. Allowed: `height` above 0.47 m + 0.6 `radius`, without an arm
     above 0.37 m. Parts: pole, base, arm, luminaire.
-    Raises: SceneError where the luminaire, or the arm, does not begin above the base.
+    Raises: SceneError where the luminaire, or the arm, does not begin above the base, or the arm's foot, 0.6 `radius`,
+    holds all of the arm.
     """
     made = Assembly()
     top, foot, thick, below = height - 0.12, 0.25, 0.6 * radius, 0.1
@@ -30,8 +31,12 @@ def lamp_post(
     made.add("pole", material, pillar(radius, top, 0.01, max_sag))
     made.add("base", material, pillar(1.9 * radius, foot, 0.01, max_sag))
     if arm > 0.0:
-        start, stop = np.array([0.0, 0.0, top - below]), np.array([arm, 0.0, height - 0.05])
-        made.add("arm", material, capsule(start, stop, thick, 0.035, max_sag))
+        start, stop, thin = np.array([0.0, 0.0, top - below]), np.array([arm, 0.0, height - 0.05]), 0.035
+        widest = (float(np.linalg.norm(stop - start)) + thin) / 0.6
+        if radius >= widest:
+            allowed = f"less than {widest:.4g} m with an arm of {arm:g} m, which its own foot would hold"
+            raise SceneError(f"{radius:g} is not possible", key="radius", value=radius, allowed=allowed)
+        made.add("arm", material, capsule(start, stop, thick, thin, max_sag))
     head = rounded_block(0.55, 0.24, 0.12, 0.03, max_sag)
     made.add("luminaire", material, head.moved(offset=(arm, 0.0, height - 0.12)))
     return made.mesh()
@@ -150,7 +155,7 @@ def _hoop(span: float, top: float, bend: float, r: float, sag: float) -> Piece:
     left = np.stack([half - bend + bend * np.cos(turns), top - bend + bend * np.sin(turns)], axis=1)
     heading = np.concatenate([[0.0], turns, np.pi - turns[::-1], [np.pi]])
     line = np.concatenate([[[half, 0.0]], left, left[::-1] * [-1.0, 1.0], [[-half, 0.0]]])
-    around = np.linspace(0.0, 2.0 * np.pi, 4 * max(3, int(np.ceil(np.pi / (4.0 * np.arccos(1.0 - sag / r))))) + 1)
+    around = np.linspace(0.0, 2.0 * np.pi, 4 * steps(r, 0.5 * np.pi, sag) + 1)
     around[-1] = 0.0
     n = np.empty((len(line), len(around), 3))
     n[..., 0] = np.sin(around)
