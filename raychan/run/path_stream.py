@@ -60,8 +60,10 @@ class Launched:
     def notes(self) -> list[str]:
         """Return what to tell of a launch, such as that it had more paths than a result can hold."""
         kept = len(self.paths.delay)
+        if self.whole:
+            return list(self.said)
         many = f"{self.count:,} paths: all are in the samples, the {kept:,} strongest are kept to explain them"
-        return list(self.said) if self.whole else [*self.said, many]
+        return [*self.said, f"{many}, whose sums and shares lack what the others bring"]
 
     def moved(self, shift: NDArray[np.float64]) -> Launched:
         """Return the same for a scene that has moved on as one, by a shift (3,) [m]."""
