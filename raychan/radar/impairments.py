@@ -92,6 +92,12 @@ class ChirpError:
         t, error = np.array(self.table).T
         return np.asarray(np.interp(np.asarray(time, float), t, error))
 
+    def lowest(self, carrier: float, slope: float, duration: float) -> float:
+        """Return the lowest frequency [Hz] of a ramp that errs so. Args: its carrier [Hz], slope [Hz/s], duration [s]
+        of sampling."""
+        times = np.clip([0.0, duration, *(t for t, _ in self.table)], 0.0, duration)
+        return float((carrier + slope * times + self.frequency(times)).min())
+
     def phase(self, time: ArrayLike) -> Floats:
         """Return the phase error [rad] at times [s]: 2 pi times the integral of the frequency error from time 0."""
         return 2.0 * np.pi * (self._integral(np.asarray(time, float)) - self._integral(np.zeros(())))

@@ -113,6 +113,11 @@ def test_bad_overrides_are_named(change, key, says):
         (BARE_RADAR.replace("60.5", "-60.5"), "radar.waveform.chirp_us", "between 0.001"),
         (BARE_RADAR.replace("60.5", '"60.5 us"'), "radar.waveform.chirp_us", "number"),
         (BARE_RADAR + "samples = 0\n", "radar.waveform.samples", "between 1 and"),
+        (
+            BARE_RADAR + "\n[radar.impairments]\nchirp_error_us_khz = [[0, 0], [10, -1e8]]\n",
+            "radar.impairments.chirp_error_us_khz",
+            "above 0 GHz",
+        ),
         (BARE_RADAR + "repetition_us = 30.0\n", "radar.waveform", "repetition_us"),
         ("[radar]\npower_dbm = 3.0\n", "radar.waveform", "missing"),
         ("[model]\nmax_bounces = 0\n", "model.max_bounces", "1"),
