@@ -15,7 +15,7 @@ from raychan.world.scene import Scene, SceneError
         ("own/patsch.toml", "", "did you mean 'own/patch.toml'"),
         ("patch", "", "no antenna file"),
         ("own", "", "no antenna file"),
-        ("", "", "radar.antenna: '' is not possible; allowed: a table, or the name of a TOML file"),
+        ("", "", "radar.antenna: '' is not possible; allowed: the name of a file or a table"),
         ("/no/such/place/horn.toml", "", "no antenna file /no/such/place/horn.toml"),
         ("own/patch.toml", "kind = ", "patch.toml:1: not valid TOML"),
         ("own/patch.toml", 'kind = "cosine"\nhpbw_h = 3.0', "patch.toml: hpbw_h: unknown key 'hpbw_h'"),
