@@ -52,7 +52,8 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
     if found["type"] == "missing":
         return SceneError("key is missing", file=file, key=key, allowed="a value")
     if found["type"] == "value_error" and not isinstance(value, dict):
-        return SceneError(_allowed(found), file=file, key=key, value=value)
+        problem, _, allowed = _allowed(found).partition("; allowed: ")
+        return SceneError(problem, file=file, key=key, value=value, allowed=allowed)
     if found["type"] == "value_error":
         return SceneError("keys do not fit together", file=file, key=key, value=value, allowed=_allowed(found))
     # A key that takes several types has an error for each.

@@ -157,7 +157,7 @@ def test_a_frame_too_long_for_its_sample_rate_is_refused_before_it_fills_the_mem
     [
         ([[1e4, -90.0], [1e5, -80.0]], "rises"),
         ([[0.0, -90.0]], "positive"),
-        ([[1e5, -90.0], [1e4, -95.0]], "must rise"),
+        ([[1e5, -90.0], [1e4, -95.0]], "does not rise"),
         ([[1e5, 3.0]], "above the carrier"),
         ([], "pair"),
     ],

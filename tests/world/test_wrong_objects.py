@@ -51,7 +51,7 @@ def scene(**body):
             for x in ("30", True)
         ),
         (lambda: scene(rcs_dbsm=1.0, swerling=True), r"^bodies\.b\.swerling: True is not possible; allowed: 0, 1, 2"),
-        (lambda: scene(material=""), r"^bodies\.b\.material: '' is not possible; allowed: a name or a Material"),
+        (lambda: scene(material=""), r"^bodies\.b\.material: unknown material ''; allowed: one of asphalt"),
     ],
 )
 def test_a_value_of_another_type_is_told_by_its_key(make, said):
