@@ -61,6 +61,8 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
     allowed = " or ".join(dict.fromkeys(map(_allowed, alike)))
     if len(alike) == 1 and found["type"] == "literal_error":
         allowed += meant(value, re.findall("'(.*?)'", found["ctx"]["expected"]))
+    if len(alike) == 1 and found["type"] in ("model_type", "model_attributes_type"):
+        allowed += f" with keys among {', '.join(sorted(_table_at(kind, loc).model_fields))}"
     return SceneError(f"{shown_in_table(value)} is not possible", file=file, key=key, value=value, allowed=allowed)
 
 

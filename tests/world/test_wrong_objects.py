@@ -27,6 +27,14 @@ def scene(**body):
             (lambda key=key: rc.Scene(**{key: 3}), f"^{key}: 3 is not possible; allowed: a table")
             for key in ("processing", "model", "atmosphere")
         ),
+        (
+            lambda: rc.Scene(radar={"waveform": rc.Waveform(77e9, 1e9, 25e-6)}),
+            r"^radar.waveform: Waveform\(.* is not possible; allowed: a table with keys among bandwidth_mhz, carrier",
+        ),
+        (
+            lambda: rc.Scene(radar={"waveform": {"bandwidth_mhz": 1, "chirp_us": 9}, "impairments": rc.Impairments()}),
+            r"^radar.impairments: .* is not possible; allowed: a table with keys among adc_bits, adc_full",
+        ),
         (lambda: rc.Scene(model=0), "^model: 0 is not possible; allowed: a table"),
         (lambda: rc.Scene(radar=3), "^radar: 3 is not possible; allowed: a Radar, its table, or None"),
         (lambda: rc.Scene(atmosphere={"foo": 1}), "^atmosphere.foo: unknown key 'foo'"),
