@@ -129,31 +129,37 @@ def rcs(
         "crease_deg": crease,
     }
     parts: list[Rcs] = []
-
-    def keep() -> str:
-        return _kept(out, grid[0].ravel(), grid[1].ravel(), parts)
-
-    with show.keeping(keep), show.progress(kernels="rcs") as tell:
-        _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell, parts)
-    found = _joined(parts)
+    files: list[Path] = []
     place = "far field" if np.isinf(far) else f"radar at {far:g} m"
     title = f"{name}, {frequency_ghz:g} GHz, {polarization.upper()}, {place}"
-    table = rows(grid[0].ravel(), grid[1].ravel(), found)
-    files = _written(out, plot, (az, el), table, found, title, polar)
-    screen = show.console()
-    screen.print(table_of(title, table))
-    if shape is None and source:
-        from raychan.world.mesh_io import oddities
 
-        show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
-    show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
-    show.warn(further_bounces(found, max_bounces, tolerance))
-    show.warn(edge_fields(found, tolerance))
-    show.warn(near_ends(found, 1e9 * frequency_ghz))
-    show.warn(beyond_budget(found, max_rays))
-    show.warn(uncertainties(mesh, found, tolerance, crease is not None))
-    if files:
-        screen.print("written: " + ", ".join(str(f) for f in files), soft_wrap=True)
+    def keep() -> str:
+        return _names(files) or _kept(out, grid[0].ravel(), grid[1].ravel(), parts)
+
+    with show.keeping(keep):
+        with show.progress(kernels="rcs") as tell:
+            _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell, parts)
+        found = _joined(parts)
+        table = rows(grid[0].ravel(), grid[1].ravel(), found)
+        files += _written(out, plot, (az, el), table, found, title, polar)
+        show.console().print(table_of(title, table))
+        if shape is None and source:
+            from raychan.world.mesh_io import oddities
+
+            show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
+        show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
+        show.warn(further_bounces(found, max_bounces, tolerance))
+        show.warn(edge_fields(found, tolerance))
+        show.warn(near_ends(found, 1e9 * frequency_ghz))
+        show.warn(beyond_budget(found, max_rays))
+        show.warn(uncertainties(mesh, found, tolerance, crease is not None))
+        if files:
+            show.console().print(_names(files), soft_wrap=True)
+
+
+def _names(files: list[Path]) -> str:
+    """Return a line with the files that are written, '' where none is."""
+    return "written: " + ", ".join(map(str, files)) if files else ""
 
 
 def _written(

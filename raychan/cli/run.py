@@ -163,7 +163,14 @@ def _pictures(  # type: ignore[no-untyped-def]
     from raychan.parallel import run_pair
     from raychan.report.direction_figures import direction_pictures
     from raychan.report.figures import profile_picture, rdmap_picture
+    from raychan.run.output_files import PictureError
     from raychan.view.scene import drawing_of, scene_picture
+
+    def drawn() -> list[str] | PictureError:
+        try:
+            return scene_picture(drawing_of(result.scene, result), stage / "scene.png")
+        except PictureError as error:
+            return error  # what is written beside it is finished first
 
     def plots() -> None:
         first()
@@ -174,6 +181,8 @@ def _pictures(  # type: ignore[no-untyped-def]
 
     tell("pictures", 0.0)
     # The scene is drawn by a process of its own.
-    warnings, _ = run_pair(lambda: scene_picture(drawing_of(result.scene, result), stage / "scene.png"), plots)
+    warnings, _ = run_pair(drawn, plots)
+    if isinstance(warnings, PictureError):
+        raise warnings
     tell("pictures", 1.0)
     return warnings

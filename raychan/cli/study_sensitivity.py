@@ -84,9 +84,9 @@ def _write(done: Sensitivity, stage: Path) -> None:
     from raychan.study.sensitivity import write_csv, write_each_csv
 
     write_csv(done, stage / "sensitivity.csv")
-    sensitivity_picture(done, stage / "sensitivity.png")
     if done.given.each:
         write_each_csv(done, stage / "each.csv")
+    sensitivity_picture(done, stage / "sensitivity.png")
 
 
 def _print(done: Sensitivity) -> None:

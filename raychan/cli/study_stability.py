@@ -41,8 +41,8 @@ def stability(
             done = study(quick, only or (), tell)
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="--only") from None
-        drawn = pictures(done, stage)
         write_csv(done, stage / "stability.csv")
+        drawn = pictures(done, stage)
         write_markdown(done, stage / "stability.md", [p.name for p in drawn])
     screen = show.console()
     heads = ("regime", "checks", "failures", "worst/tolerance", "seconds")

@@ -76,7 +76,7 @@ def _drawing(source: Path, range: float | None, speed: float | None, detection: 
     from raychan.run.output_files import StoreError
     from raychan.run.storage import load_result
     from raychan.view.scene import drawing_of
-    from raychan.world.errors import SceneError
+    from raychan.world.errors import SceneError, is_guess
     from raychan.world.scene import Scene
 
     if speed is not None and range is None:
@@ -100,7 +100,7 @@ def _drawing(source: Path, range: float | None, speed: float | None, detection: 
         return drawing_of(Scene.load(source))
     except SceneError as error:
         # Another file, such as a mesh, may be what is missing; a name near to that of a scene is proposed alone.
-        if error.file != source or source.exists() or error.allowed.endswith("?"):
+        if error.file != source or source.exists() or is_guess(error.allowed):
             raise
         allowed = f"a directory that `raychan run` wrote, its result.nc, or {error.allowed}"
         raise SceneError("no such file or directory", file=error.file, allowed=allowed) from error

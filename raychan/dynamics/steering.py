@@ -151,7 +151,7 @@ class HeadingProgramme:
         object.__setattr__(self, "times", frozen(self.times, (n,), "times"))
         object.__setattr__(self, "headings", frozen(self.headings, (n,), "headings"))
         if n == 0 or self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
-            raise ValueError("times must begin at 0 s and grow")
+            raise ValueError("times do not begin at 0 s and grow")
         if not self.rate > 0.0:
             raise ValueError(f"rate is {self.rate} rad/s; it must be positive")
         from_ = [float(self.headings[0])]  # the wanted heading at each of the times
@@ -191,7 +191,7 @@ class WayPoints:
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen(self.points, (len(self.points), 2), "points"))
         if len(self.points) < 2 or not (np.diff(self.points, axis=0) ** 2).sum(axis=1).all():
-            raise ValueError("at least two way-points, no two running the same")
+            raise ValueError("fewer than two way-points, or two running the same")
         if not (self.acceptance > 0.0 and self.lookahead > 0.0):
             raise ValueError("acceptance and lookahead must be positive")
 

@@ -27,7 +27,7 @@ def _table(name: str, rows: ArrayLike, least: int, pair: str) -> tuple[tuple[flo
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < least or not np.isfinite(table).all():
         raise ValueError(f"{wanted}; {table.tolist()} given")
     if (np.diff(table[:, 0]) <= 0.0).any():
-        raise ValueError(f"{name}: the first number must rise from row to row")
+        raise ValueError(f"{name}: a first number does not rise; allowed: rows whose first numbers rise")
     return tuple((float(x), float(y)) for x, y in table)
 
 
@@ -45,15 +45,15 @@ class PhaseNoise:
     def __init__(self, mask: ArrayLike) -> None:
         rows = _table("PhaseNoise.mask", mask, 1, "[offset Hz, level dBc/Hz]")
         if rows[0][0] <= 0.0:
-            raise ValueError(f"PhaseNoise.mask: offset {rows[0][0]:g} Hz: must be positive")
+            raise ValueError(f"PhaseNoise.mask: an offset of {rows[0][0]:g} Hz; allowed: positive offsets")
         for (f0, low), (f1, high) in pairwise(rows):
             if high > low:
                 raise ValueError(
-                    f"PhaseNoise.mask rises from {low:g} dBc/Hz at {f0:g} Hz to {high:g} dBc/Hz at {f1:g} Hz: "
-                    "the phase noise of an oscillator falls with offset or is level"
+                    f"PhaseNoise.mask: rises from {low:g} dBc/Hz at {f0:g} Hz to {high:g} dBc/Hz at {f1:g} Hz; "
+                    "allowed: levels that fall with offset or stay, as those of oscillators do"
                 )
         if rows[0][1] > 0.0:
-            raise ValueError(f"PhaseNoise.mask: {rows[0][1]:g} dBc/Hz: noise above the carrier")
+            raise ValueError(f"PhaseNoise.mask: {rows[0][1]:g} dBc/Hz is above the carrier; allowed: at most 0")
         object.__setattr__(self, "mask", rows)
 
     def density(self, offset: ArrayLike) -> Floats:
@@ -91,6 +91,12 @@ class ChirpError:
         """Return the frequency error [Hz] at times [s] in the ramp."""
         t, error = np.array(self.table).T
         return np.asarray(np.interp(np.asarray(time, float), t, error))
+
+    def lowest(self, carrier: float, slope: float, duration: float) -> float:
+        """Return the lowest frequency [Hz] of a ramp that errs so. Args: its carrier [Hz], slope [Hz/s], duration [s]
+        of sampling."""
+        times = np.clip([0.0, duration, *(t for t, _ in self.table)], 0.0, duration)
+        return float((carrier + slope * times + self.frequency(times)).min())
 
     def phase(self, time: ArrayLike) -> Floats:
         """Return the phase error [rad] at times [s]: 2 pi times the integral of the frequency error from time 0."""

@@ -93,17 +93,20 @@ class Waveform:
             object.__setattr__(self, "repetition", sum(self.stagger) / len(self.stagger))
         if self.repetition is None:
             object.__setattr__(self, "repetition", self.chirp_duration)
-        for name, limit in _LIMITS.items():
-            limit.check(f"Waveform.{name}", getattr(self, name))
+        self._check_limits()
         if self.n_chirps < 1:  # a spectrogram has more than the most of a frame
             raise ValueError(f"Waveform.n_chirps = {self.n_chirps!r}: must be 1 or more")
-        if self.bandwidth >= self.carrier:
-            raise ValueError(
-                f"Waveform.bandwidth = {self.bandwidth:g} Hz: must be below the carrier of {self.carrier:g} Hz"
-            )
         if self.repetition < self.chirp_duration * (1.0 - 1e-9):
             raise ValueError(
                 f"Waveform.repetition = {self.repetition:g} s: shorter than chirp_duration = {self.chirp_duration:g} s"
+            )
+
+    def _check_limits(self) -> None:
+        for name, limit in _LIMITS.items():
+            limit.check(f"Waveform.{name}", getattr(self, name))
+        if self.bandwidth >= self.carrier:
+            raise ValueError(
+                f"Waveform.bandwidth = {self.bandwidth:g} Hz: must be below the carrier of {self.carrier:g} Hz"
             )
 
     def _check_stagger(self) -> None:

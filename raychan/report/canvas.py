@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.run.output_files import write_whole
+from raychan.run.output_files import write_picture
 
 Floats = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def style() -> Any:
 
 def save(made: Any, path: str | Path, flat: bool = False) -> Path:
     """Write a figure at 200 dots an inch and return its path; a `flat` PNG, of lines and marks, with 256 colours."""
-    return write_whole(path, drawn_as(made, Path(path).suffix, flat))
+    return write_picture(path, drawn_as(made, Path(path).suffix, flat))
 
 
 def drawn_as(made: Any, suffix: str, flat: bool = False) -> memoryview:

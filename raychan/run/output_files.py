@@ -1,4 +1,4 @@
-"""Atomic writing of files and folders: either all is written or nothing is changed.
+"""Atomic writing of files and folders: all is written, or all but pictures for which there is no room, or nothing.
 
 Files are written beside their place and renamed into it. Unfinished ones are locked by their process; those without a
 lock are left over from a killed process, and the next writer of the same place removes them.
@@ -26,14 +26,19 @@ class StoreError(OSError):
     """A result could not be written or read; says which and why."""
 
 
+class PictureError(StoreError):
+    """A picture could not be written; what it shows may have been."""
+
+
 @contextmanager
 def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
     """Yield a temporary directory that becomes `out` when the block ends without an error.
 
-    After any error, Ctrl-C included, the temporary directory is removed and `out` is unchanged. Files in an old `out`
-    that the command does not write stay there. Where `out` cannot be renamed (a mount, the current directory), files
-    are moved into it one by one. Raises: StoreError for errors of the disk, or where a foreign file is in the
-    way."""
+    After any error, Ctrl-C included, the temporary directory is removed and `out` is unchanged; but where a picture
+    cannot be written, results that are stay, and the error says so. Files in an old `out` that the command does not
+    write stay there. Where `out` cannot be renamed (a mount, the current directory), files are moved into it one by
+    one. Raises: StoreError for errors of the disk, or where a foreign file is in the way."""
+    lost = None
     with _disk_errors(Path(out)):
         out = Path(out).resolve()
     with folder_for(out.parent):
@@ -42,8 +47,13 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
             _check(out, contents)
             room, stage, lock = _stage(out)
         try:
-            with _disk_errors(out, stage):
-                yield stage
+            try:
+                with _disk_errors(out, stage):
+                    yield stage
+            except PictureError as error:
+                if not contents.signed(stage):
+                    raise
+                lost = error
             with _disk_errors(out), locked(room):
                 _check(out, contents)
                 _replace(stage, out, contents)
@@ -51,6 +61,8 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
             release(lock)
             with locked(room):
                 _remove_stage(stage, out, contents)
+    if lost is not None:
+        raise PictureError(f"{lost}; the results without it are in {out}") from lost
 
 
 @contextmanager
@@ -71,6 +83,14 @@ def write_whole(path: str | Path, content: bytes | memoryview) -> Path:
     """Write a file completely or not at all. Raises: StoreError for errors of the disk."""
     write_together({Path(path): content})
     return Path(path)
+
+
+def write_picture(path: str | Path, content: bytes | memoryview) -> Path:
+    """Write a picture completely or not at all. Raises: PictureError for errors of the disk."""
+    try:
+        return write_whole(path, content)
+    except StoreError as error:
+        raise PictureError(str(error)) from error
 
 
 def write_together(files: Mapping[Path, bytes | memoryview]) -> None:
@@ -127,7 +147,7 @@ def _disk_errors(path: Path, stage: Path | None = None) -> Iterator[None]:
     except StoreError as error:
         if stage is None:
             raise
-        raise StoreError(str(error).replace(str(stage), str(path))) from error
+        raise type(error)(str(error).replace(str(stage), str(path))) from error
     except OSError as error:
         raise StoreError(f"{path}: cannot write: {error.strerror or error}") from error
     except RuntimeError as error:

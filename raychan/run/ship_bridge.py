@@ -169,7 +169,11 @@ def _programme(table: ProgrammeTable, heading: float) -> Programme:
     """Return the programme; without headings and way-points, the heading at the start."""
     if table.way_points is not None:
         points = np.array(table.way_points) * [1.0, -1.0]  # y of the world is west
-        return _tried("programme", lambda: WayPoints(points, table.acceptance_m, table.lookahead_m))
+        return _tried(
+            "programme.way_points",
+            lambda: WayPoints(points, table.acceptance_m, table.lookahead_m),
+            "two way-points or more, no two running the same",
+        )
     if table.headings is None:
         return HeadingProgramme(np.zeros(1), np.array([heading]))
     times, headings = np.array(table.headings, float).T
@@ -177,7 +181,11 @@ def _programme(table: ProgrammeTable, heading: float) -> Programme:
     if np.isinf(rate) and (np.abs(np.diff(headings)) > 180.0).any():
         allowed = "changes of at most 180 deg: longer turns need turn_rate_dps"
         raise SceneError("a change of heading is too large", key="programme.headings", allowed=allowed)
-    return _tried("programme.headings", lambda: HeadingProgramme(times, np.radians(headings), float(rate)))
+    return _tried(
+        "programme.headings",
+        lambda: HeadingProgramme(times, np.radians(headings), float(rate)),
+        "times from 0 s on that grow",
+    )
 
 
 class Steered:

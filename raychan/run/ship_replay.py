@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from raychan.dynamics.ship import PHI, PSI, Array, P, R, U, X, Y
-from raychan.world.errors import SceneError, nearest, shown
+from raychan.world.errors import SceneError, is_guess, nearest, shown
 
 COLUMNS = ("t_s", "x_m", "y_m", "heading_deg", "roll_deg")
 """Columns that a pose file must have."""
@@ -52,7 +52,8 @@ class PoseFile:
 def read_poses(file: Path, max_gap: float) -> PoseFile:
     """Return the poses of a CSV file with `COLUMNS`; rows no further apart than `max_gap` [s].
 
-    Raises: SceneError with the line and the value: a missing column, no number, time running backwards, a gap.
+    Raises: SceneError with the line and the value: a missing column, no number, time running backwards, a gap; with
+    the key file or max_gap_s where that is at fault.
     """
     rows, columns, width = _rows(file)
     lines, values = [], []
@@ -75,7 +76,7 @@ def read_poses(file: Path, max_gap: float) -> PoseFile:
         if step > max_gap:
             problem = f"t_s = {time[k]:.15g} after {time[k - 1]:.15g}: a gap of {step:g} s"
             allowed = f"at most {max_gap:g} s; a longer one with replay.max_gap_s"
-            raise SceneError(problem, file=file, line=lines[k], value=step, allowed=allowed)
+            raise SceneError(problem, file=file, line=lines[k], key="max_gap_s", value=step, allowed=allowed)
     none = np.zeros(len(time))
     heading, pitch, roll = (np.radians(table.get(k, none)) for k in ("heading_deg", "pitch_deg", "roll_deg"))
     place = table["x_m"], table["y_m"], table.get("z_m", none)
@@ -90,10 +91,11 @@ def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], dict[str, int], int]
     try:
         text = file.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise SceneError("file not found", file=file, allowed="a pose file (CSV) that exists") from None
+        allowed = "a pose file (CSV) that exists"
+        raise SceneError("file not found", file=file, key="file", allowed=allowed) from None
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or error
-        raise SceneError(f"cannot be read ({why})", file=file, allowed="a pose file (CSV)") from error
+        raise SceneError(f"cannot be read ({why})", file=file, key="file", allowed="a pose file (CSV)") from error
     reader = csv.reader(text.splitlines())
     try:
         rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
@@ -105,7 +107,7 @@ def _rows(file: Path) -> tuple[list[tuple[int, list[str]]], dict[str, int], int]
     for name in COLUMNS:
         if name not in heads:
             found = nearest(name, heads)
-            allowed = f"columns {', '.join(COLUMNS)}" + (f"; {found}" if found.endswith("?") else "")
+            allowed = f"columns {', '.join(COLUMNS)}" + (f"; {found}" if is_guess(found) else "")
             raise SceneError(f"column {name} is missing", file=file, line=rows[0][0], value=heads, allowed=allowed)
     if len(set(heads)) < len(heads):
         raise SceneError("two columns have one name", file=file, line=rows[0][0], value=heads, allowed="each name once")

@@ -18,7 +18,7 @@ from raychan.sensors.spot import Echo, Spot
 from raychan.world import bundled, overrides
 from raychan.world.body import Body
 from raychan.world.build import scene_text
-from raychan.world.errors import SceneError, nearest
+from raychan.world.errors import SceneError, is_guess, nearest
 from raychan.world.scene import Scene
 from raychan.world.schema_errors import checked
 
@@ -116,7 +116,10 @@ def ship_scene(data: object, path: Path | None = None, text: str = "") -> ShipSc
 
 def _poses(file: Path, max_gap: float, scan: float) -> PoseFile:
     """Return the logged poses of a file, which must last a scan [s]. Raises: SceneError."""
-    poses = read_poses(file, max_gap)
+    try:
+        poses = read_poses(file, max_gap)
+    except SceneError as error:
+        raise (error.of_key(f"replay.{error.key}") if error.key else error) from None
     if poses.duration < scan * (1.0 - 1e-9):  # as `ShipLoop.scans` counts
         allowed = f"at least one scan, {scan:.4g} s"
         problem = f"the log lasts {poses.duration:g} s from its first row to its last"
@@ -137,8 +140,8 @@ def _scanner(t: ScannerTable) -> Scanner:
             t.fan_deg, t.step_deg, t.mirror_hz, t.max_range_m, t.dark_range_m, spot=spot, lambert=t.lambert,
             moving=t.motion,
         )  # fmt: skip
-    except ValueError as error:
-        raise SceneError(str(error), key="scanner") from error
+    except SceneError as error:
+        raise error.at(key="scanner") from None
 
 
 def _spot(t: SpotTable) -> Spot:
@@ -171,7 +174,7 @@ def _reflectivity(t: ShipBodyTable) -> float:
         return _REFLECTIVITY if t.reflectivity is None else t.reflectivity
     if t.material not in REFLECTIVITY:
         key, allowed = f"bodies.{t.name}.material", nearest(t.material, REFLECTIVITY)
-        if not allowed.endswith("?"):  # names hold commas
+        if not is_guess(allowed):  # names hold commas
             allowed = "one of " + ", ".join(map(repr, REFLECTIVITY))
         raise SceneError(f"unknown material '{t.material}'", key=key, value=t.material, allowed=allowed)
     return REFLECTIVITY[t.material]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from raychan.world.quantities import (
     Angle,
@@ -14,6 +14,7 @@ from raychan.world.quantities import (
     Divergence,
     Fan,
     FeedbackGain,
+    FileName,
     Gains,
     Heading,
     Horizontal,
@@ -215,7 +216,7 @@ class ShipRunTable(Table):
 class ReplayTable(Table):
     """Table [replay]: logged poses in place of a model."""
 
-    file: Annotated[str, Field(min_length=1)]
+    file: FileName
     """CSV, relative to the scene file."""
     max_gap_s: Voyage = 1.0
     """Longest time between two rows."""

@@ -20,6 +20,7 @@ from raychan.sensors.arguments import number, one_each
 from raychan.sensors.sea import Waves, flat_sea_range, wavy_sea_range
 from raychan.sensors.spot import Spot
 from raychan.world import limits
+from raychan.world.errors import SceneError
 from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]
@@ -73,9 +74,10 @@ class Scanner:
         for name, limit in _LIMITS.items():
             object.__setattr__(self, name, float(number(f"Scanner.{name}", getattr(self, name), limit)))
         if self.step_deg not in (1.0, 0.5, 0.25):
-            raise ValueError(f"step is {self.step_deg} deg; allowed: 1, 0.5, 0.25")
+            raise SceneError(f"{self.step_deg!r} is not possible", key="step_deg", allowed="1, 0.5 or 0.25")
         if not (self.fan_deg / self.step_deg).is_integer():
-            raise ValueError(f"fan is {self.fan_deg} deg; allowed: whole steps up to 360 deg")
+            allowed = f"whole steps of {self.step_deg:g} deg, up to 360 deg"
+            raise SceneError(f"{self.fan_deg!r} is not possible", key="fan_deg", allowed=allowed)
         check_type("Scanner.spot", self.spot, Spot, or_none=True)
         check_type("Scanner.lambert", self.lambert, bool)
         check_type("Scanner.moving", self.moving, bool)

@@ -158,6 +158,13 @@ def spacing(wave: Waveform, noise: PhaseNoise | None, error: ChirpError | None) 
     return min(found, default=math.inf)
 
 
+class _BentRamp(Waveform):
+    """The waveform with the straight part of a chirp error: it may lie beyond what a radar is asked for."""
+
+    def _check_limits(self) -> None:
+        pass
+
+
 def _straightened(paths: Paths, radar: Radar, error: ChirpError | None) -> tuple[Radar, ChirpError | None, Paths]:
     """Return radar, chirp error and paths with the straight part of the error moved into the waveform.
 
@@ -171,7 +178,8 @@ def _straightened(paths: Paths, radar: Radar, error: ChirpError | None) -> tuple
     times = np.unique([x for x, _ in error.table] + [-float(paths.delay.max(initial=0.0)), t[0], t[-1]])
     b, a = np.polyfit(t, error.frequency(t), 1) if len(t) > 1 else (0.0, float(error.frequency(0.0)))
     rest = ChirpError(np.column_stack([times, error.frequency(times) - a - b * times]))
-    bent = replace(wave, carrier=wave.carrier + a, bandwidth=wave.bandwidth + b * wave.chirp_duration)
+    line = {"carrier": wave.carrier + a, "bandwidth": wave.bandwidth + b * wave.chirp_duration}
+    bent = _BentRamp(**vars(wave) | line)
     # Amplitudes hold exp(-j 2 pi f_c tau_0) of the carrier as it should be.
     turned = scaled(paths, np.exp(-2j * np.pi * a * paths.delay))
     return replace(radar, waveform=bent), rest, turned

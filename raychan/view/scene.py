@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from raychan.run.explain import CellExplanation
-from raychan.run.output_files import write_whole
+from raychan.run.output_files import write_picture
 from raychan.run.result import Result
 from raychan.view import plain
 from raychan.view.drawing import Drawing, draw
@@ -52,7 +52,7 @@ def _rendered(drawing: Drawing, path: Path) -> str | None:
     except OSError as error:
         return f"no room for the drawing in {tempfile.gettempdir()}: {error.strerror or error}"
     if trouble is None:
-        write_whole(path, picture)
+        write_picture(path, picture)
     return trouble
 
 

@@ -23,7 +23,7 @@ from raychan.world.limbs import LimbMotion, limbs_of
 from raychan.world.limits import Limit
 from raychan.world.material import Material
 from raychan.world.mesh import CREASE_DEG, Floats, Mesh
-from raychan.world.mesh_io import check_crease, from_trimesh, load, matrix_of, oddities
+from raychan.world.mesh_io import check_crease, from_trimesh, load, matrix_of, mesh_file, oddities
 from raychan.world.motion import Motion
 from raychan.world.read_only import kept, listed
 
@@ -88,6 +88,10 @@ class Body:
             raise SceneError("keys do not fit together", key=self.name, allowed="either shape or mesh")
         try:
             if isinstance(self.mesh, (str, Path)):
+                try:
+                    mesh_file(self.mesh)
+                except SceneError as e:
+                    raise e.of_key("mesh") from None
                 return load(self.mesh, self.unit, self.up, self.forward, self.scale, self.crease_deg)
             # Without effect on a shape or a Mesh, but no less wrong beside them.
             check_crease(self.crease_deg)
@@ -192,8 +196,8 @@ class Body:
         chosen: list[str | Material] = []
         for part, default in zip(mesh.part_names, own, strict=True):
             fits = [m for pattern, m in self.materials.items() if _means(pattern, part, mesh.part_names)]
-            exact = self.materials.get(part)
-            chosen.append(exact or (fits[-1] if fits else None) or self.material or default)
+            given = (self.materials.get(part), fits[-1] if fits else None, self.material, default)
+            chosen.append(next(m for m in given if m is not None))
         return chosen
 
     def target(self) -> tuple[Floats, Floats]:

@@ -67,12 +67,16 @@ def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
 
 
 def radar_fits(radar: Radar, diffraction: bool) -> None:
-    """Raise SceneError where the radar cannot have what is asked of it: diffraction to a receiver elsewhere, or of its
-    array ESPRIT, or a taper over its beams."""
+    """Raise SceneError where the radar cannot have what is asked of it: diffraction to a receiver elsewhere, a chirp
+    error that leaves no wave, or of its array ESPRIT, or a taper over its beams."""
     if diffraction and radar.rx_position is not None:
         problem = "diffraction is modelled for a receiver beside the transmitter only"
         raise SceneError(problem, key="model.diffraction", value=True, allowed="false with radar.rx_position")
-    asked, aperture = radar.processing, Aperture(radar.virtual_elements, C0 / radar.waveform.middle)
+    wave, error = radar.waveform, radar.impairments.chirp_error
+    if error is not None and (lowest := error.lowest(wave.carrier, wave.slope, wave.chirp_duration)) <= 0.0:
+        key, problem = "radar.impairments.chirp_error_us_khz", f"the ramp comes down to {lowest / 1e9:g} GHz"
+        raise SceneError(problem, key=key, value=lowest, allowed="errors that leave it above 0 GHz")
+    asked, aperture = radar.processing, Aperture(radar.virtual_elements, C0 / wave.middle)
     if asked.doa == "esprit" and not aperture.uniform:
         allowed = "bartlett, capon or music; esprit only with elements on a uniform line along y or z"
         raise SceneError("no uniform line of elements", key="processing.doa", value="esprit", allowed=allowed)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from raychan.scalars import shown
 
-__all__ = ["SceneError", "nearest", "shown", "shown_in_table"]
+__all__ = ["SceneError", "is_guess", "nearest", "shown", "shown_in_table"]
 
 
 class SceneError(ValueError):
@@ -25,8 +25,7 @@ class SceneError(ValueError):
         self.value, self.allowed, self.line = value, allowed, line
         where = f"{file}:{line}" if file and line else str(file or "")
         head = ": ".join(x for x in (where, key, problem) if x)
-        # What `nearest` found is a question, not a list of what is allowed.
-        hint = allowed if allowed.endswith("?") else f"allowed: {allowed}"
+        hint = allowed if is_guess(allowed) else f"allowed: {allowed}"
         super().__init__(f"{head}; {hint}" if allowed else head)
 
     def at(self, *, file: str | Path | None = None, key: str = "") -> SceneError:
@@ -35,6 +34,11 @@ class SceneError(ValueError):
         return SceneError(
             self.problem, file=self.file or file, key=path, value=self.value, allowed=self.allowed, line=self.line
         )
+
+    def of_key(self, key: str) -> SceneError:
+        """Return the same error as one of a scene's key that names the file, which moves into the text."""
+        where = f"{self.file}:{self.line}" if self.line else self.file
+        return SceneError(f"{where}: {self.problem}", key=key, value=self.value, allowed=self.allowed)
 
 
 class _Word(str):
@@ -58,7 +62,13 @@ def shown_in_table(value: object) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return a text that names the nearest known word, or lists all where none is near."""
+    """Return a text that names the nearest known word, first one of the same letters, or lists all where none is
+    near."""
     names = sorted(map(str, known))
-    close = get_close_matches(word, names, n=1, cutoff=0.6)
+    close = sorted(get_close_matches(word, names), key=lambda name: sorted(name) != sorted(word))
     return f"did you mean '{close[0]}'?" if close else "one of " + ", ".join(names)
+
+
+def is_guess(allowed: str) -> bool:
+    """Return whether a text is a guess of `nearest` or its like, not a list of what is allowed."""
+    return allowed.startswith("did you mean ")

@@ -45,15 +45,9 @@ def load(
     that points ahead (default z where y is up, else x), as 'z', '-x', '+y'; scale a further factor.
     Raises: SceneError for a file that is missing, unreadable or empty, and for options not allowed.
     """
-    file = Path(path)
-    if file.is_dir():
-        raise SceneError("is a folder", file=file, value=str(file), allowed="a mesh file")
-    if not file.is_file():
-        raise SceneError("mesh file not found", file=file, value=str(file), allowed="a path to a file that exists")
-    if file.suffix.lower() not in SUFFIXES:
-        raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
+    file = mesh_file(path)
     matrix = matrix_of(unit, up, forward, scale, file)
-    check_crease(crease_deg, file)
+    check_crease(crease_deg)
     if not file.stat().st_size:
         raise SceneError("the file is empty: 0 bytes", file=file, allowed="a valid " + file.suffix)
     unread = checked(file)
@@ -78,6 +72,18 @@ def load(
     if not unread and not folds:
         return mesh
     return replace(mesh, report=replace(mesh.report, unread_normals=unread, folded=folds))
+
+
+def mesh_file(path: str | Path) -> Path:
+    """Return the path of a mesh. Raises: SceneError where there is no file, or one of another kind by its name."""
+    file = Path(path)
+    if file.is_dir():
+        raise SceneError("is a folder", file=file, value=str(file), allowed="a mesh file")
+    if not file.is_file():
+        raise SceneError("mesh file not found", file=file, value=str(file), allowed="a path to a file that exists")
+    if file.suffix.lower() not in SUFFIXES:
+        raise SceneError(f"unknown mesh format '{file.suffix}'", file=file, allowed=", ".join(SUFFIXES))
+    return file
 
 
 def _read(file: Path) -> tuple[Any, bool]:
@@ -111,20 +117,20 @@ def matrix_of(unit: str, up: str | None, forward: str | None, scale: float, file
     """
     for key, word in (("unit", unit), ("up", up), ("forward", forward)):
         if not isinstance(word, str) and (word is not None or key == "unit"):
-            raise SceneError(f"{shown(word)} is not possible", file=file, key=key, value=word, allowed="a text")
+            raise SceneError(f"{shown(word)} is not possible", key=key, value=word, allowed="a text")
     if unit not in UNITS:
-        raise SceneError(f"unknown unit '{unit}'", file=file, key="unit", value=unit, allowed=nearest(unit, UNITS))
+        raise SceneError(f"unknown unit '{unit}'", key="unit", value=unit, allowed=nearest(unit, UNITS))
     if SCALE.problem(scale):
-        raise SceneError(f"{shown(scale)} is not possible", file=file, key="scale", value=scale, allowed=SCALE.allowed)
+        raise SceneError(f"{shown(scale)} is not possible", key="scale", value=scale, allowed=SCALE.allowed)
     taken, ahead = axes_taken(file or "", up, forward)
-    return _turn(taken, ahead, file, forward is None) * (UNITS[unit] * plain(scale))
+    return _turn(taken, ahead, forward is None) * (UNITS[unit] * plain(scale))
 
 
-def check_crease(crease_deg: float, file: Path | None = None) -> None:
-    """Raise SceneError for a crease angle [deg] that is none, of a file or of an object."""
+def check_crease(crease_deg: float) -> None:
+    """Raise SceneError for a crease angle [deg] that is none."""
     if CREASE.problem(crease_deg):
         problem = f"{shown(crease_deg)} is not possible"
-        raise SceneError(problem, file=file, key="crease_deg", value=crease_deg, allowed=f"a number {CREASE.allowed}")
+        raise SceneError(problem, key="crease_deg", value=crease_deg, allowed=f"a number {CREASE.allowed}")
 
 
 def axes_taken(path: str | Path, up: str | None, forward: str | None) -> tuple[str, str]:
@@ -237,18 +243,18 @@ def _pieces(source: Any) -> list[tuple[str, Floats, Any]]:
     return found
 
 
-def _turn(up: str, forward: str, file: Path | None, usual: bool) -> Floats:
+def _turn(up: str, forward: str, usual: bool) -> Floats:
     """Return the rotation that brings the file's forward, which may be the usual one, to +x and its up to +z."""
     axes = []
     for key, word in (("up", up), ("forward", forward)):
         name = word if word[:1] in "+-" else "+" + word
         if name not in _AXES:
-            raise SceneError(f"unknown axis '{word}'", file=file, key=key, value=word, allowed="x, y, z, -x, -y or -z")
+            raise SceneError(f"unknown axis '{word}'", key=key, value=word, allowed="x, y, z, -x, -y or -z")
         axes.append(_AXES[name])
     z, x = axes
     if abs(z @ x) > 0.5:
         # The one that is given is wrong, not what is usual beside it.
         key, word, other, across = ("up", up, "forward", forward) if usual else ("forward", forward, "up", up)
         allowed = f"an axis across {other} = '{across}'"
-        raise SceneError(f"'{word}' lies along {other}", file=file, key=key, value=word, allowed=allowed)
+        raise SceneError(f"'{word}' lies along {other}", key=key, value=word, allowed=allowed)
     return np.stack([x, np.cross(z, x), z])

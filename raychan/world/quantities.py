@@ -62,6 +62,13 @@ def _refused(kind: str, allowed: str) -> PydanticCustomError:
     return PydanticCustomError(WRONG_TYPE if kind.endswith("_type") else "limit", "{allowed}", {"allowed": allowed})
 
 
+def _file_name(name: str) -> str:
+    """Check that a text can name a file."""
+    if not name or "\0" in name:
+        raise _refused("limit", "a name without a zero byte" if name else "the name of a file")
+    return name
+
+
 def _window(name: str) -> str:
     """Check the name of a window; the two most common names need no import of numpy."""
     if name not in ("rect", "hann"):
@@ -154,6 +161,7 @@ RainRate = Annotated[float, _REAL, _within(limits.RAIN_MMH)]
 Fog = Annotated[float, _REAL, _within(limits.FOG_GM3)]
 Bits = Annotated[int, _WHOLE, _whole(limits.BITS)]
 Window = Annotated[str, AfterValidator(_window)]
+FileName = Annotated[str, AfterValidator(_file_name)]
 Bearing = Annotated[tuple[Angle, Rcs], Field(strict=False), _listed("[azimuth_deg, dBsm], a pair of numbers")]
 Bearings = Annotated[list[Bearing], Field(min_length=2), _listed("2 or more pairs [azimuth_deg, dBsm]")]
 Offsets = Annotated[

@@ -77,8 +77,7 @@ class Scene(Fixed, Described):
         check_texts(title=title, text=text, path=path, folder=folder)
         self.title, self.text, self.path = title, text, path
         self.folder = folder or Path.cwd()
-        self._given = bodies_of(bodies)
-        self.bodies = tuple(limb for body in self._given for limb in body.limbs)
+        self._given, self.bodies = bodies_of(bodies, path)
         self.radar_table: RadarTable | None = mount(radar, path)
         self.processing: Processing = processing_of(processing, radar, path)
         self.is_radar_object = not isinstance(radar, RadarTable | Mapping | None)

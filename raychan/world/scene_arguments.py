@@ -22,8 +22,19 @@ _NAMES = {"shape": (str, "a text"), "role": (str, "a text"), "material": (str | 
 """Fields whose checks propose names, with the types they take."""
 
 
-def bodies_of(given: Any) -> tuple[Body, ...]:
-    """Return the bodies that a scene is given. Raises: SceneError where one is none, or has a field that cannot be."""
+def bodies_of(given: Any, file: Path | None) -> tuple[tuple[Body, ...], tuple[Body, ...]]:
+    """Return the bodies that a scene is given, and these with limbs for those that have any.
+
+    Raises: SceneError that names the scene's file where one is none, or has a field that cannot be.
+    """
+    try:
+        bodies = _bodies(given)
+        return bodies, tuple(limb for body in bodies for limb in body.limbs)
+    except SceneError as e:
+        raise e.at(file=file) from None
+
+
+def _bodies(given: Any) -> tuple[Body, ...]:
     if isinstance(given, str | Body) or not isinstance(plain(given), Iterable):
         raise _refused(given, "bodies", "a list of Body")
     bodies = tuple(given)
@@ -66,7 +77,7 @@ def _check(body: Body, number: int) -> None:
         raise e.at(key=f"bodies.{body.name}") from None
     for name, (kind, allowed) in _NAMES.items():
         value = getattr(body, name)
-        if not (value is None or (isinstance(value, kind) and value)):
+        if not isinstance(value, kind | None):
             raise _refused(value, f"bodies.{body.name}.{name}", allowed)
 
 

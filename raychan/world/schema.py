@@ -15,6 +15,7 @@ from raychan.world.quantities import (
     CellPair,
     Chirps,
     Crease,
+    FileName,
     Kelvin,
     Layers,
     MemoryMb,
@@ -107,10 +108,10 @@ class RadarTable(Table):
     noise_temperature_k: Kelvin = 290.0
     """Of the antenna: the noise power is k (T + 290 K (F - 1)) times the sample rate."""
     noise: Switch = True
-    antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
+    antenna: FileName | AntennaTable = AntennaTable(kind="isotropic", front=True)
     """Of transmitter and receiver; a text names an antenna file, relative to the scene's."""
-    tx_antenna: str | AntennaTable | None = None
-    rx_antenna: str | AntennaTable | None = None
+    tx_antenna: FileName | AntennaTable | None = None
+    rx_antenna: FileName | AntennaTable | None = None
     polarization: Literal["V", "H"] = "V"
     rx_polarization: Literal["V", "H", "both"] | None = None
     """Of the receivers; default `polarization`; both: co-polarised, then as many cross-polarised ones."""
@@ -160,7 +161,7 @@ class InterfererTable(Table):
     roll_deg: Angle = 0.0
     velocity_mps: Speed = [0.0, 0.0, 0.0]
     power_dbm: Power = 12.0
-    antenna: str | AntennaTable = AntennaTable(kind="isotropic", front=True)
+    antenna: FileName | AntennaTable = AntennaTable(kind="isotropic", front=True)
     polarization: Literal["V", "H"] = "V"
     waveform: WaveformTable
     """Its samples do not matter."""
@@ -235,7 +236,7 @@ class PlacedBodyTable(Table):
     shape: str | None = None
     params: dict[str, Any] = {}
     """Parameters of the shape [m]."""
-    mesh: str | None = None
+    mesh: FileName | None = None
     unit: str = "m"
     up: str | None = None
     forward: str | None = None

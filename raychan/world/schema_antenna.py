@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import model_validator
 
 from raychan.world.limits import ROW_WAVELENGTHS
-from raychan.world.quantities import Beam, Gain, Level, Loss, Row, Spacing, Switch, Window
+from raychan.world.quantities import Beam, FileName, Gain, Level, Loss, Row, Spacing, Switch, Window
 from raychan.world.schema_base import Table
 
 
@@ -43,7 +43,7 @@ class AntennaTable(Table):
     element: AntennaTable | None = None
     """Default: isotropic ahead."""
     front: Switch = False
-    file: str | None = None
+    file: FileName | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> AntennaTable:

@@ -52,7 +52,8 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
     if found["type"] == "missing":
         return SceneError("key is missing", file=file, key=key, allowed="a value")
     if found["type"] == "value_error" and not isinstance(value, dict):
-        return SceneError(_allowed(found), file=file, key=key, value=value)
+        problem, _, allowed = _allowed(found).partition("; allowed: ")
+        return SceneError(problem, file=file, key=key, value=value, allowed=allowed)
     if found["type"] == "value_error":
         return SceneError("keys do not fit together", file=file, key=key, value=value, allowed=_allowed(found))
     # A key that takes several types has an error for each.
@@ -60,6 +61,8 @@ def _explained(kind: type[BaseModel], data: Any, error: ValidationError, file: A
     allowed = " or ".join(dict.fromkeys(map(_allowed, alike)))
     if len(alike) == 1 and found["type"] == "literal_error":
         allowed += meant(value, re.findall("'(.*?)'", found["ctx"]["expected"]))
+    if len(alike) == 1 and found["type"] in ("model_type", "model_attributes_type"):
+        allowed += f" with keys among {', '.join(sorted(_table_at(kind, loc).model_fields))}"
     return SceneError(f"{shown_in_table(value)} is not possible", file=file, key=key, value=value, allowed=allowed)
 
 

@@ -61,7 +61,7 @@ class ImpairmentsTable(BaseModel):
                 kind(rows)
         except ValueError as e:
             # Of the class, whose name no file has.
-            raise ValueError(str(e).removeprefix(f"{kind.__name__}.{name}").removeprefix(": ").strip()) from None
+            raise ValueError(str(e).removeprefix(f"{kind.__name__}.{name}: ")) from None
         return rows
 
 

@@ -144,8 +144,9 @@ def stop_at(monkeypatch):
     """Have a function raise what is given at its call of such a number."""
 
     def prepare(name, number, stop=KeyboardInterrupt):
-        module, _, function = name.rpartition(".")
-        real, calls = getattr(import_module(module), function), []
+        path, _, function = name.rpartition(".")
+        module, calls = import_module(path), []
+        real = getattr(module, function)
 
         def one(*given, **named):
             calls.append(given)
@@ -153,7 +154,7 @@ def stop_at(monkeypatch):
                 raise stop
             return real(*given, **named)
 
-        monkeypatch.setattr(name, one)
+        monkeypatch.setattr(module, function, one)
 
     return prepare
 
@@ -176,6 +177,24 @@ def test_ctrl_c_in_rcs_keeps_the_angles_that_are_done(stop, stop_at, tmp_path, c
     assert invoke(command) == 130
     assert but_compiling(capsys.readouterr().err) == f"raychan: interrupted; 3 of 5 angles are in {out}\n"
     assert out.read_text().splitlines() == whole[:4] and not figure.exists()
+
+
+@pytest.mark.parametrize(
+    ("stage", "says"),
+    [("raychan.report.rcs_figure.rcs_picture", "5 of 5 angles are in a.csv"), ("raychan.cli.rcs.table_of", None)],
+    ids=["as the figure is drawn", "as it reports"],
+)
+def test_ctrl_c_in_rcs_after_the_last_angle_loses_none_and_says_what_is_written(
+    stage, says, stop_at, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    command = ["rcs", "--shape", "plate", "--azimuth", "0:8:2", "--out", "a.csv", "--plot", "a.png"]
+    stop_at(stage, 1)
+    assert invoke(command) == 130
+    said = but_compiling(capsys.readouterr().err)
+    assert said == f"raychan: interrupted; {says or 'written: a.csv, a.png'}\n"
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 6
+    assert (tmp_path / "a.png").exists() == (says is None)
 
 
 def test_ctrl_c_in_rcs_without_a_table_writes_nothing(stop_at, tmp_path, capsys):

@@ -7,7 +7,7 @@ import raychan as rc
 from raychan.cli import invoke
 from raychan.run.ship_loop import ShipLoop
 from raychan.run.ship_replay import read_poses
-from raychan.run.ship_scene import ship_scene
+from raychan.run.ship_scene import read_ship_scene, ship_scene
 from raychan.sensors.laser import SEA
 
 HEAD = "t_s,x_m,y_m,heading_deg,roll_deg\n"
@@ -81,7 +81,7 @@ WRONG = {
     f"{HEAD}0,0,0,0,0\n": "too few rows",
     f"{HEAD}0,0,0,0,0\n1,0,0,0,0\n0.5,0,0,0,0\n": r"poses.csv:4: t_s = 0.5 after 1: time does not grow",
     f"{HEAD}0,0,0,0,0\n0,0,0,0,0\n": r"poses.csv:3: t_s = 0 after 0: time does not grow",
-    f"{HEAD}0,0,0,0,0\n5,0,0,0,0\n": r"poses.csv:3: t_s = 5 after 0: a gap of 5 s; allowed: at most 1 s",
+    f"{HEAD}0,0,0,0,0\n5,0,0,0,0\n": r"poses.csv:3: max_gap_s: t_s = 5 after 0: a gap of 5 s; allowed: at most 1 s",
     f"{HEAD}0,0,0,nan,0\n1,0,0,0,0\n": r"poses.csv:2: heading_deg = 'nan'; allowed: a finite number",
     f"{HEAD}0,0,0,0,0\n\n1,0,inf,0,0\n": r"poses.csv:4: y_m = 'inf'",
     f"{HEAD}0,0,0,0,x\n1,0,0,0,0\n": r"poses.csv:2: roll_deg = 'x'",
@@ -101,6 +101,15 @@ def test_a_log_that_cannot_be_is_told_with_line_and_value(text, tmp_path):
     file.write_text(text)
     with pytest.raises(rc.SceneError, match=WRONG[text]):
         read_poses(file, 1.0)
+
+
+def test_a_gap_of_a_log_is_told_by_the_key_of_the_scene_that_allows_none_so_long(tmp_path):
+    (tmp_path / "poses.csv").write_text(f"{HEAD}0,0,0,0,0\n5,0,0,0,0\n")
+    file = tmp_path / "mine.toml"
+    file.write_text('[replay]\nfile = "poses.csv"\n')
+    with pytest.raises(rc.SceneError, match=r"poses.csv:3: t_s = 5 after 0: a gap of 5 s; allowed: at") as told:
+        read_ship_scene(file)
+    assert (told.value.file, told.value.key) == (file, "replay.max_gap_s")
 
 
 def test_a_log_that_is_no_text_is_told(tmp_path):

@@ -27,6 +27,14 @@ def scene(**body):
             (lambda key=key: rc.Scene(**{key: 3}), f"^{key}: 3 is not possible; allowed: a table")
             for key in ("processing", "model", "atmosphere")
         ),
+        (
+            lambda: rc.Scene(radar={"waveform": rc.Waveform(77e9, 1e9, 25e-6)}),
+            r"^radar.waveform: Waveform\(.* is not possible; allowed: a table with keys among bandwidth_mhz, carrier",
+        ),
+        (
+            lambda: rc.Scene(radar={"waveform": {"bandwidth_mhz": 1, "chirp_us": 9}, "impairments": rc.Impairments()}),
+            r"^radar.impairments: .* is not possible; allowed: a table with keys among adc_bits, adc_full",
+        ),
         (lambda: rc.Scene(model=0), "^model: 0 is not possible; allowed: a table"),
         (lambda: rc.Scene(radar=3), "^radar: 3 is not possible; allowed: a Radar, its table, or None"),
         (lambda: rc.Scene(atmosphere={"foo": 1}), "^atmosphere.foo: unknown key 'foo'"),
@@ -51,7 +59,7 @@ def scene(**body):
             for x in ("30", True)
         ),
         (lambda: scene(rcs_dbsm=1.0, swerling=True), r"^bodies\.b\.swerling: True is not possible; allowed: 0, 1, 2"),
-        (lambda: scene(material=""), r"^bodies\.b\.material: '' is not possible; allowed: a name or a Material"),
+        (lambda: scene(material=""), r"^bodies\.b\.material: unknown material ''; allowed: one of asphalt"),
     ],
 )
 def test_a_value_of_another_type_is_told_by_its_key(make, said):
