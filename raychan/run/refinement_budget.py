@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from raychan.run.rules import allowed_memory
 from raychan.tracing.stats import Stats
 
 STEPS = 8
@@ -20,21 +21,24 @@ before (`map_cells`, `refinement_plan`), so rays grow at least so. At 0.5 dB urb
 pedestrian take 3.0, 2.2 and 2.8 million rays in place of 2.0, 1.0 and 1.6, 1.5 times the CPU, and bring 27 of 31
 detections within it in place of 22 of 30. At 2 dB half of the rays lose one of 30, at 1 dB twice as many bring none."""
 _GROWTH = 2.0  # paths of a step over those of the one before, about
-_BYTES = 400.0  # a path
+_BYTES = 900.0  # a path, at the peak of a run (of 1.5 and 5.4 million 890 and 910)
 RAYS, SECONDS, MEMORY = (
     f"the budget of {what} (model.{key})"
     for what, key in (("rays", "max_rays"), ("seconds", "max_seconds"), ("memory", "max_memory_mb"))
 )
+MACHINE = "half of this machine's memory (model.max_memory_mb asks for more or less)"
 FORESEEN = ", foreseen not to suffice for what is left"
 
 
 class Budget:
-    """The budgets of a scene's model: `max_rays`, `max_seconds`, `max_memory_mb`, counted from the first launch on."""
+    """The budgets of a scene's model: `max_rays`, `max_seconds`, `max_memory_mb`, counted from the first launch on; of
+    memory half of the machine's where none is given."""
 
     def __init__(self, model: Any, stats: Stats) -> None:
         further = max(_RAYS * stats.rays, _LEAST) / min(model.tolerance_db / _FINEST, 1.0)
         self._rays = stats.rays + further if model.max_rays == "auto" else float(model.max_rays)
-        self._seconds, self._memory = model.max_seconds, model.max_memory_mb
+        self._seconds, own = model.max_seconds, model.max_memory_mb
+        self._memory, self._which = (allowed_memory(), MACHINE) if own is None else (1e6 * own, MEMORY)
         self._cast, self._start = stats.rays, time.perf_counter()
         self._spent, self._slowest = 0.0, 0.0
 
@@ -64,6 +68,4 @@ class Budget:
         left, which = self.left(stats)
         if rays > left:
             return which + (FORESEEN if left > 0.0 else "")
-        if self._memory is not None and _GROWTH * paths * _BYTES > 1e6 * self._memory:
-            return MEMORY
-        return ""
+        return self._which if _GROWTH * paths * _BYTES > self._memory else ""

@@ -76,11 +76,11 @@ def check_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
     return _rule(radar, settings, model, _COARSER * model.tolerance_db, _JITTER)
 
 
-def first_rule(radar: Radar, settings: Any, model: Any) -> PruneRule:
+def first_rule(radar: Radar, settings: Any, model: Any, step: int = 0) -> PruneRule:
     """Return the prune rule of the launch that tells what a model needs and what feeds detections: coarse, and tubes
     that bounced are cut only where one alone may bring about what a detection needs, or as much of what is found
-    there."""
-    rule = step_rule(radar, settings, model, 0)
+    there. Args: step, below 0 where it begins twice as coarse for each."""
+    rule = step_rule(radar, settings, model, step)
     refined = rule.refinement
     coarse = replace(refined, phase=_PHASE, turn=_TURN, floor=_FLOOR * refined.floor, coarse=_COARSE, fan=_FAN)
     return replace(rule, refinement=coarse)

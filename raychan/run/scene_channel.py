@@ -19,7 +19,7 @@ from raychan.run.ledger import ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages import merged, overrun, uncut
 from raychan.run.micro_doppler import retraced
-from raychan.run.path_stream import Launched, PathStream
+from raychan.run.path_stream import MOST, Launched, PathStream
 from raychan.run.preview import preview_notes, preview_of
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.scene_refinement import SceneRefinement
@@ -32,6 +32,11 @@ from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.scene import Scene
 from raychan.world.schema import PREVIEW
+
+_WHOLE = (
+    f"more than {MOST:,} paths, also by a coarser first launch: the frame is launched twice as a whole, not refined "
+    "where detections need it, and no budget (model.max_rays, max_seconds, max_memory_mb) ends that"
+)
 
 
 @dataclass(frozen=True)
@@ -82,6 +87,8 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     begun, channel = perf_counter(), None
     if time or not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)
+        if channel is None:
+            said.append(_WHOLE)
     if channel is None:
         channel = _launched_twice(scene, geometry, points, model, clock)
     over = overrun(perf_counter() - begun, model.max_seconds)
@@ -99,6 +106,8 @@ def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock
         found = refinement.converged(first)
     cost = _cost(stats, stats.rays, 1, found.model, geometry.facets.since) | {"refinements": found.remains.steps}
     launched, others, said, remains = found.launched, found.others, uncut(geometry, stats), found.remains
+    if refinement.coarser:
+        said = (*said, _coarser(model, 2**refinement.coarser))
     return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, remains=remains)
 
 
@@ -132,6 +141,14 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
     rays = stats.rays + more.rays + (turned.rays if turned else 0)
     cost = _cost(stats, rays, len(turned.times) if turned else 1, model, geometry.facets.since)
     return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)
+
+
+def _coarser(model: Any, factor: int) -> str:
+    return (
+        f"a first launch for {model.tolerance_db:g} dB brings more than {MOST:,} paths: it is one for "
+        f"{factor * model.tolerance_db:g} dB, refined where detections need it; weak echoes over several bodies may be "
+        "lost"
+    )
 
 
 def _cost(stats: Stats, rays: int, tracings: int, model: Any, time: float) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import pytest
 from support.boxes_and_balls import WAVEFORM, scene_of
 
 import raychan as rc
-from raychan.run import refinement_budget
+from raychan.run import refinement_budget, scene_refinement
 from raychan.run.point_spread import PointSpread
 from raychan.run.rules import step_rule
 from raychan.run.scene_refinement import SceneRefinement
@@ -75,6 +75,29 @@ def test_a_budget_ends_refinement_and_is_told(key, value, word):
     found = rc.simulate(scene_of(2, tolerance_db=0.1, **({"max_rays": 10**9} | {key: value})))
     assert found.stats["refinements"] == 1
     assert any(f"ended by the budget of {word} (model.{key})" in line for line in found.warnings)
+
+
+def test_half_of_the_memory_of_the_machine_ends_refinement_and_is_told(monkeypatch):
+    monkeypatch.setattr(refinement_budget, "allowed_memory", lambda: 1e6)
+    found = rc.simulate(scene_of(2, tolerance_db=0.1, max_rays=10**9))
+    assert found.stats["refinements"] == 1
+    assert any("ended by half of this machine's memory" in line for line in found.warnings)
+
+
+def test_a_first_launch_of_too_many_paths_is_made_coarser_and_refined(monkeypatch):
+    fine = rc.simulate(scene_of(2, tolerance_db=0.1))
+    monkeypatch.setattr(scene_refinement, "MOST", 40_000)
+    found = rc.simulate(scene_of(2, tolerance_db=0.1))
+    assert found.stats["refinements"] > 1
+    assert any("a first launch for 0.1 dB brings more than" in line for line in found.warnings)
+    off = 10.0 * np.log10(found.detections.power / fine.detections.power)
+    assert (np.abs(off) <= fine.detections.error_db + found.detections.error_db).all()
+
+
+def test_a_frame_of_too_many_paths_at_any_tolerance_says_that_it_is_not_refined(monkeypatch):
+    monkeypatch.setattr(scene_refinement, "MOST", 20)
+    found = rc.simulate(scene_of(2, tolerance_db=3.0))
+    assert "refinements" not in found.stats and any("launched twice as a whole" in line for line in found.warnings)
 
 
 @pytest.mark.parametrize(("allowed", "told"), [(0.0, True), (1e6, False)])
