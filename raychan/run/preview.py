@@ -48,10 +48,12 @@ _RELATIVE = 5.0  # of what is found in a range cell, for a hundred tubes: pruned
 # 18,000 of the urban street at 1 and 30, 10 ms of CPU; command not kept) and smears footprints in range: a hundred
 # of them in one cell err by 0.3 of its noise.
 _WHOLE = 30.0
-_EDGE = 0.6  # m: of tubes, seen or hidden as a whole; at 2 m an echo of the urban street is off by 7 dB, at 0.6 m by 4
+# m: of tubes. While all were seen or hidden as a whole, at 2 m an echo of the urban street was off by 7 dB, at 0.6 m
+# by 4.
+_EDGE = 0.6
 
 LEFT_OUT = (
-    "bounces from body to body and within a body (corners), diffraction, shadow edges across facets, and motion "
+    "bounces from body to body and within a body (corners), diffraction, shadow edges across weak facets, and motion "
     "within the frame other than constant rates"
 )
 

@@ -38,7 +38,9 @@ class Budget:
         further = max(_RAYS * stats.rays, _LEAST) / min(model.tolerance_db / _FINEST, 1.0)
         self._rays = stats.rays + further if model.max_rays == "auto" else float(model.max_rays)
         self._seconds, own = model.max_seconds, model.max_memory_mb
-        self._memory, self._which = (allowed_memory(), MACHINE) if own is None else (1e6 * own, MEMORY)
+        self._memory, self._which = allowed_memory(), MACHINE
+        if own is not None:
+            self._memory, self._which = 1e6 * own, MEMORY
         self._cast, self._start = stats.rays, time.perf_counter()
         self._spent, self._slowest = 0.0, 0.0
 

@@ -22,6 +22,8 @@ Bools = NDArray[np.bool_]
 _SHRINK = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share; not measured
 _PARALLEL_FROM = 1000  # tubes, of one to four rays each, from which on a second thread pays; not measured
 NONE_AWAY = np.zeros(0, bool)
+NO_GAPS, BETWEEN, ANY_GAP = 0, 1, 2
+"""Where shadow edges are searched of tubes that no ray sees."""
 _NO_BODY = np.zeros(0, np.int64)
 
 
@@ -81,14 +83,21 @@ class FlatFacets(NamedTuple):
 
 class Tested(NamedTuple):
     """What of tubes is tested: corners (n,); whether centres are; tubes that matters (n,), of which shadow edges are
-    searched; gaps (n,) whether also where two bodies hide a tube, between which there may be one; facing_away (n,;
-    empty: none) tubes beyond the horizon, for which no edge is searched and which a convex body does not hide."""
+    searched; `gaps` (n,) where they are searched of tubes that no ray sees: `NO_GAPS` nowhere, `BETWEEN` two smooth
+    patches that hide a tube, `ANY_GAP` also beside one patch, which may be hollow; facing_away (n,; empty: none) tubes
+    beyond the horizon, for which no edge is searched and which a convex body does not hide."""
 
     corners: Bools
     centres: bool
     matters: Bools
-    gaps: Bools
+    gaps: NDArray[np.int8]
     facing_away: Bools
+
+    @staticmethod
+    def centres_of(n: int) -> Tested:
+        """Return that only the centres of n tubes are tested."""
+        none = np.zeros(n, bool)
+        return Tested(none, True, none, np.full(n, NO_GAPS, np.int8), NONE_AWAY)
 
 
 _NO_TUBES = TubesToSee(np.empty((0, 4, 3)), np.empty((0, 4, 3)), np.empty(0, np.int32), np.empty((0, 3, 3)))
@@ -132,9 +141,8 @@ def points_seen(
     """Return rays to single points (n, 3) [m] on facets (n,), as centres (see `legs.Leg.visible`)."""
     rays = ShadowRays.room(len(points), len(chain.at), layers)
     rays.points[:, 3], rays.target[:, 3], rays.slack[:] = points, facet, slack
-    none = np.zeros(len(points), bool)
     body = _NO_BODY if inside is None else np.ascontiguousarray(inside, np.int64)
-    cast_shadow_rays(geometry, chain, rays, Tested(none, True, none, none, NONE_AWAY), _NO_TUBES, body)
+    cast_shadow_rays(geometry, chain, rays, Tested.centres_of(len(points)), _NO_TUBES, body)
     return rays
 
 
@@ -241,8 +249,9 @@ def _each_tube(  # type: ignore[no-untyped-def]
             other = rays.corner_blocker[i, q]
             some |= rays.corner_seen[i, q]
             whole &= rays.corner_seen[i, q]
-            # Behind one smooth patch there is no gap.
+            # Behind one smooth patch there is a gap only if it is hollow.
             one = one and other >= 0 and smooth[other] == smooth[block]
         rays.some[i], rays.mixed[i] = some, some and not whole
-        rays.search[i] = tested.matters[i] and (some or (tested.gaps[i] and not one)) and not away
+        gap = tested.gaps[i] == ANY_GAP or (tested.gaps[i] == BETWEEN and not one)
+        rays.search[i] = tested.matters[i] and (some or gap) and not away
     return casts

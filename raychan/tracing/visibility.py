@@ -22,7 +22,17 @@ from raychan.tracing.image_paths import bounds_of_light
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.radiation import exit_points
 from raychan.tracing.shadow_edges import longest_shadows, shadow_edges_of
-from raychan.tracing.tube_rays import NONE_AWAY, ShadowRays, Tested, TubesToSee, cast_shadow_rays, project_to_facet
+from raychan.tracing.tube_rays import (
+    ANY_GAP,
+    BETWEEN,
+    NO_GAPS,
+    NONE_AWAY,
+    ShadowRays,
+    Tested,
+    TubesToSee,
+    cast_shadow_rays,
+    project_to_facet,
+)
 from raychan.tracing.tubes import Refinement, Tubes
 from raychan.vectors import copy_to
 from raychan.world.geometry import Geometry
@@ -52,24 +62,9 @@ class Visibility:
 
 def centre_visibility(geometry: Geometry, leg: Leg, tubes: Tubes, first: bool, rule: Refinement) -> View:
     """Return how the centres of tubes are seen over a leg; first whether these stand on their first surface."""
-    rays, none = ShadowRays.room(len(tubes), len(leg.mirrors), rule.layers), np.zeros(len(tubes), bool)
-    cast_shadow_rays(
-        geometry, leg.chain, rays, Tested(none, True, none, none, NONE_AWAY), _drawn(geometry, tubes, first)
-    )
-    return View.of(rays)
-
-
-def corner_visibility(
-    geometry: Geometry, leg: Leg, tubes: Tubes, corners: Bools, level: int, rule: Refinement
-) -> tuple[View, Bools]:
-    """Return how the centres of tubes on their first surface are seen over a leg, and of which tubes (n,), of those
-    whose `corners` (n,) are tested too, a part only is seen, or may be through a gap; level how often they were
-    subdivided."""
     rays = ShadowRays.room(len(tubes), len(leg.mirrors), rule.layers)
-    corners = corners & (not geometry.convex_alone)
-    tested = Tested(corners, True, corners, _gaps(geometry, tubes, level), NONE_AWAY)
-    cast_shadow_rays(geometry, leg.chain, rays, tested, _drawn(geometry, tubes, True))
-    return View.of(rays), rays.mixed | (rays.search & ~rays.some)
+    cast_shadow_rays(geometry, leg.chain, rays, Tested.centres_of(len(tubes)), _drawn(geometry, tubes, first))
+    return View.of(rays)
 
 
 def tube_visibility(
@@ -79,15 +74,16 @@ def tube_visibility(
     matters: Bools,
     first: bool,
     rule: Refinement,
-    level: int = 0,
+    level: int | None = 0,
     centre: View | None = None,
     facing_away: Bools | None = None,
 ) -> Visibility:
     """Return how tubes are seen over a leg; by the centre ray alone where subdividing would not matter.
 
     Args: matters (n,); first whether they stand on their first surface; level how often they were subdivided: at the
-    first ones a gap is looked for through which a tube is seen that none of its rays is; centre how their centres are
-    seen, tested if not given; facing_away (n,) tubes beyond the horizon, which their own body does not hide.
+    first ones a gap is looked for through which a tube is seen that none of its rays is, if None in all tubes, also
+    beside a single smooth patch; centre how their centres are seen, tested if not given; facing_away (n,) tubes beyond
+    the horizon, which their own body does not hide.
     """
     n = len(tubes)
     corners = np.zeros(n, bool) if geometry.convex_alone else matters
@@ -112,9 +108,13 @@ def tube_visibility(
     return Visibility(View.of(rays) if centre is None else centre, rays.some, rays.mixed, side)
 
 
-def _gaps(geometry: Geometry, tubes: Tubes, level: int) -> Bools:
-    """Return of which hidden tubes (n,), subdivided `level` times, a part is looked for that is seen through a gap."""
-    return np.where(geometry.curved[tubes.facet], level < 1, level < _GAP_LEVELS)
+def _gaps(geometry: Geometry, tubes: Tubes, level: int | None) -> NDArray[np.int8]:
+    """Return where gaps are looked for through which parts of hidden tubes (n,), subdivided `level` times (None:
+    anywhere), are seen, as for `Tested`."""
+    if level is None:
+        return np.full(len(tubes), ANY_GAP, np.int8)
+    looked_for = np.where(geometry.curved[tubes.facet], level < 1, level < _GAP_LEVELS)
+    return np.where(looked_for, BETWEEN, NO_GAPS).astype(np.int8)
 
 
 def _drawn(geometry: Geometry, tubes: Tubes, first: bool) -> TubesToSee:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+import trimesh
 
 import raychan as rc
 
@@ -45,3 +48,33 @@ def test_a_rod_hidden_up_to_its_foot_point_scatters_half_its_amplitude(carrier, 
         found = preview_of(rod(radius, height), *before, carrier=carrier, height=level, chirps=16).detections
         powers.append(found.power[np.abs(found.range - (6.0 - radius)) < 0.5].max())
     assert 10.0 * np.log10(powers[1] / powers[0]) == pytest.approx(20.0 * np.log10(0.5), abs=1.2)
+
+
+def sheet(x: float, *rectangles: tuple[float, float, float, float]) -> trimesh.Trimesh:
+    """Return rectangles (left, low, right, high) [m] of a sheet in the plane x that looks back; where corners meet they
+    are one piece."""
+    corners = [[[x, a, b], [x, a, d], [x, c, d], [x, c, b]] for a, b, c, d in rectangles]
+    faces = [[4 * i + j for j in face] for i in range(len(rectangles)) for face in ([0, 1, 2], [0, 2, 3])]
+    return trimesh.Trimesh(np.concatenate(corners), faces)
+
+
+@pytest.mark.parametrize(("slats", "framed"), [(3, False), (24, False), (2, True)])
+def test_a_plate_behind_slats_scatters_as_the_strips_of_it_that_are_seen(slats, framed):
+    """Physical optics integrates over what is seen: the plate less the shadows of the slats, which are twice as wide
+    and high; framed ones are one sheet with slots, and the strips end where its frame begins."""
+    far, half = 8.0, 0.2
+    top = 0.5 * half if framed else half
+    edges = np.linspace(-half, half, 2 * slats + 1)
+    columns = list(pairwise(edges))
+    dark = [(a, -top, b, top) for a, b in columns[1::2]]
+    for a, b in columns if framed else []:
+        dark += [(a, top, b, 2.0 * half), (a, -2.0 * half, b, -top)]
+    shadows = 0.5 * np.array(dark)
+    behind = {"plate": sheet(far, (-half, -half, half, half)), "slats": sheet(0.5 * far, *shadows)}
+    strips = {"strips": sheet(far, *[(a, -top, b, top) for a, b in columns[::2]])}
+    powers = []
+    for meshes in (behind, strips):
+        bodies = [rc.Body(name, mesh=mesh, material="pec") for name, mesh in meshes.items()]
+        found = preview_of(*bodies, carrier=24e9, height=0.0, chirps=16).detections
+        powers.append(found.power[np.abs(found.range - far) < 0.5].max(initial=1e-300))
+    assert 10.0 * np.log10(powers[0] / powers[1]) == pytest.approx(0.0, abs=0.3)
