@@ -27,6 +27,7 @@ from raychan.units import C0, db, undb
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_BEFORE = 0.1  # map cells: peaks of echoes at range 0 are as far off by noise of 25 dB below (not measured)
 _TINY = 1e-300
 METHODS = ("bartlett", "capon", "music", "esprit")
 
@@ -145,13 +146,13 @@ def detect(
     if aperture is None or bank is None:
         place = (cells + np.clip(shift, -0.5, 0.5)) / np.array(grid.pad)
         kept = lobes.own(place, power, smear, shown, besides=lambda i: lines.own(cells[i]))
-        return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed)
+        return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed, wraps=shape.wraps)
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, shown, bar.of_beam(bank, local, pfa), smear, towards)
     scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
-    return _reported(map, grid, echoes.take(loud), ego_speed, aperture, seen.looks)
+    return _reported(map, grid, echoes.take(loud), ego_speed, aperture, seen.looks, shape.wraps)
 
 
 def least_power(
@@ -230,11 +231,14 @@ def _reported(
     ego_speed: float,
     aperture: Aperture | None = None,
     looks: int = 1,
+    wraps: bool = False,
 ) -> Detections:
     """Return what is found as detections; with an aperture, of echoes with their directions, and SNR that is that in a
-    beam over `looks`."""
-    # A peak belongs to its cell: one a fraction before the first is at range 0, not at the far end, an ambiguity away.
-    place = np.maximum(found.place, (-np.inf, 0.0))
+    beam over `looks`. Args: wraps, whether the last range cell is beside the first."""
+    place = found.place
+    # No echo comes from before the radar: where the ranges wrap such a peak is one at their far end.
+    place[:, 1] += map.power.shape[1] * (wraps & (place[:, 1] < -_BEFORE))
+    place = np.maximum(place, (-np.inf, 0.0))
     fold = np.zeros(len(place), np.int64)
     if isinstance(map, ResolvedMap):
         fold = found.fold if isinstance(found, Echoes) else map.fold[tuple(found.cells.T)].astype(np.int64)

@@ -37,7 +37,7 @@ class PeakShape:
         beside the first."""
         given = zip(windows, samples, grid.pad, strict=True)
         self.lobes = [main_lobe(name, n, pad) for name, n, pad in given]
-        self._skew, self._wraps = skew * grid.pad[1] / grid.pad[0], wraps
+        self._skew, self.wraps = skew * grid.pad[1] / grid.pad[0], wraps
 
     @classmethod
     def of(cls, grid: Grid, windows: tuple[str, str], waveform: Waveform | None, chirps: int | None) -> PeakShape:
@@ -69,12 +69,16 @@ class PeakShape:
         rows, columns = cells.T
         shift, power = (x.copy() for x in lone)
         reach = [min(_REACH, (n - 1) // 2) for n in shape]
-        told = all(lobe.pad > 1 or n <= 2 for lobe, n in zip(self.lobes, shape, strict=True)) and not self.lobes[1].flat
-        some = np.flatnonzero(told & self._inner(cells, shape) & (np.abs(shift[:, 0]) <= 0.5))
+        padded = all(lobe.pad > 1 or n <= 2 for lobe, n in zip(self.lobes, shape, strict=True))
+        told = np.full(len(cells), padded and not self.lobes[1].flat)
         # Near an end of the ranges more cells lie on one side; beyond an end of the rates echoes lie elsewhere.
         low = columns - reach[1]
-        low = low if self._wraps else np.clip(low, 0, shape[1] - 1 - 2 * reach[1])
+        low = low if self.wraps else np.clip(low, 0, shape[1] - 1 - 2 * reach[1])
         ends = np.clip(rows, reach[0], shape[0] - 1 - reach[0]) - rows
+        there = low - np.sign(ends) * round(self._turn(shape))
+        there = self._inner(cells, shape) & (there >= 0) & (there < shape[1] - 2 * reach[1])
+        told &= (self.wraps | (ends == 0) | there) & (shape[1] > 2) & (np.abs(shift[:, 0]) <= 0.5)
+        some = np.flatnonzero(told)
         groups, group = np.unique(np.stack([ends, low - columns], axis=1)[some], axis=0, return_inverse=True)
         for k, (_, first) in enumerate(groups):
             mine = some[group.ravel() == k]
@@ -125,7 +129,7 @@ class PeakShape:
 
     def _inner(self, cells: Ints, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Return which cells (c, 2) of a map have neighbours below and above in range."""
-        return ((cells[:, 1] > 0) & (cells[:, 1] < shape[1] - 1) | self._wraps) & (shape[1] > 2)
+        return ((cells[:, 1] > 0) & (cells[:, 1] < shape[1] - 1) | self.wraps) & (shape[1] > 2)
 
     def cells_at(self, rows: Ints, columns: Ints, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
         """Return rows and columns of a map of those that may lie beyond its ends: rows go on at the other end, in range
@@ -173,6 +177,6 @@ def _top(power: Floats, fine: list[Floats]) -> Peak:
         low, high = (level[k, at[0] + 1 + s * (axis == 0), at[1] + 1 + s * (axis == 1)] for s in (-1, 1))
         # No step is 0: of an axis without any all levels are equal.
         part = np.clip(0.5 * (low - high) / np.minimum(low - 2.0 * top + high, -_TINY), -0.5, 0.5)
-        off[:, axis] = place[at[axis] + 1] + part * (place[1] - place[0])
+        off[:, axis] = np.clip(place[at[axis] + 1] + part * (place[1] - place[0]), -1.0, 1.0)
         gain += 0.25 * (high - low) * part
     return off, np.exp(top + gain)

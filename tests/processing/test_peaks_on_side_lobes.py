@@ -1,6 +1,8 @@
-"""Echoes on which side lobes of stronger ones lie: level and place are those that a map of finer cells shows."""
+"""Peaks between cells: on side lobes of stronger echoes and at the end of the ranges."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -48,3 +50,15 @@ def test_an_echo_on_a_side_lobe_reads_what_a_map_of_finer_cells_shows(name, rate
         assert db(seen.power[k]) == pytest.approx(db(power), abs=0.04)
         assert abs(seen.range[k] - peak_range) < 0.06 * WAVE.range_resolution
         assert abs(seen.rate[k] - peak_rate) < 0.06 * WAVE.rate_resolution
+
+
+@pytest.mark.parametrize("away", [0.1, 0.2, 0.3, 0.6])
+def test_an_echo_just_before_the_end_of_real_sampling_reads_its_range_and_power(away):
+    """The map ends half a resolution cell before the unambiguous range: the peak lies beyond its last cell."""
+    real = replace(WAVE, complex_sampling=False)
+    r = real.unambiguous_range - away * real.range_resolution
+    start = r - 0.2 * real.unambiguous_rate * real.centre
+    cube = synthesize(echoes([start], 0.2 * real.unambiguous_rate, 1e-3), make_radar(real))
+    found = detect(range_doppler(cube, real), waveform=real)
+    assert found.range[0] == pytest.approx(r, abs=0.05 * real.range_resolution)
+    assert 10.0 * np.log10(found.power[0] / 1e-6) == pytest.approx(0.0, abs=0.1)
