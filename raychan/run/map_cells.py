@@ -79,13 +79,13 @@ class MapCells:
         """Return the place (3,) of the cell of level i."""
         return np.asarray(self.place[i % len(self.place)])
 
-    def loosened(self, spread_db: Floats) -> int:
-        """Let levels be wrong by what displaced bodies move them, (c,) [dB], where that is more; return of how many
-        cells."""
+    def loosened(self, spread_db: Floats) -> list[tuple[float, float]]:
+        """Let levels be wrong by what displaced bodies move them, (c,) [dB], where that is more; return the ranges and
+        rates of these cells."""
         speckle = 1.0 - 10.0 ** (-spread_db / 20.0)
-        count = int((speckle > self.tolerance[: len(speckle)]).sum())
+        rows = speckle > self.tolerance[: len(speckle)]
         self.tolerance = np.maximum(self.tolerance, np.tile(speckle, len(self) // max(len(speckle), 1)))
-        return count
+        return [(float(at[0]), float(at[1])) for at in self.place[rows]]
 
     def spare(self, least: Floats) -> None:
         """Let levels below amplitudes (c,), from which on cells are detections or peaks, be wrong by what keeps them

@@ -163,7 +163,7 @@ class SceneRefinement:
         held = SourcedPaths(first.paths, first.source, self._probes)
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
         cells = self._cells(radar, response, first.paths)
-        steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", 0
+        steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", list[tuple[float, float]]()
         if len(cells.place) and self.model.speckle:
             speckled = cells.loosened(
                 spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.middle)
@@ -184,7 +184,7 @@ class SceneRefinement:
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
-        remains = Remains(unreached, steps, ended, self.model.tolerance_db, speckled)
+        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(speckled))
         return Converged(launched, others, self.model, first.chosen, remains)
 
     def _cells(self, quiet: Radar, response: PointSpread, paths: Paths) -> MapCells:

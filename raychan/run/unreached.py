@@ -42,23 +42,17 @@ class Unreached:
         """Where the cell lies, and what changes there."""
         return f"{_place(self.range, self.rate)} ({self.cause})"
 
-    def detection(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> int | None:
-        """Return the row of the nearest detection within a cell, None where there is none; args as of `notes`."""
-        away, off = (np.abs(x - at) / cell for x, at, cell in zip(found, (self.range, self.rate), size, strict=True))
-        near = np.flatnonzero((away <= 1.0) & (off <= 1.0))
-        return int(near[np.argmin(np.hypot(away, off)[near])]) if len(near) else None
-
 
 @dataclass(frozen=True)
 class Remains:
     """How a refinement ended: the cells `unreached` after so many `steps`, and what `ended` it, '' where none is left;
-    `speckled` cells were refined to their speckle only."""
+    cells of `speckled` ranges and rates were refined to their speckle only."""
 
     unreached: tuple[Unreached, ...]
     steps: int
     ended: str
     tolerance_db: float
-    speckled: int = 0
+    speckled: tuple[tuple[float, float], ...] = ()
 
     def notes(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> list[str]:
         """Return a line on the cells that are speckle, one on the detections whose levels are not within the tolerance,
@@ -69,14 +63,17 @@ class Remains:
         """
         said, tolerance = [], f"{self.tolerance_db:g} dB"
         if self.speckled:
+            rows = [_detection(place, found, size) for place in self.speckled]
+            numbers = sorted({i + 1 for i in rows if i is not None})
+            which = f", {_number(len(numbers))} {', '.join(map(str, numbers))} among them" if numbers else ""
             said.append(
-                f"{self.speckled} cells of the map are speckle (model.speckle): displacing bodies by 0.05 deg and 1 mm "
-                f"moves them by more than {tolerance}, and they are refined to that only"
+                f"{len(self.speckled)} cells of the map are speckle (model.speckle){which}: displacing bodies by 0.05 "
+                f"deg and 1 mm moves them by more than {tolerance}, and they are refined to that only"
             )
         causes: dict[int, list[str]] = {}
         weak = []
         for cell in self.unreached:
-            row = cell.detection(found, size)
+            row = _detection((cell.range, cell.rate), found, size)
             if row is None:
                 weak.append(cell.text)
             else:
@@ -84,12 +81,24 @@ class Remains:
         how = f"refined {'once' if self.steps == 1 else f'{self.steps} times'}, ended by {self.ended}"
         if causes:
             some = [_numbered(i, found, causes[i]) for i in sorted(causes)]
-            numbers = "number" if len(some) == 1 else "numbers"
-            said.append(f"{how}: the level still changes by more than {tolerance} at {numbers} {_first(some, ', ')}")
+            at = f"{_number(len(some))} {_first(some, ', ')}"
+            said.append(f"{how}: the level still changes by more than {tolerance} at {at}")
         if weak:
             what = "where nothing is detected yet, what may still change makes a detection at"
             said.append(f"{how}: {what} {_first(weak, '; ')}")
         return said
+
+
+def _detection(place: tuple[float, float], found: tuple[Floats, Floats], size: tuple[float, float]) -> int | None:
+    """Return the row of the detection nearest to a range and rate, within a cell, None where there is none; args as of
+    `Remains.notes`."""
+    away, off = (np.abs(x - at) / cell for x, at, cell in zip(found, place, size, strict=True))
+    near = np.flatnonzero((away <= 1.0) & (off <= 1.0))
+    return int(near[np.argmin(np.hypot(away, off)[near])]) if len(near) else None
+
+
+def _number(count: int) -> str:
+    return "number" if count == 1 else "numbers"
 
 
 def _place(range: float, rate: float) -> str:
