@@ -127,10 +127,11 @@ def _sequence(
     scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
 ) -> None:
     from raychan.run.messages import findings, marks
+    from raychan.run.output_files import PictureError
     from raychan.run.sequence import Store, frames, overlap
 
     show.warn(overlap(scene, count, interval))
-    store, told = Store(out), set()
+    store, told, lost = Store(out), set(), list[PictureError]()
     start = perf_counter()
 
     def keep() -> str:
@@ -139,7 +140,11 @@ def _sequence(
     with show.to_the_end() as say, show.keeping(keep), show.progress() as tell:
         for frame in frames(scene, count, interval, **options, progress=tell):
             drawn: list[str] = []
-            store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
+            try:
+                store.add(frame, (lambda r, d: drawn.extend(_pictures(r, d, tell))) if pictures else None)  # noqa: B023
+            except PictureError as error:
+                # The frame's results are there, and the next ones do not hang on its pictures.
+                lost.append(error)
             # A sequence prints each warning once. Lines on detections differ from frame to frame; each frame's own
             # line counts them.
             said = [] if frame.number == 0 else findings(frame.result)
@@ -154,6 +159,8 @@ def _sequence(
         took = perf_counter() - start
         say(f"{count} frame{'' if count == 1 else 's'} in {took:.1f} s; seeds from {options['seed']}")
         say(f"results: {out / 'frame_0000'} and on; detections of all frames: {out / 'detections.csv'}")
+    if lost:
+        raise PictureError(f"{len(lost)} of {count} frames lack pictures: {lost[0]}")
 
 
 def _pictures(  # type: ignore[no-untyped-def]

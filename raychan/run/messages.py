@@ -235,8 +235,9 @@ def overrun(seconds: float, allowed: float | None) -> tuple[str, ...]:
     if allowed is None or seconds <= allowed:
         return ()
     return (
-        f"tracing took longer than the {allowed:g} s allowed (model.max_seconds), which end refinement after its first "
-        "step only: a larger tolerance (model.tolerance_db), fewer bounces or fewer elements far apart take less",
+        f"tracing took longer than the {allowed:g} s allowed (model.max_seconds), as the first launch, one step and "
+        "any step that began always end: a larger tolerance (model.tolerance_db), fewer bounces or fewer elements far "
+        "apart take less",
     )
 
 

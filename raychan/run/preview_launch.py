@@ -58,6 +58,7 @@ _CLASSES, _A_CLASS = 64, 4.0  # of sizes below the threshold, and of these to a 
 # bodies behind racks, benches, rails, posts and ends of walls 2 are beyond what is stated, 1 is missing, 3 are
 # invented; with strong ones from 0.1 on 1, 1 and 3, for 25 % more CPU of a frame of the urban street (no commands).
 _STRONG, _HIDDEN, _CLIPS = 0.3, 1.0, 60
+_CLIPPED = 2000  # tubes that are clipped at once, the strongest: streets have 319 at most, without noise far more
 _LEAST = 1e-4  # of the strongest tube: the least floor, for radars without noise; not measured
 # Halvings, and those from which on parts that do not count are dropped. Plates of 40 m to 2 km at 20 m, square on or
 # aslant, are within 0.4 dB of fine runs and take 0.1 to 0.3 s of CPU (command not kept).
@@ -244,6 +245,7 @@ def _seen_parts(geometry: Geometry, leg: Leg, outs: list[Leg], tubes: Tubes, rul
         # Parts of parts are seen through gaps, too: behind a rack there are many.
         seen = tube_visibility(geometry, leg, tubes, most > _STRONG * floor, True, rule, None)
         split = seen.mixed & (seen.some | (most > _HIDDEN * floor))
+        split[np.argsort(np.where(split, -most, 0.0), kind="stable")[_CLIPPED:]] = False
         ready, rows = np.flatnonzero(seen.centre.seen & ~split), np.flatnonzero(split)
         parts.append(tubes.take(ready))
         views.append(seen.centre.take(ready))
