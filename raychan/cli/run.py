@@ -160,7 +160,7 @@ def _sequence(
         say(f"{count} frame{'' if count == 1 else 's'} in {took:.1f} s; seeds from {options['seed']}")
         say(f"results: {out / 'frame_0000'} and on; detections of all frames: {out / 'detections.csv'}")
     if lost:
-        raise PictureError(f"{len(lost)} of {count} frames lack pictures: {lost[0]}")
+        raise PictureError(f"{show.share(len(lost), count, 'frames')} without pictures: {lost[0]}")
 
 
 def _pictures(  # type: ignore[no-untyped-def]

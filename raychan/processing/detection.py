@@ -27,7 +27,7 @@ from raychan.units import C0, db, undb
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_BEFORE = 0.1  # map cells: peaks of echoes at range 0 are as far off by noise of 25 dB below (not measured)
+_BEFORE = 0.1  # map cells by which noise may move the peak of an echo at range 0 to before it (not measured)
 _TINY = 1e-300
 METHODS = ("bartlett", "capon", "music", "esprit")
 

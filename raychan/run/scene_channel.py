@@ -34,8 +34,8 @@ from raychan.world.scene import Scene
 from raychan.world.schema import PREVIEW
 
 _WHOLE = (
-    f"more than {MOST:,} paths, also by a coarser first launch: the frame is launched twice as a whole, not refined "
-    "where detections need it, and no budget (model.max_rays, max_seconds, max_memory_mb) ends that"
+    f"the first launch brings more than {MOST:,} paths, as one for 1 dB or more does: the frame is launched twice as a "
+    "whole, not refined where detections need it, and no budget (model.max_rays, max_seconds, max_memory_mb) ends that"
 )
 
 

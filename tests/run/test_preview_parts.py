@@ -9,13 +9,14 @@ import pytest
 import trimesh
 
 import raychan as rc
+from raychan.run import preview_launch
 
 
-def preview_of(*bodies: rc.Body, carrier: float, height: float, chirps: int) -> rc.Result:
+def preview_of(*bodies: rc.Body, carrier: float, height: float, chirps: int, noise: bool = True) -> rc.Result:
     wave = rc.Waveform(
         carrier=carrier, bandwidth=300e6, chirp_duration=30e-6, repetition=80e-6, n_chirps=chirps, n_samples=64
     )
-    radar = rc.Radar(wave, position=(0.0, 0.0, height), power=1.0)
+    radar = rc.Radar(wave, position=(0.0, 0.0, height), power=1.0, noise=noise)
     return rc.simulate(rc.Scene(bodies=bodies, radar=radar, model={"mode": "preview", "max_bounces": 1}), seed=0)
 
 
@@ -78,3 +79,18 @@ def test_a_plate_behind_slats_scatters_as_the_strips_of_it_that_are_seen(slats, 
         found = preview_of(*bodies, carrier=24e9, height=0.0, chirps=16).detections
         powers.append(found.power[np.abs(found.range - far) < 0.5].max(initial=1e-300))
     assert 10.0 * np.log10(powers[0] / powers[1]) == pytest.approx(0.0, abs=0.3)
+
+
+def test_without_noise_so_many_tubes_are_clipped_at_once_at_most(monkeypatch):
+    """Without noise all tubes are strong: parts of parts would grow without end."""
+    rows, clip = [], preview_launch.subdivide
+    monkeypatch.setattr(preview_launch, "subdivide", lambda *x: (rows.append(len(x[3])), clip(*x))[1])
+    slats = sheet(4.0, *[(a, -0.1, a + 0.01, 0.1) for a in np.arange(-0.1, 0.1, 0.02)])
+    bodies = [rc.Body("plate", mesh=sheet(8.0, (-0.2, -0.2, 0.2, 0.2)), material="pec"), rc.Body("slats", mesh=slats)]
+    most = []
+    for limit in (2000, 1):
+        monkeypatch.setattr(preview_launch, "_CLIPPED", limit)
+        preview_of(*bodies, carrier=24e9, height=0.0, chirps=16, noise=False)
+        most.append(max(rows))
+        rows.clear()
+    assert most[0] > 1 and most[1] == 1
