@@ -221,7 +221,15 @@ class Splitter:
             at = reach
         cell = np.array([v[tuple(at)], r[tuple(at)]])
         beside = np.array([[level[at[0] + s, at[1]] for s in (-1, 1)], [level[at[0], at[1] + s] for s in (-1, 1)]])
-        shift, power = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
+        lone = self.shape.between(level[at[0], at[1]][None], beside[:, :, None], cell[None], shape)
+
+        def beam(v: Ints, r: Ints) -> Complexes:
+            spans = self._spans(peaks, i, fold, v)
+            # What undoes the turns of one echo by Doppler division is no band-limited function of rates.
+            spans = np.rint(spans) if self.slots.shifted else spans
+            return np.tensordot(held.weights[k], self._read(v, r, spans), 1)[None]
+
+        shift, power = self.shape.among(beam, 1, cell[None], lone, shape)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
         unsure, shown = bool(held.unsure(self.scan.aperture)[k]), float(level[at[0], at[1]])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.blas import on_one_blas_thread
+from raychan.processing.cfar import batches
 from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.processing.range_azimuth import range_azimuth as from_map
 from raychan.radar.declared import check_type
@@ -77,23 +78,26 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
 
     def passed(row: int, some: Ints, mirrored: Bools) -> Complexes:
         # A path over several bodies leaves and arrives in different directions.
-        one, way = paths.trajectories, paths.trajectory[some]
-        sent, seen = (
-            np.exp(turn * (look @ axes @ elements.T))
-            for look, axes, elements in (
-                (one.departure[way], radar.axes, radar.tx_elements),
-                (one.arrival[way], radar.rx_axes, radar.elements),
-            )
-        )
+        ways, way = np.unique(paths.trajectory[some], return_inverse=True)
         weights = found.beam[row].reshape(-1, len(radar.elements))
+        sent = _phases(radar.axes, radar.tx_elements, paths.trajectories.departure[ways], turn)
         # An image is the conjugate of its path, at minus its rate; so is what it brings to a cell.
-        sent, seen = (np.where(mirrored[:, None], x.conj(), x) for x in (sent, seen))
-        sign = np.where(mirrored, -1, 1)
+        received = np.empty((2, len(ways), len(weights)), complex)
+        for part in batches(len(ways), len(radar.elements)):
+            seen = _phases(radar.rx_axes, radar.elements, paths.trajectories.arrival[ways[part]], turn)
+            received[:, part] = seen @ weights.T, seen.conj() @ weights.T
+        sign, image = np.where(mirrored, -1, 1), mirrored[:, None]
+        sent = np.where(image, sent[way].conj(), sent[way])
         held = _in_slots(radar, len(weights), sent, sign * paths.range_rate[some] - found.rate[row], sign)
-        beam = ((held @ weights) * seen).sum(axis=1)
+        beam = (held * np.where(image, received[1, way], received[0, way])).sum(axis=1)
         return np.asarray(np.where(mirrored, beam.conj(), beam))
 
     return Beams(passed, range_spread(found, radar)[0])
+
+
+def _phases(axes: Floats, elements: Floats, look: Floats, turn: complex) -> Complexes:
+    """Return the phase factors (n, e) of elements (e, 3) [m] by waves along directions (n, 3)."""
+    return np.asarray(np.exp(turn * (look @ axes @ elements.T)))
 
 
 def _in_slots(radar: Radar, many: int, sent: Complexes, off: Floats, sign: Ints) -> Complexes:
@@ -127,12 +131,18 @@ def wave_in_beam(
     the detection, a row of those that the beams are of."""
     place = paths.delay, paths.range_rate, float(at[0]), float(at[1])
     middle = response.in_cell(paths.amplitude, *place)[0]
-    near = np.flatnonzero(np.abs(middle) * len(middle) > _LITTLE * at[2])
+    near = _without_least(np.abs(middle), _LITTLE * float(at[2]))
     wave = np.zeros_like(paths.amplitude)
     wave[near] = paths.amplitude[near] * beams.passed(row, near, _mirrored(paths, response, near, at))
     seen = response.in_cell(wave, *place)[0].sum()
     other = unexplained(seen, power[1], receiver) and not unexplained(middle.sum(), power[0], receiver)
     return None if other else wave
+
+
+def _without_least(size: Floats, least: float) -> Ints:
+    """Return the rows of sizes (n,), in order, without the smallest ones, whose sum is at most `least`."""
+    order = np.argsort(size, kind="stable")
+    return np.sort(order[np.cumsum(size[order]) > least])
 
 
 def _mirrored(paths: Paths, response: PointSpread, some: Ints, at: Floats) -> Bools:
