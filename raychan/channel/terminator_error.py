@@ -9,6 +9,9 @@ from raychan.poses import theta_phi
 
 Floats = NDArray[np.float64]
 
+TERMINATOR = 0.25
+"""Of 1 / k: backwards, the amplitude of the terminator of a sphere of any radius, where currents of physical optics
+end, against Mie's series."""
 _FOCK = 0.25  # of the amplitude of Fock's belt: its error where PO currents end smoothly (not measured by itself)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.blas import on_one_blas_thread
+from raychan.parallel import parallel_tasks
 from raychan.processing.cfar import batches
 from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.processing.range_azimuth import range_azimuth as from_map
@@ -19,6 +20,7 @@ from raychan.run.point_spread import PointSpread
 from raychan.run.receiver import aperture_of, check_cube, check_map, map_of, receivers
 from raychan.run.receiver_losses import range_spread
 from raychan.run.result import Receiver, Result
+from raychan.signal.baseband import fronts_of
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -26,6 +28,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Complexes = NDArray[np.complex128]
 
+_AT_ONCE = 32  # as many times fewer paths pass a beam at a time as memory holds, so that threads share them
 _LITTLE = 1e-3  # of a detection's amplitude: largest sum of the paths left out of a beam (not measured)
 UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
 
@@ -74,30 +77,44 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
     """Return the beams of detections; None without an array, or where a file does not hold them."""
     if not found.beam.shape[1]:
         return None
-    turn = 2j * np.pi * radar.waveform.middle / C0
+    turn, fronts = 2.0 * np.pi * radar.waveform.middle / C0, fronts_of(paths)
+    senders, receivers = radar.tx_elements @ radar.axes.T, radar.elements @ radar.rx_axes.T
 
     def passed(row: int, some: Ints, mirrored: Bools) -> Complexes:
-        # A path over several bodies leaves and arrives in different directions.
-        ways, way = np.unique(paths.trajectory[some], return_inverse=True)
-        weights = found.beam[row].reshape(-1, len(radar.elements))
-        sent = _phases(radar.axes, radar.tx_elements, paths.trajectories.departure[ways], turn)
-        # An image is the conjugate of its path, at minus its rate; so is what it brings to a cell.
-        received = np.empty((2, len(ways), len(weights)), complex)
-        for part in batches(len(ways), len(radar.elements)):
-            seen = _phases(radar.rx_axes, radar.elements, paths.trajectories.arrival[ways[part]], turn)
-            received[:, part] = seen @ weights.T, seen.conj() @ weights.T
-        sign, image = np.where(mirrored, -1, 1), mirrored[:, None]
-        sent = np.where(image, sent[way].conj(), sent[way])
-        held = _in_slots(radar, len(weights), sent, sign * paths.range_rate[some] - found.rate[row], sign)
-        beam = (held * np.where(image, received[1, way], received[0, way])).sum(axis=1)
-        return np.asarray(np.where(mirrored, beam.conj(), beam))
+        waves, weights = fronts[some], found.beam[row].reshape(-1, len(receivers)).T.astype(np.complex64)
+        sign, beam = np.where(mirrored, -1, 1), np.empty(len(some), complex)
+        parts = batches(len(some), _AT_ONCE * len(receivers))
+
+        def one(k: int) -> None:
+            # An image is the conjugate of its path, at minus its rate; so is what it brings to a cell.
+            part, image = parts[k], mirrored[parts[k], None]
+            sent, seen = (
+                np.where(image, x.conj(), x)
+                for x in (
+                    _phases(waves.tx_radius[part], waves.departure[part], senders, turn),
+                    _phases(waves.radius[part], waves.arrival[part], receivers, turn),
+                )
+            )
+            off = sign[part] * paths.range_rate[some[part]] - found.rate[row]
+            held = _in_slots(radar, weights.shape[1], sent, off, sign[part])
+            beam[part] = (held * (seen @ weights)).sum(axis=1)
+
+        parallel_tasks(len(parts), one)
+        return np.where(mirrored, beam.conj(), beam)
 
     return Beams(passed, range_spread(found, radar)[0])
 
 
-def _phases(axes: Floats, elements: Floats, look: Floats, turn: complex) -> Complexes:
-    """Return the phase factors (n, e) of elements (e, 3) [m] by waves along directions (n, 3)."""
-    return np.asarray(np.exp(turn * (look @ axes @ elements.T)))
+def _phases(radius: Floats, look: Floats, elements: Floats, turn: float) -> NDArray[np.complex64]:
+    """Return the phase factors (n, e) at elements (e, 3) [m] of spherical waves from so far (n,) [m] along directions
+    (n, 3), as `array.excess` tells them, but of all elements at once and in single precision."""
+    far, along = radius.astype(np.float32)[:, None], look.astype(np.float32) @ elements.T.astype(np.float32)
+    square = (elements**2).sum(axis=1).astype(np.float32)
+    whole = np.sqrt(np.maximum(far * (far - 2.0 * along) + square, 0.0)) + far
+    phase = np.float32(-turn) * (square - 2.0 * far * along) / np.maximum(whole, np.float32(1e-30))
+    found = np.empty(phase.shape, np.complex64)
+    found.real, found.imag = np.cos(phase), np.sin(phase)
+    return found
 
 
 def _in_slots(radar: Radar, many: int, sent: Complexes, off: Floats, sign: Ints) -> Complexes:

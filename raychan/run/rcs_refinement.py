@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from raychan.channel.error import COVER, stated_error
 from raychan.channel.mesh_error import MeshError, creeping, has_edges
-from raychan.channel.terminator_error import terminator_error
+from raychan.channel.terminator_error import TERMINATOR, terminator_error
 from raychan.run.rcs_doubt import Doubt
 from raychan.run.rcs_edges import edges_db
 from raychan.run.scattering import BodyLaunch, BySource, rounding
@@ -39,7 +39,6 @@ _EDGE_ALONE = 0.3  # m: the same for convex bodies; a larger tube may bend more 
 _RAYS = 200.0  # rays of two launches over a flat body, about, for an area of max_edge squared
 _COVER_ALONE = 1.05  # in place of COVER for convex bodies: no launch misses a hidden part (command not noted)
 _CURVED = 0.01  # of the value, a radian of a rule's `phase`: error that launches over the same curved facets share
-_TERMINATOR = 0.25  # of 1 / k: PO's abrupt terminator on a sphere of any radius, against Mie's series
 _TUBES = 30_000  # tubes that a launch may always subdivide, if max_rays allow
 _NULL = 1e-4  # of the strongest polarisation, -80 dB: a change below it does not count
 _ROUNDING = 16.0  # times what rounding may leave: below it is none. Amplitudes that are zero (the other polarisation,
@@ -123,7 +122,7 @@ def _terminator(case: Case) -> float:
         return 0.0
     k = 2.0 * np.pi * case.frequency / C0
     area, ends = float(geometry.area.sum()), (case.leg.end, case.out.end)
-    return _TERMINATOR / k + (terminator_error(area, *ends, k, case.row, case.col) if case.out != case.leg else 0.0)
+    return TERMINATOR / k + (terminator_error(area, *ends, k, case.row, case.col) if case.out != case.leg else 0.0)
 
 
 def _launched(case: Case, rules: list[Refinement]) -> tuple[SourceSums, float, float]:

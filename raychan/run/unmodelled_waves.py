@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.mesh_error import creeping
+from raychan.channel.terminator_error import TERMINATOR
 from raychan.em.fresnel import coefficients_array
 from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
@@ -33,8 +34,8 @@ _FADED = 1e-9  # coefficients below this bring nothing even where the band's mea
 def creeping_waves(
     paths: Paths, geometry: Geometry, points: Points, radar: Radar, settings: Any, weakest: float
 ) -> Entry:
-    """Return the entry of waves that creep around curved bodies, but for points, whose RCS is given: of the body where
-    they may bring most.
+    """Return the entry of waves that creep around curved bodies, but for points, whose RCS is given, and of what
+    currents bring that end abruptly where the light does: of the body where they may bring most.
 
     The bounds are those of `rcs`, by the smallest extents of its pieces: one absolute, for what faces the radar, and
     one against the body's own echo, which counts where physical optics does not hold.
@@ -51,7 +52,7 @@ def creeping_waves(
         r = np.linalg.norm(away, axis=1)
         look = away / r[:, None]
         apart = float(np.arccos(np.clip(look[0] @ look[1], -1.0, 1.0)))
-        around, share = creeping(geometry, k, rows, apart)
+        around, share = creeping(geometry, k, rows, apart, TERMINATOR)
         if around == 0.0:
             continue
         fields = radar.tx_field(look[:1]), radar.rx_field(look[1:])
@@ -65,7 +66,10 @@ def creeping_waves(
     unknown = f"{left} is curved and open, for which no bound is known" if left else ""
     if best == 0.0:
         return Entry(UNKNOWN, "none", unknown) if left else Entry(NOTHING, "exact", "no body has a curved side")
-    how = f"bound of spheres as wide as the body's pieces at their thinnest, without occlusion: around {which}"
+    how = (
+        "bound of spheres as wide as the body's pieces at their thinnest, without occlusion, and of currents that end "
+        f"where the light does: around {which}"
+    )
     return Entry(float(db(best / weakest)), "bound", f"{how}; {unknown}" if left else how)
 
 

@@ -54,7 +54,7 @@ def test_spheres_seen_from_aside_have_the_level_of_mies_series_within_what_is_st
     creeps = 20.0 * np.log10(1.0 + 10.0 ** (entry.level_db / 20.0))
     assert entry.kind == "bound"
     assert abs(off) < found.detections.error_db[0] + creeps
-    assert creeps < 1.5 and (ka < 20.0 or abs(off) < 0.06)
+    assert creeps < 1.6 and (ka < 20.0 or abs(off) < 0.06)
     assert not found.warnings or creeps > 0.5
 
 

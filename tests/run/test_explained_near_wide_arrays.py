@@ -1,0 +1,28 @@
+"""Explanations of near bodies before wide arrays: their waves are spherical in the beam, as they are in the samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.units import db
+
+WAVE = rc.Waveform(carrier=77e9, bandwidth=300e6, chirp_duration=30e-6, n_chirps=8, n_samples=64)
+
+
+@pytest.mark.parametrize("yaw_deg", [190.0, 191.0, 193.0])
+@pytest.mark.parametrize("array", ["line", "transmitters"])
+def test_a_plate_whose_glint_lies_beside_the_middle_of_a_wide_array_is_named(array, yaw_deg):
+    given = {"elements": rc.uniform_array(32, 0.5 / 31)}
+    if array == "transmitters":
+        given = {"elements": rc.uniform_array(8, 0.5 / 31), "tx_elements": rc.uniform_array(4, 4.0 / 31)}
+        given["multiplexing"] = "tdm"
+    radar = rc.Radar(waveform=WAVE, position=(0.0, 0.0, 1.0), noise=False, **given)
+    plate = {"width": 0.1, "height": 0.1}
+    body = rc.Body(name="plate", shape="plate", params=plate, position=(1.7, 0.22, 0.95), yaw_deg=yaw_deg)
+    result = rc.simulate(rc.Scene(bodies=[body], radar=radar, model={"max_bounces": 1, "tolerance_db": 0.2}))
+    strongest = int(np.argmax(result.detections.power))
+    why = result.provenance[strongest]
+    assert (why.label, why.bodies) == ("direct", "plate")
+    assert db(why.predicted) == pytest.approx(db(why.power), abs=0.3)
