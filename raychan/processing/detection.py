@@ -14,7 +14,7 @@ from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Splitter
 from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, training
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
-from raychan.processing.found import Echoes, Found, Peaks
+from raychan.processing.found import BEFORE, Echoes, Found, Peaks
 from raychan.processing.line_lobes import LineLobes
 from raychan.processing.peak_shape import PeakShape
 from raychan.processing.peaks import SideLobes
@@ -27,7 +27,6 @@ from raychan.units import C0, db, undb
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_BEFORE = 0.1  # map cells by which noise may move the peak of an echo at range 0 to before it (not measured)
 _TINY = 1e-300
 METHODS = ("bartlett", "capon", "music", "esprit")
 
@@ -237,7 +236,7 @@ def _reported(
     beam over `looks`. Args: wraps, whether the last range cell is beside the first."""
     place = found.place
     # No echo comes from before the radar: where the ranges wrap such a peak is one at their far end.
-    place[:, 1] += map.power.shape[1] * (wraps & (place[:, 1] < -_BEFORE))
+    place[:, 1] += map.power.shape[1] * (wraps & (place[:, 1] < -BEFORE))
     place = np.maximum(place, (-np.inf, 0.0))
     fold = np.zeros(len(place), np.int64)
     if isinstance(map, ResolvedMap):

@@ -12,6 +12,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
+BEFORE = 0.1
+"""Map cells by which noise may move the peak of an echo at range 0 to before it (not measured)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Found:

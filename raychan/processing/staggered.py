@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.columns import column
+from raychan.processing.found import BEFORE
 from raychan.processing.own_waveform import map_by_waveform
 from raychan.processing.slots import Slots
 from raychan.radar.radar import Radar
@@ -201,4 +202,13 @@ def unfolded(map: RangeDoppler, found: Detections, radar: Radar) -> Detections:
     left = span * np.rint((found.rate - map.rate[rows]) / span)
     shift = 0.0 if isinstance(waveform, OwnWaveform) else left * waveform.middle / waveform.slope
     ambiguous = found.ambiguous | (map.open[rows, columns] if isinstance(map, ResolvedMap) else False)
-    return found.replace(range=found.range - shift, ambiguous=ambiguous)
+    far = found.range - shift
+    before = far < -BEFORE * float(np.diff(map.range[:2]).sum())
+    if waveform.complex_sampling:
+        # Ranges wrap: what the shift takes beyond one end comes from the other.
+        beyond = before | (far >= waveform.unambiguous_range)
+        far = np.where(beyond, far % waveform.unambiguous_range, far)
+    else:
+        # With real sampling that is the mirror image of an echo, which explanations find where it stands.
+        ambiguous = ambiguous | before
+    return found.replace(range=np.where(before, far, np.maximum(far, 0.0)), ambiguous=ambiguous)
