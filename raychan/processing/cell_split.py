@@ -68,7 +68,7 @@ class Splitter:
             snapshot, distance = self._read(v, r, self._spans(peaks, i, fold, v)), float(self.map.range[r])
             held = echoes_in(snapshot, self.scan, float(peaks.least[i]), distance, self.slots)
             rows = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k, fold))]
-            rows = [replace(row, unsure=row.unsure or open_) for row in rows]
+            rows = [replace(row, unsure=row.unsure or open_ or self._bent(held, distance)) for row in rows]
             beside += [row for row in rows if row.beside]
             found = [rows[0], *(row for row in rows[1:] if not row.beside and self._own(row, kept, peaks))]
             # The strongest in a cell may be the foot of one that has its own peak, beside which another one peaks here.
@@ -93,6 +93,11 @@ class Splitter:
     def slots(self) -> Slots:
         """How transmitters are told apart."""
         return self.map.slots if isinstance(self.map, ResolvedMap) else LONE
+
+    def _bent(self, held: CellEchoes, distance: float) -> bool:
+        """Return whether echoes of a cell may be parts of one wave that is no plane one at all."""
+        alike = np.full(len(held.power), distance)
+        return len(alike) > 1 and bool((self.scan.misfit(held.direction, alike) >= 1.0).any())
 
     def _fold(self, cell: Ints) -> int:
         """Return by how many spans a map cell (2,) is held to be folded."""

@@ -97,8 +97,8 @@ def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
         said.append(
             f"{_of(rows)} {_verb(rows)} ambiguous in direction ({_numbers(rows)}): "
             "a grating lobe of the elements, or the other end of their view, shows another direction alike, or too "
-            "nearly so for the noise, or more echoes share a cell than were told apart; of equal ones that nearest "
-            "boresight is given"
+            "nearly so for the noise, or more echoes share a cell than were told apart, or those of a cell may be one "
+            "near wave; of equal ones that nearest boresight is given"
         )
     return said
 

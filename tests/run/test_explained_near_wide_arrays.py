@@ -26,3 +26,18 @@ def test_a_plate_whose_glint_lies_beside_the_middle_of_a_wide_array_is_named(arr
     why = result.provenance[strongest]
     assert (why.label, why.bodies) == ("direct", "plate")
     assert db(why.predicted) == pytest.approx(db(why.power), abs=0.3)
+
+
+def test_echoes_that_may_be_parts_of_one_near_wave_are_ambiguous():
+    """A wave from 1.6 m is curved by five radians over 0.37 m: its peak splits into two beams."""
+    wave = rc.Waveform(carrier=24e9, bandwidth=150e6, chirp_duration=30e-6, n_chirps=8, n_samples=48)
+    line = rc.uniform_array(60, 0.5 * 299_792_458.0 / wave.middle)
+    radar = rc.Radar(waveform=wave, position=(0.0, 0.0, 1.0), noise=False, elements=line)
+
+    def seen(away):
+        ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.06}, position=(away, 0.1 * away, 1.0))
+        return rc.simulate(rc.Scene(bodies=[ball], radar=radar, model={"max_bounces": 1})).detections
+
+    near, far = seen(1.6), seen(80.0)
+    assert len(near.range) == 2 and near.ambiguous.all()
+    assert len(far.range) == 1 and not far.ambiguous.any()
