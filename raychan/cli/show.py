@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
@@ -20,8 +19,6 @@ from rich.text import Text
 if TYPE_CHECKING:
     from raychan.run.result import Result
 
-ENDS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
-"""Signals that ask a command to end; SIGHUP comes as its terminal is closed."""
 _COMPILING = "compiling"
 _LONG = 3.0  # s: compiling for longer prints a line where there is no progress bar
 _SOME = ("azimuth deg", "elevation deg", "error dB", "folded: true m", "true m/s")
