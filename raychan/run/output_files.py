@@ -106,12 +106,12 @@ def write_together(files: Mapping[Path, bytes | memoryview]) -> None:
             with _disk_errors(path):
                 there = path.resolve()
             parts.append((ready.enter_context(_part(there, content)), there, path))
-        with held():
-            for part, there, path in parts:
-                with _disk_errors(path):
-                    if part is not None:
-                        os.replace(part, there)
-                    note_file(path)
+        ready.enter_context(held())
+        for part, there, path in parts:
+            with _disk_errors(path):
+                if part is not None:
+                    os.replace(part, there)
+                note_file(path)
 
 
 @contextmanager
