@@ -35,20 +35,20 @@ class Interrupted(Exception):
 @contextmanager
 def keeping(keep: Callable[[], str]) -> Iterator[None]:
     """Turn Ctrl-C into Interrupted with what `keep` returns: it writes what is finished, if anything, and says which
-    that is, '' for none. Where a later part is no possible scene, what is finished is written and said, too."""
+    that is, '' for none. Where a later part fails, as one that is no scene, what is finished is written, too."""
     from raychan.parallel import was_interrupted
-    from raychan.world.errors import SceneError
 
     try:
         yield
-    except SceneError:
-        if kept := keep():
+    except OSError:  # what cannot be written now could not be then
+        raise
+    except (KeyboardInterrupt, Exception) as stop:
+        kept = keep()
+        if isinstance(stop, KeyboardInterrupt) or was_interrupted(stop):
+            raise Interrupted(f"interrupted; {kept or 'nothing was written'}") from None
+        if kept:
             warn([kept])
         raise
-    except (KeyboardInterrupt, SystemError) as stop:
-        if not (isinstance(stop, KeyboardInterrupt) or was_interrupted(stop)):
-            raise
-        raise Interrupted(f"interrupted; {keep() or 'nothing was written'}") from None
 
 
 def share(done: int, count: int, things: str) -> str:
