@@ -102,10 +102,10 @@ def hil(
     if out is not None:
         check_out(out)
     names = {"scanner": scanner, "position": position, "heading": heading, "attitude": attitude}
-    with ExitStack() as closing:
+    with ExitStack() as ending, ExitStack() as closing:  # signals are heard until the ports are closed
         channels = _channels(names, baud, nmea_baud, closing)
         wishes = _Wishes(scene, set_ or [], place, rate, duration, stream, realtime, ports, out)
-        numbers = _run(wishes, channels, closing)
+        numbers = _run(wishes, channels, ending)
         if out is not None:
             write_summary(out, numbers)
         show.warn(warnings(numbers))
@@ -151,8 +151,8 @@ def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: 
     return made
 
 
-def _run(wishes: _Wishes, channels: dict[str, Channel], closing: ExitStack) -> dict[str, Any]:
-    """Run and return the numbers of the run; from the first port's name on until `closing` closes, signals end the run
+def _run(wishes: _Wishes, channels: dict[str, Channel], ending: ExitStack) -> dict[str, Any]:
+    """Run and return the numbers of the run; from the first port's name on until `ending` closes, signals end the run
     only."""
     from raychan.hil.instruments import ScannedShip
     from raychan.hil.lms import STREAM, check_sendable
@@ -166,7 +166,7 @@ def _run(wishes: _Wishes, channels: dict[str, Channel], closing: ExitStack) -> d
         session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate)
     if wishes.stream:
         session.scanner.mode = STREAM
-    stopped = closing.enter_context(_stops())
+    stopped = ending.enter_context(_stops())
     # Threads that are started while this one goes first do so too: none waits for the interpreter behind others.
     with _first(wishes.realtime) as session.first, track(wishes.out) as session.tell:
         names = {name: channel.port.name for name, channel in channels.items()}
