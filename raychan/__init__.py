@@ -6,9 +6,8 @@ The public names below are loaded when first used, so that `import raychan` cost
 from __future__ import annotations
 
 import os
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as `typing` has it, whose import takes most of the time in which a Ctrl-C is a traceback
 _PLACES = (os.path.dirname(__file__), os.path.expanduser("~"))
 if "NUMBA_CACHE_DIR" not in os.environ and not any(os.access(place, os.W_OK) for place in _PLACES):
     # Compiled loops are kept beside the package or in the home; where neither can be written, numba refuses to run.
@@ -73,6 +72,8 @@ _HOME = {
 """Where each public name is at home; the imports below say the same to type checkers."""
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from raychan.em.atmosphere import Atmosphere as Atmosphere
     from raychan.em.diffuse import Diffuse as Diffuse
     from raychan.kinds import InteractionType as InteractionType
@@ -177,6 +178,8 @@ def _load(name: str) -> Any:
         return version("raychan")
     if name not in _HOME:
         raise AttributeError(f"module 'raychan' has no attribute {name!r}{_hint(name)}")
+    from importlib import import_module
+
     value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value

@@ -19,11 +19,12 @@ from raychan.cli.options import help_of, unread
 from raychan.cli.rcs import rcs
 from raychan.cli.run import run
 from raychan.cli.ship import ship
-from raychan.cli.show import ENDS, Interrupted, open_streams, say, silence
+from raychan.cli.show import Interrupted, open_streams, say, silence
 from raychan.cli.spectrogram import spectrogram
 from raychan.cli.study import study
 from raychan.cli.validate import validate
 from raychan.cli.view import view
+from raychan.run.in_place import ENDS, forget, told
 
 _HELP = """Simulate a radar: from a scene to a range-Doppler map whose detections name the bodies they come from.
 
@@ -46,7 +47,6 @@ Exit code 0: done
   2: wrong input; the message says what, where, and what is allowed
   130: interrupted, 143: ended by SIGTERM, 129: by the end of its terminal; the message says what was written"""
 
-_STOPPED = "interrupted; nothing was written"
 _ended: list[int] = []  # signals that asked this process to end, the first counts
 
 app = typer.Typer(
@@ -107,6 +107,10 @@ def _end(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def _no_more(number: int, frame: FrameType | None) -> None:
+    """Let a further signal pass, while the command tells that it was interrupted."""
+
+
 def _settle(code: int) -> None:
     """Have signals end the process with this exit code from now on: its command is done."""
 
@@ -114,7 +118,7 @@ def _settle(code: int) -> None:
         os._exit(code)
 
     for number in ENDS:
-        if signal.getsignal(number) is _end:
+        if signal.getsignal(number) in (_end, _no_more):
             signal.signal(number, leave)
 
 
@@ -124,10 +128,16 @@ def _ignore() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def _stopped(text: str) -> int:
-    """Print that the command was interrupted; return the exit code, 128 plus the signal's number."""
+def _stopped(text: str = "") -> int:
+    """Print that the command was interrupted, and what is in place; return the exit code, 128 plus the signal's number.
+
+    Args: text in place of that."""
+    for number in ENDS:
+        if signal.getsignal(number) is _end:
+            signal.signal(number, _no_more)
     _unprinted()
-    return _fail(text, 128 + (_ended[0] if _ended else signal.SIGINT))
+    written = told() or "nothing was written"
+    return _fail(text or f"interrupted; {written}", 128 + (_ended[0] if _ended else signal.SIGINT))
 
 
 def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
@@ -151,14 +161,15 @@ def invoke(argv: list[str]) -> int:
     """Run one command and return its exit code: 0, 2 for input that is wrong, 130 for Ctrl-C, 143 for SIGTERM, 129 for
     SIGHUP."""
     open_streams()
+    forget()
     try:
         code = typer.main.get_command(app).main(args=argv, prog_name="raychan", standalone_mode=False)
         if (trouble := _unprinted()) is not None:
             return trouble
         # typer turns Ctrl-C into an exit code of its own, silently.
-        return _stopped(_STOPPED) if code == 130 else int(code or 0)
+        return _stopped() if code == 130 else int(code or 0)
     except (KeyboardInterrupt, typer.Abort):
-        return _stopped(_STOPPED)
+        return _stopped()
     except Interrupted as stop:
         return _stopped(str(stop))
     except BrokenPipeError:
@@ -179,7 +190,7 @@ def invoke(argv: list[str]) -> int:
 
         # Compiled modules turn an interruption while they are imported into errors of their own.
         if _ended or was_interrupted(error):
-            return _stopped(_STOPPED)
+            return _stopped()
 
         _unprinted()
         if isinstance(error, OSError) and error.errno and not error.filename:

@@ -14,6 +14,7 @@ import typer
 from raychan.cli import show
 from raychan.cli.hil_files import check_out, track, write_summary
 from raychan.cli.options import ShipChanges, ShipSceneFile, directory, within
+from raychan.run.in_place import ENDS
 from raychan.world.limits import Limit
 
 if TYPE_CHECKING:
@@ -95,19 +96,20 @@ def hil(
     Without SCENE: ship_turn. Once the ports are named, Ctrl-C, SIGTERM or SIGHUP ends the run in order, with exit
     code 0.
     """
+    from raychan.hil.summary import one_line, warnings
+
     place = _origin(origin)
     if out is not None:
         check_out(out)
     names = {"scanner": scanner, "position": position, "heading": heading, "attitude": attitude}
-    with ExitStack() as closing:
+    with ExitStack() as ending, ExitStack() as closing:  # signals are heard until the ports are closed
         channels = _channels(names, baud, nmea_baud, closing)
-        numbers = _run(_Wishes(scene, set_ or [], place, rate, duration, stream, realtime, ports, out), channels)
-    from raychan.hil.summary import one_line, warnings
-
-    if out is not None:
-        write_summary(out, numbers)
-    show.warn(warnings(numbers))
-    _say(one_line(numbers))
+        wishes = _Wishes(scene, set_ or [], place, rate, duration, stream, realtime, ports, out)
+        numbers = _run(wishes, channels, ending)
+        if out is not None:
+            write_summary(out, numbers)
+        show.warn(warnings(numbers))
+        _say(one_line(numbers))
     if numbers["failed"]:
         from raychan.world.errors import SceneError
 
@@ -149,8 +151,9 @@ def _channels(names: dict[str, str | None], baud: int, nmea_baud: int, closing: 
     return made
 
 
-def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
-    """Run and return the numbers of the run."""
+def _run(wishes: _Wishes, channels: dict[str, Channel], ending: ExitStack) -> dict[str, Any]:
+    """Run and return the numbers of the run; from the first port's name on until `ending` closes, signals end the run
+    only."""
     from raychan.hil.instruments import ScannedShip
     from raychan.hil.lms import STREAM, check_sendable
     from raychan.hil.session import Session
@@ -163,8 +166,9 @@ def _run(wishes: _Wishes, channels: dict[str, Channel]) -> dict[str, Any]:
         session = Session(ScannedShip(loaded), channels, wishes.origin, wishes.rate)
     if wishes.stream:
         session.scanner.mode = STREAM
+    stopped = ending.enter_context(_stops())
     # Threads that are started while this one goes first do so too: none waits for the interpreter behind others.
-    with _stops() as stopped, _first(wishes.realtime) as session.first, track(wishes.out) as session.tell:
+    with _first(wishes.realtime) as session.first, track(wishes.out) as session.tell:
         names = {name: channel.port.name for name, channel in channels.items()}
         _say(json.dumps(names) if wishes.ports else "  ".join(f"{name} {port}" for name, port in names.items()))
         session.run(float("inf") if wishes.duration is None else wishes.duration, stopped)
@@ -193,7 +197,7 @@ def _first(wanted: bool) -> Iterator[bool]:
 def _stops() -> Iterator[Callable[[], bool]]:
     """Yield whether a signal to end has come; they end the run, not the process."""
     asked: list[int] = []
-    heard = [n for n in show.ENDS if n in _ALWAYS or signal.getsignal(n) is not signal.SIG_IGN]
+    heard = [n for n in ENDS if n in _ALWAYS or signal.getsignal(n) is not signal.SIG_IGN]
     before = {number: signal.signal(number, lambda n, frame: asked.append(n)) for number in heard}
     try:
         yield lambda: bool(asked)

@@ -21,6 +21,7 @@ from raychan.cli.rcs_output import (
     table_of,
     uncertainties,
 )
+from raychan.run.in_place import told
 from raychan.scalars import as_text
 from raychan.world import limits
 
@@ -129,19 +130,18 @@ def rcs(
         "crease_deg": crease,
     }
     parts: list[Rcs] = []
-    files: list[Path] = []
     place = "far field" if np.isinf(far) else f"radar at {far:g} m"
     title = f"{name}, {frequency_ghz:g} GHz, {polarization.upper()}, {place}"
 
     def keep() -> str:
-        return _names(files) or _kept(out, grid[0].ravel(), grid[1].ravel(), parts)
+        return told() or _kept(out, plot, grid[0].ravel(), grid[1].ravel(), parts)
 
     with show.keeping(keep):
         with show.progress(kernels="rcs") as tell:
             _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell, parts)
         found = _joined(parts)
         table = rows(grid[0].ravel(), grid[1].ravel(), found)
-        files += _written(out, plot, (az, el), table, found, title, polar)
+        _written(out, plot, (az, el), table, found, title, polar)
         show.console().print(table_of(title, table))
         if shape is None and source:
             from raychan.world.mesh_io import oddities
@@ -153,19 +153,14 @@ def rcs(
         show.warn(near_ends(found, 1e9 * frequency_ghz))
         show.warn(beyond_budget(found, max_rays))
         show.warn(uncertainties(mesh, found, tolerance, crease is not None))
-        if files:
-            show.console().print(_names(files), soft_wrap=True)
-
-
-def _names(files: list[Path]) -> str:
-    """Return a line with the files that are written, '' where none is."""
-    return "written: " + ", ".join(map(str, files)) if files else ""
+        if told():
+            show.console().print(told(), soft_wrap=True)
 
 
 def _written(
     out: Path | None, plot: Path | None, angles: tuple[Any, Any], table: list[Any], found: Rcs, title: str, polar: bool
-) -> list[Path]:
-    """Write the table and the figure that are asked for; return their files."""
+) -> None:
+    """Write the table and the figure that are asked for."""
     import numpy as np
 
     from raychan.run.output_files import write_together
@@ -181,7 +176,6 @@ def _written(
         dbsm = np.array([row[3] for row in table]).reshape(shape)
         files[plot] = rcs_picture(az, el, dbsm, found.error_db.reshape(shape), title, plot.suffix, polar)
     write_together(files)
-    return list(files)
 
 
 def _target(
@@ -219,8 +213,9 @@ def _parameter(text: str) -> tuple[str, Any]:
         return key, value
 
 
-def _kept(out: Path | None, az: Any, el: Any, parts: list[Rcs]) -> str:
-    """Write the table of the angles that are done, if one is asked for; return how many these are, '' for none."""
+def _kept(out: Path | None, plot: Path | None, az: Any, el: Any, parts: list[Rcs]) -> str:
+    """Write the table of the angles that are done, if one is asked for; return how many these are, '' for none, and
+    that a figure which is there is not of them."""
     if out is None or not parts:
         return ""
     from raychan.run.output_files import write_whole
@@ -228,7 +223,8 @@ def _kept(out: Path | None, az: Any, el: Any, parts: list[Rcs]) -> str:
     found = _joined(parts)
     count = found.sigma.size
     write_whole(out, csv_text(rows(az[:count], el[:count], found)).encode())
-    return f"{show.share(count, len(az), 'angles')} in {out}"
+    earlier = f"; {plot} is of an earlier run" if plot is not None and plot.is_file() else ""
+    return f"{show.share(count, len(az), 'angles')} in {out}{earlier}"
 
 
 def _sweep(

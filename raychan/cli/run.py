@@ -97,10 +97,7 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
             warnings += _pictures(result, stage, tell, lambda: write_result(result, stage))
         else:
             write_result(result, stage)
-    try:
-        _report(result, out, warnings, pictures)
-    except KeyboardInterrupt:
-        raise show.Interrupted(f"interrupted; the results are in {out}") from None
+    _report(result, out, warnings, pictures)
 
 
 def _report(result: Result, out: Path, warnings: list[str], pictures: bool) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
@@ -20,8 +19,6 @@ from rich.text import Text
 if TYPE_CHECKING:
     from raychan.run.result import Result
 
-ENDS = (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
-"""Signals that ask a command to end; SIGHUP comes as its terminal is closed."""
 _COMPILING = "compiling"
 _LONG = 3.0  # s: compiling for longer prints a line where there is no progress bar
 _SOME = ("azimuth deg", "elevation deg", "error dB", "folded: true m", "true m/s")
@@ -38,20 +35,20 @@ class Interrupted(Exception):
 @contextmanager
 def keeping(keep: Callable[[], str]) -> Iterator[None]:
     """Turn Ctrl-C into Interrupted with what `keep` returns: it writes what is finished, if anything, and says which
-    that is, '' for none. Where a later part is no possible scene, what is finished is written and said, too."""
+    that is, '' for none. Where a later part fails, as one that is no scene, what is finished is written, too."""
     from raychan.parallel import was_interrupted
-    from raychan.world.errors import SceneError
 
     try:
         yield
-    except SceneError:
-        if kept := keep():
+    except OSError:  # what cannot be written now could not be then
+        raise
+    except (KeyboardInterrupt, Exception) as stop:
+        kept = keep()
+        if isinstance(stop, KeyboardInterrupt) or was_interrupted(stop):
+            raise Interrupted(f"interrupted; {kept or 'nothing was written'}") from None
+        if kept:
             warn([kept])
         raise
-    except (KeyboardInterrupt, SystemError) as stop:
-        if not (isinstance(stop, KeyboardInterrupt) or was_interrupted(stop)):
-            raise
-        raise Interrupted(f"interrupted; {keep() or 'nothing was written'}") from None
 
 
 def share(done: int, count: int, things: str) -> str:

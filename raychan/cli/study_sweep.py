@@ -11,6 +11,7 @@ import typer
 from raychan.cli import show
 from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, directory
 from raychan.run.contents import Contents
+from raychan.run.in_place import told
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -65,7 +66,7 @@ def sweep(
     axes, steps = _axes(vary or [], times), list[study.Step]()
 
     def keep() -> str:
-        return _kept(study.Sweep(loaded.title, target, axes, tuple(steps)), out)
+        return told() or _kept(study.Sweep(loaded.title, target, axes, tuple(steps)), out)
 
     with show.keeping(keep), staging(out, _CONTENTS) as stage, show.progress() as tell:
         try:

@@ -53,21 +53,31 @@ def view(
         if file is not None and file.suffix.lower() != ending:
             raise typer.BadParameter(f"{option} {file}: the name must end in {ending}")
     drawing = _drawing(source, range, speed, detection)
-    if screenshot is not None:
-        from raychan.view.scene import scene_picture
-
-        show.warn(scene_picture(drawing, screenshot))
-        print(screenshot)
-    if html is not None:
-        from raychan.view.web import page
-
-        print(page(drawing, html))
+    if screenshot is not None or html is not None:
+        _write(drawing, screenshot, html)
     if screenshot is None and html is None:
         if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
             raise typer.BadParameter("there is no display; use --screenshot FILE.png or --html FILE.html")
         from raychan.view.render import window
 
         window(drawing)
+
+
+def _write(drawing: Drawing, screenshot: Path | None, html: Path | None) -> None:
+    """Write the picture and the page that are asked for, and print their names."""
+    from raychan.run.output_files import write_together
+    from raychan.view.scene import drawn_scene
+    from raychan.view.web import page
+
+    files, warnings = dict[Path, bytes | memoryview](), list[str]()
+    if screenshot is not None:
+        files[screenshot], warnings = drawn_scene(drawing)
+    if html is not None:
+        files[html] = page(drawing)
+    write_together(files)
+    show.warn(warnings)
+    for name in files:
+        print(name)
 
 
 def _drawing(source: Path, range: float | None, speed: float | None, detection: int | None) -> Drawing:

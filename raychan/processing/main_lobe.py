@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
+from raychan.radar.near_spectrum import near_zero
 from raychan.radar.windows import window
 
 Floats = NDArray[np.float64]
@@ -30,8 +30,7 @@ class MainLobe:
         self._x = np.arange(_SPAN * _FINE + 1) / _FINE
         middle = np.exp(1j * np.pi * self._x * (n - 1) / n)
         self._wave, self._covariance = (
-            (scipy.fft.fft(x / x.sum(), n * _FINE).take(range(len(self._x)), mode="wrap") * middle).real
-            for x in (taper, taper**2)
+            (near_zero(x / x.sum(), _FINE, len(self._x)) * middle).real for x in (taper, taper**2)
         )
         self._fall = np.log(np.maximum(np.abs(self._wave), _TINY) ** 2 + _TINY)
         self.n, self.pad, shift = n, pad, np.linspace(0.0, 0.5, _KNOTS)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from raychan.radar.near_spectrum import MANY, near_zero
 from raychan.radar.windows import window
 
 Floats = NDArray[np.float64]
@@ -15,6 +16,7 @@ Singles = NDArray[np.float32]
 
 _FINE = 16  # points per resolution cell
 _COARSE = 2  # the same of two axes: a side lobe between points is up to 0.9 dB higher; 4 take four times as long
+_WIDEST = 64  # resolution cells within which every window of many samples has its first null
 _AS_HIGH = 0.5  # of the highest peak of a smeared echo: a map cell between two peaks may make such a one the higher
 
 
@@ -25,8 +27,11 @@ class SideLobeEnvelope:
         """Args: window by name, of n samples; slots, parts of its period that fall on each other, as those of the
         transmitters do by Doppler division: what they leak adds up as amplitudes."""
         taper = window(name, n)
-        period = np.abs(np.fft.fft(taper / taper.sum(), n * _FINE)).reshape(slots, -1).sum(axis=0)
-        response = period[: len(period) // 2 + 1] ** 2
+        if n > MANY and slots == 1:
+            response = np.abs(np.fft.rfft(taper / taper.sum(), n * _FINE)) ** 2
+        else:
+            period = np.abs(np.fft.fft(taper / taper.sum(), n * _FINE)).reshape(slots, -1).sum(axis=0)
+            response = period[: len(period) // 2 + 1] ** 2
         self.table: Floats = np.maximum.accumulate(response[::-1])[::-1]
 
     def __call__(self, cells: Floats) -> Floats:
@@ -88,7 +93,11 @@ def _peaks(power: Singles) -> Floats:
 
 def main_lobe(name: str, n: int) -> float:
     """Return where the main lobe of a window of n samples ends: its first null, in resolution cells from the peak."""
-    size = np.abs(np.fft.fft(window(name, n), n * _FINE))[: n * _FINE // 2 + 1]
+    taper = window(name, n)
+    if n > MANY:
+        size = np.abs(near_zero(taper, _FINE, _WIDEST * _FINE))
+    else:
+        size = np.abs(np.fft.fft(taper, n * _FINE))[: n * _FINE // 2 + 1]
     rises = np.flatnonzero(np.diff(size) > 0.0)
     return (float(rises[0]) if len(rises) else 0.5 * n * _FINE) / _FINE
 

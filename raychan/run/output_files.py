@@ -12,7 +12,7 @@ import io
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from fnmatch import fnmatch
 from pathlib import Path
@@ -20,6 +20,7 @@ from typing import Any
 
 from raychan.run.atomic_swap import MARK, UNFINISHED, acquire, exchange, locked, release, stale_of
 from raychan.run.contents import Contents
+from raychan.run.in_place import held, note_file, note_folder
 
 
 class StoreError(OSError):
@@ -31,14 +32,15 @@ class PictureError(StoreError):
 
 
 @contextmanager
-def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
+def staging(out: str | Path, contents: Contents, then: Callable[[], None] = lambda: None) -> Iterator[Path]:
     """Yield a temporary directory that becomes `out` when the block ends without an error.
 
     After any error, Ctrl-C included, the temporary directory is removed and `out` is unchanged; but where a picture
     cannot be written, results that are stay, and the error says so. Files in an old `out` that the command does not
     write stay there. Where `out` cannot be renamed (a mount, the current directory), files are moved into it one by
-    one. Raises: StoreError for errors of the disk, or where a foreign file is in the way."""
-    lost = None
+    one. `then` is called as soon as `out` is in place; signals that end the program wait from before that until all is
+    done. Raises: StoreError for errors of the disk, or where a foreign file is in the way."""
+    lost, given = None, out
     with _disk_errors(Path(out)):
         out = Path(out).resolve()
     with folder_for(out.parent):
@@ -54,12 +56,15 @@ def staging(out: str | Path, contents: Contents) -> Iterator[Path]:
                 if not contents.signed(stage):
                     raise
                 lost = error
-            with _disk_errors(out), locked(room):
+            with _disk_errors(out), locked(room), held():
                 _check(out, contents)
                 _replace(stage, out, contents)
+                note_folder(given)
+                then()
+                _remove_stage(stage, out, contents)
         finally:
             release(lock)
-            with locked(room):
+            with locked(room), held():
                 _remove_stage(stage, out, contents)
     if lost is not None:
         raise PictureError(f"{lost}; the results without it are in {out}") from lost
@@ -101,10 +106,12 @@ def write_together(files: Mapping[Path, bytes | memoryview]) -> None:
             with _disk_errors(path):
                 there = path.resolve()
             parts.append((ready.enter_context(_part(there, content)), there, path))
+        ready.enter_context(held())
         for part, there, path in parts:
             with _disk_errors(path):
                 if part is not None:
                     os.replace(part, there)
+                note_file(path)
 
 
 @contextmanager

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.parallel import parallel_for
+from raychan.radar.near_spectrum import MANY
 from raychan.radar.side_lobes import main_lobe
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
@@ -73,11 +74,9 @@ class PointSpread:
         self._by_parts: dict[int, tuple[Complexes, Floats]] = {}
         self._beyond: dict[int, tuple[Floats, Floats]] = {}
 
-    @cached_property
+    @property
     def _range_tables(self) -> Complexes:
-        """The range response and its derivative by range cells."""
-        table = _table(self._range / self._range.sum())
-        return np.stack([table, np.gradient(table, 1.0 / _FINE)], axis=1)
+        return _in_range(self._windows[0], len(self._range))
 
     def in_profile(self, delay: Floats, range: float) -> tuple[Complexes, Floats]:
         """Return the response (n,) at a range [m] to paths of delays (n,) [s], with their phase at mid sweep of the
@@ -175,7 +174,7 @@ class PointSpread:
         """Return upper bounds of the range response (s,) and of the rate responses of a frame in parts (2, m), at 0,
         1, 2, ... cells from the peak."""
         if parts not in self._beyond:
-            in_range = np.abs(self._range_tables).max(axis=1)
+            in_range = np.maximum(*np.abs(self._range_tables).T)
             rates = np.abs(self._by_parts[parts][0]).sum(axis=0).T
             self._beyond[parts] = _beyond(in_range), np.stack([_beyond(x) for x in rates])
         return self._beyond[parts]
@@ -222,9 +221,28 @@ class PointSpread:
         return np.array(tables), np.array(middles)
 
 
+@lru_cache(maxsize=2)
+def _in_range(name: str, n: int) -> Complexes:
+    """Return the range response of a window of n samples and its derivative by range cells (., 2)."""
+    taper = window(name, n)
+    table = _table(taper / taper.sum())
+    both = np.empty((len(table), 2), table.dtype)
+    both[:, 0] = table
+    # What np.gradient gives, without an array more: of 2^20 samples each has a gigabyte.
+    np.subtract(table[2:], table[:-2], out=both[1:-1, 1])
+    both[1:-1, 1] *= 0.5 * _FINE
+    both[0, 1], both[-1, 1] = _FINE * (table[1] - table[0]), _FINE * (table[-1] - table[-2])
+    return both
+
+
 def _table(weights: Floats) -> Complexes:
     """Return the spectrum of weights over its period of len(weights) cells, _FINE points a cell."""
     n = len(weights)
+    if n > MANY:
+        half = np.fft.rfft(weights, n * _FINE)
+        half *= np.exp((1j * np.pi * (n - 1) / n / _FINE) * np.arange(len(half)))
+        # One period on, it changes sign where n is even.
+        return np.concatenate([half, (half if n & 1 else -half)[-2::-1].conj()])
     raw = np.fft.fft(weights, n * _FINE)
     # The phase is counted from the middle of the samples, where a symmetric window is real.
     return np.append(raw, raw[0]) * np.exp(1j * np.pi * (n - 1) / n * np.arange(n * _FINE + 1) / _FINE)

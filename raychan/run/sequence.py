@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from raychan.run.clock import Clock, Progress
-from raychan.run.output_files import PictureError, StoreError, csv_bytes, staging
+from raychan.run.output_files import StoreError, csv_bytes, staging
 from raychan.run.result import Result
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.simulate import result_of
@@ -135,34 +135,29 @@ class Store:
     def add(self, frame: Frame, draw: Callable[[Result, Path], None] | None = None) -> None:
         """Write a frame; `draw(result, directory)` adds pictures to it."""
         lines = csv_bytes((frame.number, f"{frame.time:.6f}", *row) for row in rows(frame.result))
-        lost = None
-        try:
-            self._stage(frame, lines, draw)
-        except PictureError as error:
-            lost = error
-        if self.count:
-            try:
-                self._append(lines)
-            except StoreError:
-                shutil.rmtree(self.directory / frame.name, ignore_errors=True)
-                raise
-        self.count += 1
-        self._left = self._found()
-        if lost is not None:
-            raise lost
-
-    def _stage(self, frame: Frame, lines: bytes, draw: Callable[[Result, Path], None] | None) -> None:
-        """Write the folder of a frame, of the first with the directory around it and its lines of detections.csv."""
         if self.count == 0:
-            with staging(self.directory, CONTENTS) as stage:
+            with staging(self.directory, CONTENTS, self._counted) as stage:
                 (stage / "detections.csv").write_bytes(csv_bytes([(*HEAD, *columns_of(frame.result))]) + lines)
                 (stage / frame.name).mkdir()
                 _fill(stage / frame.name, frame, draw)
             return
         self._check()
-        with staging(self.directory / frame.name, CONTENTS) as stage:
+        with staging(self.directory / frame.name, CONTENTS, lambda: self._listed(frame, lines)) as stage:
             _fill(stage, frame, draw)
             self._check()  # pictures take a while
+
+    def _listed(self, frame: Frame, lines: bytes) -> None:
+        """Append a frame in place to detections.csv, or remove it."""
+        try:
+            self._append(lines)
+        except StoreError:
+            shutil.rmtree(self.directory / frame.name, ignore_errors=True)
+            raise
+        self._counted()
+
+    def _counted(self) -> None:
+        self.count += 1
+        self._left = self._found()
 
     def _check(self) -> None:
         """Raise StoreError unless the directory is as the last frame left it: of two sequences that share one, or of a

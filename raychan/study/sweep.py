@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -151,7 +152,8 @@ def sweep(
         raise ValueError(f"{len(places)} steps; at most {MOST} are allowed")
     # The first and the last scene are checked before any time goes into those between.
     for place in (places[0], places[-1]):
-        check_target(_scene(scene, axes, place), target)
+        with _named(axes, place):
+            check_target(_scene(scene, axes, place), target)
     tell = progress or (lambda stage, share: None)
     steps = [] if steps is None else steps
     for i, place in enumerate(places):
@@ -160,20 +162,29 @@ def sweep(
             if stage in STAGES:
                 tell("sweep", (done + (STAGES.index(stage) + share) / len(STAGES)) / len(places))
 
-        result = simulate(_scene(scene, axes, place), seed, tolerance_db, max_bounces, inner)
-        values = tuple(a.values[j] for a, j in zip(axes, place, strict=True))
-        steps.append(_step(values, result, visibility(result, target)))
+        with _named(axes, place):
+            result = simulate(_scene(scene, axes, place), seed, tolerance_db, max_bounces, inner)
+            values = tuple(a.values[j] for a, j in zip(axes, place, strict=True))
+            steps.append(_step(values, result, visibility(result, target)))
     tell("sweep", 1.0)
     return Sweep(scene.title, target, tuple(axes), tuple(steps))
 
 
 def _scene(scene: Scene, axes: Sequence[Axis], place: Sequence[int]) -> Scene:
-    where = ", ".join(f"{a.key} = {a.values[j]:g}" for a, j in zip(axes, place, strict=True))
     changes = [a.changes[j] for a, j in zip(axes, place, strict=True) if a.changes]
     later = sum(a.values[j] for a, j in zip(axes, place, strict=True) if not a.changes)
+    return scene.override(changes).at(later)
+
+
+@contextmanager
+def _named(axes: Sequence[Axis], place: Sequence[int]) -> Iterator[None]:
+    """Name the step in errors of its scene."""
     try:
-        return scene.override(changes).at(later)
+        yield
     except SceneError as e:
+        if not axes:
+            raise
+        where = ", ".join(f"{a.key} = {a.values[j]:g}" for a, j in zip(axes, place, strict=True))
         problem = f"{e.problem} (step {where})"
         raise SceneError(problem, file=e.file, key=e.key, value=e.value, allowed=e.allowed) from None
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.report.canvas import collections, figure, save, style, verbatim
+from raychan.report.canvas import collections, drawn_as, figure, style, verbatim
 from raychan.view.drawing import Drawing
 
 _DASH = 0.015  # length of a dash over the scene's diagonal
@@ -22,8 +21,8 @@ def _largest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return triangles[np.argsort(-np.linalg.norm(cross, axis=1), kind="stable")[:_MOST]]
 
 
-def picture(drawing: Drawing, path: str | Path) -> Path:
-    """Draw a scene in 3-D by matplotlib and return the picture's path."""
+def picture(drawing: Drawing) -> memoryview:
+    """Draw a scene in 3-D by matplotlib and return the bytes of a PNG."""
     solids = collections()
     with style():
         made = figure(9.0, 5.0, layout=None)
@@ -61,4 +60,4 @@ def picture(drawing: Drawing, path: str | Path) -> Path:
         axes.set_zlabel("z [m]")
         made.suptitle(verbatim(drawing.title))
         made.text(0.02, 0.93, drawing.note, fontsize=8)
-        return save(made, path)
+        return drawn_as(made, ".png")

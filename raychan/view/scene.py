@@ -33,27 +33,30 @@ def drawing_of(scene: Any, result: Result | None = None, cell: CellExplanation |
 
 
 def scene_picture(drawing: Drawing, path: str | Path) -> list[str]:
-    """Draw into a PNG and return warnings: none, or the reason why matplotlib drew it.
+    """Draw into a PNG and return warnings: none, or the reason why matplotlib drew it."""
+    content, warnings = drawn_scene(drawing)
+    write_picture(path, content)
+    return warnings
+
+
+def drawn_scene(drawing: Drawing) -> tuple[bytes | memoryview, list[str]]:
+    """Return the bytes of a PNG, and warnings: none, or the reason why matplotlib drew it.
 
     pyvista runs in a process of its own, so that a driver that crashes or hangs is only a warning.
     """
-    trouble = _rendered(drawing, Path(path))
+    content, trouble = _rendered(drawing)
     if trouble is None:
-        return []
-    plain.picture(drawing, path)
-    return [f"scene picture drawn by matplotlib, as pyvista drew none ({trouble})"]
+        return content, []
+    return plain.picture(drawing), [f"scene picture drawn by matplotlib, as pyvista drew none ({trouble})"]
 
 
-def _rendered(drawing: Drawing, path: Path) -> str | None:
+def _rendered(drawing: Drawing) -> tuple[bytes, str | None]:
     if os.environ.get("RAYCHAN_NO_OPENGL"):
-        return "RAYCHAN_NO_OPENGL is set"
+        return b"", "RAYCHAN_NO_OPENGL is set"
     try:
-        picture, trouble = _in_own_process(drawing)
+        return _in_own_process(drawing)
     except OSError as error:
-        return f"no room for the drawing in {tempfile.gettempdir()}: {error.strerror or error}"
-    if trouble is None:
-        write_picture(path, picture)
-    return trouble
+        return b"", f"no room for the drawing in {tempfile.gettempdir()}: {error.strerror or error}"
 
 
 def _in_own_process(drawing: Drawing) -> tuple[bytes, str | None]:

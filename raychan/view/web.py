@@ -5,20 +5,18 @@ from __future__ import annotations
 import base64
 import json
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.run.output_files import write_whole
 from raychan.view.drawing import Drawing, Ray
 
 _DASH = 0.008  # length of a dash over the scene's diagonal
 
 
-def page(drawing: Drawing, path: str | Path) -> Path:
-    """Write a drawing as a self-contained page and return its path."""
+def page(drawing: Drawing) -> bytes:
+    """Return a drawing as a self-contained page."""
     low, high = drawing.bounds()
     dash = _DASH * float(np.linalg.norm(high - low))
     data = {
@@ -36,8 +34,7 @@ def page(drawing: Drawing, path: str | Path) -> Path:
     }
     template = (files("raychan.view") / "viewer.html").read_text(encoding="utf-8")
     # '<' is escaped so that no name can end the script element.
-    text = template.replace("/*DATA*/null", json.dumps(data).replace("<", "\\u003c"))
-    return write_whole(path, text.encode())
+    return template.replace("/*DATA*/null", json.dumps(data).replace("<", "\\u003c")).encode()
 
 
 def _ray(ray: Ray, dash: float) -> dict[str, Any]:

@@ -18,6 +18,9 @@ from raychan.world.mesh import Floats
 from raychan.world.point_in_body import Place, in_plane_of, nearest_on, place_of, within
 from raychan.world.schema import RadarTable
 
+NEAREST = 0.01
+"""Least distance [m] of a radar from a point target, or from another radar: nearer ones are at one place."""
+
 
 def names_differ(bodies: Iterable[Body]) -> None:
     """Raise SceneError where two bodies have one name."""
@@ -31,9 +34,10 @@ def names_differ(bodies: Iterable[Body]) -> None:
 
 
 def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
-    """Raise SceneError where the radar is inside a body, on its surface, or below a mirror."""
+    """Raise SceneError where the radar is inside a body, on its surface, at its point target, or below a mirror."""
     if radar is None:
         return
+    bodies = tuple(bodies)
     outside(bodies, np.array(radar.position), "radar", "radar.position")
     if radar.rx_position is not None:
         outside(bodies, np.array(radar.rx_position), "receiver", "radar.rx_position")
@@ -44,7 +48,7 @@ def radar_outside(bodies: Iterable[Body], radar: RadarTable | None) -> None:
 
 
 def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
-    """Raise SceneError where a place (3,) [m] is inside a body, on its surface, or below a mirror.
+    """Raise SceneError where a place (3,) [m] is inside a body, on its surface, at its point target, or below a mirror.
 
     Args: what stands there, as messages call it; key that gives the place.
     """
@@ -64,6 +68,11 @@ def outside(bodies: Iterable[Body], at: Floats, what: str, key: str) -> None:
             allowed = "; ".join(["a place outside all bodies", *(n for n in body.notes() if "check unit" in n)])
             problem = f"{what} is {where} '{body.name}'"
             raise SceneError(problem, key=key, value=at.tolist(), allowed=allowed)
+        if body.rcs_dbsm is not None and np.linalg.norm(body.target_point() - local) < NEAREST:
+            allowed = f"a place at least {NEAREST:g} m from its rcs_point"
+            raise SceneError(
+                f"{what} is at the point target of '{body.name}'", key=key, value=at.tolist(), allowed=allowed
+            )
 
 
 def radar_fits(radar: Radar, diffraction: bool) -> None:

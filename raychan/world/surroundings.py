@@ -12,7 +12,7 @@ import numpy as np
 from raychan.em.atmosphere import Atmosphere
 from raychan.scalars import plain
 from raychan.world.body import Body
-from raychan.world.checks import outside
+from raychan.world.checks import NEAREST, outside
 from raychan.world.errors import SceneError, shown
 from raychan.world.radar_mount import radar_of
 from raychan.world.schema import InterfererTable, RadarTable
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from raychan.radar.interferer import Interferer
 
 _OF_ITS_OWN = {"name", "start_us", "locked"}
-_NEAREST = 0.01  # m between two radars: nearer ones are one
 
 
 def atmosphere_of(given: Any, file: Path | None) -> Atmosphere | None:
@@ -89,7 +88,7 @@ def check_places(interferers: Iterable[Interferer], bodies: Iterable[Body], rada
         if radar is None:
             raise SceneError("an interferer and no radar", key=f"interferers.{one.name}", allowed="a [radar] table")
         ends = (np.array(x) for x in (radar.position, radar.rx_position) if x is not None)
-        if min(float(np.linalg.norm(at - end)) for end in ends) < _NEAREST:
+        if min(float(np.linalg.norm(at - end)) for end in ends) < NEAREST:
             raise SceneError(
                 "an interferer at the radar's own place", key=key, value=at.tolist(), allowed="a place of its own"
             )

@@ -10,6 +10,12 @@ import pytest
 RUN = "raychan.run.simulate, raychan.run.storage, raychan.cli.run"
 
 
+def test_next_to_nothing_is_imported_before_ctrl_c_is_heeded():
+    code = "import __future__, os, sys; had = {*sys.modules, 'raychan'}; import raychan; print({*sys.modules} - had)"
+    done = subprocess.run([sys.executable, "-S", "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (0, "set()\n"), done.stdout + done.stderr
+
+
 @pytest.mark.parametrize(
     ("modules", "late"),
     [

@@ -134,7 +134,7 @@ def test_rays_of_a_detection_that_is_not_converged_are_dashed_and_the_others_who
     assert "dashed" in drawing.note and "not converged" in broken.text
     drawing.save(tmp_path / "d.npz")
     assert [ray.converged for ray in Drawing.load(tmp_path / "d.npz").rays] == [ray.converged for ray in drawing.rays]
-    text = page(drawing, tmp_path / "p.html").read_text()
+    text = page(drawing).decode()
     assert "not converged" in text and drawing.note in text
     assert drawing_of(WORLD, r).note == ""
 
