@@ -20,7 +20,7 @@ from raychan.processing.peak_shape import PeakShape
 from raychan.processing.peaks import SideLobes
 from raychan.processing.staggered import ResolvedMap
 from raychan.radar.aperture import Aperture
-from raychan.radar.waveform import Waveform
+from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.records import Detections, RangeDoppler
 from raychan.units import C0, db, undb
 
@@ -89,9 +89,12 @@ def seen_in(
     """Return a map as `detect` sees it: by a bank of beams, or by the mean power of its receivers; args and errors as
     there."""
     array, aperture = array or Array(), _aperture(map, waveform, elements)
+    mirrors = waveform is not None and not isinstance(waveform, OwnWaveform) and not waveform.complex_sampling
+    # By Doppler division an image falls on other slots than its echo.
+    mirrors &= not (isinstance(map, ResolvedMap) and map.slots.shifted)
     if aperture and array.beams == "coherent":
-        return StrongestBeam(map, BeamBank(aperture, array.beam_window))
-    return MeanPower(map)
+        return StrongestBeam(map, BeamBank(aperture, array.beam_window), mirrors)
+    return MeanPower(map, mirrors)
 
 
 def detect(

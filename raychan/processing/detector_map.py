@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.beams import BeamBank
 from raychan.processing.cfar import Training, batches, level, statistic
-from raychan.processing.peaks import AROUND, maxima
+from raychan.processing.peaks import AROUND, maxima, stepped
 from raychan.records import RangeDoppler
 
 Floats = NDArray[np.float64]
@@ -52,13 +52,15 @@ class MeanPower:
 
     dip = 0.5  # between two padded cells of any window (not measured)
 
-    def __init__(self, map: RangeDoppler) -> None:
+    def __init__(self, map: RangeDoppler, mirrors: bool = False) -> None:
+        """Args: mirrors, whether ranges go on as mirror images (see `peaks.stepped`)."""
         self.power, self.noise, self.looks = map.power, map.noise, len(map.spectrum)
+        self._mirrors = mirrors
         self.receiver_noise = float(self.looks)  # SNR is over the noise of one receiver
 
     def maxima(self, least: float) -> Ints:
         """Return the local maxima (c, 2) above a power [W]."""
-        return maxima(self.power, least)
+        return maxima(self.power, least, self._mirrors)
 
     def lines(self, cell: Ints) -> tuple[Floats, Floats]:
         """Return the power of the column (v,) and the row (r,) of a cell (2,)."""
@@ -79,8 +81,9 @@ class StrongestBeam:
     looks = 1
     dip = 0.3  # as above, less 0.9 dB between two beams, twice for a plane array
 
-    def __init__(self, map: RangeDoppler, bank: BeamBank) -> None:
-        self.bank, self.spectrum = bank, map.spectrum
+    def __init__(self, map: RangeDoppler, bank: BeamBank, mirrors: bool = False) -> None:
+        """Args: mirrors, whether ranges go on as mirror images (see `peaks.stepped`)."""
+        self.bank, self.spectrum, self._mirrors = bank, map.spectrum, mirrors
         self.power, self.beam = bank.strongest(map.spectrum)
         self.noise = map.noise * bank.noise_gain
         self.receiver_noise = 1.0 / bank.noise_gain
@@ -93,11 +96,12 @@ class StrongestBeam:
         """
         cells = np.argwhere(self.power > least)
         for step in AROUND:
-            near = (cells + step) % self.power.shape
+            near, image = stepped(cells, step, self.power.shape, self._mirrors)
             beside = np.empty(len(cells))
             for at in batches(len(cells), self.spectrum.shape[0]):
                 rows = self.bank.rows[self.beam[tuple(cells[at].T)]]
-                wave = np.einsum("ca,ac->c", rows, self.spectrum[:, near[at, 0], near[at, 1]])
+                held = self.spectrum[:, near[at, 0], near[at, 1]]
+                wave = np.einsum("ca,ac->c", rows, np.where(image[at], held.conj(), held))
                 beside[at] = wave.real**2 + wave.imag**2
             cells = cells[self.power[tuple(cells.T)] >= beside * (1.0 - _ROUNDING)]
         return cells

@@ -28,11 +28,26 @@ AROUND = [(v, r) for v in (-1, 0, 1) for r in (-1, 0, 1) if v or r]
 """Steps from a cell to the eight around it."""
 
 
-def maxima(power: Floats, least: float) -> Ints:
-    """Return the local maxima (c, 2) of a map; both axes wrap as the transforms do."""
+def stepped(
+    cells: Ints, step: tuple[int, int], shape: tuple[int, ...], mirrors: bool
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """Return the cells (c, 2) a step away from those of a map (c, 2), and which of them are mirror images (c,), whose
+    amplitudes are the conjugates of what is there.
+
+    Both axes wrap as the transforms do; with real sampling, `mirrors`, ranges go on as images of the rates of the other
+    sign, beyond the last one after a cell that the map lacks."""
+    near = cells + step
+    beyond = (near[:, 1] < 0) | (near[:, 1] >= shape[1]) if mirrors else np.zeros(len(near), bool)
+    rows, columns = near[beyond].T
+    near[beyond] = np.stack([2 * (shape[0] // 2) - rows, np.where(columns < 0, -columns, shape[1] - 1)], axis=1)
+    return near % shape, beyond
+
+
+def maxima(power: Floats, least: float, mirrors: bool = False) -> Ints:
+    """Return the local maxima (c, 2) of a map; args as for `stepped`."""
     cells = np.argwhere(power > least)
     for step in AROUND:
-        near = (cells + step) % power.shape
+        near, _ = stepped(cells, step, power.shape, mirrors)
         cells = cells[power[tuple(cells.T)] >= power[tuple(near.T)]]
     return cells
 

@@ -19,7 +19,7 @@ from raychan.run.directions import Beams, unexplained, wave_in_beam
 from raychan.run.folding import Shown, peaks_of, truth
 from raychan.run.point_spread import PointSpread
 from raychan.run.result import CLUTTER, DIRECT, MULTIPATH, SIDELOBE, Contribution, Explanation, Receiver
-from raychan.run.side_lobes import Cell, is_side_lobe
+from raychan.run.side_lobes import Cell, reaches
 from raychan.run.turns import Turns, added, turns_of
 
 Ints = NDArray[np.int64]
@@ -111,6 +111,18 @@ def _explained(
     # A chain and its reverse differ by rounding only; among these the order of chains decides.
     order = np.argsort(-shares.round(_DIGITS), kind="stable")
     first = order[known.targets[order] == leading][0]
+
+    def reached(rows: Ints) -> bool:
+        return reaches(paths, rows, response, cell, abs(whole) ** 2)
+
+    def of(g: Any) -> Ints:
+        return np.flatnonzero(known.part == g)
+
+    # Most cells are explained by their leading chain; all paths take longer.
+    lobe = not (mine := reached(of(first))) and not reached(np.arange(len(known.part)))
+    if not mine and not lobe:
+        # Side lobes of the leading chain lie on another echo.
+        first = next((g for g in order[shares[order] >= _LEAST_SHARE] if reached(of(g))), first)
     order = np.append(first, order[order != first])
     parts = tuple(
         Contribution(
@@ -125,11 +137,8 @@ def _explained(
         if (shares[g] >= _LEAST_SHARE or g == first) and size[g] > 0.0
     )
     leader = int(strongest[first])
-    label = label_of(paths, leader, known.bodies[first], receiver)
-    rows = np.flatnonzero(known.part == first)
-    if is_side_lobe(paths, rows, response, cell, abs(whole) ** 2):
-        label = SIDELOBE
-    true = truth(paths, rows, leader, response, cell.shown)
+    label = SIDELOBE if lobe else label_of(paths, leader, known.bodies[first], receiver)
+    true = truth(paths, of(first), leader, response, cell.shown)
     if not math.isnan(true.range):
         parts = replace(parts[0], range=true.range, rate=true.rate), *parts[1:]
     error_db = figure(predicted, cell.error)

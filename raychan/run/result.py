@@ -64,7 +64,7 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Explanation:
-    """Which paths made a cell of the map: powers in W, strongest chain first."""
+    """Which paths made a cell of the map: powers in W, the leading chain first, then the strongest."""
 
     range: float
     rate: float

@@ -30,16 +30,11 @@ class Cell:
     spread: float = 0.0
 
 
-def is_side_lobe(paths: Paths, rows: Ints, response: PointSpread, cell: Cell, power: float) -> bool:
-    """Return whether a cell of the map is a side lobe: whether paths whose main lobes reach it bring little there.
+def reaches(paths: Paths, rows: Ints, response: PointSpread, cell: Cell, power: float) -> bool:
+    """Return whether the main lobes of some paths, rows of all, reach a cell of the map and bring more than a little.
 
-    Args: rows of the leading chain; power that all paths bring, over that transmitted.
-    """
-    if cell.shown.rate is None:
-        return False
-    # Most cells are explained by their leading chain; all paths take longer.
-    every = np.arange(len(paths.delay))
-    return all(from_main_lobes(paths, some, response, cell) < _LITTLE * power for some in (rows, every))
+    Args: power that all paths bring, over that transmitted."""
+    return cell.shown.rate is None or from_main_lobes(paths, rows, response, cell) >= _LITTLE * power
 
 
 def from_main_lobes(paths: Paths, rows: Ints, response: PointSpread, cell: Cell) -> float:

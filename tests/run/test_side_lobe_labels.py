@@ -55,6 +55,18 @@ def test_a_weak_echo_amid_side_lobes_counts_from_a_tenth_of_the_power_on():
         assert label(both, 5.5, 0.0, "rect", place=(6.0, 0.0)) == seen
 
 
+def test_a_weak_echo_amid_stronger_side_lobes_of_another_body_is_named():
+    rx, at, other = receiver("rect"), 6.0 + 5.5 * CELL, [(2, 4)]
+    response = response_of(rx)
+    places = 2.0 * np.array([6.0, at]) / 299792458.0
+    lobe, own = response.in_cell(np.ones(2, complex), places, np.zeros(2), at, 0.0)[0]
+    both = paths([6.0, at], [0.0, 0.0], [1.0, 0.7 * lobe / own], [SUV, other])
+    why = explain_cell(both, chains(both, rx.background), response, rx, at, 0.0, 1e-30)
+    assert (why.label, why.bodies) == ("direct", "truck.tail")
+    assert why.true_range == pytest.approx(at)
+    assert why.contributions[0].share < why.contributions[1].share
+
+
 @pytest.mark.parametrize("noise", [False, True])
 def test_side_lobes_of_a_bench_whose_legs_cancel_in_their_cell_are_named_where_no_noise_covers_them(noise):
     wave = {"bandwidth_mhz": 500.0, "chirp_us": 40.0, "chirps": 16, "samples": 64}
