@@ -136,7 +136,7 @@ def creeping(
     wave, and for open sheets, for which no bound is known.
     Args: rows (n,) the facets of the body, if there are others; apart [rad] of the directions to both ends: waves creep
     less far, and reflection is stronger or weaker than physical optics by second order; ring, of 1 / wavenumber, what
-    the terminator of a sphere brings backwards, where that counts, too.
+    the terminator of a sphere brings backwards, where that counts, too: of pieces that are curved all over.
     Source: Bowman, Senior, Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, sec. 10.3.3.
     """
     every = np.arange(len(geometry.area)) if rows is None else rows
@@ -150,7 +150,8 @@ def creeping(
         size = wavenumber * 0.5 * _thinnest(geometry.facets.vertices[piece], geometry.area[piece])
         x = max(size, _RESONANCE)
         wave = _CREEPING * x ** (4.0 / 3.0) * np.exp(-_DECAY * np.cbrt(x) * (math.pi - apart))
-        wave += min(ring, 0.5 * ring * size)  # of a ball thinner than a wavelength less
+        # Edges end currents of their own; of a ball thinner than a wavelength there is less.
+        wave += min(ring, 0.5 * ring * size) * bool(geometry.curved[piece].all())
         # Backwards the waves all round add up in phase; aside those do that creep within the plane of both ends.
         wave *= min(1.0, math.sqrt(2.0 / (math.pi * x * max(math.sin(apart), 1e-12))))
         # Of second order. With 1 / 2x, what it is backwards, this covers Mie's series less geometrical optics, k a = 10
