@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from raychan.blas import on_one_blas_thread
 from raychan.columns import Record, column
+from raychan.processing.climb_kernels import refine_beams, snapshots_for
 from raychan.processing.covariance import Covariance, covariance
 from raychan.processing.esprit import esprit
 from raychan.processing.joint_search import joint
 from raychan.processing.monopulse import monopulse
 from raychan.processing.source_number import source_number
-from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, capon, climb, music, peaks
+from raychan.processing.spectra import BEAMS_PER_BEAM, Bartlett, beams_of, capon, music, peaks
 from raychan.processing.twins import ambiguous
 from raychan.radar.aperture import Aperture
 from raychan.radar.declared import check_type, reals
@@ -109,7 +110,7 @@ def estimate(data: Complexes, aperture: Aperture, method: str, count: int, made:
     if method == "bartlett":
         return by_turns(data, aperture, count)
     if method == "monopulse":
-        start = peaks(bartlett(data), aperture, 1, BEAMS_PER_BEAM)
+        start = peaks(Bartlett(data), aperture, 1, BEAMS_PER_BEAM)
         axis = 0 if aperture.scans[0] else 1
         found = np.zeros((1, 2))
         found[:, axis] = monopulse(data, aperture, np.full(len(data), start[0, axis])).mean()
@@ -132,21 +133,14 @@ def by_turns(data: Complexes, aperture: Aperture, count: int) -> Floats:
     All are refined by turns until none moves: for noise that is each receiver's own the maximum-likelihood estimate.
     Source: Li and Stoica 1996 (RELAX).
     """
-    grid = aperture.grid(2)
     width = np.where(np.isfinite(aperture.beamwidth), aperture.beamwidth, 1.0)
+    beams, held = beams_of(aperture, aperture.grid(2)), snapshots_for(data)
     found = np.zeros((0, 2))
-    for _ in range(count):
+    for k in range(count):
         rest = data - amplitudes(data, aperture, found) @ aperture.steering(found)
-        found = np.concatenate([found, peaks(bartlett(rest), aperture, 1, BEAMS_PER_BEAM)])
-        for _ in range(_ROUNDS if len(found) > 1 else 0):
-            before = found.copy()
-            for k in range(len(found)):
-                waves = amplitudes(data, aperture, found)
-                waves[:, k] = 0.0
-                form = bartlett(data - waves @ aperture.steering(found))
-                found[k] = climb(form, aperture, found[k : k + 1], grid)[0][0]
-            if np.abs((found - before) / width).max() < _STILL:
-                break
+        found = np.concatenate([found, peaks(Bartlett(rest), aperture, 1, BEAMS_PER_BEAM)])
+        if k > 0:
+            refine_beams(found, held, beams, _ROUNDS, _STILL * width)
     if count > 1 and aperture.table is None:
         found = joint(data, aperture, found)
     return aperture.canonical(found)

@@ -109,8 +109,7 @@ class Beams:
     @cached_property
     def _search(self) -> tuple[Floats, ...]:
         """Places, distances of beams alike, and the first step, as kernels take them."""
-        period = np.where(self.array.wraps, self.array.period, np.inf)
-        return self.places, period, np.ascontiguousarray(self.array.skewed, np.float64), self.step
+        return self.places, self.array.repeats, np.ascontiguousarray(self.array.skewed, np.float64), self.step
 
 
 def squared(wave: Any) -> Floats:

@@ -72,10 +72,9 @@ def leave(rest, values, weights, own, gram, right):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, nogil=True)
-def make_visible(at, period, skewed):  # type: ignore[no-untyped-def]
-    """Replace cosines (2,) by those of a real wave that look alike, or else by the nearest at the edge, as
-    Aperture.visible does. Args: period (2,), infinite where the array's beams do not repeat; skewed (l, 2)."""
-    u, w = at
+def canonical(u, w, period, skewed):  # type: ignore[no-untyped-def]
+    """Return the cosines nearest to boresight that look like u and w along y and z, as Aperture.canonical does. Args:
+    period (2,), infinite where the array's beams do not repeat; skewed (l, 2)."""
     if abs(u) > 0.5 * period[0]:
         u -= period[0] * np.rint(u / period[0])
     if abs(w) > 0.5 * period[1]:
@@ -86,8 +85,16 @@ def make_visible(at, period, skewed):  # type: ignore[no-untyped-def]
         size = other_u * other_u + other_w * other_w
         if size < least:
             best_u, best_w, least = other_u, other_w, size
-    if best_u * best_u + best_w * best_w <= 1.0:
-        at[0], at[1] = best_u, best_w
+    return best_u, best_w
+
+
+@njit(cache=True, nogil=True)
+def make_visible(at, period, skewed):  # type: ignore[no-untyped-def]
+    """Replace cosines (2,) by those of a real wave that look alike, or else by the nearest at the edge, as
+    Aperture.visible does; arguments as of `canonical`."""
+    u, w = canonical(at[0], at[1], period, skewed)
+    if u * u + w * w <= 1.0:
+        at[0], at[1] = u, w
     size = math.sqrt(at[0] * at[0] + at[1] * at[1])
     if size > 1.0:
         at[0], at[1] = at[0] / size, at[1] / size

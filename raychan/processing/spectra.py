@@ -7,12 +7,14 @@ are found on a grid and then between the points by parabolas.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
+from raychan.processing.climb_kernels import Beams, climb_beams, snapshots_for
 from raychan.processing.covariance import Covariance
 from raychan.processing.twins import neighbours
 from raychan.radar.aperture import Aperture, Grid
@@ -35,14 +37,16 @@ _BATCH = 1 << 21  # steering values at once, 32 MB
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
 
 
-def bartlett(snapshots: Complexes) -> Form:
-    """Return the power of a beam [W] over snapshots (n, a): |a^H x|^2 / a^2 (Van Trees 2002, section 6.7)."""
+@dataclass(frozen=True, eq=False)
+class Bartlett:
+    """The power of a beam [W] over snapshots (n, a): |a^H x|^2 / a^2 (Van Trees 2002, section 6.7)."""
 
-    def value(steering: Complexes) -> Floats:
-        wave = steering.conj() @ snapshots.T
+    snapshots: Complexes
+
+    def __call__(self, steering: Complexes) -> Floats:
+        """Return the power (n,) of beams of steering vectors (n, a)."""
+        wave = steering.conj() @ self.snapshots.T
         return np.asarray((wave.real**2 + wave.imag**2).mean(axis=1) / steering.shape[1] ** 2)
-
-    return value
 
 
 def capon(found: Covariance) -> Form:
@@ -118,9 +122,12 @@ def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Fl
 
 def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Floats, Floats]:
     """Return the maxima (k, 2) next to grid points (k, 2), and the form's values (k,) there."""
-    at = np.array(start)
+    at, step = np.array(start, float), grid.step
+    if isinstance(form, Bartlett):
+        best = np.empty(len(at))
+        climb_beams(at, best, snapshots_for(form.snapshots), beams_of(aperture, grid))
+        return at, best
     best = form(aperture.steering(at))
-    step = grid.step
     for _ in range(_SHRINKS):
         for axis in np.flatnonzero(step):
             # Beyond the visible edge the form goes on as smoothly, or as it does at the other edge.
@@ -134,3 +141,9 @@ def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Fl
             at, best = np.where(better[:, None], tried, at), np.where(better, value, best)
         step = 0.5 * step
     return at, best
+
+
+def beams_of(aperture: Aperture, grid: Grid) -> Beams:
+    """Return an array's beams as kernels take them, to search from points of a grid."""
+    places, skewed = aperture.elements / aperture.wavelength, np.ascontiguousarray(aperture.skewed, np.float64)
+    return Beams(places, aperture.repeats, skewed, grid.step, _SHRINKS, aperture.deep, all(aperture.scans))

@@ -97,8 +97,7 @@ class Aperture:
     @cached_property
     def period(self) -> Floats:
         """Distance (2,) of grating lobes in the cosines along y and z: wavelength / pitch (Van Trees 2002, 2.4)."""
-        none = np.full(2, np.inf)
-        return np.divide(self.wavelength, self.pitch, out=none, where=self.pitch > 0.0)
+        return np.divide(self.wavelength, self.pitch, out=np.full(2, np.inf), where=self.pitch > 0.0)
 
     @cached_property
     def wraps(self) -> tuple[bool, bool]:
@@ -109,6 +108,11 @@ class Aperture:
             for scanned, period in zip(self.scans, self.period, strict=True)
         )
         return bool(y), bool(z)
+
+    @cached_property
+    def repeats(self) -> Floats:
+        """Distance (2,) of directions quite alike in the cosines along y and z; infinite where there are none."""
+        return np.where(self.wraps, self.period, np.inf)
 
     @cached_property
     def depth(self) -> float:
@@ -151,15 +155,14 @@ class Aperture:
         """Grating lobes of the elements, as if they were flat."""
         if self.table is not None:
             return on_rectangle(self.period, self.beamwidth)
-        width = np.where(self.scans, self.beamwidth, np.inf)
-        return of_places(self.elements[:, 1:] / self.wavelength, width)
+        return of_places(self.elements[:, 1:] / self.wavelength, np.where(self.scans, self.beamwidth, np.inf))
 
     @cached_property
     def skewed(self) -> Floats:
         """Grating lobes (l, 2) quite like the main lobe and not a period along y or z away; none unless flat."""
         if not self.flat or self.table is not None or not any(self.scans):
             return np.zeros((0, 2))
-        cell = np.where(self.wraps, self.period, np.inf) * (1.0 - SAME_EDGE)
+        cell = self.repeats * (1.0 - SAME_EDGE)
         return self.lobes.at[(self.lobes.lost <= ALIKE) & (np.abs(self.lobes.at) < cell).all(axis=1)]
 
     @property

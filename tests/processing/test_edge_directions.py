@@ -7,7 +7,7 @@ import pytest
 
 import raychan as rc
 from raychan.processing.doa import METHODS
-from raychan.processing.spectra import BEAMS_PER_BEAM, bartlett, peaks
+from raychan.processing.spectra import BEAMS_PER_BEAM, Bartlett, peaks
 from raychan.radar.aperture import Aperture, cosines
 from raychan.units import C0
 
@@ -83,7 +83,7 @@ def test_a_grid_of_two_directions_still_finds_the_maximum_between_them():
     """Elements so near each other that a beam is wider than all directions."""
     line = Aperture(rc.uniform_array(2, 0.01), 1.0)
     wave = line.steering(cosines(0.4))
-    assert peaks(bartlett(wave), line, 1, BEAMS_PER_BEAM)[0, 0] == pytest.approx(np.sin(0.4), abs=2e-3)
+    assert peaks(Bartlett(wave), line, 1, BEAMS_PER_BEAM)[0, 0] == pytest.approx(np.sin(0.4), abs=2e-3)
 
 
 @pytest.mark.parametrize("doa", ["bartlett", "capon", "music", "esprit"])

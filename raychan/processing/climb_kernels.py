@@ -1,0 +1,155 @@
+"""Kernels that find maxima of Bartlett's spectrum next to directions, of one echo or of several by turns (see
+processing.spectra and processing.doa)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.compile.jit import njit
+from raychan.processing.fold_kernels import canonical, make_visible, solve_in_place
+
+Floats = NDArray[np.float64]
+
+_RIDGE = 1e-13  # of a wave's power: waves that come to lie on each other have amplitudes nevertheless (not measured)
+
+
+class Beams(NamedTuple):
+    """Beams as kernels take them: places (a, 3) [waves]; period (2,), infinite where directions do not repeat along y
+    or z; skewed (l, 2) lobes quite like the main one; step (2,), the first distance of a search, 0 along an axis that
+    is not measured; how often it is halved; whether the array is deep; whether it measures both cosines."""
+
+    places: Floats
+    period: Floats
+    skewed: Floats
+    step: Floats
+    shrinks: int
+    deep: bool
+    both: bool
+
+
+@njit(cache=True, nogil=True)
+def _point(wave, places, u, w):  # type: ignore[no-untyped-def]
+    """Write the phasors (a,) of a plane wave from cosines u and w along y and z at places (a, 3) [waves]."""
+    ahead = math.sqrt(max(1.0 - u * u - w * w, 0.0))
+    for i in range(len(places)):
+        phase = 2.0 * math.pi * (places[i, 0] * ahead + places[i, 1] * u + places[i, 2] * w)
+        wave[i] = complex(math.cos(phase), math.sin(phase))
+
+
+@njit(cache=True, nogil=True)
+def _power(snapshots, places, u, w, wave):  # type: ignore[no-untyped-def]
+    """Return the power of a beam towards cosines u and w over snapshots (n, a); scratch: wave (a,)."""
+    _point(wave, places, u, w)
+    total = 0.0
+    for n in range(len(snapshots)):
+        seen = 0j
+        for i in range(len(wave)):
+            seen += wave[i].conjugate() * snapshots[n, i]
+        total += seen.real**2 + seen.imag**2
+    return total / (len(snapshots) * len(wave) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def _moved(u, w, axis, by, beams):  # type: ignore[no-untyped-def]
+    """Return cosines u and w moved along an axis, as Aperture.moved does."""
+    if not beams.deep:
+        return (u + by, w) if axis == 0 else (u, w + by)
+    size = math.sqrt(u * u + w * w) if beams.both else (u if axis == 0 else w)
+    along, aside = (1.0, 0.0) if axis == 0 or beams.both else (0.0, 1.0)
+    if beams.both and size > 0.0:
+        along, aside = u / size, w / size
+    if beams.both and axis == 1:
+        return u * math.cos(by) - aside * math.sin(by), w * math.cos(by) + along * math.sin(by)
+    turned = math.sin(min(max(math.asin(min(max(size, -1.0), 1.0)) + by, -0.5 * math.pi), 0.5 * math.pi))
+    return along * turned, aside * turned
+
+
+@njit(cache=True, nogil=True)
+def _climb(at, snapshots, beams, wave, tried):  # type: ignore[no-untyped-def]
+    """Move cosines at (2,) to the maximum next to them of the power over snapshots (n, a), and return that; scratch:
+    wave (a,), tried (2,)."""
+    places, period, skewed = beams.places, beams.period, beams.skewed
+    best = _power(snapshots, places, at[0], at[1], wave)
+    for s in range(beams.shrinks):
+        for axis in range(2):
+            step = beams.step[axis] * 0.5**s
+            if step == 0.0:
+                continue
+            # Beyond the visible edge the power goes on as smoothly, or as it does at the other edge.
+            u, w = _moved(at[0], at[1], axis, -step, beams)
+            u, w = canonical(u, w, period, skewed)
+            below = _power(snapshots, places, u, w, wave)
+            u, w = _moved(at[0], at[1], axis, step, beams)
+            u, w = canonical(u, w, period, skewed)
+            above = _power(snapshots, places, u, w, wave)
+            bend = below - 2.0 * best + above
+            shift = 0.5 * (below - above) / bend if bend < 0.0 else np.sign(above - below)
+            tried[0], tried[1] = _moved(at[0], at[1], axis, min(max(shift, -1.0), 1.0) * step, beams)
+            make_visible(tried, period, skewed)
+            value = _power(snapshots, places, tried[0], tried[1], wave)
+            if value > best:
+                best, at[0], at[1] = value, tried[0], tried[1]
+    return best
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def climb_beams(at, best, snapshots, beams):  # type: ignore[no-untyped-def]
+    """Move cosines at (k, 2) to the maxima next to them of the power over snapshots (n, a), and write that, best (k,).
+    Args: beams as `Beams`."""
+    wave, tried = np.empty(len(beams.places), np.complex128), np.empty(2)
+    for k in range(len(at)):
+        best[k] = _climb(at[k], snapshots, beams, wave, tried)
+
+
+@njit(cache=True, nogil=True)
+def _all_but(own, rest, snapshots, waves, gram, amplitude):  # type: ignore[no-untyped-def]
+    """Write what waves (k, a), fitted to snapshots (n, a) by least squares, leave of them, and wave `own` with it;
+    scratch: gram (k, k), amplitude (k,)."""
+    count, many = waves.shape
+    for n in range(len(snapshots)):
+        for j in range(count):
+            amplitude[j] = 0.0
+            for i in range(many):
+                amplitude[j] += waves[j, i].conjugate() * snapshots[n, i]
+            for m in range(count):
+                gram[j, m] = _RIDGE * many if j == m else 0.0
+                for i in range(many):
+                    gram[j, m] += waves[j, i].conjugate() * waves[m, i]
+        solve_in_place(gram, amplitude)
+        for i in range(many):
+            rest[n, i] = snapshots[n, i]
+            for j in range(count):
+                if j != own:
+                    rest[n, i] -= amplitude[j] * waves[j, i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def refine_beams(at, snapshots, beams, rounds, still):  # type: ignore[no-untyped-def]
+    """Move cosines at (k, 2) by turns, each to the maximum of the power that the others' waves leave of snapshots
+    (n, a), until none moves by more than `still` (2,), but at most `rounds` times. Args: beams as `Beams`."""
+    count, many = len(at), len(beams.places)
+    waves, wave, tried = np.empty((count, many), np.complex128), np.empty(many, np.complex128), np.empty(2)
+    gram, amplitude = np.empty((count, count), np.complex128), np.empty(count, np.complex128)
+    rest, before = np.empty_like(snapshots), np.empty_like(at)
+    for k in range(count):
+        _point(waves[k], beams.places, at[k, 0], at[k, 1])
+    for _ in range(rounds):
+        before[:] = at
+        for k in range(count):
+            _all_but(k, rest, snapshots, waves, gram, amplitude)
+            _climb(at[k], rest, beams, wave, tried)
+            _point(waves[k], beams.places, at[k, 0], at[k, 1])
+        moved = False
+        for k in range(count):
+            moved |= abs(at[k, 0] - before[k, 0]) >= still[0] or abs(at[k, 1] - before[k, 1]) >= still[1]
+        if not moved:
+            break
+
+
+def snapshots_for(data: NDArray[Any]) -> NDArray[np.complex128]:
+    """Return snapshots (n, a) as kernels take them."""
+    return np.ascontiguousarray(data, np.complex128)
