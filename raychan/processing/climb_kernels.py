@@ -1,5 +1,5 @@
-"""Kernels that find maxima of Bartlett's spectrum next to directions, of one echo or of several by turns (see
-processing.spectra and processing.doa)."""
+"""Kernels that find maxima next to directions: of Bartlett's spectrum, of one echo or of several by turns, and of what
+a wave explains beside others (see processing.spectra and processing.doa)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from raychan.processing.fold_kernels import canonical, make_visible, solve_in_pl
 
 Floats = NDArray[np.float64]
 
+ALONE = 0.1  # of a beam's power that others must leave it: as a quarter of a beam width does (not measured)
 _RIDGE = 1e-13  # of a wave's power: waves that come to lie on each other have amplitudes nevertheless (not measured)
 
 
@@ -41,16 +42,24 @@ def _point(wave, places, u, w):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _power(snapshots, places, u, w, wave):  # type: ignore[no-untyped-def]
-    """Return the power of a beam towards cosines u and w over snapshots (n, a); scratch: wave (a,)."""
-    _point(wave, places, u, w)
+def _seen(rows, wave):  # type: ignore[no-untyped-def]
+    """Return the sum of the powers that a beam towards a wave (a,) sees of rows (n, a)."""
     total = 0.0
-    for n in range(len(snapshots)):
+    for n in range(len(rows)):
         seen = 0j
         for i in range(len(wave)):
-            seen += wave[i].conjugate() * snapshots[n, i]
+            seen += wave[i].conjugate() * rows[n, i]
         total += seen.real**2 + seen.imag**2
-    return total / (len(snapshots) * len(wave) ** 2)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _power(snapshots, basis, places, u, w, wave):  # type: ignore[no-untyped-def]
+    """Return the power that a wave from cosines u and w explains of snapshots (n, a) beside others of orthonormal rows
+    basis (k, a); scratch: wave (a,)."""
+    _point(wave, places, u, w)
+    alone = len(wave) - _seen(basis, wave)
+    return _seen(snapshots, wave) / alone if alone > ALONE * len(wave) else 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -69,11 +78,10 @@ def _moved(u, w, axis, by, beams):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _climb(at, snapshots, beams, wave, tried):  # type: ignore[no-untyped-def]
-    """Move cosines at (2,) to the maximum next to them of the power over snapshots (n, a), and return that; scratch:
-    wave (a,), tried (2,)."""
+def _climb(at, snapshots, basis, beams, wave, tried):  # type: ignore[no-untyped-def]
+    """Move cosines at (2,) to the maximum next to them of `_power`, and return that; scratch: wave (a,), tried (2,)."""
     places, period, skewed = beams.places, beams.period, beams.skewed
-    best = _power(snapshots, places, at[0], at[1], wave)
+    best = _power(snapshots, basis, places, at[0], at[1], wave)
     for s in range(beams.shrinks):
         for axis in range(2):
             step = beams.step[axis] * 0.5**s
@@ -82,27 +90,28 @@ def _climb(at, snapshots, beams, wave, tried):  # type: ignore[no-untyped-def]
             # Beyond the visible edge the power goes on as smoothly, or as it does at the other edge.
             u, w = _moved(at[0], at[1], axis, -step, beams)
             u, w = canonical(u, w, period, skewed)
-            below = _power(snapshots, places, u, w, wave)
+            below = _power(snapshots, basis, places, u, w, wave)
             u, w = _moved(at[0], at[1], axis, step, beams)
             u, w = canonical(u, w, period, skewed)
-            above = _power(snapshots, places, u, w, wave)
+            above = _power(snapshots, basis, places, u, w, wave)
             bend = below - 2.0 * best + above
             shift = 0.5 * (below - above) / bend if bend < 0.0 else np.sign(above - below)
             tried[0], tried[1] = _moved(at[0], at[1], axis, min(max(shift, -1.0), 1.0) * step, beams)
             make_visible(tried, period, skewed)
-            value = _power(snapshots, places, tried[0], tried[1], wave)
+            value = _power(snapshots, basis, places, tried[0], tried[1], wave)
             if value > best:
                 best, at[0], at[1] = value, tried[0], tried[1]
     return best
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def climb_beams(at, best, snapshots, beams):  # type: ignore[no-untyped-def]
-    """Move cosines at (k, 2) to the maxima next to them of the power over snapshots (n, a), and write that, best (k,).
-    Args: beams as `Beams`."""
+def climb_beams(at, best, snapshots, basis, beams):  # type: ignore[no-untyped-def]
+    """Move cosines at (k, 2) to the maxima next to them of what a wave explains, and write that, best (k,).
+
+    Args: snapshots (n, a), which others of orthonormal rows basis (m, a) leave; beams as `Beams`."""
     wave, tried = np.empty(len(beams.places), np.complex128), np.empty(2)
     for k in range(len(at)):
-        best[k] = _climb(at[k], snapshots, beams, wave, tried)
+        best[k] = _climb(at[k], snapshots, basis, beams, wave, tried)
 
 
 @njit(cache=True, nogil=True)
@@ -134,14 +143,14 @@ def refine_beams(at, snapshots, beams, rounds, still):  # type: ignore[no-untype
     count, many = len(at), len(beams.places)
     waves, wave, tried = np.empty((count, many), np.complex128), np.empty(many, np.complex128), np.empty(2)
     gram, amplitude = np.empty((count, count), np.complex128), np.empty(count, np.complex128)
-    rest, before = np.empty_like(snapshots), np.empty_like(at)
+    rest, before, none = np.empty_like(snapshots), np.empty_like(at), np.empty((0, many), np.complex128)
     for k in range(count):
         _point(waves[k], beams.places, at[k, 0], at[k, 1])
     for _ in range(rounds):
         before[:] = at
         for k in range(count):
             _all_but(k, rest, snapshots, waves, gram, amplitude)
-            _climb(at[k], rest, beams, wave, tried)
+            _climb(at[k], rest, none, beams, wave, tried)
             _point(waves[k], beams.places, at[k, 0], at[k, 1])
         moved = False
         for k in range(count):

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.processing.spectra import PER_BEAM, Form, climb, peaks
+from raychan.processing.climb_kernels import ALONE
+from raychan.processing.spectra import PER_BEAM, Beside, climb, peaks, squared
 from raychan.radar.aperture import Aperture
 
 Floats = NDArray[np.float64]
@@ -22,7 +23,6 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 # 60 trials of 33 dB: wrong are 16 with 16 and 16, 4 with 16 and 256, 3 with 32 or 64 and 256.
 _SETS, _UNFINISHED = 32, 256
 _PAIRS = 1 << 18  # of beams tried: all of a line of 30 wavelengths, else those of the strongest beams (not measured)
-_ALONE = 0.1  # of a beam's power that others must leave it: as a quarter of a beam width does (not measured)
 _SAME = 0.5  # beam widths: sets whose waves are all nearer are one (not measured)
 _ROUNDS = 20  # of refining a set by turns (not measured)
 _STILL = 1e-5  # beam widths: a wave that moves less has arrived
@@ -50,27 +50,15 @@ def explained(data: Complexes, aperture: Aperture, at: Floats) -> float:
     return float(squared(data @ _basis(aperture.steering(at)).conj().T).sum())
 
 
-def squared(wave: Complexes) -> Floats:
-    """Return the power of complex values."""
-    return np.asarray(wave.real**2 + wave.imag**2)
-
-
 def _basis(waves: Complexes) -> Complexes:
     """Return orthonormal rows (k, a) that span waves (k, a)."""
     return np.asarray(np.linalg.qr(waves.T)[0].T)
 
 
-def _beside(data: Complexes, aperture: Aperture, others: Floats) -> Form:
+def _beside(data: Complexes, aperture: Aperture, others: Floats) -> Beside:
     """Return the power that a wave explains of snapshots (n, a) beside others from cosines (k, 2)."""
     basis = _basis(aperture.steering(others))
-    rest = data - (data @ basis.conj().T) @ basis
-
-    def value(steering: Complexes) -> Floats:
-        alone = steering.shape[1] - squared(steering @ basis.conj().T).sum(axis=1)
-        power = squared(steering.conj() @ rest.T).sum(axis=1)
-        return np.where(alone > _ALONE * steering.shape[1], power / np.maximum(alone, 1e-300), 0.0)
-
-    return value
+    return Beside(data - (data @ basis.conj().T) @ basis, basis)
 
 
 def _on_grid(data: Complexes, aperture: Aperture, count: int) -> tuple[Floats, Floats]:
@@ -97,7 +85,7 @@ def _gains(data: Complexes, steering: Complexes, seen: Complexes, bases: Complex
     power = np.zeros(alone.shape)
     for snapshot, wave in zip(data, seen.T, strict=True):
         power += squared(wave[:, None] - (shared * (bases.conj() @ snapshot)).sum(axis=2))
-    return np.where(alone > _ALONE * size, power / np.maximum(alone, _ALONE), 0.0).T
+    return np.where(alone > ALONE * size, power / np.maximum(alone, ALONE), 0.0).T
 
 
 def _longer(aperture: Aperture, beams: Floats, sets: Floats, values: Floats, kept: int) -> tuple[Floats, Floats]:

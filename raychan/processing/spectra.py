@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from raychan.processing.climb_kernels import Beams, climb_beams, snapshots_for
+from raychan.processing.climb_kernels import ALONE, Beams, climb_beams, snapshots_for
 from raychan.processing.covariance import Covariance
 from raychan.processing.twins import neighbours
 from raychan.radar.aperture import Aperture, Grid
@@ -45,8 +45,26 @@ class Bartlett:
 
     def __call__(self, steering: Complexes) -> Floats:
         """Return the power (n,) of beams of steering vectors (n, a)."""
-        wave = steering.conj() @ self.snapshots.T
-        return np.asarray((wave.real**2 + wave.imag**2).mean(axis=1) / steering.shape[1] ** 2)
+        return np.asarray(squared(steering.conj() @ self.snapshots.T).mean(axis=1) / steering.shape[1] ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """The power that a wave explains beside others of orthonormal rows basis (k, a), which leave snapshots (n, a)."""
+
+    snapshots: Complexes
+    basis: Complexes
+
+    def __call__(self, steering: Complexes) -> Floats:
+        """Return the power (n,) that waves of steering vectors (n, a) explain; 0 where others leave too little."""
+        alone = steering.shape[1] - squared(steering @ self.basis.conj().T).sum(axis=1)
+        power = squared(steering.conj() @ self.snapshots.T).sum(axis=1)
+        return np.where(alone > ALONE * steering.shape[1], power / np.maximum(alone, 1e-300), 0.0)
+
+
+def squared(wave: Complexes) -> Floats:
+    """Return the power of complex values."""
+    return np.asarray(wave.real**2 + wave.imag**2)
 
 
 def capon(found: Covariance) -> Form:
@@ -123,10 +141,11 @@ def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Fl
 def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Floats, Floats]:
     """Return the maxima (k, 2) next to grid points (k, 2), and the form's values (k,) there."""
     at, step = np.array(start, float), grid.step
-    if isinstance(form, Bartlett):
-        best = np.empty(len(at))
-        climb_beams(at, best, snapshots_for(form.snapshots), beams_of(aperture, grid))
-        return at, best
+    if isinstance(form, Bartlett | Beside):
+        best, (count, size) = np.empty(len(at)), form.snapshots.shape
+        basis = form.basis if isinstance(form, Beside) else np.zeros((0, size))
+        climb_beams(at, best, snapshots_for(form.snapshots), snapshots_for(basis), beams_of(aperture, grid))
+        return at, best if isinstance(form, Beside) else best / (count * size)
     best = form(aperture.steering(at))
     for _ in range(_SHRINKS):
         for axis in np.flatnonzero(step):

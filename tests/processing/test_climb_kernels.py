@@ -7,7 +7,7 @@ import pytest
 
 from raychan.processing.climb_kernels import climb_beams, refine_beams, snapshots_for
 from raychan.processing.doa import amplitudes
-from raychan.processing.spectra import Bartlett, beams_of, climb
+from raychan.processing.spectra import Bartlett, Beside, beams_of, climb
 from raychan.radar.aperture import Aperture
 
 LAMBDA = 3.9e-3
@@ -46,13 +46,16 @@ def made(name, count=40, snapshots=3):
     return array, data, at * array.scans
 
 
+@pytest.mark.parametrize("others", [0, 2])
 @pytest.mark.parametrize("name", ARRAYS)
-def test_the_maximum_next_to_a_direction_is_that_of_the_slow_form(name):
+def test_the_maximum_next_to_a_direction_is_that_of_the_slow_form(name, others):
     array, data, start = made(name)
     assert array.deep == name.startswith("deep")
-    grid, power = array.grid(4), Bartlett(data)
+    basis = np.linalg.qr(array.steering(start[:others]).T)[0].T
+    grid = array.grid(4)
+    power = Beside(data - (data @ basis.conj().T) @ basis, basis) if others else Bartlett(data)
     at, best = climb(power, array, start, grid)
-    # What is no `Bartlett` is climbed in plain numpy.
+    # What is a function only is climbed in plain numpy.
     slow, expected = climb(lambda steering: power(steering), array, start, grid)
     assert best == pytest.approx(power(array.steering(at)), rel=1e-9)
     # Where both sides of a start are as high to rounding, it may climb to either.
@@ -91,5 +94,5 @@ def test_turns_end_where_none_moves():
 def test_no_start_has_no_maximum():
     array, data, _ = made("line")
     best = np.empty(0)
-    climb_beams(np.zeros((0, 2)), best, snapshots_for(data), beams_of(array, array.grid(2)))
+    climb_beams(np.zeros((0, 2)), best, snapshots_for(data), snapshots_for(data[:0]), beams_of(array, array.grid(2)))
     assert not len(best)
