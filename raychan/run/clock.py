@@ -21,6 +21,7 @@ class Clock:
         check_type("progress", progress, Callable, or_none=True)  # type: ignore[arg-type]
         self.tell = progress or (lambda stage, share: None)
         self.timings: dict[str, float] = {}
+        self.begun = time.perf_counter()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:

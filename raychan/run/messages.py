@@ -231,13 +231,13 @@ def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
 
 
 def overrun(seconds: float, allowed: float | None) -> tuple[str, ...]:
-    """Return a line if tracing took more seconds than a budget allows."""
+    """Return a line if a run took more seconds than a budget allows."""
     if allowed is None or seconds <= allowed:
         return ()
     return (
-        f"tracing took longer than the {allowed:g} s allowed (model.max_seconds), as the first launch, one step and "
-        "any step that began always end: a larger tolerance (model.tolerance_db), fewer bounces or fewer elements far "
-        "apart take less",
+        f"the run took longer than the {allowed:g} s allowed (model.max_seconds), as the first launch, one step and "
+        "what follows the steps always end: a larger tolerance (model.tolerance_db), fewer bounces or fewer elements "
+        "far apart take less",
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from raychan.run.refinement_seconds import Pace
 from raychan.run.rules import allowed_memory
 from raychan.tracing.stats import Stats
 
@@ -31,36 +32,27 @@ FORESEEN = ", foreseen not to suffice for what is left"
 
 
 class Budget:
-    """The budgets of a scene's model: `max_rays`, `max_seconds`, `max_memory_mb`, counted from the first launch on; of
-    memory half of the machine's where none is given."""
+    """The budgets of a scene's model: `max_rays`, `max_seconds`, `max_memory_mb`; of memory half of the machine's where
+    none is given.
 
-    def __init__(self, model: Any, stats: Stats) -> None:
+    Args: paths held so far; begun when the run began, now if None; look how long the first look at the map took [s].
+    """
+
+    def __init__(self, model: Any, stats: Stats, paths: int = 0, begun: float | None = None, look: float = 0.0) -> None:
         further = max(_RAYS * stats.rays, _LEAST) / min(model.tolerance_db / _FINEST, 1.0)
         self._rays = stats.rays + further if model.max_rays == "auto" else float(model.max_rays)
-        self._seconds, own = model.max_seconds, model.max_memory_mb
+        own = model.max_memory_mb
         self._memory, self._which = allowed_memory(), MACHINE
         if own is not None:
             self._memory, self._which = 1e6 * own, MEMORY
-        self._cast, self._start = stats.rays, time.perf_counter()
-        self._spent, self._slowest = 0.0, 0.0
-
-    def stepped(self, stats: Stats) -> None:
-        """Note what a step took."""
-        spent, cast = time.perf_counter() - self._start, stats.rays
-        # A step of few rays does not take its time for these.
-        if cast > self._cast:
-            self._slowest = max(self._slowest, (spent - self._spent) / (cast - self._cast))
-        self._cast, self._spent = cast, spent
+        begun = time.perf_counter() if begun is None else begun
+        self.pace = Pace(model.max_seconds, begun, look, stats.rays, paths)
 
     def left(self, stats: Stats) -> tuple[float, str]:
         """Return the rays that further steps may cast, and which budget does not allow more: seconds count as the rays
-        that the slowest step so far would have cast in them."""
-        rays = self._rays - stats.rays
-        if self._seconds is not None:
-            within = max(self._seconds - self._spent, 0.0) / max(self._slowest, 1e-12)
-            if within < rays:
-                return within, SECONDS
-        return rays, RAYS
+        that steps cast in them, as fast as so far."""
+        rays, within = self._rays - stats.rays, self.pace.rays
+        return (within, SECONDS) if within < rays else (rays, RAYS)
 
     def ended(self, stats: Stats, paths: int, rays: float) -> str:
         """Return what leaves no room for a further step, '' if nothing does.

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.run.map_cells import MapCells
-from raychan.run.refinement_budget import FORESEEN, STEPS
+from raychan.run.refinement_budget import FORESEEN, SECONDS, STEPS, Budget
+from raychan.run.refinement_seconds import StepRays
 from raychan.tracing.source_rays import SourceRays
 from raychan.tracing.sources import Sources, without_out
+from raychan.tracing.stats import Stats
 
 Floats = NDArray[np.float64]
 
@@ -19,6 +23,28 @@ _GROWTH = 1.6
 """Rays of a cell's step over those of the one before: ever fewer sources keep it open. At 2.2, as for one source, cells
 are given up before half of the rays that are left is spent: 90 % of the detections of `bench.detections`, seeds 9640 to
 9759, at 0.5 dB are within it, 93 % at 1.6, by 16 and 21 million rays."""
+_LESS = 0.7  # of the rays of a plan, at most, may be planned where its step would end too late (not measured)
+
+
+def next_step(
+    cells: MapCells, rays: SourceRays, cost: StepRays, budget: Budget, so_far: tuple[Stats, int], steps: int
+) -> tuple[Sources, float, str]:
+    """Return the sources to trace again, when that must have ended, and what ends the refinement, '' if nothing does.
+
+    Args: so_far what launches took, and the paths held; steps that are left.
+    """
+    left, which = budget.left(so_far[0])
+    while True:
+        wanted, planned_rays, ended = planned(cells, rays, (left, which), steps)
+        if not ended and len(wanted):
+            ended = budget.ended(*so_far, planned_rays)
+        if ended or not len(wanted):
+            return wanted, math.inf, ended
+        foreseen, within = cost.of(wanted, rays.next_step(wanted)), budget.pace.rays
+        if foreseen <= within:
+            return wanted, budget.pace.end(foreseen), ""
+        # A step takes more rays than its plan counts: so much less may be planned.
+        left, which = min(left, planned_rays) * min(within / foreseen, _LESS), SECONDS
 
 
 def planned(cells: MapCells, rays: SourceRays, budget: tuple[float, str], steps: int) -> tuple[Sources, float, str]:

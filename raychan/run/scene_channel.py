@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from time import perf_counter
 from typing import Any
 
 from raychan.blas import on_one_blas_thread
@@ -17,7 +16,7 @@ from raychan.run.fluctuation import check
 from raychan.run.instant import traced_at
 from raychan.run.ledger import ModelChoice
 from raychan.run.mechanisms import choose
-from raychan.run.messages import merged, overrun, uncut
+from raychan.run.messages import merged, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import MOST, Launched, PathStream
 from raychan.run.preview import preview_notes, preview_of
@@ -84,21 +83,20 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         cost = _cost(stats, stats.rays, 1, model, time)
         return Channel(geometry, points, launched, launched, model, None, cost, (*said, *preview_notes()))
     edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
-    begun, channel = perf_counter(), None
+    channel = None
     if time or not needed(scene, model.retrace, edge):
         channel = _refined(scene, geometry, points, model, clock)
         if channel is None:
             said.append(_WHOLE)
     if channel is None:
         channel = _launched_twice(scene, geometry, points, model, clock)
-    over = overrun(perf_counter() - begun, model.max_seconds)
-    return replace(channel, warnings=(*said, *channel.warnings, *over))
+    return replace(channel, warnings=(*said, *channel.warnings))
 
 
 def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel | None:
     """Return the channel of a scene refined where detections need it; None where it has too many paths to be held."""
     stats, radar = Stats(), scene.radar
-    refinement = SceneRefinement(geometry, points, radar, scene.processing, model, clock.tell, stats)
+    refinement = SceneRefinement(geometry, points, radar, scene.processing, model, clock.tell, stats, begun=clock.begun)
     with clock.stage("trace"):
         first = refinement.first()
         if first is None:

@@ -9,8 +9,9 @@ or a budget ends.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -18,22 +19,23 @@ from numpy.typing import NDArray
 
 from raychan.channel.error import COVER
 from raychan.channel.paths import join, nothing, of_trajectories, paths_of
-from raychan.parallel import parallel_tasks, run_pair
+from raychan.parallel import run_pair
 from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths, Points
+from raychan.run.feeding import each, feeding
 from raychan.run.ledger import ModelChoice
-from raychan.run.map_cells import ALONG, MapCells, feeding_sources
+from raychan.run.map_cells import ALONG, MapCells
 from raychan.run.mechanisms import QUIET, choose, needed
 from raychan.run.other_ways import Facets, OtherWays, last_facets
 from raychan.run.path_stream import MOST, Launched
 from raychan.run.point_spread import PointSpread
 from raychan.run.probes import probes_of
 from raychan.run.receiver import detections_in, least_in, map_of, noise_amplitude, seen_in_map, shoulders_in
-from raychan.run.refinement_budget import STEPS, Budget
-from raychan.run.refinement_plan import planned
+from raychan.run.refinement_budget import SECONDS, STEPS, Budget
+from raychan.run.refinement_plan import next_step
+from raychan.run.refinement_seconds import StepRays
 from raychan.run.rules import first_rule, step_rule
-from raychan.run.source_changes import class_of
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.speckle import spreads_db
 from raychan.run.streams import Stage, stream
@@ -56,6 +58,10 @@ _COARSEST_DB = 1.0
 """Tolerance from which on first launches bring as many paths: of boxes and balls 69, 42, 32 and 32 thousand at 0.05,
 0.2, 1 and 3 dB."""
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
+
+
+class _Late(Exception):
+    """Raised where a step takes too long for the run to end in time: nothing of it counts."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +103,11 @@ class SceneRefinement:
     """Where given, the routes of all launches are kept here."""
     coarser: int = 0
     """Steps by which the first launch was made coarser, half as fine each, for too many paths."""
+    begun: float = field(default_factory=perf_counter)
+    """When the run began, by `time.perf_counter`."""
 
     def __post_init__(self) -> None:
+        self._end = math.inf
         self._noise = noise_amplitude(self.radar, self.settings)
         self._probes = probes_of(self.radar)
 
@@ -133,6 +142,8 @@ class SceneRefinement:
 
     def _carried(self, batch: Batch) -> tuple[Batch | None, Facets, Paths]:
         """Return a batch of routes, where they are kept, the facets that they scatter on, and their paths."""
+        if perf_counter() > self._end:
+            raise _Late
         paths = paths_of(batch, self.geometry.facets, self.radar, self.radar.waveform.carrier, self._noise)
         return (None if self.launches is None else batch), last_facets(batch), paths
 
@@ -162,14 +173,16 @@ class SceneRefinement:
         radar, window = replace(self.radar, noise=False), self.settings.range_window
         held = SourcedPaths(first.paths, first.source, self._probes)
         response = PointSpread(radar.channel_waveform, window, self.settings.rate_window)
+        since = perf_counter()
         cells = self._cells(radar, response, first.paths)
-        steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", list[tuple[float, float]]()
+        look, steps = perf_counter() - since, 0
+        unreached, ended, speckled = tuple[Unreached, ...](), "", list[tuple[float, float]]()
         if len(cells.place) and self.model.speckle:
             speckled = cells.loosened(
                 spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.middle)
             )
         if len(cells.place):
-            steps, unreached, ended = self._refined(first.launch, held, response, cells)
+            steps, unreached, ended = self._refined(first.launch, held, response, cells, look)
         if self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
 
@@ -217,24 +230,32 @@ class SceneRefinement:
         return cells
 
     def _refined(
-        self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells
+        self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells, look: float
     ) -> tuple[int, tuple[Unreached, ...], str]:
-        """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why."""
-        wanted, rays = _feeding(held, response, cells), SourceRays(len(self.geometry.facets.body))
-        budget, rings, steps, ended = Budget(self.model, self.stats), Rings(self.geometry), 0, ""
+        """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why.
+
+        Args: look, how long the first look at the map took [s].
+        """
+        count = len(self.geometry.facets.body)
+        wanted, rays, cost = feeding(held, response, cells), SourceRays(count), StepRays(count)
+        budget = Budget(self.model, self.stats, len(held), self.begun, look)
+        rings, steps, ended = Rings(self.geometry), 0, ""
         while len(wanted) and not ended:
             self.tell("trace", 0.5 + 0.5 * steps / STEPS)
-            again = self._again(launch, held, wanted, self._ways.missing(wanted), rays, rings)
-            own, sums = held.sums_of(*again, response, cells.place)
-            _each(sums, lambda i, change, own=own: cells.changed(i, own, change))  # type: ignore[misc]
+            try:
+                changed = self._again(launch, held, wanted, self._ways.missing(wanted), rays, rings, cost)
+            except _Late:
+                ended = SECONDS
+                break
+            own, sums = held.sums_of(*changed, response, cells.place)
+            each(sums, lambda i, change, own=own: cells.changed(i, own, change))  # type: ignore[misc]
             if not steps:
                 cells.traced(own)
             steps += 1
             cells.stepped()
-            budget.stepped(self.stats)
-            wanted, foreseen, ended = planned(cells, rays, budget.left(self.stats), STEPS - steps)
-            if not ended and len(wanted):
-                ended = budget.ended(self.stats, len(held), foreseen)
+            budget.pace.stepped(self.stats.rays, len(held))
+            wanted, self._end, ended = next_step(cells, rays, cost, budget, (self.stats, len(held)), STEPS - steps)
+        self._end = math.inf
         reached = cells.over <= 1.0
         for i in range(len(cells)):
             source, factor, share = cells.slowness(i)
@@ -243,7 +264,14 @@ class SceneRefinement:
         return steps, tuple(unreached_of(cells, self.geometry.facets)), ended
 
     def _again(
-        self, launch: Launch, held: SourcedPaths, wanted: Sources, alone: Sources, rays: SourceRays, rings: Rings
+        self,
+        launch: Launch,
+        held: SourcedPaths,
+        wanted: Sources,
+        alone: Sources,
+        rays: SourceRays,
+        rings: Rings,
+        cost: StepRays,
     ) -> tuple[Paths, Sources]:
         """Trace sources again, each half as coarse as before, and others `alone` as a first step does; return what that
         changes, as `SourcedPaths.replace`."""
@@ -254,7 +282,9 @@ class SceneRefinement:
             rule = step_rule(self.radar, self.settings, self.model, k - self.coarser).refinement
             asked.append(Further(replace(rule, least=k), by))
         changed = list[tuple[Paths, Sources]]()
-        for k, one, brought in zip(steps, asked, launch.again(asked, self._carried), strict=True):
+        again = launch.again(asked, self._carried)
+        cost.learn(list(zip(steps, asked, strict=True)))
+        for k, one, brought in zip(steps, asked, again, strict=True):
             new = self._paths(brought)
             assert new is not None
             self.stats.add(one.stats)
@@ -262,30 +292,3 @@ class SceneRefinement:
             changed.append(held.replace(*new, one.wanted))
         paths, sources = zip(*changed, strict=True)
         return join(list(paths)), np.concatenate(sources)
-
-
-def _feeding(held: SourcedPaths, response: PointSpread, cells: MapCells) -> Sources:
-    """Return the sources that feed cells, and note what all tubes bring, and the deep ones that are left."""
-    own, sums = held.by_source(response, cells.place)
-    deep, allowed, found = class_of(own) == 1, cells.allowed, np.zeros(len(own), bool)
-    tubes = int(np.searchsorted(own, EXACT, side="right"))  # from there on, for exact routes have the least number
-
-    def one(i: int, x: Complexes) -> None:
-        feeding = feeding_sources(own, x, float(allowed[i]))
-        cells.left[i] = x[deep & ~feeding].sum()
-        weak = ~deep & ~feeding & (own != EXACT) & (x != 0.0)
-        cells.weak(i, own[weak], x[weak])
-        # Not by BLAS, whose sums depend on how many threads it takes.
-        cells.tubes[i] = math.sqrt((np.abs(x[tubes:]) ** 2).sum())
-        found[feeding] = True
-
-    _each(sums, one)
-    return own[found]
-
-
-def _each(sums: Iterator[Complexes], work: Callable[[int, Complexes], None]) -> None:
-    """Call `work` with the number of each level and its sums (s,), by all threads."""
-    first = 0
-    for part in sums:
-        parallel_tasks(len(part), lambda j, first=first, part=part: work(first + j, part[j]))  # type: ignore[misc]
-        first += len(part)

@@ -16,7 +16,7 @@ from raychan.run.directions import beam_to
 from raychan.run.interferers import interference, never_heard
 from raychan.run.labels import Chains, chains, provenance
 from raychan.run.ledger import Entry
-from raychan.run.messages import counts, told
+from raychan.run.messages import counts, overrun, told
 from raychan.run.own_signals import all_named, own_signals
 from raychan.run.path_stream import Launched
 from raychan.run.preview import preview_error, preview_ledger
@@ -108,6 +108,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *_remaining(channel, known, radar),
             *heard,
             *told(known, reasons, tolerance, rdmap, left_out, radar),
+            *overrun(sum(clock.timings.values()), channel.model.max_seconds),
         ),
         scene=scene.without_caches(),
         text=scene.text,

@@ -137,10 +137,15 @@ class Launch:
             for k, i, what in (parts[j] for j in group):
                 budget = Budget(self._limited(asked[k].refinement))
                 jobs.append((i, self._found[i].frozen(budget), what))
-            brought = self._together(jobs, [asked[k].stats for k in own], each)
-            for k, (_, job, _), made in zip(own, jobs, brought, strict=True):
+            costs = [Stats() for _ in jobs]
+            brought = self._together(jobs, costs, each)
+            for k, (i, job, _), (_, _, what), cost, made in zip(
+                own, jobs, (parts[j] for j in group), costs, brought, strict=True
+            ):
                 found[k] += made
-                asked[k].stats.count_uncut(job.budget.uncut)
+                cost.count_uncut(job.budget.uncut)
+                asked[k].stats.add(cost)
+                asked[k].parts.append((i, what, cost.rays))
         for further in asked:
             further.stats.legs = len(self.every[0])
         return found

@@ -42,3 +42,5 @@ class Further:
     refinement: Refinement
     wanted: list[tuple[int, Wanted]]
     stats: Stats = field(default_factory=Stats)
+    parts: list[tuple[int, Wanted, int]] = field(default_factory=list)
+    """Number of the leg in, what was wanted and the rays that it took, of each part of the launch."""

@@ -214,7 +214,7 @@ class Model(Table):
     """Rays that a frame may cast to reach tolerance_db; auto: those of its first launch and half
     as many again, or 1,000,000 more where that is more; below 1 dB what comes on top is divided by the tolerance."""
     max_seconds: RunSeconds | None = None
-    """Time after which refinement takes no further step."""
+    """Time that a run may take: refinement takes no further step where the run might not end within it."""
     max_memory_mb: MemoryMb | None = None
     """Memory of paths beyond which refinement takes no further step."""
     retrace: Literal["auto"] | Tracings = "auto"

@@ -191,15 +191,16 @@ def test_a_step_of_few_rays_fits_into_what_is_left():
 
 @pytest.mark.parametrize(("rays", "why"), [(100_000, ""), (400_000, "seconds")])
 def test_a_step_does_not_start_that_would_end_beyond_the_seconds(monkeypatch, rays, why):
-    """200,000 rays took 2 of 5 s: 400,000 more would take 4 s."""
+    """200,000 rays took 2 of 5 s: 400,000 more would take 4 s. A run that began 2 s before has 1 s left."""
     now = [100.0]
     monkeypatch.setattr(refinement_budget.time, "perf_counter", lambda: now[0])
     model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}, model={"max_seconds": 5.0}).model
     stats = Stats(rays=100)
-    budget = refinement_budget.Budget(model, stats)
+    budget, late = refinement_budget.Budget(model, stats), refinement_budget.Budget(model, stats, begun=98.0)
     stats.rays, now[0] = 200_100, 102.0
-    budget.stepped(stats)
-    assert budget.left(stats)[0] == pytest.approx(300_000)
+    for one, left in ((budget, 300_000), (late, 100_000)):
+        one.pace.stepped(stats.rays, 0)
+        assert one.left(stats)[0] == pytest.approx(left)
     ended = budget.ended(stats, 10, rays)
     assert ended == "" if not why else (why in ended and "foreseen" in ended and "rays" not in ended)
 
