@@ -184,7 +184,7 @@ class SceneRefinement:
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
-        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(speckled))
+        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(speckled), tuple(cells.settled))
         return Converged(launched, others, self.model, first.chosen, remains)
 
     def _cells(self, quiet: Radar, response: PointSpread, paths: Paths) -> MapCells:

@@ -119,7 +119,12 @@ def _remaining(channel: Channel, found: ExplainedDetections, radar: Radar) -> li
     """Return lines on what the refinement did not reach, given what was detected."""
     wave = radar.channel_waveform
     size = wave.range_resolution, wave.rate_resolution
-    return channel.remains.notes((found.range, found.rate), size) if channel.remains else []
+    if channel.remains is None:
+        return []
+    also = [
+        what for what, held in (("merged facets", channel.geometry.merged), ("turning bodies", channel.turned)) if held
+    ]
+    return channel.remains.notes((found.range, found.rate), size, found.error_db, also)
 
 
 def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:
