@@ -101,6 +101,9 @@ class SceneRefinement:
     def __post_init__(self) -> None:
         self._noise = noise_amplitude(self.radar, self.settings)
         self._probes = probes_of(self.radar)
+        self._asked = self.launches is not None
+        if self.model.speckle and not self._asked:
+            self.launches = []
 
     def first(self) -> First | None:
         """Return the first launch; None where it brings more paths than can be held."""
@@ -165,9 +168,7 @@ class SceneRefinement:
         cells = self._cells(radar, response, first.paths)
         steps, unreached, ended, speckled = 0, tuple[Unreached, ...](), "", list[tuple[float, float]]()
         if len(cells.place) and self.model.speckle:
-            speckled = cells.loosened(
-                spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.middle)
-            )
+            speckled = cells.loosened(self._spreads(first.paths, response, cells.place))
         if len(cells.place):
             steps, unreached, ended = self._refined(first.launch, held, response, cells)
         if self.launches is not None:
@@ -186,6 +187,14 @@ class SceneRefinement:
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
         remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(speckled), tuple(cells.settled))
         return Converged(launched, others, self.model, first.chosen, remains)
+
+    def _spreads(self, paths: Paths, response: PointSpread, place: Floats) -> Floats:
+        """Return by how much (c,) [dB] displaced bodies move the levels of cells."""
+        assert self.launches is not None
+        found = spreads_db(paths, self.launches[0], self.geometry, self.radar, response, place, self._noise)
+        if not self._asked:
+            self.launches = None
+        return found
 
     def _cells(self, quiet: Radar, response: PointSpread, paths: Paths) -> MapCells:
         """Return the cells of the map that are detections, or would be a little stronger, also beside stronger ones;

@@ -72,9 +72,12 @@ class Remains:
             rows = [_detection(place, found, size) for place in self.speckled]
             numbers = sorted({i + 1 for i in rows if i is not None})
             which = f", {_number(len(numbers))} {', '.join(map(str, numbers))} among them" if numbers else ""
+            is_one = len(self.speckled) == 1
+            cells, them, they = ("cell", "it", "it is") if is_one else ("cells", "them", "they are")
             said.append(
-                f"{len(self.speckled)} cells of the map are speckle (model.speckle){which}: displacing bodies by 0.05 "
-                f"deg and 1 mm moves them by more than {tolerance}, and they are refined to that only"
+                f"{len(self.speckled)} {cells} of the map {'is' if is_one else 'are'} speckle (model.speckle){which}: "
+                f"displacing bodies by 0.05 deg and 1 mm moves {them} by more than {tolerance}, and {they} refined to "
+                "that only"
             )
         causes: dict[int, list[str]] = {}
         weak = []
