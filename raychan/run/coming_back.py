@@ -56,8 +56,14 @@ def coming_back(paths: Paths, geometry: Geometry, bounces: int, wavelength: floa
 
 def _some(paths: Paths, rows: NDArray[np.bool_], bounces: int) -> Ints:
     """Return some trajectories of paths (n,) with as many interactions, of all chains of bodies as many."""
-    way, found = paths.trajectories, np.unique(paths.trajectory[rows]).astype(np.int64)
-    return found[of_each(np.unique(way.body[found, :bounces], axis=0, return_inverse=True)[1].ravel())]
+    taken = np.zeros(len(paths.trajectories.kind), bool)
+    taken[paths.trajectory[rows]] = True
+    found = np.flatnonzero(taken)
+    met = paths.trajectories.body[found, :bounces]
+    # Neighbours are mostly alike: one of each run is sorted.
+    heads = np.flatnonzero(np.append(True, (met[1:] != met[:-1]).any(axis=1))[: len(met)])
+    group = np.unique(met[heads], axis=0, return_inverse=True)[1].ravel()
+    return found[of_each(np.repeat(group, np.diff(heads, append=len(met))))]
 
 
 def _specular(met: Followed, start: Floats, end: Floats) -> Floats:

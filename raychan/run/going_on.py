@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.records import NONE, POINT, REFLECT, SCATTER, TRANSMIT, Paths
-from raychan.run.labels import alike
 from raychan.run.mirrored_rays import followed, of_each
 from raychan.tracing.legs import legs_over
 from raychan.world.geometry import Geometry
@@ -16,9 +15,9 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
-def going_on(paths: Paths, geometry: Geometry, last: Bools) -> Bools:
-    """Return which paths (n,), of those of the `last` order (n,), are of chains of which a wave, mirrored at its last
-    surface, meets another.
+def going_on(paths: Paths, geometry: Geometry, last: Bools, chains: tuple[Ints, Ints]) -> Bools:
+    """Return which paths (n,), of those of the `last` order (n,), are of chains, as `alike` gives them, of which a
+    wave, mirrored at its last surface, meets another.
 
     Rays of each chain tell it. Targets of given RCS send waves everywhere: these go on where there are mirrors. What
     only mirrors at both ends show is none of them: a wall over ground has two ways over it, but no third.
@@ -26,7 +25,7 @@ def going_on(paths: Paths, geometry: Geometry, last: Bools) -> Bools:
     if not last.any():
         return last
     rows = np.flatnonzero(last)
-    chain = alike(paths)[1][rows]
+    chain = chains[1][rows]
     some = of_each(chain)
     way = paths.trajectory[rows[some]].astype(np.int64)
     goes = np.zeros(int(chain.max()) + 1, bool)
@@ -40,13 +39,13 @@ def going_on(paths: Paths, geometry: Geometry, last: Bools) -> Bools:
     return found
 
 
-def shorter(paths: Paths, goes: Bools) -> Bools:
-    """Return which paths (n,) meet the bodies of paths that go on (n,), all but the first or all but the last, where
-    these meet them.
+def shorter(paths: Paths, goes: Bools, chains: tuple[Ints, Ints]) -> Bools:
+    """Return which paths (n,), of chains as `alike` gives them, meet the bodies of paths that go on (n,), all but the
+    first or all but the last, where these meet them.
 
     The radar's foot point on a wall, of whatever level, tells nothing of what stands aside; mirrors alone never do.
     """
-    first, chain = alike(paths)
+    first, chain = chains
     body, kind = paths.trajectories.body[first], paths.trajectories.kind[first]
     met = [
         tuple(b for b, k in zip(*row, strict=True) if k not in (NONE, TRANSMIT))
@@ -59,25 +58,32 @@ def shorter(paths: Paths, goes: Bools) -> Bools:
     return found
 
 
-def _among(paths: Paths, ways: NDArray[np.int32], others: NDArray[np.int32]) -> Bools:
-    """Return which trajectories (n,) scatter within the box of the places where others (m,) meet the same body."""
+def _among(paths: Paths, ways: NDArray[np.int32], goal: NDArray[np.int32]) -> Bools:
+    """Return which trajectories (n,) scatter within the box of the places where others, goal (m,), meet a body."""
     kind, body, at = (getattr(paths.trajectories, name) for name in ("kind", "body", "vertices"))
     low, high = (np.full((len(paths.body_names), 3), end) for end in (np.inf, -np.inf))
-    others = np.unique(others)
-    # Slot by slot and sorted by body, for speed.
+    others = _once(goal, len(kind))
     for slot in range(kind.shape[1]):
         others = others[kind[others, slot] != NONE]
         if not len(others):
             break
-        rows = others[np.argsort(body[others, slot], kind="stable")]
-        first = np.flatnonzero(np.diff(body[rows, slot], prepend=-1))
+        # Neighbours are mostly on one body: each run of them first, for speed.
+        on, place = body[others, slot], at[others, slot]
+        first = np.flatnonzero(np.diff(on, prepend=on[:1] - 1))
         for box, end in ((low, np.minimum), (high, np.maximum)):
-            met = body[rows[first], slot]
-            box[met] = end(box[met], end.reduceat(at[rows, slot], first))
-    each, back = np.unique(ways, return_inverse=True)
+            end.at(box, on[first], end.reduceat(place, first))
+    each, within = _once(ways, len(kind)), np.zeros(len(kind), bool)
     slot = np.argmax((kind[each] == SCATTER) | (kind[each] == POINT), axis=1)
     met, place = body[each, slot], at[each, slot]
-    return np.asarray(((place >= low[met]) & (place <= high[met])).all(axis=1)[back])
+    within[each] = ((place >= low[met]) & (place <= high[met])).all(axis=1)
+    return within[ways]
+
+
+def _once(ways: NDArray[np.int32], count: int) -> Ints:
+    """Return the numbers of some of `count` trajectories, in order, each once."""
+    taken = np.zeros(count, bool)
+    taken[ways] = True
+    return np.flatnonzero(taken)
 
 
 def _mirrored(paths: Paths, geometry: Geometry, way: Ints) -> Ints:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, NONE, REFLECT, TRANSMIT, Facets, Paths
 from raychan.run.ledger import NOTHING, Entry
+from raychan.run.mechanisms import slots_used
 from raychan.tracing.tubes import unit
 from raychan.units import C0, db
 
@@ -50,7 +51,8 @@ def _bend(paths: Paths, taken: Ints, nearest: Floats, facets: Facets, radar: Rad
     """Return the largest radial acceleration [m/s^2] of what some trajectories meet, and of lines of sight; nearest
     (w,) [m] of each path."""
     way = paths.trajectories
-    body, kind = way.body[taken], way.kind[taken]
+    deep = slots_used(paths)
+    body, kind = way.body[taken, :deep], way.kind[taken, :deep]
     # The last row is of unused slots.
     role, velocity = np.append(facets.role, MIRROR), np.append(facets.velocity, np.zeros((1, 3)), axis=0)
     used = (role[body] != MIRROR) & (kind != TRANSMIT)
@@ -58,7 +60,7 @@ def _bend(paths: Paths, taken: Ints, nearest: Floats, facets: Facets, radar: Rad
         ends = [(radar.velocity, way.departure, np.broadcast_to(nearest[taken, None], body.shape))]
     else:
         sides = (radar.velocity, way.departure, paths.tx), (radar.rx_motion, way.arrival, paths.rx)
-        ends = [(own, look, np.linalg.norm(way.vertices[taken] - end, axis=2)) for own, look, end in sides]
+        ends = [(own, look, np.linalg.norm(way.vertices[taken, :deep] - end, axis=2)) for own, look, end in sides]
     bend = np.zeros(body.shape)
     for own, look, far in ends:
         relative = velocity - np.asarray(own)

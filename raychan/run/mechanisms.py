@@ -29,6 +29,11 @@ def interactions(paths: Paths) -> NDArray[np.int64]:
     return np.asarray(((kind > 0) & (kind != TRANSMIT)).sum(axis=1))[paths.trajectory]
 
 
+def slots_used(paths: Paths) -> int:
+    """Return how many of the slots of trajectories hold an interaction of any."""
+    return int(np.flatnonzero(paths.trajectories.kind.any(axis=0)).max(initial=-1)) + 1
+
+
 def layers(paths: Paths) -> NDArray[np.int64]:
     """Return the number of transmissions through thin layers (n,) of each path."""
     return np.asarray((paths.trajectories.kind == TRANSMIT).sum(axis=1))[paths.trajectory]

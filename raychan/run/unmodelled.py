@@ -17,6 +17,7 @@ from raychan.run.clutter import laws_of, scatters_diffusely, share_of_distance
 from raychan.run.coming_back import coming_back
 from raychan.run.going_on import going_on, shorter
 from raychan.run.intra_frame import intra_frame
+from raychan.run.labels import alike
 from raychan.run.ledger import NOTHING, SEEN, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, layers_at_once, least_detection, peak
 from raychan.run.solver import paths_over_wedges
@@ -122,14 +123,14 @@ def _returning(paths: Paths, geometry: Geometry, radar: Radar, model: Any) -> En
 
 
 def _by_ratio(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, bounces: int, weakest: float) -> Entry:
-    met = interactions(paths)
-    goes = going_on(paths, geometry, met == bounces)
+    met, chains = interactions(paths), alike(paths)
+    goes = going_on(paths, geometry, met == bounces, chains)
     if not goes.any():
         return Entry(UNKNOWN, "none", f"no wave of {bounces} interactions meets a surface more")
     if bounces == 1:
         how = "waves meet a second surface, but one bounce is modelled (model.max_bounces): nothing to extrapolate from"
         return Entry(UNKNOWN, SEEN, how)
-    last, before = (peak(paths, rows, radar, settings) for rows in (goes, shorter(paths, goes)))
+    last, before = (peak(paths, rows, radar, settings) for rows in (goes, shorter(paths, goes, chains)))
     if before == 0.0:
         how = f"no path has {bounces - 1} interactions over the same bodies: nothing to extrapolate from"
         return Entry(UNKNOWN, "none", how)

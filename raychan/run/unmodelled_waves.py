@@ -15,7 +15,7 @@ from raychan.radar.dual_paths import scaled
 from raychan.radar.radar import Radar
 from raychan.records import REFLECT, SCATTERER, TRANSMIT, Facets, Paths, Points
 from raychan.run.ledger import NOTHING, UNKNOWN, Entry
-from raychan.run.mechanisms import peak
+from raychan.run.mechanisms import peak, slots_used
 from raychan.units import C0, db
 from raychan.world.geometry import Geometry
 
@@ -80,19 +80,23 @@ def over_band(paths: Paths, geometry: Geometry, radar: Radar, settings: Any, wea
     changing = np.abs(sizes.mean(axis=0) - 1.0).max(axis=(0, 3)) > _STEADY
     row = np.zeros((len(f.body_names), parts), np.int64)
     row[f.body, f.part] = f.material
-    met, passed = row[np.maximum(way.body, 0), np.maximum(way.part, 0)], (way.kind == TRANSMIT).astype(np.int64)
-    slots = (way.body >= 0) & (way.kind > 0) & changing[passed, met]
+    body, part, kind = (x[:, : slots_used(paths)] for x in (way.body, way.part, way.kind))
+    met, passed = row[np.maximum(body, 0), np.maximum(part, 0)], (kind == TRANSMIT).astype(np.int64)
+    slots = (body >= 0) & (kind > 0) & changing[passed, met]
     rows, slot = np.nonzero(slots)
     if not len(rows):
         how = "no path meets a material whose coefficients change by a thousandth over the band"
         return Entry(NOTHING, "estimate", how)
     at = np.clip(np.rint(_COSINES * _cosines(paths, rows, slot, geometry)).astype(np.int64) - 1, 0, _COSINES - 1)
     passed, met = passed[rows, slot], met[rows, slot]
-    off = np.zeros(len(slots))
+    first = np.diff(rows, prepend=-1) > 0
+    own, found = np.cumsum(first) - 1, np.zeros(np.count_nonzero(first))
     # Of what a path meets together: two layers whose peaks coincide pass more than the product of both means.
     for size in np.moveaxis(np.log(np.maximum(sizes, _FADED)), 1, 0):
-        each = [np.exp(np.bincount(rows, one[passed, met, at], len(slots))) for one in size]
-        off = np.maximum(off, np.abs(np.mean(each, axis=0) - 1.0))
+        each = [np.exp(np.bincount(own, one[passed, met, at])) for one in size]
+        found = np.maximum(found, np.abs(np.mean(each, axis=0) - 1.0))
+    off = np.zeros(len(slots))
+    off[rows[first]] = found
     brought = off[paths.trajectory]
     level = peak(scaled(paths, brought), brought > 0.0, radar, settings)
     how = (

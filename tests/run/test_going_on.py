@@ -5,6 +5,7 @@ import pytest
 
 import raychan as rc
 from raychan.run.going_on import going_on, shorter
+from raychan.run.labels import alike
 from raychan.run.mechanisms import interactions
 from raychan.world.geometry import geometry_of
 
@@ -23,7 +24,7 @@ def shares(bodies, bounces):
     met = interactions(paths)
     orders = range(1, bounces + 1)
     assert all((met == n).any() for n in orders)
-    return [going_on(paths, geometry, met == n).sum() / (met == n).sum() for n in orders]
+    return [going_on(paths, geometry, met == n, alike(paths)).sum() / (met == n).sum() for n in orders]
 
 
 @pytest.mark.parametrize("m", [2, 3, 4])
@@ -62,7 +63,7 @@ def test_shorter_ways_are_those_over_the_same_bodies_without_the_first_or_the_la
     )
     paths = rc.simulate(scene).paths
     met = interactions(paths)
-    goes = going_on(paths, geometry_of(scene), met == 2)
-    rows = shorter(paths, goes)
+    goes = going_on(paths, geometry_of(scene), met == 2, alike(paths))
+    rows = shorter(paths, goes, alike(paths))
     assert goes.any() and set(met[rows]) == {1}
     assert {tuple(b) for b in paths.bodies[rows][:, :1]} == {("ball",)}
