@@ -50,7 +50,8 @@ def sensitivity(
 
     Every body but mirrors such as the ground turns about three axes through its middle and shifts along three, by
     independent Gaussian amounts; the receiver's noise stays. A level whose spread exceeds the tolerance
-    and the stated error is speckle.
+    and the stated error is speckle; it is in error where the stated error exceeds the tolerance and is not below the
+    spread; else it is steady, or intermittent where not every draw sees it.
     With --out, writes sensitivity.csv and sensitivity.png, and with --each, each.csv."""
     from raychan.run.contents import Contents
     from raychan.run.output_files import staging

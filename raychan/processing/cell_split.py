@@ -234,7 +234,9 @@ class Splitter:
             spans = np.rint(spans) if self.slots.shifted else spans
             return np.tensordot(held.weights[k], self._read(v, r, spans), 1)[None]
 
-        shift, power = self.shape.among(beam, 1, cell[None], lone, shape)
+        # One slot holds each cell under its own fold; of several each is read under the echo's.
+        alike = not isinstance(self.map, ResolvedMap) or self.slots.count > 1
+        shift, power = self.shape.among(beam, 1, cell[None], lone, shape, alike)
         noise = float(peaks.noise[i] * self.receiver_noise * held.noise_gain[k])
         misfit = min(1.0, _HIDDEN * held.rest / float(held.power[k]))
         unsure, shown = bool(held.unsure(self.scan.aperture)[k]), float(level[at[0], at[1]])

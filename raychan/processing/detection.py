@@ -205,7 +205,8 @@ def _refined(
     lone = shape.refine(seen.power, cells)
     if aperture:
         return lone
-    return shape.among(lambda v, r: map.spectrum[:, v, r], len(map.spectrum), cells, lone, seen.power.shape)
+    alike = not isinstance(map, ResolvedMap)
+    return shape.among(lambda v, r: map.spectrum[:, v, r], len(map.spectrum), cells, lone, seen.power.shape, alike)
 
 
 def _rate(map: RangeDoppler, grid: Grid, place: Floats, fold: Ints) -> Floats:

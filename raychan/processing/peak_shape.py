@@ -23,6 +23,7 @@ _TINY = 1e-300
 _REACH = 6
 """Map cells around a peak. At padding 2, of 122 detections of a strong and a weak echo (Hann and rect windows), no
 level is more than 0.003 dB off the peak of the map."""
+_ASIDE = 2  # range cells to either side that are needed where cells are read under different folds (not measured)
 _STEPS = 8  # per map cell, of places that are tried for a peak: over one a lobe is a parabola (not measured)
 
 
@@ -58,13 +59,16 @@ class PeakShape:
         around = [power[self.cells_at(rows + down, columns + along, power.shape)] for down, along in steps]
         return self.between(power[tuple(cells.T)], np.array(around).reshape(2, 2, -1), cells, power.shape)
 
-    def among(self, wave: Wave, looks: int, cells: Ints, lone: Peak, shape: tuple[int, ...]) -> Peak:
+    def among(
+        self, wave: Wave, looks: int, cells: Ints, lone: Peak, shape: tuple[int, ...], alike: bool = True
+    ) -> Peak:
         """Return what `refine` does, whatever the cells around hold beside a lone echo.
 
         A window makes a spectrum band-limited: from the cells around follows what lies between them. At padding 1 too
         much of it is beyond them, and peaks stay as they are.
         Args: wave, a function that returns what so many looks hold (looks, ...) in rows and columns (...) of a map;
-        lone, what `refine` returns.
+        lone, what `refine` returns; alike, whether all cells are read under one fold. Where they are not, noise is
+        not band-limited, and near an end of the ranges, where cells on one side tell it all, peaks stay as they are.
         """
         rows, columns = cells.T
         shift, power = (x.copy() for x in lone)
@@ -78,6 +82,7 @@ class PeakShape:
         there = low - np.sign(ends) * round(self._turn(shape))
         there = self._inner(cells, shape) & (there >= 0) & (there < shape[1] - 2 * reach[1])
         told &= (self.wraps | (ends == 0) | there) & (shape[1] > 2) & (np.abs(shift[:, 0]) <= 0.5)
+        told &= alike | self.wraps | (np.minimum(columns, shape[1] - 1 - columns) >= _ASIDE * self.lobes[1].pad)
         some = np.flatnonzero(told)
         groups, group = np.unique(np.stack([ends, low - columns], axis=1)[some], axis=0, return_inverse=True)
         for k, (_, first) in enumerate(groups):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from raychan.radar.declared import check_type, finite, reals
+from raychan.radar.wave_kernels import lengthen
 from raychan.scalars import is_one_of, meant, plain, shown
 
 Floats = NDArray[np.float64]
@@ -169,18 +170,6 @@ def _offsets(radar: Any) -> tuple[Floats, Floats]:
     return np.reshape(tx, (-1, 3)), np.reshape(getattr(radar, "elements_world", ()), (-1, 3))
 
 
-def excess(radius: Floats, look: Floats, offset: Floats) -> Floats:
-    """Return how much longer (n,) [m] the way to spherical waves' sources is from `offset` (3,) [m] than from 0.
-
-    Args: radius (n,) [m] and unit directions look (n, 3) of the sources as seen from 0. It is |radius look - offset| -
-    radius, without the difference of two large numbers; -look @ offset in the far field.
-    """
-    along, square = look @ offset, float(offset @ offset)
-    far = np.sqrt(np.maximum(radius * (radius - 2.0 * along) + square, 0.0)) + radius
-    # A source at the phase centre itself is as far as the offset is long.
-    return np.where(far > 0.0, (square - 2.0 * radius * along) / np.maximum(far, 1e-300), 0.0)
-
-
 @dataclass(frozen=True, eq=False)
 class Wavefronts:
     """The spherical waves of paths at both ends; a row a path.
@@ -219,11 +208,9 @@ class Wavefronts:
         by which factor (n,) their amplitude is larger, as the waves spread over less or more."""
         longer, factor = np.zeros(len(self.radius)), np.ones(len(self.radius))
         if rx.any():
-            more = excess(self.radius, self.arrival, rx)
-            longer, factor = more, _spread(self.radius, more)
+            lengthen(self.radius, self.arrival, rx, longer, factor)
         if tx.any():
-            more = excess(self.tx_radius, self.departure, tx)
-            longer, factor = longer + more, factor * _spread(self.tx_radius, more)
+            lengthen(self.tx_radius, self.departure, tx, longer, factor)
             rows = np.flatnonzero(self.bare)
             if len(rows):
                 longer[rows] = self[rows]._longer_bare(tx, rx)

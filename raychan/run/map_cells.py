@@ -79,6 +79,12 @@ class MapCells:
         """Return the place (3,) of the cell of level i."""
         return np.asarray(self.place[i % len(self.place)])
 
+    @property
+    def settled(self) -> list[tuple[float, float]]:
+        """Ranges and rates of the cells that are refined no further and of which each level is within its tolerance."""
+        left = np.flatnonzero(self.open | (self.doubt > np.abs(self.level) * self.tolerance)) % max(len(self.place), 1)
+        return [(float(at[0]), float(at[1])) for at in np.delete(self.place, left, axis=0)]
+
     def loosened(self, spread_db: Floats) -> list[tuple[float, float]]:
         """Let levels be wrong by what displaced bodies move them, (c,) [dB], where that is more; return the ranges and
         rates of these cells."""

@@ -15,8 +15,6 @@ from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
 from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
 from raychan.run.result import DC, IMAGE, SIDELOBE, ExplainedDetections, Explanation, Result
-from raychan.tracing.stats import Stats
-from raychan.world.geometry import Geometry
 
 _NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: rounds to 1 dB or more
@@ -183,8 +181,9 @@ def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, 
     # A preview refines nothing: no tolerance counts.
     if (over or stated["not_converged"]) and "preview" not in ledger:
         within = n - over - stated["not_converged"]
-        worst = f"; the largest error stated is {stated['reached_db']:.1f} dB" if over else ""
-        said.append(f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{worst}")
+        said.append(
+            f"{within} of {n} detections within the tolerance of {tolerance_db:g} dB{_above(found, tolerance_db)}"
+        )
     least = "the weakest detection" if n else "the weakest detection possible"
     if above := _listed(ledger, _LEAST_DB, math.inf):
         said.append(f"left out, above {least}: {above} (see left_out in summary.json of raychan run)")
@@ -213,39 +212,6 @@ def told(
     ]
 
 
-def uncut(geometry: Geometry, *launches: Stats) -> tuple[str, ...]:
-    """Return a line if launches needed to subdivide more tubes on a body than they may."""
-    left = np.zeros(len(geometry.facets.role), np.int64)
-    for stats in launches:
-        left[: len(stats.uncut)] += stats.uncut
-    if not left.any():
-        return ()
-    worst, facets = int(np.argmax(left)), geometry.facets
-    area = float(geometry.area[facets.body == worst].sum())
-    body = f"body '{facets.body_names[worst]}': {int(left[worst]):,} tubes on its {area:.3g} m2"
-    return (
-        f"{body} are coarser than the tolerance asks for: too many are partly hidden or too large. Errors may exceed "
-        "those stated; a larger tolerance asks for fewer, and a mesh file may have spikes, faces that cross or lie on "
-        "each other, or another unit",
-    )
-
-
-def overrun(seconds: float, allowed: float | None) -> tuple[str, ...]:
-    """Return a line if a run took more seconds than a budget allows."""
-    if allowed is None or seconds <= allowed:
-        return ()
-    return (
-        f"the run took longer than the {allowed:g} s allowed (model.max_seconds), as the first launch, one step and "
-        "what follows the steps always end: a larger tolerance (model.tolerance_db), fewer bounces or fewer elements "
-        "far apart take less",
-    )
-
-
-def merged(geometry: Geometry) -> tuple[str, ...]:
-    """Return a line if facets were merged, with the deviation of the surface."""
-    return (f"smooth surfaces: {geometry.merged} (model.simplify)",) if geometry.merged else ()
-
-
 def notes(result: Result) -> list[str]:
     """Return the lines below a result's table; its warnings contain them too."""
     return noted(result.detections, float(result.stats.get("tolerance_db", math.inf)), result.ledger)
@@ -262,6 +228,17 @@ def marks(found: ExplainedDetections) -> str:
     """Return the counts of marked detections, as ', 2 not converged, 1 folded'; '' where there are none."""
     counted = {"not converged": int((~found.converged).sum()), "folded": int(found.folded.sum())}
     return "".join(f", {n} {word}" for word, n in counted.items() if n)
+
+
+def _above(found: ExplainedDetections, tolerance_db: float) -> str:
+    """Return which detections state errors above the tolerance, and the largest; '' where none does."""
+    known = np.where(found.converged, found.error_db, 0.0)
+    if not (rows := known > tolerance_db).any():
+        return ""
+    # As many digits as tell it from the tolerance.
+    texts = [f"{known.max():.{digits}f}" for digits in (1, 2, 3, 6)]
+    shown = next((text for text in texts if float(text) > tolerance_db), texts[-1])
+    return f"; above it {_verb(rows)} {_numbers(rows)}, the largest error stated is {shown} dB"
 
 
 def _listed(ledger: Mapping[str, Entry], least: float, below: float) -> str:

@@ -14,9 +14,9 @@ from raychan.records import Cube, Points
 from raychan.run.clock import Clock
 from raychan.run.fluctuation import check
 from raychan.run.instant import traced_at
+from raychan.run.launch_messages import merged, uncut
 from raychan.run.ledger import ModelChoice
 from raychan.run.mechanisms import choose
-from raychan.run.messages import merged, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import MOST, Launched, PathStream
 from raychan.run.preview import preview_notes, preview_of

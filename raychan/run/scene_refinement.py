@@ -107,9 +107,11 @@ class SceneRefinement:
     """When the run began, by `time.perf_counter`."""
 
     def __post_init__(self) -> None:
-        self._end = math.inf
         self._noise = noise_amplitude(self.radar, self.settings)
         self._probes = probes_of(self.radar)
+        self._asked, self._end = self.launches is not None, math.inf
+        if self.model.speckle and not self._asked:
+            self.launches = []
 
     def first(self) -> First | None:
         """Return the first launch; None where it brings more paths than can be held."""
@@ -178,9 +180,7 @@ class SceneRefinement:
         look, steps = perf_counter() - since, 0
         unreached, ended, speckled = tuple[Unreached, ...](), "", list[tuple[float, float]]()
         if len(cells.place) and self.model.speckle:
-            speckled = cells.loosened(
-                spreads_db(first.paths, self.geometry, response, cells.place, radar.waveform.middle)
-            )
+            speckled = cells.loosened(self._spreads(first.paths, response, cells.place))
         if len(cells.place):
             steps, unreached, ended = self._refined(first.launch, held, response, cells, look)
         if self.launches is not None:
@@ -197,8 +197,16 @@ class SceneRefinement:
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
-        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(speckled))
+        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(speckled), tuple(cells.settled))
         return Converged(launched, others, self.model, first.chosen, remains)
+
+    def _spreads(self, paths: Paths, response: PointSpread, place: Floats) -> Floats:
+        """Return by how much (c,) [dB] displaced bodies move the levels of cells."""
+        assert self.launches is not None
+        found = spreads_db(paths, self.launches[0], self.geometry, self.radar, response, place, self._noise)
+        if not self._asked:
+            self.launches = None
+        return found
 
     def _cells(self, quiet: Radar, response: PointSpread, paths: Paths) -> MapCells:
         """Return the cells of the map that are detections, or would be a little stronger, also beside stronger ones;
@@ -232,10 +240,8 @@ class SceneRefinement:
     def _refined(
         self, launch: Launch, held: SourcedPaths, response: PointSpread, cells: MapCells, look: float
     ) -> tuple[int, tuple[Unreached, ...], str]:
-        """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why.
-
-        Args: look, how long the first look at the map took [s].
-        """
+        """Refine the sources that feed cells; return how many steps that took, the cells not reached, and why. Args:
+        look, how long the first look at the map took [s]."""
         count = len(self.geometry.facets.body)
         wanted, rays, cost = feeding(held, response, cells), SourceRays(count), StepRays(count)
         budget = Budget(self.model, self.stats, len(held), self.begun, look)

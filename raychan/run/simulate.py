@@ -15,8 +15,9 @@ from raychan.run.clock import Clock, Progress
 from raychan.run.directions import beam_to
 from raychan.run.interferers import interference, never_heard
 from raychan.run.labels import Chains, chains, provenance
+from raychan.run.launch_messages import overrun
 from raychan.run.ledger import Entry
-from raychan.run.messages import counts, overrun, told
+from raychan.run.messages import counts, told
 from raychan.run.own_signals import all_named, own_signals
 from raychan.run.path_stream import Launched
 from raychan.run.preview import preview_error, preview_ledger
@@ -120,7 +121,12 @@ def _remaining(channel: Channel, found: ExplainedDetections, radar: Radar) -> li
     """Return lines on what the refinement did not reach, given what was detected."""
     wave = radar.channel_waveform
     size = wave.range_resolution, wave.rate_resolution
-    return channel.remains.notes((found.range, found.rate), size) if channel.remains else []
+    if channel.remains is None:
+        return []
+    also = [
+        what for what, held in (("merged facets", channel.geometry.merged), ("turning bodies", channel.turned)) if held
+    ]
+    return channel.remains.notes((found.range, found.rate), size, found.error_db, also)
 
 
 def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,13 +22,15 @@ _BODIES = 2  # named at most
 @dataclass(frozen=True)
 class Unreached:
     """A cell that a budget left above the tolerance: range [m], rate [m/s], the `bounce` at which those tubes scatter
-    that may change it most, 1 on first surfaces, and the `bodies` on which these start, `others` more not named."""
+    that may change it most, 1 on first surfaces, and the `bodies` on which these start, `others` more not named. Not
+    `beyond`: within the tolerance, but not as far within as refinement aims at."""
 
     range: float
     rate: float
     bounce: int
     bodies: tuple[str, ...]
     others: int = 0
+    beyond: bool = True
 
     @property
     def cause(self) -> str:
@@ -46,37 +48,44 @@ class Unreached:
 @dataclass(frozen=True)
 class Remains:
     """How a refinement ended: the cells `unreached` after so many `steps`, and what `ended` it, '' where none is left;
-    cells of `speckled` ranges and rates were refined to their speckle only."""
+    cells of `speckled` ranges and rates were refined to their speckle only, those of `settled` to the tolerance."""
 
     unreached: tuple[Unreached, ...]
     steps: int
     ended: str
     tolerance_db: float
     speckled: tuple[tuple[float, float], ...] = ()
+    settled: tuple[tuple[float, float], ...] = ()
 
-    def notes(self, found: tuple[Floats, Floats], size: tuple[float, float]) -> list[str]:
+    def notes(
+        self, found: tuple[Floats, Floats], size: tuple[float, float], error_db: Floats, also: Sequence[str] = ()
+    ) -> list[str]:
         """Return a line on the cells that are speckle, one on the detections whose levels are not within the tolerance,
-        and one on cells that may still become detections, with what ended the refinement. Detections go by their
-        numbers and places in the table.
+        one on cells that may still become detections, with what ended the refinement, and one on detections whose own
+        cell is refined while their error exceeds the tolerance. Detections go by their numbers and places in the table.
 
-        Args: found ranges and rates (n,) of the detections; size of a cell [m], [m/s].
+        Args: found ranges and rates (n,) of the detections; size of a cell [m], [m/s]; error_db (n,) stated of them;
+        also what errors hold besides, in words.
         """
-        said, tolerance = [], f"{self.tolerance_db:g} dB"
+        said, tolerance, over = [], f"{self.tolerance_db:g} dB", error_db > self.tolerance_db
         if self.speckled:
             rows = [_detection(place, found, size) for place in self.speckled]
             numbers = sorted({i + 1 for i in rows if i is not None})
             which = f", {_number(len(numbers))} {', '.join(map(str, numbers))} among them" if numbers else ""
+            is_one = len(self.speckled) == 1
+            cells, them, they = ("cell", "it", "it is") if is_one else ("cells", "them", "they are")
             said.append(
-                f"{len(self.speckled)} cells of the map are speckle (model.speckle){which}: displacing bodies by 0.05 "
-                f"deg and 1 mm moves them by more than {tolerance}, and they are refined to that only"
+                f"{len(self.speckled)} {cells} of the map {'is' if is_one else 'are'} speckle (model.speckle){which}: "
+                f"displacing bodies by 0.05 deg and 1 mm moves {them} by more than {tolerance}, and {they} refined to "
+                "that only"
             )
         causes: dict[int, list[str]] = {}
         weak = []
         for cell in self.unreached:
             row = _detection((cell.range, cell.rate), found, size)
-            if row is None:
+            if row is None and cell.beyond:
                 weak.append(cell.text)
-            else:
+            elif row is not None and (cell.beyond or over[row]):
                 causes.setdefault(row, []).append(cell.cause)
         how = f"refined {'once' if self.steps == 1 else f'{self.steps} times'}, ended by {self.ended}"
         if causes:
@@ -86,6 +95,14 @@ class Remains:
         if weak:
             what = "where nothing is detected yet, what may still change makes a detection at"
             said.append(f"{how}: {what} {_first(weak, '; ')}")
+        told = {_detection(at, found, size) for at in self.speckled}.union(causes)
+        settled = {_detection(at, found, size) for at in self.settled} - told
+        if rest := [_numbered(int(i), found, []) for i in np.flatnonzero(over) if i in settled]:
+            others = ", ".join((*also, "what may still change in cells beside and tubes below the noise"))
+            said.append(
+                f"refined to {tolerance} in its own cell: {_number(len(rest))} {_first(rest, ', ')}; "
+                f"what is stated above that is of {others}"
+            )
         return said
 
 
@@ -116,12 +133,13 @@ def _first(some: list[str], between: str) -> str:
 
 
 def unreached_of(cells: MapCells, facets: Facets) -> Iterator[Unreached]:
-    """Give the cells that are still to be refined and may be wrong by more than is allowed: refinement aims at less."""
+    """Give the cells that are still to be refined: first those that may be wrong by more than is allowed, then those
+    that may not, as refinement aims at less."""
     beyond = cells.doubt > np.abs(cells.level) * cells.allowed
-    last = np.flatnonzero(cells.open & beyond)
-    for i in last[np.unique(last % max(len(cells.place), 1), return_index=True)[1]]:
+    last = np.concatenate([np.flatnonzero(cells.open & beyond), np.flatnonzero(cells.open & ~beyond)])
+    for i in last[np.sort(np.unique(last % max(len(cells.place), 1), return_index=True)[1])]:
         place = cells.cell_of(i)
-        yield Unreached(float(place[0]), float(place[1]), *_cause(cells, i, facets))
+        yield Unreached(float(place[0]), float(place[1]), *_cause(cells, i, facets), beyond=bool(beyond[i]))
 
 
 def _cause(cells: MapCells, i: int, facets: Facets) -> tuple[int, tuple[str, ...], int]:

@@ -39,7 +39,7 @@ VERDICTS = {
     STEADY: "spread and stated error within the tolerance",
     SPECKLE: "spread above the tolerance and above the stated error: poses decide the level, more rays do not",
     ERROR: "stated error above the tolerance and not below the spread, which may be of it: more rays would help",
-    INTERMITTENT: "not seen in every draw, and of those seen the spread is within the tolerance",
+    INTERMITTENT: "not seen in every draw; spread, if two or more see it, and stated error within the tolerance",
     NOISE: "no path explains it",
 }
 
@@ -99,9 +99,9 @@ class Moves:
             return NOISE
         if self.count > 1 and self.spread() > max(tolerance_db, self.stated_db):
             return SPECKLE
-        if self.count < self.draws:
-            return INTERMITTENT
-        return STEADY if self.stated_db <= tolerance_db else ERROR
+        if self.stated_db > tolerance_db:
+            return ERROR
+        return STEADY if self.count == self.draws else INTERMITTENT
 
 
 @dataclass(frozen=True)

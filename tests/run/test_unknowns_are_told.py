@@ -102,9 +102,23 @@ def test_what_is_not_converged_is_warned_of_with_what_would_help(half):
 def test_errors_above_the_tolerance_are_counted_as_such(half):
     assert noted(half.detections, 3.0, {}) == ["1 of 2 detections within the tolerance of 3 dB"]
     (line,) = noted(half.detections, 0.01, {})
-    assert line.startswith("0 of 2 detections within the tolerance of 0.01 dB; the largest error stated is 0.")
+    stated = half.detections.error_db[0]
+    assert line == (
+        "0 of 2 detections within the tolerance of 0.01 dB; above it is number 1, the largest error stated is "
+        f"{stated:.1f} dB"
+    )
     fine = result(paths([9.0], [0.0], [2e-5], [TAIL]), [(9.0, 0.0, 4e-10)], differ=0.0).detections
     assert noted(fine, 0.5, {}) == []
+
+
+@pytest.mark.parametrize(
+    ("stated", "tolerance", "shown"),
+    [(0.5014, 0.5, "0.501"), (1.0261, 1.0, "1.03"), (1.26, 1.0, "1.3"), (0.50004, 0.5, "0.500040")],
+)
+def test_the_largest_error_never_looks_like_the_tolerance_that_it_exceeds(half, stated, tolerance, shown):
+    found = half.detections.replace(error_db=[0.0, stated], converged=[True, True])
+    (line,) = noted(found, tolerance, {})
+    assert line.endswith(f"above it is number 2, the largest error stated is {shown} dB")
 
 
 def test_only_what_the_ledger_puts_above_the_weakest_detection_is_listed(half):

@@ -16,10 +16,11 @@ FACETS = SimpleNamespace(
 )
 
 
-def said(unreached, steps, ranges, rates):
+def said(unreached, steps, ranges, rates, error_db=0.0, settled=(), also=()):
     """Return the lines on cells, given the detections and cells of 0.30 m and 0.76 m/s."""
-    remains = Remains(tuple(unreached), steps, "8 steps", 0.5)
-    return remains.notes((np.array(ranges), np.array(rates)), (0.30, 0.76))
+    remains = Remains(tuple(unreached), steps, "8 steps", 0.5, settled=tuple(settled))
+    errors = np.broadcast_to(error_db, len(ranges))
+    return remains.notes((np.array(ranges), np.array(rates)), (0.30, 0.76), errors, also)
 
 
 def test_weak_cells_are_told_apart_from_detections():
@@ -79,3 +80,34 @@ def test_the_bounce_and_the_bodies_that_may_change_a_cell_most_are_named():
     cells.changed(0, source[:1], np.array([0.6], complex))
     (cell,) = unreached_of(cells, FACETS)
     assert (cell.bounce, cell.bodies) == (1, ("car.a",))
+
+
+def test_a_level_within_the_tolerance_and_not_as_far_as_asked_is_told_where_its_error_is_above():
+    place = np.array([[10.0, 1.0, 1.0], [20.0, 0.0, 1.0], [30.0, 0.0, 1.0]])
+    cells, small = (MapCells(place, np.ones(3, complex), 0.5) for _ in range(2))
+    small.changed(0, np.array([DEEP]), np.array([1e-3j]))
+    # 0.95 and 0.5 of the tolerance: refinement aims at 0.9.
+    for i, share in ((0, 0.95), (1, 0.5)):
+        cells.changed(i, np.array([DEEP]), np.array([1e-3j * share * small.tolerance[0] / small.doubt[0]]))
+    (cell,) = unreached_of(cells, FACETS)
+    assert cell == Unreached(10.0, 1.0, 2, ("car.a",), beyond=False)
+    assert cells.settled == [(20.0, 0.0), (30.0, 0.0)]
+    (line,) = said([cell], 7, [10.0], [1.0], 0.501)
+    assert line.endswith("by more than 0.5 dB at number 1 (10.00 m, +1.00 m/s; bounce 2 of tubes off car.a)")
+    assert said([cell], 7, [10.0], [1.0], 0.499) == said([cell], 7, [15.0], [1.0], 0.501) == []
+
+
+def test_errors_above_the_tolerance_of_cells_that_are_refined_are_told_with_what_else_they_hold():
+    found = [5.0, 10.05, 20.0], [0.0, 1.0, 0.0]
+    settled = [(10.0, 1.0), (20.0, 0.0)]
+    (line,) = said([], 4, *found, [0.6, 0.6, 0.4], settled)
+    assert line == (
+        "refined to 0.5 dB in its own cell: number 2 (10.05 m, +1.00 m/s); what is stated above that is of what may "
+        "still change in cells beside and tubes below the noise"
+    )
+    (line,) = said([], 4, *found, [0.6, 0.6, 0.6], settled, ["merged facets", "turning bodies"])
+    assert "numbers 2 (10.05 m, +1.00 m/s), 3 (20.00 m, +0.00 m/s); " in line
+    assert "is of merged facets, turning bodies, what may" in line
+    # A budget is reason enough, and so is an error that is unknown.
+    (line,) = said([Unreached(10.0, 1.0, 1, ("post",))], 4, *found, [0.6, 0.6, np.nan], settled)
+    assert line.startswith("refined 4 times")

@@ -7,7 +7,8 @@ import pytest
 from support.echoes import SMALL, echoes, make_radar
 
 import raychan as rc
-from raychan.radar.array import Wavefronts, excess, virtual_elements, wavefronts
+from raychan.radar.array import Wavefronts, virtual_elements, wavefronts
+from raychan.radar.wave_kernels import lengthen
 from raychan.records import POINT, REFLECT, Paths
 from raychan.signal.baseband import synthesize
 from raychan.units import C0, db
@@ -55,8 +56,10 @@ def test_near_field_delays_are_exact_distances_to_a_nanometre():
 def test_far_field_is_the_plane_wave():
     """The curvature |e|^2 / 2R goes to nothing: a picometre at 1e9 m."""
     look, e = np.array([[0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]), np.array([0.01, -0.04, 0.02])
-    np.testing.assert_allclose(excess(np.full(2, 1e9), look, e), -look @ e, rtol=0.0, atol=2e-12)
-    curved = excess(np.full(2, 1e3), look, e) + look @ e
+    plane, curved, factor = np.zeros(2), look @ e, np.ones(2)
+    lengthen(np.full(2, 1e9), look, e, plane, factor)
+    np.testing.assert_allclose(plane, -look @ e, rtol=0.0, atol=2e-12)
+    lengthen(np.full(2, 1e3), look, e, curved, factor)
     np.testing.assert_allclose(curved, ((e @ e) - (look @ e) ** 2) / 2e3, rtol=0.0, atol=1e-10)
 
 

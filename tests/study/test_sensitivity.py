@@ -166,6 +166,10 @@ def sighting(**given):
         (0.1, math.nan, 4, "car", ERROR),
         (0.1, 0.2, 3, "car", INTERMITTENT),
         (0.0, 0.2, 1, "car", INTERMITTENT),
+        (2.0, 3.0, 3, "car", ERROR),
+        (0.1, 3.0, 3, "car", ERROR),
+        (0.0, 3.0, 1, "car", ERROR),
+        (0.1, math.nan, 3, "car", ERROR),
         (2.0, 0.2, 4, "noise", NOISE),
     ],
 )
@@ -173,6 +177,9 @@ def test_a_verdict_is_speckle_where_the_spread_exceeds_tolerance_and_stated_erro
     seen = {i: sighting(level_dbm=-80.0 + spread * (-1) ** i, error_db=error) for i in range(count)}
     moved = Moves(Track(sighting(bodies=bodies), seen), True, 4, {})
     assert moved.verdict(0.5) == said
+    # What the legend says of a verdict holds.
+    if said in (STEADY, INTERMITTENT):
+        assert moved.stated_db <= 0.5 and not moved.spread() > 0.5
 
 
 def test_the_stated_error_of_a_level_is_the_median_over_the_draws():
