@@ -13,6 +13,10 @@ from raychan.signal.baseband import noisy, synthesize
 from raychan.signal.converter import digitized
 from raychan.signal.phase_error import faulty
 
+_FINE = 0.8
+"""Of the converter's step: the root mean square of samples' parts from which on rounding changes the level of an echo 6
+dB above the noise of a sample by 0.14 dB at most; by 0.54 dB at 0.67, by -1.9 at 0.4 (one seed)."""
+
 
 def received(
     quiet: Cube,
@@ -36,8 +40,26 @@ def received(
     if interference is not None:
         cube = Cube(samples=(cube.samples + interference).astype(np.complex64), noise_power=0.0)
     cube = noisy(cube, radar, stream(seed, Stage.NOISE))
+    said = too_coarse(cube, radar)
     cube, clipped = digitized(cube, radar.impairments, radar.waveform.complex_sampling)
-    return cube, clipping(clipped, cube.samples.size)
+    return cube, [*said, *clipping(clipped, cube.samples.size)]
+
+
+def too_coarse(cube: Cube, radar: Radar) -> list[str]:
+    """Return a line where the samples that reach the converter are small against its steps."""
+    converter = radar.impairments.converter
+    if converter is None:
+        return []
+    parts = cube.samples.real.astype(np.float64), cube.samples.imag.astype(np.float64)
+    power = sum(float((x**2).mean()) for x in parts) / (2.0 if radar.waveform.complex_sampling else 1.0)
+    if power >= (_FINE * converter.step) ** 2:
+        return []
+    step, size = (10.0 * np.log10(max(x, 1e-300)) + 30.0 for x in (converter.step**2, power))
+    return [
+        f"the converter's step of {step:.1f} dBm is more than {1.0 / _FINE:g} times the samples' root mean square of "
+        f"{size:.1f} dBm: echoes may be lost or their levels far off, which no error stated holds; more adc_bits or a "
+        "lower adc_full_scale_dbm avoids it"
+    ]
 
 
 def clipping(clipped: int, count: int) -> list[str]:
