@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import raychan as rc
 from raychan.cli import app
 from raychan.run.clock import Clock
-from raychan.run.messages import uncut
+from raychan.run.launch_messages import uncut
 from raychan.run.rules import demand, fine_rule
 from raychan.run.scene_channel import channel_of
 from raychan.run.simulate import result_of
