@@ -18,10 +18,10 @@ Ints = NDArray[np.int64]
 _GROWTH = 4.0
 """Rays of a facet over those of its launch before, half as coarse: as many as its tubes are more."""
 _DEARER = 1.2
-"""Times the rays foreseen so, at least: of 19 steps of six streets at 0.1 dB eight take more, up to 2.3 times as many.
+"""Times the rays foreseen so, at least: of 16 steps of five streets at 0.1 dB seven take more, up to 2.3 times as many.
 """
 _AFTER = 1.3
-"""Time of a path in all that follows the steps, over that of a ray in a step: 0.7 to 1.2 in these streets."""
+"""Time of a path in all that follows the steps, over that of a ray in a step: 0.7 to 1.2 in five such streets."""
 _LOOKS = 4.0
 """Times as long as the first look at the map what follows takes beside that of its paths: samples twice, map and
 detections, directions (not measured)."""
