@@ -12,6 +12,7 @@ from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
 from raychan.signal.converter import digitized
 from raychan.signal.phase_error import faulty
+from raychan.units import db
 
 _FINE = 0.8
 """Of the converter's step: the root mean square of samples' parts from which on rounding changes the level of an echo 6
@@ -54,7 +55,7 @@ def too_coarse(cube: Cube, radar: Radar) -> list[str]:
     power = sum(float((x**2).mean()) for x in parts) / (2.0 if radar.waveform.complex_sampling else 1.0)
     if power >= (_FINE * converter.step) ** 2:
         return []
-    step, size = (10.0 * np.log10(max(x, 1e-300)) + 30.0 for x in (converter.step**2, power))
+    step, size = (db(max(x, 1e-300)) + 30.0 for x in (converter.step**2, power))
     return [
         f"the converter's step of {step:.1f} dBm is more than {1.0 / _FINE:g} times the samples' root mean square of "
         f"{size:.1f} dBm: echoes may be lost or their levels far off, which no error stated holds; more adc_bits or a "
