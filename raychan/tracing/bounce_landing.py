@@ -51,7 +51,7 @@ def land(flight, met, landed, count, world, how):  # type: ignore[no-untyped-def
     ready = _ready(met)
     shapes, curvature, curved = world.shapes, how.patches.edge_curvature, world.curved
     rows, facet, reach = resolve_hits(
-        ready, tubes.points, rays.directions, rays.hit, met.one_surface, shapes.first, shapes.normal,
+        ready, tubes.points, rays.directions, rays.hit, rays.reach, met.one_surface, shapes.first, shapes.normal,
         (shapes.vertices, curvature, curved),
     )  # fmt: skip
     end = count + len(rows)

@@ -23,6 +23,11 @@ Bools = NDArray[np.bool_]
 _SHRINK = 0.98  # of a corner's distance from the centre: corners lie on edges that other facets share; not measured
 _BEHIND = -1e-6  # m: a hit no farther behind its tube than this is rounding
 _BULGE = -0.05  # m: how far curved patches of coarse meshes bulge through their neighbours, about; not measured
+_ONE_PLANE = 1.0 - 1e-9  # cosine between normals from which on they are those of one plane: rounding
+_PARALLEL = 0.1
+"""Of the way of the ray that was cast beside a corner: where the corner's own ray meets the plane of that facet by so
+much sooner or later, the plane lies almost along it, and the corner counts as where the other ray landed (not
+measured)."""
 _GRAZING_REACH = (
     10.0  # times the centre's distance (and 1 m more) to a corner's hit: beyond, a ray grazes; not measured
 )
@@ -189,23 +194,24 @@ def on_one_surface(h, plane, smooth, normal, least_cosine):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def resolve_hits(rows, points, directions, hit, one_surface, first, normal, patches):  # type: ignore[no-untyped-def]
+def resolve_hits(rows, points, directions, hit, cast, one_surface, first, normal, patches):  # type: ignore[no-untyped-def]
     """Return the tubes (m,) of `rows` that land, the facet (m, 4) on whose curved patch each ray lands, and after how
     far (m, 4) [m]. Tubes with a ray that misses or grazes the centre's plane are slivers, and are dropped.
 
     Where two surfaces run into each other, or a curved patch bulges over its facet, a corner lies behind the surface
     beside it: of a tube all rays of which meet one surface they may land as far behind as that.
 
-    Args: patches vertices, edge curvature (f, 3, 3) and curved (f,) of the facets.
+    Args: hit (n, 4) facets that the rays cast met, after `cast` (n, 4) [m]; patches vertices, edge curvature (f, 3, 3)
+    and curved (f,) of the facets.
     """
     m = len(rows)
     kept, facet, reach = np.empty(m, np.int64), np.empty((m, 4), hit.dtype), np.empty((m, 4))
-    count = _each_hit(rows, points, directions, hit, one_surface, first, normal, patches, kept, facet, reach)
+    count = _each_hit(rows, points, directions, hit, cast, one_surface, first, normal, patches, kept, facet, reach)
     return kept[:count], facet[:count], reach[:count]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", uncounted=True)
-def _each_hit(rows, points, directions, hit, one_surface, first, normal, patches, kept, facet, reach):  # type: ignore[no-untyped-def]
+def _each_hit(rows, points, directions, hit, cast, one_surface, first, normal, patches, kept, facet, reach):  # type: ignore[no-untyped-def]
     """Write what `resolve_hits` returns, of the first m tubes; return m."""
     vertices, edge_curvature, curved = patches
     count = 0
@@ -220,6 +226,10 @@ def _each_hit(rows, points, directions, hit, one_surface, first, normal, patches
             t = height / slope if slope != 0.0 else np.inf
             if curved[f] and slope != 0.0:
                 t = distance_to_patch(vertices[f], edge_curvature[f], normal[f], points[i, q], directions[i, q], t)
+            # Of one plane all corners land on it, however flatly.
+            bent = one_surface[i] and dot(normal[f], normal[hit[i, 3]]) < _ONE_PLANE
+            if bent and abs(t - cast[i, q]) > _PARALLEL * cast[i, q]:
+                t = cast[i, q]
             facet[count, q], reach[count, q] = f, t
             least = _BULGE if one_surface[i] else _BEHIND
             lands &= t > least and t < _GRAZING_REACH * abs(reach[count, 3]) + 1.0

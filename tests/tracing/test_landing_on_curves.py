@@ -11,6 +11,7 @@ from raychan.compile.jit import njit
 from raychan.geometry.curved_patches import distance_to_patch, place_on, rise_off_chord
 from raychan.tracing.history import History
 from raychan.tracing.legs import Leg
+from raychan.tracing.resolve_hits import resolve_hits
 from raychan.tracing.subdivide import bisect
 from raychan.tracing.tubes import Tubes, clearance, edge_middles
 from raychan.world.geometry import Geometry
@@ -135,3 +136,26 @@ def test_rays_that_leave_a_hollow_meet_its_far_side():
     assert (facet >= 0).all()
     assert reach == pytest.approx(chord, rel=0.05)
     assert not clearance(ball(2), landed(ball(2), 1.0)[0]).any()
+
+
+def test_a_corner_whose_ray_runs_almost_along_its_facet_lands_where_the_ray_cast_beside_it_does():
+    """A hood's far facet lay within 3e-4 of a ray, and the corner 0.1 mm beside it landed 0.67 m short of the hood."""
+    tilt = 3e-4
+    normal = np.array([[0.0, 0.0, 1.0], [np.sin(0.1 - tilt), 0.0, np.cos(0.1 - tilt)]])
+    down = np.array([np.cos(0.1), 0.0, -np.sin(0.1)])
+    points, directions = np.zeros((1, 4, 3)), np.repeat(down[None, None], 4, axis=1)
+    first = np.array([0.5 * down, 0.8 * down])
+    points[0, 1] = -1e-4 * normal[1]
+    hit, cast = np.array([[0, 1, 0, 0]], np.int32), np.array([[0.5, 0.8, 0.5, 0.5]])
+    surface = np.zeros((2, 3, 3)), np.zeros((2, 3, 3)), np.zeros(2, bool)
+
+    def reach(one_surface, facing=normal):
+        one = np.array([one_surface])
+        return resolve_hits(np.array([0]), points, directions, hit, cast, one, first, facing, surface)[2][0]
+
+    plane = 0.8 - 1e-4 / tilt
+    assert reach(True)[1] == pytest.approx(0.8)
+    assert reach(True)[[0, 2, 3]] == pytest.approx(0.5)
+    # On one plane it lands there; the corner of a tube that lands by its centre's facet, on that.
+    assert reach(True, normal[[1, 1]])[1] == pytest.approx(plane, rel=1e-3)
+    assert reach(False)[1] == pytest.approx(0.499, rel=1e-4)
