@@ -20,13 +20,14 @@ _RIDGE = 1e-13  # of a wave's power: waves that come to lie on each other have a
 
 class Beams(NamedTuple):
     """Beams as kernels take them: places (a, 3) [waves]; period (2,), infinite where directions do not repeat along y
-    or z; skewed (l, 2) lobes quite like the main one; step (2,), the first distance of a search, 0 along an axis that
-    is not measured; how often it is halved; whether the array is deep; whether it measures both cosines."""
+    or z; skewed (l, 2) lobes quite like the main one; steps (2, 2), the first distances of a search, one along each of
+    two axes, 0 along one that is not measured; how often they are halved; whether the array is deep; whether it
+    measures both cosines."""
 
     places: Floats
     period: Floats
     skewed: Floats
-    step: Floats
+    steps: Floats
     shrinks: int
     deep: bool
     both: bool
@@ -63,10 +64,13 @@ def _power(snapshots, basis, places, u, w, wave):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True)
-def _moved(u, w, axis, by, beams):  # type: ignore[no-untyped-def]
-    """Return cosines u and w moved along an axis, as Aperture.moved does."""
+def _moved(u, w, axis, steps, beams):  # type: ignore[no-untyped-def]
+    """Return cosines u and w moved along an axis by so many of its first steps, of a deep array as Aperture.moved
+    does."""
+    over, up = steps * beams.steps[axis, 0], steps * beams.steps[axis, 1]
     if not beams.deep:
-        return (u + by, w) if axis == 0 else (u, w + by)
+        return u + over, w + up
+    by = over if axis == 0 else up
     size = math.sqrt(u * u + w * w) if beams.both else (u if axis == 0 else w)
     along, aside = (1.0, 0.0) if axis == 0 or beams.both else (0.0, 1.0)
     if beams.both and size > 0.0:
@@ -84,8 +88,8 @@ def _climb(at, snapshots, basis, beams, wave, tried):  # type: ignore[no-untyped
     best = _power(snapshots, basis, places, at[0], at[1], wave)
     for s in range(beams.shrinks):
         for axis in range(2):
-            step = beams.step[axis] * 0.5**s
-            if step == 0.0:
+            step = 0.5**s
+            if beams.steps[axis, 0] == 0.0 and beams.steps[axis, 1] == 0.0:
                 continue
             # Beyond the visible edge the power goes on as smoothly, or as it does at the other edge.
             u, w = _moved(at[0], at[1], axis, -step, beams)

@@ -35,6 +35,7 @@ _ONE = 0.02  # beam widths: twins, refined each by itself, are nearer (1/128 of 
 _ON = 0.1  # of _ONE: the nearest twins lie on each other (not measured)
 _BATCH = 1 << 21  # steering values at once, 32 MB
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
+_WIDEST = 0.25  # cosine: the longest first step along the ridge of an array that is all but a line (not measured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +110,8 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     start = np.stack([grid.u[m[order]], grid.w[n[order]]], axis=1)
     found, heights = climb(form, aperture, start, grid)
     found = aperture.canonical(found[np.argsort(-heights, kind="stable")])
-    return _once(found, aperture, count) if len(aperture.skewed) else found[:count]
+    # Along an oblique ridge points of the grid are greater than their neighbours, and climb to one maximum.
+    return found[:count] if aperture.table is not None else _once(found, aperture, count)
 
 
 def _once(found: Floats, aperture: Aperture, count: int) -> Floats:
@@ -140,7 +142,7 @@ def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Fl
 
 def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Floats, Floats]:
     """Return the maxima (k, 2) next to grid points (k, 2), and the form's values (k,) there."""
-    at, step = np.array(start, float), grid.step
+    at, steps = np.array(start, float), steps_of(aperture, grid)
     if isinstance(form, Bartlett | Beside):
         best, (count, size) = np.empty(len(at)), form.snapshots.shape
         basis = form.basis if isinstance(form, Beside) else np.zeros((0, size))
@@ -148,21 +150,44 @@ def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Fl
         return at, best if isinstance(form, Beside) else best / (count * size)
     best = form(aperture.steering(at))
     for _ in range(_SHRINKS):
-        for axis in np.flatnonzero(step):
+        for axis in np.flatnonzero(steps.any(axis=1)):
             # Beyond the visible edge the form goes on as smoothly, or as it does at the other edge.
-            beside = (aperture.moved(at, int(axis), sign * step[axis]) for sign in (-1.0, 1.0))
+            beside = (_moved(aperture, at, int(axis), sign * steps[axis]) for sign in (-1.0, 1.0))
             below, above = (form(aperture.steering(aperture.canonical(x))) for x in beside)
             bend = below - 2.0 * best + above
             offset = np.divide(0.5 * (below - above), bend, out=np.sign(above - below), where=bend < 0.0)
-            tried = aperture.visible(aperture.moved(at, int(axis), np.clip(offset, -1.0, 1.0) * step[axis]))
+            shift = np.clip(offset, -1.0, 1.0)[:, None] * steps[axis]
+            tried = aperture.visible(_moved(aperture, at, int(axis), shift))
             value = form(aperture.steering(tried))
             better = value > best
             at, best = np.where(better[:, None], tried, at), np.where(better, value, best)
-        step = 0.5 * step
+        steps = 0.5 * steps
     return at, best
+
+
+def _moved(aperture: Aperture, at: Floats, axis: int, by: Floats) -> Floats:
+    """Return cosines (n, 2) moved by distances (2,) or (n, 2), of a deep array as Aperture.moved does along an axis."""
+    return aperture.moved(at, axis, by[..., axis]) if aperture.deep else at + by
+
+
+def steps_of(aperture: Aperture, grid: Grid) -> Floats:
+    """Return the first distances (2, 2) of a search from points of a grid, one along each of two axes; 0 along one that
+    is not measured.
+
+    Axes are those of the main lobe, oblique where the array lies obliquely: a ridge along neither y nor z ends a search
+    along these."""
+    if aperture.deep or aperture.table is not None or not all(aperture.scans):
+        return np.diag(grid.step)
+    places = aperture.elements[:, 1:] / aperture.wavelength
+    spread, axes = np.linalg.eigh(np.cov(places.T, bias=True))
+    # Of as many points to a beam width; a uniform line is sqrt(12) as long as its places deviate.
+    share = float((grid.step / aperture.beamwidth).mean())
+    length = np.minimum(share / np.sqrt(12.0 * np.maximum(spread, 1e-12)), _WIDEST)
+    return np.ascontiguousarray(length[:, None] * axes.T)
 
 
 def beams_of(aperture: Aperture, grid: Grid) -> Beams:
     """Return an array's beams as kernels take them, to search from points of a grid."""
     places, skewed = aperture.elements / aperture.wavelength, np.ascontiguousarray(aperture.skewed, np.float64)
-    return Beams(places, aperture.repeats, skewed, grid.step, _SHRINKS, aperture.deep, all(aperture.scans))
+    steps = steps_of(aperture, grid)
+    return Beams(places, aperture.repeats, skewed, steps, _SHRINKS, aperture.deep, all(aperture.scans))

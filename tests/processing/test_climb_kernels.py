@@ -31,6 +31,7 @@ ARRAYS = {
     "upright line": line(6, axis=2),
     "wide line": 3.0 * line(6),
     "plane": rows(HALF),
+    "oblique": rows(HALF)[:10] @ [[1.0, 0.0, 0.0], [0.0, 0.8, 0.6], [0.0, -0.6, 0.8]],
     "askew": rows(2.0 * HALF, 0.5),
     "anywhere": np.random.default_rng(1).uniform(-3.0, 3.0, (9, 3)) * [0.0, HALF, HALF],
     "deep line": line(8, depth=9.0 * LAMBDA),
