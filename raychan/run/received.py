@@ -41,25 +41,29 @@ def received(
     if interference is not None:
         cube = Cube(samples=(cube.samples + interference).astype(np.complex64), noise_power=0.0)
     cube = noisy(cube, radar, stream(seed, Stage.NOISE))
-    said = too_coarse(cube, radar)
+    said = too_coarse(power_of_parts(cube, radar), radar)
     cube, clipped = digitized(cube, radar.impairments, radar.waveform.complex_sampling)
     return cube, [*said, *clipping(clipped, cube.samples.size)]
 
 
-def too_coarse(cube: Cube, radar: Radar) -> list[str]:
-    """Return a line where the samples that reach the converter are small against its steps."""
-    converter = radar.impairments.converter
-    if converter is None:
-        return []
+def power_of_parts(cube: Cube, radar: Radar) -> float:
+    """Return the mean power [W] of the parts of samples that a converter rounds: of I and Q, or of real samples."""
     parts = cube.samples.real.astype(np.float64), cube.samples.imag.astype(np.float64)
-    power = sum(float((x**2).mean()) for x in parts) / (2.0 if radar.waveform.complex_sampling else 1.0)
-    if power >= (_FINE * converter.step) ** 2:
+    return sum(float((x**2).mean()) for x in parts) / (2.0 if radar.waveform.complex_sampling else 1.0)
+
+
+def too_coarse(power: float, radar: Radar) -> list[str]:
+    """Return a line where samples are small against the steps of a converter. Args: power as `power_of_parts`, without
+    I/Q imbalance and DC offset."""
+    converter = radar.impairments.converter
+    if converter is None or power >= (_FINE * converter.step) ** 2:
         return []
     step, size = (db(max(x, 1e-300)) + 30.0 for x in (converter.step**2, power))
+    beside = "" if radar.impairments.dc_offset_dbm is None else ", the DC offset aside"
     return [
         f"the converter's step of {step:.1f} dBm is more than {1.0 / _FINE:g} times the samples' root mean square of "
-        f"{size:.1f} dBm: echoes may be lost or their levels far off, which no error stated holds; more adc_bits or a "
-        "lower adc_full_scale_dbm avoids it"
+        f"{size:.1f} dBm{beside}: echoes may be lost or their levels far off, which no error stated holds; more "
+        "adc_bits or a lower adc_full_scale_dbm avoids it"
     ]
 
 

@@ -23,7 +23,7 @@ from raychan.records import Cube
 from raychan.reprs import Plotted
 from raychan.run.clock import Clock, Progress
 from raychan.run.micro_doppler import stretches
-from raychan.run.received import clipping
+from raychan.run.received import clipping, power_of_parts, too_coarse
 from raychan.run.rules import allowed_memory, asked, check_demand, fine_rule
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy
@@ -109,11 +109,12 @@ def spectrogram(
     if (need := _BYTES * chirps * len(cells) * len(radar.elements)) > allowed_memory():
         raise ValueError(f"duration = {duration:g} s takes {need / 1e9:.0f} GB of memory: fewer ranges take less")
     tell = Clock(progress).tell
-    rng, slow, signal, error, clipped = stream(seed, Stage.NOISE), [], 0.0, 0.0, 0
+    rng, slow, signal, error, clipped, parts = stream(seed, Stage.NOISE), [], 0.0, 0.0, 0, 0.0
     rule = fine_rule(scene.radar, scene.processing, model)
     for quiet, off in stretches(long, rule, model, count, lambda share: tell("trace", share)):
         signal, error = signal + float((np.abs(quiet) ** 2).sum()), error + float((np.abs(off) ** 2).sum())
         cube = noisy(Cube(quiet.astype(np.complex64), 0.0), radar, rng)
+        parts += power_of_parts(cube, radar) * quiet.shape[1] / chirps
         cube, over = digitized(cube, radar.impairments, wave.complex_sampling)
         clipped += over
         slow.append(_range_cells(cube, radar, cells))
@@ -121,19 +122,23 @@ def spectrogram(
     # The range window spreads an echo over neighbouring cells, whose powers add up to this times its own.
     spread = wave.n_samples * _range_gain(radar)
     noise = radar.noise_power / wave.n_samples * gain * len(cells) if radar.noise else 0.0
-    step = wave.range_resolution
     return Spectrogram(
         time=time,
         rate=rate,
         power=power / spread,
-        ranges=(float(cells[0] * step), float(cells[-1] * step)),
+        ranges=(float(cells[0] * wave.range_resolution), float(cells[-1] * wave.range_resolution)),
         resolution=0.5 * C0 / wave.middle / (length * wave.repetition),
         noise=noise * (1.0 if wave.complex_sampling else 2.0),
         error_db=float(db(error / signal)) if signal > 0.0 else float("-inf"),
         tracings=count,
         seed=seed,
-        warnings=(*clipping(clipped, chirps * wave.n_samples * scene.radar.receivers), *_left_out(scene)),
+        warnings=(*too_coarse(parts, radar), *_clipping(clipped, radar), *_left_out(scene)),
     )
+
+
+def _clipping(clipped: int, radar: Radar) -> list[str]:
+    wave = radar.waveform
+    return clipping(clipped, wave.n_chirps * wave.n_samples * radar.receivers)
 
 
 def _left_out(scene: Scene) -> list[str]:
@@ -148,6 +153,8 @@ def _left_out(scene: Scene) -> list[str]:
 def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]:
     """Return how many chirps there are, and how many of them make a stretch. Raises: ValueError where that cannot be;
     SceneError for a target that fluctuates, which only `simulate` draws."""
+    if scene.radar.rx_position is not None:
+        raise ValueError("a spectrogram is of receivers beside the transmitter: radar.rx_position is elsewhere")
     if len(scene.radar.tx_elements) > 1:
         raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
     if scene.radar.waveform.stagger:
@@ -214,9 +221,12 @@ def _transformed(slow: Samples, radar: Radar, length: int) -> tuple[Floats, Floa
     wave = radar.waveform
     taper = window(radar.processing.rate_window, length)
     size = 1 << int(np.ceil(np.log2(2 * length)))
-    step = max(1, length // _OVERLAP)
-    short = ShortTimeFFT(taper / taper.sum(), step, 1.0 / wave.repetition, fft_mode="centered", mfft=size)
-    begin, end = short.lower_border_end[1], short.upper_border_begin(slow.shape[1])[1]
+    # Where no stretch of the finer grid lies within the chirps, the first one that does begins with them.
+    for step in (max(1, length // _OVERLAP), length // 2):
+        short = ShortTimeFFT(taper / taper.sum(), step, 1.0 / wave.repetition, fft_mode="centered", mfft=size)
+        begin, end = short.lower_border_end[1], short.upper_border_begin(slow.shape[1])[1]
+        if end > begin:
+            break
     power: Floats | float = 0.0
     for antenna in slow:
         for signal in antenna.T:

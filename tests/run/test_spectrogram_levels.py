@@ -82,3 +82,32 @@ def test_staggered_ramps_are_refused_in_words():
     wave = rc.Waveform(**WAVE, n_samples=64, stagger=(60e-6, 70e-6))
     with pytest.raises(ValueError, match=r"of ramps at equal distances: radar\.waveform has a stagger"):
         rc.spectrogram(rc.Scene(radar=rc.Radar(wave)), 0.3)
+
+
+def test_a_converter_too_coarse_is_said_as_a_run_says_it():
+    coarse = rc.Impairments(converter=rc.Converter(3, -30.0), dc_offset_dbm=-60.0)
+    lines = [
+        [w for w in found.warnings if w.startswith("the converter's step of -42.0 dBm is more than 1.25 times")]
+        for found in (rc.spectrogram(scene(impairments=coarse), 0.1), rc.simulate(scene(impairments=coarse)))
+    ]
+    assert [len(x) for x in lines] == [1, 1] and lines[0] == lines[1]
+    assert "dBm, the DC offset aside: " in lines[0][0]
+    fine = rc.Impairments(converter=rc.Converter(16, -40.0))
+    assert not [w for w in rc.spectrogram(scene(impairments=fine), 0.1).warnings if "step of" in w]
+
+
+@pytest.mark.parametrize("more", [0, 1, 2, 5, 9, 13])
+def test_a_duration_of_hardly_more_than_a_stretch_gives_a_stretch(more):
+    wave = rc.Waveform(**WAVE, n_samples=64)
+    length = round(0.5 * C0 / wave.middle / wave.repetition / 0.1)
+    found = rc.spectrogram(scene(), (length + more) * wave.repetition, resolution=0.1)
+    assert len(found.time) >= 1
+    assert np.isfinite(found.power).all() and found.power.max(axis=1) == pytest.approx(
+        rc.spectrogram(scene(), 0.1).power.max(), rel=0.02
+    )
+    assert (found.time > 0.0).all() and (found.time < (length + more) * wave.repetition).all()
+
+
+def test_a_receiver_elsewhere_is_refused_for_what_it_is():
+    with pytest.raises(ValueError, match=r"receivers beside the transmitter: radar\.rx_position is elsewhere"):
+        rc.spectrogram(scene(rx_position=(0.0, 5.0, 0.5)), 0.1)
