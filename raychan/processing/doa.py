@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 METHODS = ("bartlett", "capon", "music", "esprit", "monopulse")
-_ROUNDS = 20  # of refining several echoes by turns: those a beam width apart need 3 to 10 (not measured)
+_ROUNDS = 200  # of refining several echoes by turns: two a beam width apart need 3 to 10, some threes over 60
 _STILL = 1e-5  # beam widths: an echo that moves less has arrived
 _ROUNDING = 16.0  # times the rounding of a value: amplitudes below, relative to the strongest, are none (not measured)
 _LARGEST = 1e150  # sqrt(W): its square is a power that a float holds
