@@ -103,8 +103,8 @@ class CellEchoes:
         return np.asarray((np.abs(self.weights) ** 2).sum(axis=1))
 
     def unsure(self, aperture: Aperture) -> NDArray[np.bool_]:
-        """Return which directions (k,) may be those of sums of waves that were not told apart: wrong by a part of a beam
-        width before uniform lines and rectangles, by more where side lobes are high."""
+        """Return which directions (k,) may be those of sums of waves not told apart: wrong by a part of a beam width
+        before uniform lines and rectangles, by more where side lobes are high."""
         share = _UNTOLD if aperture.table is None else _UNTOLD_EVEN
         return np.asarray((self.rest > share * self.power) & (not self.explained))
 
