@@ -32,7 +32,7 @@ def overrun(seconds: float, allowed: float | None) -> tuple[str, ...]:
     return (
         f"the run took longer than the {allowed:g} s allowed (model.max_seconds), as the first launch, one step and "
         "what follows the steps always end: a larger tolerance (model.tolerance_db), fewer bounces or fewer elements "
-        "far apart take less",
+        "far apart take less, a preview (model.mode) least",
     )
 
 

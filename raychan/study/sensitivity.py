@@ -38,7 +38,8 @@ SPECKLE, ERROR, STEADY, INTERMITTENT = "speckle", "error", "steady", "intermitte
 VERDICTS = {
     STEADY: "spread and stated error within the tolerance",
     SPECKLE: "spread above the tolerance and above the stated error: poses decide the level, more rays do not",
-    ERROR: "stated error above the tolerance and not below the spread, which may be of it: more rays would help",
+    ERROR: "stated error above the tolerance and not below the spread, which may be of it: more rays would help "
+    "(a preview takes none)",
     INTERMITTENT: "not seen in every draw; spread, if two or more see it, and stated error within the tolerance",
     NOISE: "no path explains it",
 }
