@@ -25,10 +25,9 @@ _MOST = 8  # echoes in a cell
 _FLOOR = 1e-4  # of a cell's strongest echo: what a wave that is no plane one to rounding and side lobes leaves
 _APART = 0.05  # beam widths: nearer echoes share their power at the noise's whim (not measured)
 _UNTOLD = 0.01  # of an echo's power: waves that were not told apart, weaker than this, move its level by 0.9 dB at most
-_UNTOLD_EVEN = (
-    0.1  # the same before a uniform line or rectangle, whose side lobes are low: of 215 cells of streets before
-)
-# lines of 8, 16 and 64 two leave that much
+_UNTOLD_EVEN = 0.1
+"""The same before a uniform line or rectangle, whose side lobes are low: of 215 cells of streets before lines of 8, 16
+and 64 two leave that much."""
 _ROUNDS = 20  # of seeking the echoes of different folds by turns (not measured)
 _STILL = 1e-4  # beam widths: echoes of different folds that move less have arrived (not measured)
 _SAFETY = 4.0  # on the power that a plane wave cannot fit (not measured)
