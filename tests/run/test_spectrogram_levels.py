@@ -111,3 +111,15 @@ def test_a_duration_of_hardly_more_than_a_stretch_gives_a_stretch(more):
 def test_a_receiver_elsewhere_is_refused_for_what_it_is():
     with pytest.raises(ValueError, match=r"receivers beside the transmitter: radar\.rx_position is elsewhere"):
         rc.spectrogram(scene(rx_position=(0.0, 5.0, 0.5)), 0.1)
+
+
+def test_the_command_gives_one_stretch_and_refuses_a_receiver_elsewhere_by_its_exit_code(tmp_path, capsys):
+    wave = "[radar.waveform]\nbandwidth_mhz = 300.0\nchirp_us = 60.0\nchirps = 64\nsamples = 64\n"
+    ball = '[[bodies]]\nname = "ball"\nshape = "sphere"\nposition = [10.0, 0.0, 0.5]\nrcs_dbsm = 10.0\n'
+    given = tmp_path / "ball.toml"
+    given.write_text(wave + ball, encoding="utf-8")
+    run = ["spectrogram", str(given), "--seconds", "0.02"]
+    assert invoke([*run, "--out", str(tmp_path / "one")]) == 0
+    assert invoke([*run, "--out", str(tmp_path / "two"), "--set", "radar.rx_position=[0.0, 5.0, 0.5]"]) == 2
+    assert "receivers beside the transmitter" in capsys.readouterr().err
+    assert not (tmp_path / "two").exists()
