@@ -24,7 +24,7 @@ from raychan.run.preview_bounds import NEAR, facet_bounds
 from raychan.run.preview_rates import RateClasses
 from raychan.tracing.contributions import SHARE, Contributions, amplitudes
 from raychan.tracing.culling import seed_facets
-from raychan.tracing.launch import write_leg
+from raychan.tracing.launch import across_gain_ends, clip_where_gains_end, write_leg
 from raychan.tracing.legs import Leg, View, reachable
 from raychan.tracing.mirrors import Mirror
 from raychan.tracing.radiation import FACING, Phases, phases_of, radiating
@@ -155,11 +155,13 @@ class _Tubes:
         allowed = reachable(geometry, leg) & (geometry.piece_role == SCATTERER)
         allowed[leg.pieces(geometry)] = False
         facet = seed_facets(geometry, leg, allowed)
-        counts = np.zeros(len(facet), bool)
+        # Bounds are those of their middles.
+        counts = across_gain_ends(leg, geometry.facets.vertices[facet])
         for bound, length in facet_bounds(geometry, leg, outs, facet, rule.wavenumber):
             counts |= that_count(nothing, _turned(bound, length, rule), length, _SEEDS)
         facet, bary = _cut(geometry, leg, outs, facet[counts], nothing, apart)
-        tubes, view = _seen_parts(geometry, leg, outs, launch_tubes(geometry, leg, facet, bary), rule)
+        tubes = clip_where_gains_end(geometry, leg, leg, launch_tubes(geometry, leg, facet, bary))
+        tubes, view = _seen_parts(geometry, leg, outs, tubes, rule)
         write_leg(geometry, tubes, leg, view.corners, view.passed, rule)
         straight = None
         if leg in outs:
@@ -284,6 +286,7 @@ def _may_count(geometry: Geometry, leg: Leg, outs: list[Leg], tubes: Tubes, noth
     """Return the numbers (m,) of the tubes that may count over one of `outs`, with those too near to be bounded."""
     corners, middle = tubes.points[:, :CENTRE], tubes.points[:, CENTRE]
     counts = sizes(corners - np.roll(corners, -1, axis=1)).max(axis=1) > NEAR * sizes(middle - leg.image)
+    counts |= across_gain_ends(leg, corners)
     for out in outs:
         ph = phases_of(geometry, leg, out, tubes, nothing.rule)
         counts |= that_count(nothing, _turned(ph.bound, ph.length, nothing.rule), ph.length, _SEEDS)

@@ -61,7 +61,7 @@ def launch(
         facet = facet[only[facet]]
     for part, bary in _bisect_for_phase(geometry, facet, shape, images, found, not more):
         part, bary = lit_parts(part, bary, *shape, geometry.both_sides, leg.image, leg.far)
-        tubes = _clip_where_gains_end(geometry, leg, out, launch_tubes(geometry, leg, part, bary))
+        tubes = clip_where_gains_end(geometry, leg, out, launch_tubes(geometry, leg, part, bary))
         if leg.mirrors:
             tubes = _prune_facing_away(geometry, leg, out, others, tubes, found)
         yield _clip_at_shadows(geometry, leg, out, tubes, found, more)
@@ -76,12 +76,22 @@ def seeds_of(geometry: Geometry, leg: Leg, pieces: Bools) -> Ints:
     return found if np.array_equal(known, allowed) else seed_facets(geometry, leg, allowed)
 
 
-def _clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -> Tubes:
-    """Return the tubes, clipped at the planes behind which the gain of an end ends at once."""
+def clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -> Tubes:
+    """Return the tubes, just launched, clipped at the planes behind which the gain of an end ends at once."""
+    count = len(tubes)
     for end in [leg] if out is leg else [leg, out]:
         for normal in end.gain_ends:
             tubes = clipped(geometry, leg, tubes, (tubes.points[:, :CENTRE] - end.image) @ normal)
+    if len(tubes) > count:
+        # Parts have the strength of the whole, whose centre may lie behind.
+        tubes.strength = leg.weight(tubes.points[:, CENTRE])
     return tubes
+
+
+def across_gain_ends(leg: Leg, corners: Floats) -> Bools:
+    """Return which triangles (n, 3, 3) [m] a plane runs through behind which the gain of the leg's end ends at once."""
+    side = (corners - leg.image) @ leg.gain_ends.T
+    return np.asarray(((side.min(axis=1) < 0.0) & (side.max(axis=1) > 0.0)).any(axis=1))
 
 
 def _prune_facing_away(

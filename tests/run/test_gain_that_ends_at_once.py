@@ -1,4 +1,5 @@
-"""A wall through the plane of an antenna that sends ahead only: tubes end there with the gain, and levels converge."""
+"""Walls and floors through the plane of an antenna that sends ahead only: tubes end there with the gain, and levels
+converge."""
 
 from __future__ import annotations
 
@@ -32,3 +33,24 @@ def test_the_gain_of_an_antenna_on_both_sides_or_falling_to_nothing_does_not_end
     for one in (rc.IsotropicAntenna(), rc.CosineAntenna(60.0, 20.0)):
         assert len(beam_of(rc.Radar(WAVE, tx_antenna=one, rx_antenna=one)).ends) == 0
     assert beam_of(rc.Radar(WAVE, yaw_deg=90.0)).ends == pytest.approx(np.array([[0.0, 1.0, 0.0]]), abs=1e-12)
+
+
+def floor_below(x: float, **model: object) -> rc.Detections:
+    """Return the echoes of a floor under the radar, which stands over its plane at x [m], as its gain ends there and as
+    it is alike all around."""
+    floor = rc.Body("floor", shape="box", params={"length": 9.0, "width": 7.0, "height": 0.2}, position=(3.5, 0, -0.2))
+    kind = rc.IsotropicAntenna() if model.pop("all_around", False) else rc.IsotropicAntenna(front=True)
+    radar = rc.Radar(WAVE, (x, 0, 0.9), tx_antenna=kind, rx_antenna=kind, noise_figure_db=14.0)
+    return rc.simulate(rc.Scene(bodies=[floor], radar=radar, model={"max_bounces": 1, **model})).detections
+
+
+@pytest.mark.parametrize("x", [-0.3, 0.0, 0.3])
+@pytest.mark.parametrize("model", [{"tolerance_db": 0.15}, {"mode": "preview"}], ids=["run", "preview"])
+def test_half_a_mirror_point_under_twice_the_gain_returns_what_a_whole_one_does(x, model):
+    found, whole = floor_below(x, **model), floor_below(x, tolerance_db=0.15, all_around=True)
+    i, k = int(np.argmax(found.snr)), int(np.argmax(whole.snr))
+    assert found.range[i] == pytest.approx(0.9, abs=0.05)
+    assert found.error_db[i] <= (0.15 if "mode" not in model else 4.1)
+    # What a preview prunes of one plane is less than what it states of any scene.
+    off = abs(10.0 * np.log10(found.power[i] / whole.power[k]))
+    assert off <= (found.error_db[i] + whole.error_db[k] if "mode" not in model else 1.0)
