@@ -58,7 +58,8 @@ def facet_bounds(
         light(facet[rows], shape, f.normals, leg.antenna, wavenumber, part)
         for out, (bound, length) in zip(outs, found, strict=True):
             same = out is leg
-            bounds(facet[rows], f.vertices, part, out.antenna, same, wavenumber, bound[rows], length[rows])
+            ends = leg.image, out.antenna, same
+            bounds(facet[rows], f.vertices, part, ends, wavenumber, bound[rows], length[rows])
 
     parallel_for(n, some, _PARALLEL_FROM)
     return found
@@ -109,21 +110,46 @@ def light(facet, facets, normals, leg, wavenumber, out):  # type: ignore[no-unty
             size[i] = _UNBOUNDED
 
 
+@njit(cache=True, forceinline=True, error_model="numpy", uncounted=True)
+def _specular_share(v, image, lengths, out_image, backs, wavenumber):  # type: ignore[no-untyped-def]
+    """Return what share of a facet of corners v (3, 3) may be in phase about a point at which the two-way length along
+    an edge is least or most; 0 where no edge has one.
+
+    Args: image, out_image (3,) [m]; lengths, backs (3,) [m] from there to the corners. Along an edge on which the
+    phase bends by b from end to end that is sqrt(2 pi / b) of it (stationary phase), where the facet may be twice as
+    wide as in the mean.
+    """
+    share = 0.0
+    for c in range(3):
+        d, begin, end = (c + 1) % 3, 0.0, 0.0
+        for x in range(3):
+            along = v[d, x] - v[c, x]
+            begin += along * ((v[c, x] - image[x]) / lengths[c] + (v[c, x] - out_image[x]) / backs[c])
+            end += along * ((v[d, x] - image[x]) / lengths[d] + (v[d, x] - out_image[x]) / backs[d])
+        if begin * end < 0.0:
+            share = max(share, min(1.0, 2.0 * math.sqrt(2.0 * math.pi / (wavenumber * abs(end - begin)))))
+    return share
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def bounds(facet, vertices, lit, out, same, wavenumber, bound, length):  # type: ignore[no-untyped-def]
+def bounds(facet, vertices, lit, ends, wavenumber, bound, length):  # type: ignore[no-untyped-def]
     """Write the bound (n,) [1/m] on what facets (n,) scatter to a leg out, and the two-way length (n,) [m].
 
-    Args: vertices (f, 3, 3) [m]; lit as `_Lit`; out, antenna of the leg out; same, whether that is the leg in.
+    Args: vertices (f, 3, 3) [m]; lit as `_Lit`; ends: image (3,) [m] of the leg in, antenna of that out, whether both
+    are one.
     """
+    here, out, same = ends
     middle, lengths, gain, size = lit
-    image, look = out[0][len(out[2])], np.empty(3)
+    image, look, backs = out[0][len(out[2])], np.empty(3), np.empty(3)
     for i in range(len(facet)):
         v, p, bounded = vertices[facet[i]], middle[i], size[i] < _UNBOUNDED
         low, high, whole = np.inf, -np.inf, 0.0
         for c in range(3):
-            way = lengths[i, c] + (lengths[i, c] if same else length_to(v[c], image, False))
+            backs[c] = lengths[i, c] if same else length_to(v[c], image, False)
+            way = lengths[i, c] + backs[c]
             low, high, whole = min(low, way), max(high, way), whole + way
         length[i] = whole / 3.0
         back = gain[i] if same else weight(p, *out, look)
-        most = size[i] * back / length_to(p, image, False) / (1.0 + 0.5 * wavenumber * (high - low))
-        bound[i] = most if bounded else _UNBOUNDED
+        share = 1.0 / (1.0 + 0.5 * wavenumber * (high - low))
+        share = max(share, _specular_share(v, here, lengths[i], image, backs, wavenumber))
+        bound[i] = size[i] * back / length_to(p, image, False) * share if bounded else _UNBOUNDED

@@ -228,3 +228,18 @@ def test_the_ledger_of_a_preview_names_thin_layers_that_are_closed_and_clutter_f
     # Corners of the ground are 57 m away.
     assert named(ground(material=stone)) == {"diffuse scattering": beyond}
     assert named(ground(material=stone), reach=2.0) == {}
+
+
+@pytest.mark.parametrize("power_dbm", [12.0, 20.0])
+def test_a_pole_of_long_facets_keeps_its_level_at_any_power(power_dbm):
+    """A lamp post at 14 m over ground, 30 and 38 dB above the noise."""
+    ground = rc.Body("ground", shape="ground", material="asphalt")
+    post = rc.Body("post", shape="lamp_post", position=(13.94, 0.16, 0.0))
+    wave = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=40e-6, n_chirps=64, n_samples=128)
+    radar = rc.Radar(wave, (0.0, 0.0, 0.92), power=1e-3 * 10.0 ** (power_dbm / 10.0))
+    models = {"max_bounces": 2}, {"mode": "preview"}
+    fine, coarse = (rc.simulate(rc.Scene(bodies=[ground, post], radar=radar, model=model)) for model in models)
+    i, k = (int(np.argmax(r.detections.snr * (r.detections.range > 10.0))) for r in (fine, coarse))
+    assert coarse.provenance[k].bodies == fine.provenance[i].bodies
+    off = abs(10.0 * np.log10(coarse.detections.power[k] / fine.detections.power[i]))
+    assert off <= coarse.detections.error_db[k] + fine.detections.error_db[i]
