@@ -37,7 +37,7 @@ from raychan.run.refinement_plan import next_step
 from raychan.run.refinement_seconds import StepRays
 from raychan.run.rules import first_rule, step_rule
 from raychan.run.sourced_paths import SourcedPaths, changes, raised
-from raychan.run.speckle import spreads_db
+from raychan.run.speckle import loosened
 from raychan.run.streams import Stage, stream
 from raychan.run.unreached import Remains, Unreached, unreached_of
 from raychan.signal.baseband import noisy, synthesize
@@ -57,6 +57,7 @@ _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
 _COARSEST_DB = 1.0
 """Tolerance from which on first launches bring as many paths: of boxes and balls 69, 42, 32 and 32 thousand at 0.05,
 0.2, 1 and 3 dB."""
+_TOLD = 2  # steps after which `model.speckle` asks which of the levels still open displaced bodies move
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
 
 
@@ -110,6 +111,7 @@ class SceneRefinement:
         self._noise = noise_amplitude(self.radar, self.settings)
         self._probes = probes_of(self.radar)
         self._asked, self._end = self.launches is not None, math.inf
+        self._speckled = list[tuple[float, float]]()
         if self.model.speckle and not self._asked:
             self.launches = []
 
@@ -178,12 +180,10 @@ class SceneRefinement:
         since = perf_counter()
         cells = self._cells(radar, response, first.paths)
         look, steps = perf_counter() - since, 0
-        unreached, ended, speckled = tuple[Unreached, ...](), "", list[tuple[float, float]]()
-        if len(cells.place) and self.model.speckle:
-            speckled = cells.loosened(self._spreads(first.paths, response, cells.place))
+        unreached, ended = tuple[Unreached, ...](), ""
         if len(cells.place):
             steps, unreached, ended = self._refined(first.launch, held, response, cells, look)
-        if self.launches is not None:
+        if self._asked and self.launches is not None:
             self.launches[:] = [counting(*x) for x in zip(self.launches, held.counts, strict=True)]
 
         def doubted() -> Paths:
@@ -197,16 +197,8 @@ class SceneRefinement:
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
-        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(speckled), tuple(cells.settled))
+        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(self._speckled), tuple(cells.settled))
         return Converged(launched, others, self.model, first.chosen, remains)
-
-    def _spreads(self, paths: Paths, response: PointSpread, place: Floats) -> Floats:
-        """Return by how much (c,) [dB] displaced bodies move the levels of cells."""
-        assert self.launches is not None
-        found = spreads_db(paths, self.launches[0], self.geometry, self.radar, response, place, self._noise)
-        if not self._asked:
-            self.launches = None
-        return found
 
     def _cells(self, quiet: Radar, response: PointSpread, paths: Paths) -> MapCells:
         """Return the cells of the map that are detections, or would be a little stronger, also beside stronger ones;
@@ -259,6 +251,10 @@ class SceneRefinement:
                 cells.traced(own)
             steps += 1
             cells.stepped()
+            if steps == _TOLD and self.model.speckle and self.launches is not None:
+                about = self.geometry, self.radar, response, self._noise
+                self._speckled = loosened(cells, held, self.launches, *about)
+                self.launches = self.launches if self._asked else None
             budget.pace.stepped(self.stats.rays, len(held))
             wanted, self._end, ended = next_step(cells, rays, cost, budget, (self.stats, len(held)), STEPS - steps)
         self._end = math.inf

@@ -19,7 +19,10 @@ from raychan.channel.paths import paths_of
 from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, REFLECT, SCATTER, TRANSMIT, DiffractedRoutes, Paths, Routes
+from raychan.run.map_cells import MapCells
 from raychan.run.point_spread import PointSpread
+from raychan.run.sourced_paths import SourcedPaths
+from raychan.tracing.routes import counting
 from raychan.units import C0
 from raychan.world.geometry import Geometry
 
@@ -48,6 +51,28 @@ class Slopes:
         """Return by how much (n, p) [m] lengths grow as bodies (b, 3) turn [rad] and shift [m]."""
         by_shift = np.einsum("npi,ni->np", self.shift, shift[self.body])
         return np.asarray(by_shift + np.einsum("npi,ni->np", self.turn, turn[self.body]))
+
+
+def loosened(
+    cells: MapCells,
+    held: SourcedPaths,
+    launches: Sequence[list[Batch]],
+    geometry: Geometry,
+    radar: Radar,
+    response: PointSpread,
+    noise: float,
+) -> list[tuple[float, float]]:
+    """Let open levels be wrong by what displaced bodies move them; return the ranges and rates of these cells.
+
+    Args: held the paths of launches, of which these are the routes.
+    """
+    rows = np.unique(np.flatnonzero(cells.open) % max(len(cells.place), 1))
+    spread = np.zeros(len(cells.place))
+    if len(rows):
+        every = zip(launches, held.counts, strict=True)
+        batches = [one for batch, kept in every for one in counting(batch, kept)]
+        spread[rows] = spreads_db(held.now, batches, geometry, radar, response, cells.place[rows], noise)
+    return cells.loosened(spread)
 
 
 def spreads_db(

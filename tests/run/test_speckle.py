@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,9 +10,12 @@ import pytest
 
 import raychan as rc
 from raychan.records import MIRROR, REFLECT, SCATTER
-from raychan.run import scene_refinement
+from raychan.run.point_spread import PointSpread
+from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.speckle import SHIFT, TURN, slopes_of, spreads_db
+from raychan.tracing.stats import Stats
 from raychan.units import C0, db
+from raychan.world.geometry import geometry_of
 
 WAVE = {"bandwidth_mhz": 500.0, "chirp_us": 30.0, "chirps": 16, "samples": 128}
 RADAR = {"position": [0, 0, 0], "antenna": {"kind": "isotropic"}, "power_dbm": 50.0, "waveform": WAVE}
@@ -19,28 +23,21 @@ LAMBDA = C0 / (77e9 + 250e6)  # a cell's phase is that at the middle of the ramp
 DRAWS = 20
 
 
-def scene(*bodies, bounces=1):
-    model = {"max_bounces": bounces, "tolerance_db": 0.5, "speckle": True}
+def scene(*bodies, bounces=1, tolerance_db=0.5):
+    model = {"max_bounces": bounces, "tolerance_db": tolerance_db, "speckle": True}
     return rc.Scene(bodies=list(bodies), radar=RADAR, model=model)
 
 
-@pytest.fixture
-def launched(monkeypatch):
-    """Return what `spreads_db` is given for a scene, or that of some bodies, by names."""
-
-    def of(*bodies, bounces=1):
-        given = {}
-
-        def seen(paths, batches, geometry, radar, response, cells, noise):
-            given.update(paths=paths, batches=list(batches), geometry=geometry, radar=radar)
-            given.update(response=response, cells=cells, noise=noise)
-            return np.zeros(len(cells))
-
-        monkeypatch.setattr(scene_refinement, "spreads_db", seen)
-        rc.simulate(bodies[0] if isinstance(bodies[0], rc.Scene) else scene(*bodies, bounces=bounces))
-        return given
-
-    return of
+def launched(*bodies, bounces=1):
+    """Return what `spreads_db` takes, of the first launch over a scene, or over one of some bodies."""
+    of = bodies[0] if isinstance(bodies[0], rc.Scene) else scene(*bodies, bounces=bounces)
+    given, batches, wave = (geometry_of(of), of.points(0.0), of.radar, of.processing), [], of.radar.channel_waveform
+    refinement = SceneRefinement(*given, of.model, lambda *_: None, Stats(), batches)
+    paths = refinement.first().paths
+    response = PointSpread(wave, of.processing.range_window, of.processing.rate_window)
+    place = refinement._cells(replace(of.radar, noise=False), response, paths).place
+    named = {"geometry": given[0], "radar": of.radar, "response": response}
+    return {"paths": paths, "batches": batches[0], "cells": place, "noise": refinement._noise} | named
 
 
 def strongest(given):
@@ -60,7 +57,7 @@ def ball(name, *place):
     return rc.Body(name=name, shape="sphere", params={"radius": 0.3}, position=place)
 
 
-def test_two_equal_echoes_move_as_two_phasors(launched):
+def test_two_equal_echoes_move_as_two_phasors():
     given = launched(ball("one", 12, 0.8, 0), ball("two", 12, -0.8, 0))
     ranges = [
         np.linalg.norm(np.array([12.0, side, 0.0]) + draws(given, name)[1], axis=1)
@@ -70,11 +67,11 @@ def test_two_equal_echoes_move_as_two_phasors(launched):
     assert asked > 3.0 and strongest(given) == pytest.approx(asked, rel=0.03)
 
 
-def test_a_lone_sphere_does_not_move(launched):
+def test_a_lone_sphere_does_not_move():
     assert strongest(launched(ball("one", 12, 0.8, 0))) < 0.02
 
 
-def test_a_plate_at_normal_incidence_moves_by_the_sinc_of_its_turns(launched):
+def test_a_plate_at_normal_incidence_moves_by_the_sinc_of_its_turns():
     width, height = 0.5, 0.3
     size = {"width": width, "height": height}
     given = launched(rc.Body(name="plate", shape="plate", params=size, position=(150, 0, 0), yaw_deg=180.0))
@@ -109,20 +106,20 @@ yaw_deg = {}
         (19.406207387976004, -1.1537989485679514, -6.9086516887462555),
     ],
 )
-def test_vehicles_seen_face_on_stay_as_the_place_that_mirrors_slides_over_them(launched, tmp_path, x, y, yaw):
+def test_vehicles_seen_face_on_stay_as_the_place_that_mirrors_slides_over_them(tmp_path, x, y, yaw):
     """While footprints kept their own sums and only turned, these moved by 0.66 to 1.04 dB, and the run said so."""
     (tmp_path / "it.toml").write_text(FACE_ON.format(x, y, yaw))
     assert strongest(launched(rc.Scene.load(tmp_path / "it.toml"))) < 0.2
 
 
-def test_mirrors_stay(launched):
+def test_mirrors_stay():
     given = launched(ball("one", 12, 0.8, 0), ball("two", 12, -0.8, 0))
     facets, extents = given["geometry"].facets, given["geometry"].extents
     still = SimpleNamespace(facets=facets.replace(role=np.full_like(facets.role, MIRROR)), extents=extents)
     assert strongest(given | {"geometry": still}) < 1e-9
 
 
-def test_lengths_change_as_over_the_images_of_displaced_mirrors(launched):
+def test_lengths_change_as_over_the_images_of_displaced_mirrors():
     wall = rc.Body(
         name="wall", shape="plate", params={"width": 6.0, "height": 3.0}, position=(6.0, 4.0, 0.0), yaw_deg=-90.0
     )
@@ -161,6 +158,23 @@ def test_lengths_change_as_over_the_images_of_displaced_mirrors(launched):
     assert compared > 10
 
 
-def test_a_run_says_speckle_of_two_spheres_in_one_cell_and_traces_no_further():
+def post(speckle):
+    """Return a run over a lamp post, of which pole, base and arm share a cell."""
+    of = rc.Body(name="post", shape="lamp_post", position=(11.0, 0.7, 0.0), yaw_deg=160.0)
+    radar = {"position": [0, 0, 0.6], "power_dbm": 12.0, "waveform": WAVE}
+    model = {"max_bounces": 2, "tolerance_db": 0.1, "max_rays": 400_000, "speckle": speckle}
+    return rc.simulate(rc.Scene(bodies=[of], radar=radar, model=model))
+
+
+def test_a_run_says_which_levels_two_steps_leave_open_are_speckle_and_traces_them_less():
+    loose, wanted = post(True), post(False)
+    assert any("number 1 among them" in line for line in loose.warnings)
+    assert loose.stats["refinements"] >= 2 and loose.stats["rays"] < wanted.stats["rays"]
+    assert loose.detections.error_db[0] > 0.1
+
+
+def test_what_two_steps_bring_within_the_tolerance_is_not_speckle():
+    """Two spheres in a cell move by decibels, but their level is known to 0.1 dB after one step."""
     result = rc.simulate(scene(ball("one", 12, 0.8, 0), ball("two", 12, -0.8, 0)))
-    assert any("number 1 among them" in line for line in result.warnings)
+    assert result.stats["refinements"] < 2 and result.detections.error_db[0] < 0.1
+    assert not any("model.speckle" in line for line in result.warnings)
