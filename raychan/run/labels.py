@@ -142,8 +142,10 @@ def _explained(
     if not math.isnan(true.range):
         parts = replace(parts[0], range=true.range, rate=true.rate), *parts[1:]
     error_db = figure(predicted, cell.error)
-    known_of = true.folded, true.range, true.rate
-    return Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of, known.turns.off_db(summed))
+    way, at = paths.trajectories, paths.trajectory[leader]
+    away, back = (tuple(x[at].tolist()) for x in (way.departure, way.arrival))
+    known_of = true.folded, true.range, true.rate, known.turns.off_db(summed), away, back
+    return Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of)
 
 
 def waves_in(

@@ -15,6 +15,7 @@ from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
 from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
 from raychan.run.result import DC, IMAGE, SIDELOBE, ExplainedDetections, Explanation, Result
+from raychan.run.two_ways import apart
 
 _NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: rounds to 1 dB or more
@@ -173,6 +174,20 @@ def not_reciprocal(reasons: Sequence[Explanation], tolerance_db: float) -> list[
     ]
 
 
+def two_ways(reasons: Sequence[Explanation], radar: Radar | None) -> list[str]:
+    """Return a line if echoes before several transmitters leave and return in different directions."""
+    rows = np.zeros(len(reasons), bool)
+    rows[apart(reasons, radar) if radar is not None else []] = True
+    if not rows.any():
+        return []
+    is_one = rows.sum() == 1
+    return [
+        f"{_of(rows)} {'leaves' if is_one else 'leave'} in one direction and {'returns' if is_one else 'return'} from "
+        f"another ({_numbers(rows)}), over several surfaces: to several transmitters that is no plane wave, so one "
+        "echo may show several times, and directions, and rates that are found by them, may be wrong"
+    ]
+
+
 def noted(found: ExplainedDetections, tolerance_db: float, ledger: Mapping[str, Entry]) -> list[str]:
     """Return the lines that stand below the table of detections: on the tolerance, and on what was left out."""
     said = []
@@ -207,6 +222,7 @@ def told(
     return [
         *no_echoes(reasons),
         *not_reciprocal(reasons, tolerance_db),
+        *two_ways(reasons, radar),
         *warned(found, tolerance_db, rdmap, radar),
         *noted(found, tolerance_db, ledger),
     ]

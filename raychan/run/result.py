@@ -88,6 +88,10 @@ class Explanation:
     reciprocity_db: float = 0.0
     """By how much the level changes as waves over several surfaces are taken to scatter on one of these or another,
     which reciprocity makes alike [dB]: what paths differ by that are there either way, in no stated error."""
+    departure: tuple[float, ...] = (0.0, 0.0, 0.0)
+    """Unit direction in which the strongest path of the leading chain leaves, world axes; zeros where unknown."""
+    arrival: tuple[float, ...] = (0.0, 0.0, 0.0)
+    """Unit direction that it returns from."""
 
     @property
     def converged(self) -> bool:
