@@ -144,8 +144,9 @@ def _explained(
     error_db = figure(predicted, cell.error)
     way, at = paths.trajectories, paths.trajectory[leader]
     away, back = (tuple(x[at].tolist()) for x in (way.departure, way.arrival))
-    known_of = true.folded, true.range, true.rate, known.turns.off_db(summed), away, back
-    return Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of)
+    known_of = true.folded, true.range, true.rate, known.turns.off_db(summed)
+    made = Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of)
+    return replace(made, departure=away, arrival=back)
 
 
 def waves_in(
