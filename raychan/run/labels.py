@@ -144,8 +144,8 @@ def _explained(
     error_db = figure(predicted, cell.error)
     way, at = paths.trajectories, paths.trajectory[leader]
     away, back = (tuple(x[at].tolist()) for x in (way.departure, way.arrival))
-    known_of = true.folded, true.range, true.rate, known.turns.off_db(summed)
-    made = Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of)
+    known_of = true.folded, true.range, true.rate
+    made = Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of, known.turns.off_db(summed))
     return replace(made, departure=away, arrival=back)
 
 
