@@ -45,8 +45,9 @@ def warned(
         verb = _verb(~found.converged)
         said.append(
             f"{_of(~found.converged)} {verb} not converged ({_numbers(~found.converged)}): the last two launches "
-            f"differ there by about as much as they find, so the error is unknown; more rays (model.max_rays) or a "
-            f"smaller tolerance than {tolerance_db:g} dB (--tolerance, model.tolerance_db) may help"
+            f"differ there by about as much as they find, so the error is unknown; more of the budget that "
+            f"ended it (model.max_rays, max_seconds, max_memory_mb) or a smaller tolerance than {tolerance_db:g} dB "
+            "(--tolerance, model.tolerance_db) may help"
         )
     if found.folded.any():
         first = int(np.flatnonzero(found.folded)[0])

@@ -21,7 +21,6 @@ _FINEST = 1.0
 before (`map_cells`, `refinement_plan`), so rays grow at least so. At 0.5 dB urban, living street and occluded
 pedestrian take 3.0, 2.2 and 2.8 million rays in place of 2.0, 1.0 and 1.6, 1.5 times the CPU, and bring 27 of 31
 detections within it in place of 22 of 30. At 2 dB half of the rays lose one of 30, at 1 dB twice as many bring none."""
-_GROWTH = 2.0  # paths of a step over those of the one before, about
 _BYTES = 900.0  # a path, at the peak of a run (of 1.5 and 5.4 million 890 and 910)
 RAYS, SECONDS, MEMORY = (
     f"the budget of {what} (model.{key})"
@@ -54,12 +53,28 @@ class Budget:
         rays, within = self._rays - stats.rays, self.pace.rays
         return (within, SECONDS) if within < rays else (rays, RAYS)
 
-    def ended(self, stats: Stats, paths: int, rays: float) -> str:
+    def ended(self, stats: Stats, rays: float) -> str:
         """Return what leaves no room for a further step, '' if nothing does.
 
-        Args: paths held; rays that the step takes, about.
+        Args: rays that the step takes, about.
         """
         left, which = self.left(stats)
         if rays > left:
             return which + (FORESEEN if left > 0.0 else "")
-        return self._which if _GROWTH * paths * _BYTES > self._memory else ""
+        return self._which if self.pace.paths(rays) * _BYTES > self._memory else ""
+
+    def exceeded(self, model: Any, stats: Stats, paths: int) -> list[str]:
+        """Return a line each if more rays were cast or more memory is taken than a scene's model allows."""
+        said, always = [], "the first launch and one step always end"
+        if model.max_rays != "auto" and stats.rays > model.max_rays:
+            said.append(
+                f"{stats.rays:,} rays were cast, more than the {model.max_rays:,} allowed (model.max_rays): {always}, "
+                "and a later one may take some percent more than foreseen"
+            )
+        taken = 1e-6 * paths * _BYTES
+        if model.max_memory_mb is not None and taken > model.max_memory_mb:
+            said.append(
+                f"paths took about {taken:,.0f} MB, more than the {model.max_memory_mb:,g} allowed "
+                f"(model.max_memory_mb): {always}; a larger tolerance (model.tolerance_db) or fewer bounces take less"
+            )
+        return said

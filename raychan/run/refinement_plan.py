@@ -27,17 +27,17 @@ _LESS = 0.7  # of the rays of a plan, at most, may be planned where its step wou
 
 
 def next_step(
-    cells: MapCells, rays: SourceRays, cost: StepRays, budget: Budget, so_far: tuple[Stats, int], steps: int
+    cells: MapCells, rays: SourceRays, cost: StepRays, budget: Budget, so_far: Stats, steps: int
 ) -> tuple[Sources, float, str]:
     """Return the sources to trace again, when that must have ended, and what ends the refinement, '' if nothing does.
 
-    Args: so_far what launches took, and the paths held; steps that are left.
+    Args: so_far what launches took; steps that are left.
     """
-    left, which = budget.left(so_far[0])
+    left, which = budget.left(so_far)
     while True:
         wanted, planned_rays, ended = planned(cells, rays, (left, which), steps)
         if not ended and len(wanted):
-            ended = budget.ended(*so_far, planned_rays)
+            ended = budget.ended(so_far, planned_rays)
         if ended or not len(wanted):
             return wanted, math.inf, ended
         foreseen, within = cost.of(wanted, rays.next_step(wanted)), budget.pace.rays

@@ -83,7 +83,11 @@ class Pace:
 
     def end(self, rays: float) -> float:
         """Return when a step of so many rays must end, for what follows to end in time as well."""
-        return self._end - _AFTER * self._each * (self._paths + self._brought * rays)
+        return self._end - _AFTER * self._each * self.paths(rays)
+
+    def paths(self, rays: float) -> float:
+        """Return how many paths are held after a step of so many rays, those replaced among them."""
+        return self._paths + self._brought * rays
 
     @property
     def rays(self) -> float:

@@ -111,7 +111,7 @@ class SceneRefinement:
         self._noise = noise_amplitude(self.radar, self.settings)
         self._probes = probes_of(self.radar)
         self._asked, self._end = self.launches is not None, math.inf
-        self._speckled = list[tuple[float, float]]()
+        self._speckled, self._exceeded = list[tuple[float, float]](), list[str]()
         if self.model.speckle and not self._asked:
             self.launches = []
 
@@ -197,7 +197,8 @@ class SceneRefinement:
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
-        remains = Remains(unreached, steps, ended, self.model.tolerance_db, tuple(self._speckled), tuple(cells.settled))
+        told = tuple(self._speckled), tuple(cells.settled), tuple(self._exceeded)
+        remains = Remains(unreached, steps, ended, self.model.tolerance_db, *told)
         return Converged(launched, others, self.model, first.chosen, remains)
 
     def _cells(self, quiet: Radar, response: PointSpread, paths: Paths) -> MapCells:
@@ -256,8 +257,8 @@ class SceneRefinement:
                 self._speckled = loosened(cells, held, self.launches, *about)
                 self.launches = self.launches if self._asked else None
             budget.pace.stepped(self.stats.rays, len(held))
-            wanted, self._end, ended = next_step(cells, rays, cost, budget, (self.stats, len(held)), STEPS - steps)
-        self._end = math.inf
+            wanted, self._end, ended = next_step(cells, rays, cost, budget, self.stats, STEPS - steps)
+        self._end, self._exceeded = math.inf, budget.exceeded(self.model, self.stats, len(held))
         reached = cells.over <= 1.0
         for i in range(len(cells)):
             source, factor, share = cells.slowness(i)

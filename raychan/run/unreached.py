@@ -56,18 +56,21 @@ class Remains:
     tolerance_db: float
     speckled: tuple[tuple[float, float], ...] = ()
     settled: tuple[tuple[float, float], ...] = ()
+    exceeded: tuple[str, ...] = ()
+    """Lines on budgets that were exceeded."""
 
     def notes(
         self, found: tuple[Floats, Floats], size: tuple[float, float], error_db: Floats, also: Sequence[str] = ()
     ) -> list[str]:
-        """Return a line on the cells that are speckle, one on the detections whose levels are not within the tolerance,
-        one on cells that may still become detections, with what ended the refinement, and one on detections whose own
-        cell is refined while their error exceeds the tolerance. Detections go by their numbers and places in the table.
+        """Return the lines on budgets, one on the cells that are speckle, one on the detections whose levels are not
+        within the tolerance, one on cells that may still become detections, with what ended the refinement, and one on
+        detections whose own cell is refined while their error exceeds the tolerance. Detections go by their numbers and
+        places in the table.
 
         Args: found ranges and rates (n,) of the detections; size of a cell [m], [m/s]; error_db (n,) stated of them;
         also what errors hold besides, in words.
         """
-        said, tolerance, over = [], f"{self.tolerance_db:g} dB", error_db > self.tolerance_db
+        said, tolerance, over = list(self.exceeded), f"{self.tolerance_db:g} dB", error_db > self.tolerance_db
         if self.speckled:
             rows = [_detection(place, found, size) for place in self.speckled]
             numbers = sorted({i + 1 for i in rows if i is not None})

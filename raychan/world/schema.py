@@ -211,12 +211,12 @@ class Model(Table):
     speckle: Switch = False
     """Levels that makers' tolerances of the bodies move by more than tolerance_db are refined to that only."""
     max_rays: Literal["auto"] | Rays = "auto"
-    """Rays that a frame may cast to reach tolerance_db; auto: those of its first launch and half
+    """Rays that a frame may cast to reach tolerance_db, about; auto: those of its first launch and half
     as many again, or 1,000,000 more where that is more; below 1 dB what comes on top is divided by the tolerance."""
     max_seconds: RunSeconds | None = None
     """Time that a run may take: refinement takes no further step where the run might not end within it."""
     max_memory_mb: MemoryMb | None = None
-    """Memory of paths beyond which refinement takes no further step."""
+    """Memory of paths: refinement takes no further step that is foreseen to take more."""
     retrace: Literal["auto"] | Tracings = "auto"
     """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, at its middle, whose
     range rates paths keep; more: all moving bodies are extrapolated between the tracings."""

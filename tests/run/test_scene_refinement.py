@@ -162,9 +162,9 @@ def test_a_scene_of_few_rays_may_still_be_refined():
     stats = Stats(rays=100)
     budget = refinement_budget.Budget(model, stats)
     stats.rays = 10_000
-    assert budget.ended(stats, 10, 20_000.0) == ""
+    assert budget.ended(stats, 20_000.0) == ""
     stats.rays = 2_000_000
-    assert "max_rays" in budget.ended(stats, 10, 20_000.0)
+    assert "max_rays" in budget.ended(stats, 20_000.0)
 
 
 def test_finer_tolerances_may_take_more_rays():
@@ -185,8 +185,28 @@ def test_a_step_of_few_rays_fits_into_what_is_left():
         stats = Stats(rays=1_000_000)
         budget = refinement_budget.Budget(model, stats)
         stats.rays = 2_000_000
-        ended.append(budget.ended(stats, 10, rays))
+        ended.append(budget.ended(stats, rays))
     assert "max_rays" in ended[0] and ended[1] == ""
+
+
+@pytest.mark.parametrize(("rays", "word"), [(100_000, ""), (400_000, "memory")])
+def test_a_step_does_not_start_that_would_hold_more_paths_than_memory_allows(rays, word):
+    """100,000 rays brought 50,000 paths beside 100,000: as many more take 180 MB, four times as many 315."""
+    model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}, model={"max_memory_mb": 200.0}).model
+    stats = Stats(rays=100_000)
+    budget = refinement_budget.Budget(model, stats, paths=100_000)
+    stats.rays = 200_000
+    budget.pace.stepped(stats.rays, 150_000)
+    assert (word in budget.ended(stats, rays)) and bool(budget.ended(stats, rays)) == bool(word)
+    assert not budget.exceeded(model, stats, 222_000) and len(budget.exceeded(model, stats, 223_000)) == 1
+
+
+def test_rays_beyond_the_budget_are_told():
+    model = rc.Scene(bodies=[], radar={"waveform": WAVEFORM}, model={"max_rays": 1000}).model
+    budget = refinement_budget.Budget(model, Stats(rays=900))
+    assert not budget.exceeded(model, Stats(rays=1000), 10)
+    (line,) = budget.exceeded(model, Stats(rays=1001), 10)
+    assert "1,001" in line and "1,000" in line and "model.max_rays" in line
 
 
 @pytest.mark.parametrize(("rays", "why"), [(100_000, ""), (400_000, "seconds")])
@@ -201,7 +221,7 @@ def test_a_step_does_not_start_that_would_end_beyond_the_seconds(monkeypatch, ra
     for one, left in ((budget, 300_000), (late, 100_000)):
         one.pace.stepped(stats.rays, 0)
         assert one.left(stats)[0] == pytest.approx(left)
-    ended = budget.ended(stats, 10, rays)
+    ended = budget.ended(stats, rays)
     assert ended == "" if not why else (why in ended and "foreseen" in ended and "rays" not in ended)
 
 
