@@ -8,6 +8,8 @@ def main() -> None:
     """Run the command line; Ctrl-C while its modules are imported ends the process, too."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupted)
+    # Pictures need no display; matplotlib cannot be imported where this names none of its own backends.
+    os.environ["MPLBACKEND"] = "agg"
     from raychan.cli import main as run
 
     run()

@@ -60,7 +60,7 @@ def tradeoff(
     from raychan.report.tradeoff_figures import case_picture, summary_picture
     from raychan.run.contents import Contents
     from raychan.run.output_files import staging
-    from raychan.study.tradeoff import read_csv, tradeoff, write_csv
+    from raychan.study.tradeoff import comparable, read_csv, tradeoff, write_csv
     from raychan.study.verdicts import verdicts
 
     try:
@@ -76,11 +76,12 @@ def tradeoff(
         write_csv(rows, stage / "tradeoff.csv")
         for name in dict.fromkeys(r.case for r in rows):
             case_picture([r for r in rows if r.case == name], stage / f"tradeoff_{name}.png")
-        summary_picture(rows, stage / "tradeoff.png", earlier)
+        same, said = comparable(rows, earlier) if earlier else ([], [])
+        summary_picture(rows, stage / "tradeoff.png", same)
     screen = show.console()
     heads = ["case", "method", "setting", "rays", "seconds", "rms error dB", "on the front"]
     screen.print(show.table("Error against effort", heads, [_cells(r) for r in rows], left=(0, 1, 2, 6)))
-    for line in verdicts(rows):
+    for line in [*verdicts(rows), *said]:
         screen.print(line, soft_wrap=True)
     screen.print(f"figures and table: {out}", soft_wrap=True)
 

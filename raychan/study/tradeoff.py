@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
@@ -51,7 +52,7 @@ def tradeoff(names: Sequence[str] = (), quick: bool = False, progress: Progress 
     tell = progress or (lambda stage, share: None)
     _warm()
     rows: list[Row] = []
-    for name in names or tuple(TARGETS):
+    for name in dict.fromkeys(names or TARGETS):
         tell(name, 0.0)
         make: Callable[..., Target | Street] = TARGETS[name]
         case = make(quick=quick) if name in ("car", "urban") else make()
@@ -68,6 +69,7 @@ def overall(rows: Sequence[Row]) -> list[Row]:
     needs is not known beforehand. The scene has other settings and is left out; empty for fewer than two targets."""
     mine = [r for r in rows if r.case != "urban"]
     count = len({r.case for r in mine})
+    which = "all" if count == len(TARGETS) - 1 else str(count)
     groups: dict[tuple[str, str], list[Row]] = {}
     for r in mine:
         groups.setdefault((r.method, r.setting), []).append(r)
@@ -77,7 +79,7 @@ def overall(rows: Sequence[Row]) -> list[Row]:
             made.append(
                 Row(
                     "all",
-                    "all targets, one setting",
+                    f"{which} targets, one setting",
                     "worst of the targets",
                     max(r.truth_db for r in g),
                     method,
@@ -89,6 +91,23 @@ def overall(rows: Sequence[Row]) -> list[Row]:
                 )
             )
     return marked(made)
+
+
+def comparable(rows: Sequence[Row], earlier: Sequence[Row]) -> tuple[list[Row], list[str]]:
+    """Return the rows of an earlier run that stand beside rows: of the same cases, those of all targets made anew of
+    these; and a line if it lacks cases, or has others."""
+    mine, theirs = ([c for c in dict.fromkeys(r.case for r in x) if c != "all"] for x in (rows, earlier))
+    same = [r for r in earlier if r.case in mine and r.case != "all"]
+    lacking, more = ([c for c in x if c not in y] for x, y in ((mine, theirs), (theirs, mine)))
+    made = [] if set(lacking) - {"urban"} else overall(same)
+    said = []
+    if lacking:
+        said.append(
+            f"the earlier run lacks {', '.join(lacking)}: its front is not drawn there, nor that of all targets"
+        )
+    if more:
+        said.append(f"the earlier run has {', '.join(more)} as well, left out of the picture")
+    return same + made, said
 
 
 def _target(case: Target, quick: bool, tell: Progress) -> list[Row]:
@@ -189,9 +208,15 @@ def read_csv(path: Path) -> list[Row]:
     rows = []
     for number, line in enumerate(lines, 2):
         try:
-            rows.append(Row(**{f.name: kinds[str(f.type)](line[f.name]) for f in fields(Row)}))
+            values = {f.name: kinds[str(f.type)](line[f.name]) for f in fields(Row)}
         except (TypeError, ValueError):
-            raise ValueError(f"{path}: line {number} is not one of a trade-off") from None
+            values = {"": None}
+        numbers = [x for x in values.values() if isinstance(x, float)]
+        if None in values.values() or not all(math.isfinite(x) and x >= 0.0 for x in numbers):
+            raise ValueError(f"{path}: line {number} is not one of a trade-off")
+        rows.append(Row(**values))
+    if not rows:
+        raise ValueError(f"{path}: no rows: must be a tradeoff.csv of this command")
     return rows
 
 

@@ -17,7 +17,7 @@ def verdicts(rows: Sequence[Row]) -> list[str]:
     """Return lines for people: the default of each case on both fronts, and its gain over point samples."""
     lines = []
     for row in (r for r in rows if r.default):
-        lines.append(f"default on {row.case}: {_cost(row)}")
+        lines.append(f"default on {row.title if row.case == 'all' else row.case}: {_cost(row)}")
         lines += [f"  {key}: {_place(rows, row, key)}" for key in ("rays", "seconds")]
     return lines + [_gain(rows, case, level) for case, level in EQUAL_DB.items() if any(r.case == case for r in rows)]
 

@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 
 import pytest
 from support.scene_texts import PLATE, but_compiling
@@ -51,3 +53,14 @@ def test_results_stay_where_their_pictures_cannot_be_written(argv, kept, tmp_pat
     }
     assert found == kept
     assert {p.name for p in tmp_path.iterdir()} == {"plate.toml", "ship.toml", "out"}
+
+
+def test_a_backend_of_no_name_does_not_matter_to_pictures(tmp_path):
+    """Matplotlib cannot be imported with it, and commands draw without a display."""
+    (tmp_path / "plate.toml").write_text(PLATE)
+    command = [sys.executable, "-m", "raychan", "run", "plate.toml", "--out", "out"]
+    given = os.environ | {"MPLBACKEND": "nonsense", "RAYCHAN_NO_OPENGL": "1"}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=given, capture_output=True, text=True, timeout=120, check=False
+    )  # fmt: skip
+    assert done.returncode == 0 and "Traceback" not in done.stderr and (tmp_path / "out" / "rdmap.png").is_file()

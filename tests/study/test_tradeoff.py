@@ -11,7 +11,7 @@ from raychan.run.single_body import facets_of
 from raychan.study import cases, methods
 from raychan.study.ray_lattice import Window, echoes
 from raychan.study.specular_points import specular_points
-from raychan.study.tradeoff import Row, beaten_by, marked, read_csv, write_csv
+from raychan.study.tradeoff import Row, beaten_by, comparable, marked, overall, read_csv, tradeoff, write_csv
 from raychan.study.verdicts import verdicts
 from raychan.tracing.legs import Leg
 from raychan.world.ray_caster import RayCaster
@@ -103,6 +103,40 @@ def test_table_comes_back_as_it_was_written_and_another_file_is_refused(tmp_path
     with pytest.raises(ValueError, match="column 'rays' is missing"):
         read_csv(tmp_path / "other.csv")
     assert invoke(["study", "tradeoff", "--beside", str(tmp_path / "none.csv"), "--out", str(tmp_path / "o")]) == 2
+
+
+@pytest.mark.parametrize(("column", "value"), [("error_db", "inf"), ("seconds", "-1"), ("default", "maybe")])
+def test_rows_that_cannot_be_are_refused_by_their_line(tmp_path, column, value):
+    with write_csv([row("a", 10.0, 1.0, 3.0)], tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
+        (line,) = csv.DictReader(file)
+    head, body = ",".join(line), ",".join((line | {column: value}).values())
+    (tmp_path / "bad.csv").write_text(f"{head}\n{body}\n")
+    with pytest.raises(ValueError, match="line 2 is not one"):
+        read_csv(tmp_path / "bad.csv")
+    (tmp_path / "empty.csv").write_text(f"{head}\n")
+    with pytest.raises(ValueError, match="no rows"):
+        read_csv(tmp_path / "empty.csv")
+
+
+def of_cases(*names):
+    """Return rows of one setting on cases, each of a second and 1 dB, and those of all."""
+    rows = [Row(name, name, "t", 0.01, "m", "s", True, 10.0, 1.0, 1.0) for name in names]
+    return rows + overall(rows)
+
+
+def test_an_earlier_run_is_compared_on_the_cases_of_both():
+    """Of five cases and two the front of all is that of the two; where it lacks one there is none, and a line."""
+    both, said = comparable(of_cases("plate", "sphere"), of_cases("plate", "sphere", "car", "urban"))
+    (whole,) = (r for r in both if r.case == "all")
+    assert whole.seconds == 2.0 and "2 targets" in whole.title and "car, urban" in said[0]
+    both, said = comparable(of_cases("plate", "sphere"), of_cases("plate", "car"))
+    assert {r.case for r in both} == {"plate"} and "lacks sphere" in said[0] and "has car" in said[1]
+    assert comparable(of_cases("plate"), of_cases("plate"))[1] == []
+
+
+def test_a_case_named_twice_runs_once(tmp_path):
+    rows = tradeoff(("dihedral", "dihedral"), quick=True)
+    assert len({(r.method, r.setting) for r in rows}) == len(rows)
 
 
 def test_verdict_names_what_beats_the_default_and_where_that_fails():
