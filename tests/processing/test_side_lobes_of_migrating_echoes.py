@@ -51,6 +51,24 @@ def test_the_envelope_bounds_the_direct_sum_about_each_peak_and_is_no_higher_tha
     assert all((seen / bound)[(bands == k) & (bound > 1e-10)].max() > 0.25 for k in np.unique(bands))
 
 
+@pytest.mark.parametrize(
+    ("names", "moved"), [(("rect", "rect"), 4.9), (("hamming", "taylor(30)"), 3.0), (("rect", "hamming"), 40.0)]
+)
+def test_the_envelope_of_frames_of_many_samples_is_that_of_fewer_and_bounds_the_direct_sum(names, moved):
+    """Of 900 x 700 samples, by a table of 512 each: also farther off than that reaches, and to its last cells."""
+    count, rng = (900, 700), np.random.default_rng(4)
+    envelope = MigratingEnvelope(names, count, moved)
+    fine = np.stack(np.meshgrid(*[np.arange(0.0, 0.5 * moved + 1.0, 0.25)] * 2, indexing="ij"), -1).reshape(-1, 2)
+    top = direct_sum(names, count, moved, 1, fine).max()
+    places = rng.uniform(0.0, 1.0, (150, 2)) ** 2 * [0.5 * count[0], 0.5 * count[1]]
+    ends = [[255.9, 3.0], [256.0, 0.5], [300.3, 1.2], [2.1, 255.9], [0.3, 340.5], [449.5, 0.0]]
+    places = np.concatenate([places, ends])
+    seen, bound = direct_sum(names, count, moved, 1, places) / top, envelope(*places.T)
+    assert (seen <= 10.0**0.18 * bound + 1e-12).all()
+    near = (places < 64.0).all(axis=1)
+    assert envelope.table.shape == (513, 513) and (seen / bound)[near].max() > 0.25
+
+
 @pytest.mark.parametrize("windows", [("rect", "rect"), ("rect", "taylor(30)"), ("hamming", "rect")])
 @pytest.mark.parametrize("elements", [1, 4])
 def test_an_echo_that_migrates_is_one_detection(windows, elements):
