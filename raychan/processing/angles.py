@@ -8,6 +8,7 @@ transmitters echoes may be folded differently: each is a wave in what the slots 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from raychan.processing.doa import amplitudes, estimate
 from raychan.processing.slots import LONE, Slots
 from raychan.radar.aperture import Aperture
+from raychan.radar.measured import beside_line
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -46,14 +48,25 @@ class Scan:
         """Return the share of echoes' power (n,) that one plane wave in one range cell cannot fit, an upper estimate.
 
         Args: directions, cosines (n, 2); distances (n,) [m].
-        Two causes: the element farthest out sees the echo earlier by x range cells, on the slope of the window's
+        Three causes: the element farthest out sees the echo earlier by x range cells, on the slope of the window's
         response (at most 2 x of the amplitude); and the wave is curved, by the phase k D^2 / 8 r at the rim, of
-        whose power 4/45 is left by the best plane (integral of the parabola less its mean).
+        whose power 4/45 is left by the best plane (integral of the parabola less its mean); and of a line that spreads
+        a little beside itself beams are those of a straight one.
         """
         extent = np.ptp(self.aperture.elements, axis=0)
         early = 0.25 * (np.abs(directions) @ extent[1:]) / self.range_resolution
         bend = 2.0 * np.pi / self.aperture.wavelength * float(extent @ extent) / (8.0 * np.maximum(distances, 1e-3))
-        return np.asarray(np.minimum(1.0, _FLOOR + _SAFETY * ((2.0 * early) ** 2 / 3.0 + 4.0 / 45.0 * bend**2)))
+        share = _FLOOR + self._beside + _SAFETY * ((2.0 * early) ** 2 / 3.0 + 4.0 / 45.0 * bend**2)
+        return np.asarray(np.minimum(1.0, share))
+
+    @cached_property
+    def _beside(self) -> float:
+        """Share of an echo's power that a beam reads, at most, of what places beside a line make of its wave."""
+        scans, places = self.aperture.scans, self.aperture.elements[:, 1:] / self.aperture.wavelength
+        if sum(scans) != 1:
+            return 0.0
+        axis = 0 if scans[0] else 1
+        return beside_line(places[:, axis], places[:, 1 - axis], 1.0 / float(self.aperture.beamwidth[axis]))
 
     def conventional(self, direction: Floats) -> Complexes:
         """Return the weights (s, a) of beams towards cosines (2,) and half a beam width to all sides of it."""

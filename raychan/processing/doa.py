@@ -75,7 +75,9 @@ def doa(
     if not is_one_of(method, METHODS):
         raise ValueError(f"method {shown(method)}: must be one of {', '.join(METHODS)}{meant(method, METHODS)}")
     if not any(aperture.scans):
-        raise ValueError("elements: no spread along y or z, or along a slanted line; such an array measures no angle")
+        raise ValueError(
+            "elements: too little spread along y and z, under a sixth of a wavelength; such an array measures no angle"
+        )
     most = len(aperture.elements) - 1
     if sources is not None and not 0 <= sources <= most:
         raise ValueError(f"sources = {sources}: {len(aperture.elements)} elements tell 0 to {most} apart")
