@@ -25,10 +25,13 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _MOST = 8  # echoes in a cell
 _FLOOR = 1e-4  # of a cell's strongest echo: what a wave that is no plane one to rounding and side lobes leaves
+_TOLD_BY_LINES, _TOLD_BY_PLANES = 1.0, 0.75
+"""Beam widths: echoes farther apart are told apart by Bartlett's beams. Of 120 pairs 0.3 to 1.5 of them apart before
+rectangles 11 are lost so without a word, of 1.0 28, and no run has more echoes than there are."""
 _APART = 0.05  # beam widths: nearer echoes share their power at the noise's whim (not measured)
 _UNTOLD = 0.01  # of an echo's power: waves that were not told apart, weaker than this, move its level by 0.9 dB at most
 _UNTOLD_EVEN = 0.1
-"""The same before a uniform line or rectangle, whose side lobes are low: of 215 cells of streets before lines of 8, 16
+"""The same before a uniform line, whose side lobes are low: of 215 cells of streets before lines of 8, 16
 and 64 two leave that much."""
 _ROUNDS = 20  # of seeking the echoes of different folds by turns (not measured)
 _STILL = 1e-4  # beam widths: echoes of different folds that move less have arrived (not measured)
@@ -117,7 +120,7 @@ class CellEchoes:
     def unsure(self, aperture: Aperture) -> NDArray[np.bool_]:
         """Return which directions (k,) may be those of sums of waves not told apart: wrong by a part of a beam width
         before uniform lines and rectangles, by more where side lobes are high."""
-        share = _UNTOLD if aperture.table is None else _UNTOLD_EVEN
+        share = _UNTOLD_EVEN if aperture.uniform else _UNTOLD
         return np.asarray((self.rest > share * self.power) & (not self.explained))
 
 
@@ -126,7 +129,7 @@ def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float, sl
 
     Args: least, power [W] below which a beam is noise; distance [m] of the cell; slots of transmitters. Two echoes are
     told apart where both exceed `least` in their beams and what of both is no plane wave; by Bartlett's beams those of
-    one fold only a beam width apart."""
+    one fold only a beam width apart, or three quarters of it where both angles are measured."""
     cell = _Cell(snapshot[None, :].astype(np.complex128), scan, slots, least, distance)
     most = min(_MOST, len(scan.aperture.elements) // 2)
     found = cell.grown(slots.folds[:1], most)
@@ -223,7 +226,8 @@ class _Cell:
             return None
         left = [self._energy(way) for way in ways]
         way = next(way for way, rest in zip(ways, left, strict=True) if rest <= min(left) + self._clear(found))
-        apart = 1.0 if self.scan.method == "bartlett" else _APART
+        told = _TOLD_BY_PLANES if all(self.scan.aperture.scans) else _TOLD_BY_LINES
+        apart = told if self.scan.method == "bartlett" else _APART
         near = any(_nearest(x, self.scan.aperture) < apart for x in way.values())
         return None if near else self.told(way)
 
