@@ -59,7 +59,8 @@ def covariance(snapshots: Complexes, aperture: Aperture, smoothing: float | None
         size = [max(1, int(np.ceil(smoothing * n - 1e-9))) for n in aperture.table.shape]
         starts = np.ndindex(*(n - m + 1 for n, m in zip(aperture.table.shape, size, strict=True)))
         rows = [aperture.table[i : i + size[0], k : k + size[1]].ravel() for i, k in starts]
-    part = Aperture(aperture.elements[rows[0]], aperture.wavelength) if smoothing < 1.0 else aperture
+    axes = aperture.scans if sum(aperture.scans) == 1 else None  # a short part of a line is one, too
+    part = Aperture(aperture.elements[rows[0]], aperture.wavelength, axes) if smoothing < 1.0 else aperture
     data = np.concatenate([snapshots[:, index] for index in rows])
     matrix = data.T @ data.conj() / len(data)
     turned = mirrored(part)

@@ -17,7 +17,7 @@ from raychan.processing.joint_search import joint
 from raychan.processing.monopulse import monopulse
 from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, Bartlett, beams_of, capon, music, peaks
-from raychan.processing.twins import ambiguous
+from raychan.processing.twins import ambiguous, nearest_boresight
 from raychan.radar.aperture import Aperture
 from raychan.radar.declared import check_type, reals
 from raychan.scalars import is_one_of, meant, shown
@@ -75,7 +75,9 @@ def doa(
     if not is_one_of(method, METHODS):
         raise ValueError(f"method {shown(method)}: must be one of {', '.join(METHODS)}{meant(method, METHODS)}")
     if not any(aperture.scans):
-        raise ValueError("elements: no spread along y or z, or along a slanted line; such an array measures no angle")
+        raise ValueError(
+            "elements: too little spread along y and z, under a sixth of a wavelength; such an array measures no angle"
+        )
     most = len(aperture.elements) - 1
     if sources is not None and not 0 <= sources <= most:
         raise ValueError(f"sources = {sources}: {len(aperture.elements)} elements tell 0 to {most} apart")
@@ -106,7 +108,12 @@ def _counted(data: Complexes, aperture: Aperture, criterion: str, smoothing: flo
 
 
 def estimate(data: Complexes, aperture: Aperture, method: str, count: int, made: Covariance | None = None) -> Floats:
-    """Return the cosines (k, 2) of at most `count` echoes in snapshots (n, a), by a method of METHODS."""
+    """Return the cosines (k, 2) of at most `count` echoes in snapshots (n, a), by a method of METHODS; of directions
+    alike about the plane of a tilted array those nearest boresight."""
+    return nearest_boresight(aperture, _sought(data, aperture, method, count, made))
+
+
+def _sought(data: Complexes, aperture: Aperture, method: str, count: int, made: Covariance | None) -> Floats:
     if method == "bartlett":
         return by_turns(data, aperture, count)
     if method == "monopulse":

@@ -46,7 +46,7 @@ class Beams:
         """Return the beams of a radar."""
         array = Aperture(radar.virtual_elements, C0 / radar.waveform.middle)
         places = array.elements / array.wavelength
-        counts = np.ceil(_PER_BEAM * np.ptp(places[:, 1:], axis=0)).astype(int)
+        counts = np.ceil(_PER_BEAM * np.ptp(array.places, axis=0) / array.wavelength).astype(int)
         y, z = (np.linspace(-1.0, 1.0, 2 * n + 1) if n else np.zeros(1) for n in counts)
         at = np.stack([x.ravel() for x in np.meshgrid(y, z)], axis=1)
         return cls(array, places, at[(at**2).sum(axis=1) <= 1.0], np.where(counts, 1.0 / np.maximum(counts, 1), 0.0))

@@ -46,7 +46,9 @@ def range_azimuth(map: RangeDoppler, elements: Any, wavelength: float, taper: st
     """
     aperture = Aperture(np.asarray(elements, np.float64), float(wavelength))
     if not aperture.scans[0]:
-        raise ValueError("elements: no spread along y, or on a slanted line; such an array measures no azimuth")
+        raise ValueError(
+            "elements: too little spread along y, or a line nearer to z; such an array measures no azimuth"
+        )
     bank = BeamBank(aperture, taper)
     sines = _sines(aperture)
     heights = aperture.grid(2).w

@@ -16,7 +16,7 @@ from scipy.ndimage import maximum_filter
 
 from raychan.processing.climb_kernels import ALONE, Beams, climb_beams, snapshots_for
 from raychan.processing.covariance import Covariance
-from raychan.processing.twins import neighbours
+from raychan.processing.twins import nearest_boresight, neighbours
 from raychan.radar.aperture import Aperture, Grid
 
 Floats = NDArray[np.float64]
@@ -137,7 +137,8 @@ def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Fl
     top = np.flatnonzero(values >= values[neighbours(aperture, at)].max(axis=1))
     start = at[top[np.argsort(-values[top], kind="stable")[: 2 * count]]]
     found, heights = climb(form, aperture, start, aperture.grid(per_beam))
-    return found[np.argsort(-heights, kind="stable")[:count]]
+    # A maximum and its mirror image about the plane of a tilted array are one.
+    return _once(nearest_boresight(aperture, found[np.argsort(-heights, kind="stable")]), aperture, count)
 
 
 def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Floats, Floats]:

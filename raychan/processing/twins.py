@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from raychan.processing.staggered import CLEAR
 from raychan.radar.aperture import ALIKE, SAME_EDGE, Aperture
 from raychan.radar.lobes import HALF
+from raychan.radar.measured import SAME
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -41,6 +42,27 @@ def ambiguous(aperture: Aperture, cosines: Floats, snr: Floats | None = None) ->
     if not len(cosines):
         return np.zeros(0, bool)
     return _of_flat(aperture, cosines, snr) if aperture.flat else _of_deep(aperture, cosines, snr)
+
+
+def nearest_boresight(aperture: Aperture, cosines: Floats) -> Floats:
+    """Return, of directions (n, 2) and their mirror images about the plane of an array that lies in one, those nearest
+    boresight."""
+    if aperture.flat or not any(aperture.scans):
+        return cosines
+    image, ahead, off = _mirrored(aperture, cosines)
+    nearer = ahead & ((image**2).sum(axis=1) < (cosines**2).sum(axis=1) - SAME_EDGE)
+    return np.where(nearer[:, None] & (off <= SAME), image, cosines)
+
+
+def _mirrored(aperture: Aperture, cosines: Floats) -> tuple[Floats, Bools, float]:
+    """Return the mirror images (n, 2) of directions about the plane that fits the elements best, which of them are
+    ahead, and how far elements stand off that plane [wavelengths]; of one angle, in the plane in which it is taken."""
+    axes = np.array([0, *(1 + np.flatnonzero(aperture.scans))])
+    places = (aperture.elements - aperture.elements.mean(axis=0))[:, axes] / aperture.wavelength
+    normal = np.linalg.eigh(places.T @ places)[1][:, 0]
+    look = np.column_stack([np.sqrt(np.maximum(1.0 - (cosines**2).sum(axis=1), 0.0)), cosines])
+    look[:, axes] -= 2.0 * np.outer(look[:, axes] @ normal, normal)
+    return look[:, 1:], look[:, 0] > 0.0, float(np.ptp(places @ normal))
 
 
 def neighbours(aperture: Aperture, at: Floats) -> Ints:
@@ -82,7 +104,9 @@ def _of_deep(aperture: Aperture, cosines: Floats, snr: Floats) -> Bools:
         g, i = np.nonzero(power > _NEAR)
         top = power[g, i] >= power[beside[g], i[:, None]].max(axis=1)
         g, i = g[top], some[i[top]]
-        twin, lost = _climbed(aperture, cosines[i], at[g])
+        image, ahead = _mirrored(aperture, cosines[some])[:2]
+        start, i = np.concatenate([at[g], image[ahead]]), np.concatenate([i, some[ahead]])
+        twin, lost = _climbed(aperture, cosines[i], start)
         inside = (twin**2).sum(axis=1) < 1.0 - SAME_EDGE
         close = np.where(inside, _alike(lost, snr[i]), (lost <= ALIKE) | (lost * snr[i] < 0.5 * _SIGMAS**2))
         out[i[close & (_angle(cosines[i], twin) > 0.5 * _beam(aperture))]] = True

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.lobes import Lobes, of_places, on_rectangle
+from raychan.radar.measured import SAME, beam_width, measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
-_SAME = 1e-3  # wavelengths: elements nearer than this along an axis share a coordinate; 6 mrad of phase
 _EDGE = 1e-9
 ALIKE = 1e-4
-"""Of a beam's power: lobes that lose less are as strong, however weak the noise; places within _SAME lose 4e-5."""
+"""Of a beam's power: lobes that lose less are as strong, however weak the noise; places within SAME lose 4e-5."""
 SAME_EDGE = 1e-6
 """Of a squared cosine: +90 and -90 deg are one to elements half a wavelength apart."""
 _KEPT = 1 << 21  # steering values kept between searches, 32 MB; more are made anew each time
@@ -58,13 +58,15 @@ class Grid:
 class Aperture:
     """Elements (a, 3) [m] in the antenna's frame, at a wavelength [m].
 
-    A line along y measures azimuth (elevation 0 is assumed), a line along z elevation; elements that spread along y and
-    z, not on one line, measure both; others measure nothing. Directions are taken ahead of the antenna. With depth
-    (along x) and one angle all beams are of elevation, or azimuth, 0, and fit no wave from elsewhere.
+    A line along y measures azimuth (elevation 0 is assumed), a line along z elevation, a slanted line that of the
+    nearer axis; elements that spread along y and z, not on one line, measure both; others measure nothing. Directions
+    are taken ahead of the antenna. With depth (along x) and one angle all beams are of elevation, or azimuth, 0, and
+    fit no wave from elsewhere. A part of an array may be told which cosines the whole measures, `axes`.
     """
 
     elements: Floats
     wavelength: float
+    axes: tuple[bool, bool] | None = None
 
     def __post_init__(self) -> None:
         elements = np.asarray(self.elements, np.float64)
@@ -76,23 +78,23 @@ class Aperture:
 
     @cached_property
     def scans(self) -> tuple[bool, bool]:
-        """Whether the cosine along y, and that along z, can be measured."""
-        across = self.elements[:, 1:] - self.elements[0, 1:]
-        spread = np.ptp(across, axis=0) > _SAME * self.wavelength
-        if spread.all() and np.linalg.matrix_rank(across, tol=_SAME * self.wavelength) < 2:
-            return False, False  # a slanted line: a cone of directions looks alike
-        return bool(spread[0]), bool(spread[1])
+        """Whether the cosine along y, and that along z, is measured."""
+        return measured(self.elements, self.wavelength) if self.axes is None else self.axes
+
+    @cached_property
+    def places(self) -> Floats:
+        """Places (a, 2) [m] along y and z from the first of each; 0 along an axis whose cosine is not measured."""
+        return (self.elements[:, 1:] - self.elements[:, 1:].min(axis=0)) * self.scans
 
     @cached_property
     def index(self) -> Ints:
         """Place (a, 2) of each element on the lattice along y and z."""
-        across = self.elements[:, 1:] - self.elements[:, 1:].min(axis=0)
-        return np.rint(across / np.where(self.pitch > 0.0, self.pitch, 1.0)).astype(np.int64)
+        return np.rint(self.places / np.where(self.pitch > 0.0, self.pitch, 1.0)).astype(np.int64)
 
     @cached_property
     def pitch(self) -> Floats:
         """Lattice spacing (2,) [m] along y and z: the greatest of which all spacings are multiples; 0 for one row."""
-        return np.array([_pitch(x, _SAME * self.wavelength) for x in self.elements[:, 1:].T])
+        return np.array([_pitch(x, SAME * self.wavelength) for x in self.places.T])
 
     @cached_property
     def period(self) -> Floats:
@@ -128,18 +130,16 @@ class Aperture:
 
     @cached_property
     def beamwidth(self) -> Floats:
-        """Distance (2,) of the first null from the peak of a beam, in cosines along y and z; infinite for one row."""
-        rows = [np.unique(np.rint(x / (_SAME * self.wavelength))) for x in self.elements[:, 1:].T]
-        extents = np.ptp(self.elements[:, 1:], axis=0)
-        sizes = [x * len(r) / (len(r) - 1) if len(r) > 1 else 0.0 for x, r in zip(extents, rows, strict=True)]
-        return np.array([self.wavelength / x if x > 0.0 else np.inf for x in sizes])
+        """Distance (2,) of the first null from the peak of a beam, in cosines along y and z; infinite where they are
+        not measured."""
+        return np.array([beam_width(x, self.wavelength) for x in self.places.T])
 
     @cached_property
     def table(self) -> Ints | None:
         """Elements (ny, nz) by their place where they fill a rectangle on the lattice, else None."""
         size = self.index.max(axis=0) + 1
         flat = self.index[:, 0] * size[1] + self.index[:, 1]
-        if np.prod(size) != len(flat) or len(np.unique(flat)) != len(flat) or np.ptp(self.elements[:, 0]) > 0.0:
+        if np.prod(size) != len(flat) or len(np.unique(flat)) != len(flat) or not self.flat:
             return None
         out = np.empty(size, np.int64)
         out[self.index[:, 0], self.index[:, 1]] = np.arange(len(flat))
@@ -148,14 +148,14 @@ class Aperture:
     @property
     def flat(self) -> bool:
         """Whether all elements stand in one plane across the look ahead."""
-        return self.depth <= _SAME
+        return self.depth <= SAME
 
     @cached_property
     def lobes(self) -> Lobes:
         """Grating lobes of the elements, as if they were flat."""
         if self.table is not None:
             return on_rectangle(self.period, self.beamwidth)
-        return of_places(self.elements[:, 1:] / self.wavelength, np.where(self.scans, self.beamwidth, np.inf))
+        return of_places(self.places / self.wavelength, self.beamwidth)
 
     @cached_property
     def skewed(self) -> Floats:
@@ -187,7 +187,7 @@ class Aperture:
                 n = max(2, int(np.ceil(per_beam * period / width - 1e-6)))
                 axes.append((np.arange(n) - n // 2) * (period / n))
             else:
-                axes.append(np.linspace(-1.0, 1.0, int(np.ceil(2.0 * per_beam / width)) + 1))
+                axes.append(np.linspace(-1.0, 1.0, max(2, int(np.ceil(2.0 * per_beam / width))) + 1))
         inside = axes[0][:, None] ** 2 + axes[1][None, :] ** 2 <= 1.0 + _EDGE
         return Grid(axes[0], axes[1], inside, self.wraps)
 

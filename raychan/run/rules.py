@@ -241,8 +241,8 @@ def _ambiguities(scene: Scene) -> list[str]:
             )
     if len(radar.elements) > 1 and asked.beams == "coherent" and not any(aperture_of(radar).scans):
         said.append(
-            "the receivers have no spread along y or z: no azimuth, and their powers are averaged instead of added in "
-            "phase (radar.elements_mm)"
+            "the receivers spread too little along y and z, under a sixth of a wavelength: no azimuth, and their "
+            "powers are averaged instead of added in phase (radar.elements_mm)"
         )
     return said
 

@@ -79,9 +79,9 @@ def test_directions_at_both_sides_are_near_each_other_where_grating_lobes_meet()
     assert Aperture(rc.uniform_array(8, 0.45), 1.0).apart(one, other) == pytest.approx(1.96 * 8 * 0.45)
 
 
-def test_a_grid_of_two_directions_still_finds_the_maximum_between_them():
+def test_a_grid_of_three_directions_still_finds_the_maximum_between_them():
     """Elements so near each other that a beam is wider than all directions."""
-    line = Aperture(rc.uniform_array(2, 0.01), 1.0)
+    line = Aperture(rc.uniform_array(2, 0.01), 1.0, axes=(True, False))
     wave = line.steering(cosines(0.4))
     assert peaks(Bartlett(wave), line, 1, BEAMS_PER_BEAM)[0, 0] == pytest.approx(np.sin(0.4), abs=2e-3)
 

@@ -52,3 +52,21 @@ def test_a_body_off_the_plane_of_a_circle_is_told_with_what_its_best_beam_loses(
 
 def test_a_flat_line_and_a_plane_say_nothing_of_elevation():
     assert not any("off elevation" in x for e in (LINE, PLANE) for x in scene(e, elevation=60.0).warnings)
+
+
+@pytest.mark.parametrize(
+    ("towards", "azimuth", "elevation", "shown"),
+    [
+        ((1.0, 0.0, 1.0), 16.7, 0.0, "elevation -2.5 deg in place of 0.0"),
+        ((0.0, 1.0, 1.0), 16.7, 16.0, "azimuth 33.3 deg in place of 16.7"),
+        ((1.0, 1.0, 0.0), 20.0, 0.0, None),
+        ((0.0, 1.0, 1.0), 20.0, 0.0, None),
+        ((0.0, 1.0, 0.001), 20.0, 30.0, None),
+    ],
+    ids=["x+z", "y+z", "x+y in its plane", "y+z in its plane", "all but along y"],
+)
+def test_a_line_slanted_or_deep_tells_where_a_body_off_its_plane_shows(towards, azimuth, elevation, shown):
+    line = 0.5 * LAMBDA * np.outer(np.arange(12) - 5.5, np.array(towards) / np.linalg.norm(towards))
+    said = [x for x in scene(line, azimuth=azimuth, elevation=elevation).warnings if "stands off" in x]
+    assert len(said) == (shown is not None)
+    assert all(f"shows near {shown}" in x for x in said)
