@@ -105,14 +105,13 @@ def spectrogram(
     wave = scene.radar.waveform
     count = max(2, 1 + round(duration * tracings_per_second))
     radar = replace(scene.radar, waveform=replace(wave, n_chirps=chirps))
-    long = _with(scene, radar)
     cells = _cells(radar, ranges)
     _check_memory(duration, chirps * len(cells) * len(radar.elements), radar)
     tell = Clock(progress).tell
     rng, slow, signal, error, clipped = stream(seed, Stage.NOISE), list[Samples](), 0.0, 0.0, 0
     spoilt = list[Samples]()
     rule = fine_rule(scene.radar, scene.processing, model)
-    for quiet, off in stretches(long, rule, model, count, lambda share: tell("trace", share)):
+    for quiet, off in stretches(_with(scene, radar), rule, model, count, lambda share: tell("trace", share)):
         signal, error = signal + float((np.abs(quiet) ** 2).sum()), error + float((np.abs(off) ** 2).sum())
         cube = Cube(quiet.astype(np.complex64), 0.0)
         spoilt += _rounded(cube, radar, cells)
@@ -123,8 +122,7 @@ def spectrogram(
     time, rate, power, gain = _transformed(np.concatenate(slow, axis=1), radar, length)
     # The range window spreads an echo over neighbouring cells, whose powers add up to this times its own.
     spread = wave.n_samples * _range_gain(radar)
-    noise = radar.noise_power / wave.n_samples * gain * len(cells) if radar.noise else 0.0
-    noise *= 1.0 if wave.complex_sampling else 2.0
+    noise = _noise(radar, gain * len(cells))
     return Spectrogram(
         time=time,
         rate=rate,
@@ -153,6 +151,13 @@ def _rounded(cube: Cube, radar: Radar, cells: NDArray[np.int64]) -> list[Samples
     if rounding is None:
         return []
     return [np.stack([_range_cells(Cube(x, 0.0), radar, cells) for x in (rounding.signal, rounding.error)])]
+
+
+def _noise(radar: Radar, gain: float) -> float:
+    """Return the thermal noise [W] of cells that hold such a share of that of a sample, over all samples of a ramp."""
+    if not radar.noise:
+        return 0.0
+    return radar.noise_power / radar.waveform.n_samples * gain * (1.0 if radar.waveform.complex_sampling else 2.0)
 
 
 def _coarse(spoilt: list[Samples], radar: Radar, length: int, spread: float, noise: float) -> list[str]:
