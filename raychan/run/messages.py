@@ -34,11 +34,8 @@ def counts(found: ExplainedDetections, tolerance_db: float | None) -> dict[str, 
     }
 
 
-def warned(
-    found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, radar: Radar | None = None
-) -> list[str]:
-    """Return a line if detections are not converged, and one if some are folded, or ambiguous, or lose by what the
-    receiver of a radar makes of them."""
+def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler) -> list[str]:
+    """Return a line if detections are not converged, and one if some are folded, or ambiguous."""
     said = []
     if (~found.converged).any():
         verb = _verb(~found.converged)
@@ -64,7 +61,7 @@ def warned(
             f"number {first + 1} is at {true}, shown at {shown}"
         )
     said += unsure(found, rdmap)
-    return said if radar is None else said + mirrored(found, rdmap, radar) + lost(found, radar)
+    return said
 
 
 def mirrored(found: ExplainedDetections, rdmap: RangeDoppler, radar: Radar) -> list[str]:
@@ -101,11 +98,13 @@ def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
     return said
 
 
-def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
+def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Radar) -> list[str]:
     """Return a line each if detections lose by spherical waves in a beam, by ranges that differ over the elements, or
     by migration over range cells."""
     said = []
-    loss = near_field_losses(found, radar)
+    # The receiver's DC offset is no wave.
+    wave = np.array([why.label != DC for why in reasons], bool)
+    loss = wave * near_field_losses(found, radar)
     if (near := loss > _LOST_DB).any():
         limit = far_field_distance(radar)
         said.append(
@@ -113,7 +112,7 @@ def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
             f"wavelength = {limit:.3g} m: beams are those of plane waves and read up to {loss.max():.1f} dB less of a "
             "spherical one"
         )
-    differ, loss = range_spread(found, radar)
+    differ, loss = (wave * x for x in range_spread(found, radar))
     if (wide := loss > _LOST_DB).any():
         said.append(
             f"{share_of(wide)} {'has' if wide.sum() == 1 else 'have'} ranges that differ over the elements "
@@ -208,7 +207,8 @@ def told(
     return [
         *no_echoes(reasons),
         *not_reciprocal(reasons, tolerance_db),
-        *warned(found, tolerance_db, rdmap, radar),
+        *warned(found, tolerance_db, rdmap),
+        *([] if radar is None else [*mirrored(found, rdmap, radar), *lost(found, reasons, radar)]),
         *noted(found, tolerance_db, ledger),
     ]
 

@@ -189,6 +189,8 @@ def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]
     SceneError for a target that fluctuates, which only `simulate` draws."""
     if scene.radar.rx_position is not None:
         raise ValueError("a spectrogram is of receivers beside the transmitter: radar.rx_position is elsewhere")
+    if scene.radar.rx_polarization == "both":
+        raise ValueError('a spectrogram is of receivers of one polarisation: radar.rx_polarization = "both" has two')
     if len(scene.radar.tx_elements) > 1:
         raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
     if scene.radar.waveform.stagger:

@@ -129,6 +129,17 @@ def test_a_receiver_elsewhere_is_refused_for_what_it_is():
         rc.spectrogram(scene(rx_position=(0.0, 5.0, 0.5)), 0.1)
 
 
+def test_receivers_of_both_polarisations_are_refused_for_what_they_are(tmp_path, capsys):
+    given = scene(rx_polarization="both")
+    with pytest.raises(ValueError, match=r'receivers of one polarisation: radar\.rx_polarization = "both" has two'):
+        rc.spectrogram(given, 0.1)
+    (tmp_path / "s.toml").write_text(given.to_toml(), encoding="utf-8")
+    assert invoke(["spectrogram", str(tmp_path / "s.toml"), "--seconds", "0.1", "--out", str(tmp_path / "o")]) == 2
+    said = capsys.readouterr().err
+    assert "of receivers of one polarisation" in said and "retrace" not in said
+    assert not (tmp_path / "o").exists()
+
+
 def test_the_command_gives_one_stretch_and_refuses_a_receiver_elsewhere_by_its_exit_code(tmp_path, capsys):
     wave = "[radar.waveform]\nbandwidth_mhz = 300.0\nchirp_us = 60.0\nchirps = 64\nsamples = 64\n"
     ball = '[[bodies]]\nname = "ball"\nshape = "sphere"\nposition = [10.0, 0.0, 0.5]\nrcs_dbsm = 10.0\n'
