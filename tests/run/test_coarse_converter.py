@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.cli import invoke
 from raychan.signal.converter import quantized, rounding_error
 from raychan.units import C0, db, undb
 
@@ -109,3 +110,11 @@ def test_without_noise_the_line_does_not_speak_of_noise():
     found, _ = run(10.0, 18.0, noise=False)
     (line,) = told(found)
     assert "dBm is coarse, without noise: rounding " in line
+
+
+def test_the_command_prints_the_line_and_succeeds(tmp_path, capsys):
+    found, _ = run(20.0, 18.0)
+    (tmp_path / "s.toml").write_text(found.scene.to_toml(), encoding="utf-8")
+    assert invoke(["run", str(tmp_path / "s.toml"), "--seed", "2", "--out", str(tmp_path / "o")]) == 0
+    printed = capsys.readouterr()
+    assert " ".join(told(found)[0].split()) in " ".join((printed.out + printed.err).split())
