@@ -31,6 +31,7 @@ Complexes = NDArray[np.complex128]
 _AT_ONCE = 32  # as many times fewer paths pass a beam at a time as memory holds, so that threads share them
 _LITTLE = 1e-3  # of a detection's amplitude: largest sum of the paths left out of a beam (not measured)
 UNEXPLAINED = 0.1  # a cell is noise if its paths give less than this share of its power (not measured)
+_OTHER = 30.0  # times a detection's power: paths at the middle that bring more are of another echo (not measured)
 
 
 @on_one_blas_thread
@@ -97,7 +98,10 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
             )
             off = sign[part] * paths.range_rate[some[part]] - found.rate[row]
             held = _in_slots(radar, weights.shape[1], sent, off, sign[part])
-            beam[part] = (held * (seen @ weights)).sum(axis=1)
+            whole = (held * (seen @ weights)).sum(axis=1)
+            # The little that is left of an echo in slots of another rate is none of a detection at that rate.
+            leak = _folded(radar, off) & (np.abs(whole) ** 2 * _OTHER < 1.0)
+            beam[part] = np.where(leak, 0.0, whole)
 
         parallel_tasks(len(parts), one)
         return np.where(mirrored, beam.conj(), beam)
@@ -115,6 +119,13 @@ def _phases(radius: Floats, look: Floats, elements: Floats, turn: float) -> NDAr
     found = np.empty(phase.shape, np.complex64)
     found.real, found.imag = np.cos(phase), np.sin(phase)
     return found
+
+
+def _folded(radar: Radar, off: Floats) -> Bools:
+    """Return which paths (n,), whose rates are so far off [m/s] those for which transmitters are told apart, stand in
+    other slots of Doppler division."""
+    spacing = C0 / (2.0 * radar.waveform.middle * radar.waveform.repetition * radar.slots)
+    return (radar.multiplexing == "ddm") & (np.abs(off) > 0.5 * spacing)
 
 
 def _in_slots(radar: Radar, many: int, sent: Complexes, off: Floats, sign: Ints) -> Complexes:
@@ -142,7 +153,7 @@ def wave_in_beam(
 ) -> Complexes | None:
     """Return what an array's beam lets through of each path (n,) that may bring something to a detection, 0 of others;
     None where that does not explain it, but what arrives at the middle of the array does: the direction of an
-    ambiguous detection may not be that of its echo.
+    ambiguous detection may not be that of its echo. Paths that bring far more than it are of another echo of its cell.
 
     Args: at (3,) range [m], rate [m/s] and amplitude of the detection's peak in the map; power [W] of the cell and of
     the detection, a row of those that the beams are of."""
@@ -152,7 +163,11 @@ def wave_in_beam(
     wave = np.zeros_like(paths.amplitude)
     wave[near] = paths.amplitude[near] * beams.passed(row, near, _mirrored(paths, response, near, at))
     seen = response.in_cell(wave, *place)[0].sum()
-    other = unexplained(seen, power[1], receiver) and not unexplained(middle.sum(), power[0], receiver)
+    # What leaks into slots of another rate is no echo of this detection, at whatever place.
+    middle[near[wave[near] == 0.0]] = 0.0
+    brought = complex(middle.sum())
+    other = unexplained(seen, power[1], receiver) and not unexplained(brought, power[0], receiver)
+    other = other and abs(brought) ** 2 * receiver.power <= _OTHER * power[1]
     return None if other else wave
 
 

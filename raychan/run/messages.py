@@ -35,16 +35,13 @@ def counts(found: ExplainedDetections, tolerance_db: float | None) -> dict[str, 
     }
 
 
-def warned(
-    found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler, radar: Radar | None = None
-) -> list[str]:
-    """Return a line if detections are not converged, and one if some are folded, or ambiguous, or lose by what the
-    receiver of a radar makes of them."""
+def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler) -> list[str]:
+    """Return a line if detections are not converged, and one if some are folded, or ambiguous."""
     said = []
     if (~found.converged).any():
         verb = _verb(~found.converged)
         said.append(
-            f"{_of(~found.converged)} {verb} not converged ({_numbers(~found.converged)}): the last two launches "
+            f"{share_of(~found.converged)} {verb} not converged ({numbers(~found.converged)}): the last two launches "
             f"differ there by about as much as they find, so the error is unknown; more of the budget that "
             f"ended it (model.max_rays, max_seconds, max_memory_mb) or a smaller tolerance than {tolerance_db:g} dB "
             "(--tolerance, model.tolerance_db) may help"
@@ -61,12 +58,12 @@ def warned(
             near = (found.true_range <= rdmap.unambiguous_range) & (np.abs(found.true_rate) <= limit)
             open_ = ", and a slower one where noise leaves its fold open" if (found.folded & near).any() else ""
         said.append(
-            f"{_of(found.folded)} {_verb(found.folded)} folded ({_numbers(found.folded)}): beyond "
+            f"{share_of(found.folded)} {_verb(found.folded)} folded ({numbers(found.folded)}): beyond "
             f"{rdmap.unambiguous_range:.4g} m or {limit:.4g} m/s an echo shows elsewhere{open_}; "
             f"number {first + 1} is at {true}, shown at {shown}"
         )
     said += unsure(found, rdmap)
-    return said if radar is None else said + mirrored(found, rdmap, radar) + lost(found, radar)
+    return said
 
 
 def mirrored(found: ExplainedDetections, rdmap: RangeDoppler, radar: Radar) -> list[str]:
@@ -77,7 +74,7 @@ def mirrored(found: ExplainedDetections, rdmap: RangeDoppler, radar: Radar) -> l
         return []
     slots = ", and by Doppler division in several wrong directions" if radar.multiplexing == "ddm" else ""
     return [
-        f"{_of(rows)} {_verb(rows)} mirrored ({_numbers(rows)}): with real sampling echoes beyond "
+        f"{share_of(rows)} {_verb(rows)} mirrored ({numbers(rows)}): with real sampling echoes beyond "
         f"{rdmap.unambiguous_range:.4g} m show at minus their rates and on the other side of boresight{slots}"
     ]
 
@@ -89,13 +86,13 @@ def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
         rows = found.ambiguous & rdmap.open[tuple(found.cell.T)]
     if rows.any():
         said.append(
-            f"{_of(rows)} {_verb(rows)} ambiguous in rate and direction ({_numbers(rows)}): another rate, a multiple "
-            f"of {2.0 * rdmap.unambiguous_rate:.4g} m/s away, explains what the receivers see as well, from another or "
-            "the same direction; the slowest rate is given"
+            f"{share_of(rows)} {_verb(rows)} ambiguous in rate and direction ({numbers(rows)}): another rate, a "
+            f"multiple of {2.0 * rdmap.unambiguous_rate:.4g} m/s away, explains what the receivers see as well, from "
+            "another or the same direction; the slowest rate is given"
         )
     if (rows := found.ambiguous & ~rows).any():
         said.append(
-            f"{_of(rows)} {_verb(rows)} ambiguous in direction ({_numbers(rows)}): "
+            f"{share_of(rows)} {_verb(rows)} ambiguous in direction ({numbers(rows)}): "
             "a grating lobe of the elements, or the other end of their view, shows another direction alike, or too "
             "nearly so for the noise, or more echoes share a cell than were told apart, or those of a cell may be one "
             "near wave; of equal ones that nearest boresight is given"
@@ -103,23 +100,25 @@ def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
     return said
 
 
-def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
+def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Radar) -> list[str]:
     """Return a line each if detections lose by spherical waves in a beam, by ranges that differ over the elements, or
     by migration over range cells."""
     said = []
-    loss = near_field_losses(found, radar)
+    # The receiver's DC offset is no wave.
+    wave = np.array([why.label != DC for why in reasons], bool)
+    loss = wave * near_field_losses(found, radar)
     if (near := loss > _LOST_DB).any():
         limit = far_field_distance(radar)
         said.append(
-            f"{_of(near)} {_verb(near)} in the near field of the array ({_numbers(near)}), nearer than 2 D^2 / "
+            f"{share_of(near)} {_verb(near)} in the near field of the array ({numbers(near)}), nearer than 2 D^2 / "
             f"wavelength = {limit:.3g} m: beams are those of plane waves and read up to {loss.max():.1f} dB less of a "
             "spherical one"
         )
-    differ, loss = range_spread(found, radar)
+    differ, loss = (wave * x for x in range_spread(found, radar))
     if (wide := loss > _LOST_DB).any():
         said.append(
-            f"{_of(wide)} {'has' if wide.sum() == 1 else 'have'} ranges that differ over the elements "
-            f"({_numbers(wide)}), by up to {differ.max():.1f} cells: beams add one cell of all and read up to "
+            f"{share_of(wide)} {'has' if wide.sum() == 1 else 'have'} ranges that differ over the elements "
+            f"({numbers(wide)}), by up to {differ.max():.1f} cells: beams add one cell of all and read up to "
             f"{loss.max():.1f} dB less"
         )
     moved, loss = migration(found.true_rate, radar)
@@ -127,8 +126,8 @@ def lost(found: ExplainedDetections, radar: Radar) -> list[str]:
         off = beside(moved[fast], radar)
         stand = f", and may stand up to {off[1]:g} range cells and {off[0]:g} rate cells off" if off.any() else ""
         said.append(
-            f"{_of(fast)} {'moves' if fast.sum() == 1 else 'move'} over range cells during the frame "
-            f"({_numbers(fast)}), up to {moved.max():.1f}: peaks read up to {loss.max():.1f} dB less{stand}"
+            f"{share_of(fast)} {'moves' if fast.sum() == 1 else 'move'} over range cells during the frame "
+            f"({numbers(fast)}), up to {moved.max():.1f}: peaks read up to {loss.max():.1f} dB less{stand}"
         )
     return said
 
@@ -157,7 +156,7 @@ def no_echoes(reasons: Sequence[Explanation]) -> list[str]:
         rows = np.array([reason.label == label for reason in reasons], bool)
         if rows.any():
             what = one if rows.sum() == 1 else more
-            said.append(f"{_of(rows)} {what} ({_numbers(rows)}), and nothing stands where shown: {why}")
+            said.append(f"{share_of(rows)} {what} ({numbers(rows)}), and nothing stands where shown: {why}")
     return said
 
 
@@ -169,9 +168,10 @@ def not_reciprocal(reasons: Sequence[Explanation], tolerance_db: float) -> list[
     if not rows.any():
         return []
     return [
-        f"{_of(rows)} {'changes' if rows.sum() == 1 else 'change'} ({_numbers(rows)}), by up to {off[rows].max():.1f} "
-        "dB, with the surface on which waves over several are taken to scatter, which reciprocity makes alike: no "
-        "stated error has it; corners seen off the direction in which rays come back return by their edges only"
+        f"{share_of(rows)} {'changes' if rows.sum() == 1 else 'change'} ({numbers(rows)}), by up to "
+        f"{off[rows].max():.1f} dB, with the surface on which waves over several are taken to scatter, which "
+        "reciprocity makes alike: no stated error has it; corners seen off the direction in which rays come back "
+        "return by their edges only"
     ]
 
 
@@ -183,8 +183,8 @@ def two_ways(reasons: Sequence[Explanation], radar: Radar | None) -> list[str]:
         return []
     is_one = rows.sum() == 1
     return [
-        f"{_of(rows)} {'leaves' if is_one else 'leave'} in one direction and {'returns' if is_one else 'return'} from "
-        f"another ({_numbers(rows)}), over several surfaces: to several transmitters that is no plane wave, so one "
+        f"{share_of(rows)} {'leaves' if is_one else 'leave'} in one direction and {'returns' if is_one else 'return'} from "
+        f"another ({numbers(rows)}), over several surfaces: to several transmitters that is no plane wave, so one "
         "echo may show several times, and directions, and rates that are found by them, may be wrong"
     ]
 
@@ -224,7 +224,8 @@ def told(
         *no_echoes(reasons),
         *not_reciprocal(reasons, tolerance_db),
         *two_ways(reasons, radar),
-        *warned(found, tolerance_db, rdmap, radar),
+        *warned(found, tolerance_db, rdmap),
+        *([] if radar is None else [*mirrored(found, rdmap, radar), *lost(found, reasons, radar)]),
         *noted(found, tolerance_db, ledger),
     ]
 
@@ -255,7 +256,7 @@ def _above(found: ExplainedDetections, tolerance_db: float) -> str:
     # As many digits as tell it from the tolerance.
     texts = [f"{known.max():.{digits}f}" for digits in (1, 2, 3, 6)]
     shown = next((text for text in texts if float(text) > tolerance_db), texts[-1])
-    return f"; above it {_verb(rows)} {_numbers(rows)}, the largest error stated is {shown} dB"
+    return f"; above it {_verb(rows)} {numbers(rows)}, the largest error stated is {shown} dB"
 
 
 def _listed(ledger: Mapping[str, Entry], least: float, below: float) -> str:
@@ -268,7 +269,8 @@ def _listed(ledger: Mapping[str, Entry], least: float, below: float) -> str:
     )
 
 
-def _of(chosen: Any) -> str:
+def share_of(chosen: Any) -> str:
+    """Return how many of all detections are chosen (n,)."""
     return f"{int(chosen.sum())} of {len(chosen)} detection{'' if len(chosen) == 1 else 's'}"
 
 
@@ -276,7 +278,7 @@ def _verb(chosen: Any) -> str:
     return "is" if chosen.sum() == 1 else "are"
 
 
-def _numbers(chosen: Any) -> str:
+def numbers(chosen: Any) -> str:
     """Return the numbers of detections, counted from 1 as the table does."""
     rows = np.flatnonzero(chosen) + 1
     more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""

@@ -224,7 +224,7 @@ def map_error(quiet: Cube, others: Cube, radar: Radar, settings: Any) -> MapErro
     own, off = (channel(Cube(samples=x, noise_power=0.0), radar).samples for x in (quiet.samples, change))
     towards, mean, count = np.zeros(0, np.complex64), np.zeros(0), 0
     for k in range(len(own)):
-        echo, wrong = (_quiet_spectrum(x[k : k + 1], radar, settings) for x in (own, off))
+        echo, wrong = (quiet_spectrum(x[k : k + 1], radar, settings) for x in (own, off))
         if not count:
             towards, mean = np.zeros(echo.shape[1:], np.complex64), np.zeros(echo.shape[1:])
         count += len(echo)
@@ -250,7 +250,8 @@ def quiet_map(samples: Any, radar: Radar, settings: Any) -> Any:
     return _quiet(cube, radar, settings).power
 
 
-def _quiet_spectrum(samples: Complexes, radar: Radar, settings: Any) -> Complexes:
+def quiet_spectrum(samples: Complexes, radar: Radar, settings: Any) -> Complexes:
+    """Return the spectrum (a, v, r) [sqrt(W)] of the map of samples without noise, of channels as they do not fold."""
     return _quiet(Cube(samples=samples, noise_power=0.0), radar, settings).spectrum
 
 

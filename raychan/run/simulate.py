@@ -26,6 +26,7 @@ from raychan.run.realization import realized
 from raychan.run.received import notes, received
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
 from raychan.run.result import ExplainedDetections, Explanation, Receiver, Result
+from raychan.run.rounding import Rounding, coarse
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.unmodelled import ledger
 from raychan.run.wide_arrays import WIDE, before_wide_arrays
@@ -70,7 +71,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         then = scene.at(channel.geometry.facets.since)
         quiet, launched = realized(then, channel.geometry, channel.model, channel.quiet, channel.launched, seed)
         noise = radar.noise_power if radar.noise else 0.0
-        pdp, (cube, heard) = run_pair(
+        pdp, (cube, heard, rounding) = run_pair(
             lambda: profile_of(launched.response, radar.waveform, noise, settings.range_window),
             lambda: _received(then, channel, launched, quiet, seed),
         )
@@ -108,6 +109,7 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
             *channel.warnings,
             *_remaining(channel, known, radar),
             *heard,
+            *coarse(rounding, known, reasons, radar, settings),
             *told(known, reasons, tolerance, rdmap, left_out, radar),
             *overrun(sum(clock.timings.values()), channel.model.max_seconds),
         ),
@@ -129,15 +131,17 @@ def _remaining(channel: Channel, found: ExplainedDetections, radar: Radar) -> li
     return channel.remains.notes((found.range, found.rate), size, found.error_db, also)
 
 
-def _received(scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int) -> tuple[Cube, list[str]]:
-    """Return what the receiver records of noise-free samples, and what a user should know of it."""
+def _received(
+    scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int
+) -> tuple[Cube, list[str], Rounding | None]:
+    """Return what the receiver records of noise-free samples, what a user should know of it, and its rounding."""
     turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
     others = interference(scene, channel.geometry, seed)
     # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
     clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
-    cube, said = received(quiet, paths, scene.radar, seed, others, clean)
-    return cube, said + notes(scene.radar, launched.whole, turned is not None) + never_heard(scene)
+    cube, said, rounding = received(quiet, paths, scene.radar, seed, others, clean)
+    return cube, said + notes(scene.radar, launched.whole, turned is not None) + never_heard(scene), rounding
 
 
 def _detected(scene: Scene, channel: Channel, cube: Cube) -> Detected:

@@ -23,7 +23,8 @@ from raychan.records import Cube
 from raychan.reprs import Plotted
 from raychan.run.clock import Clock, Progress
 from raychan.run.micro_doppler import stretches
-from raychan.run.received import clipping, power_of_parts, too_coarse
+from raychan.run.received import clipping
+from raychan.run.rounding import coarse_picture, rounding_of, spoils
 from raychan.run.rules import allowed_memory, asked, check_demand, fine_rule
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy
@@ -104,36 +105,69 @@ def spectrogram(
     wave = scene.radar.waveform
     count = max(2, 1 + round(duration * tracings_per_second))
     radar = replace(scene.radar, waveform=replace(wave, n_chirps=chirps))
-    long = _with(scene, radar)
     cells = _cells(radar, ranges)
-    if (need := _BYTES * chirps * len(cells) * len(radar.elements)) > allowed_memory():
-        raise ValueError(f"duration = {duration:g} s takes {need / 1e9:.0f} GB of memory: fewer ranges take less")
+    _check_memory(duration, chirps * len(cells) * len(radar.elements), radar)
     tell = Clock(progress).tell
-    rng, slow, signal, error, clipped, parts = stream(seed, Stage.NOISE), [], 0.0, 0.0, 0, 0.0
+    rng, slow, signal, error, clipped = stream(seed, Stage.NOISE), list[Samples](), 0.0, 0.0, 0
+    spoilt = list[Samples]()
     rule = fine_rule(scene.radar, scene.processing, model)
-    for quiet, off in stretches(long, rule, model, count, lambda share: tell("trace", share)):
+    for quiet, off in stretches(_with(scene, radar), rule, model, count, lambda share: tell("trace", share)):
         signal, error = signal + float((np.abs(quiet) ** 2).sum()), error + float((np.abs(off) ** 2).sum())
-        cube = noisy(Cube(quiet.astype(np.complex64), 0.0), radar, rng)
-        parts += power_of_parts(cube, radar) * quiet.shape[1] / chirps
+        cube = Cube(quiet.astype(np.complex64), 0.0)
+        spoilt += _rounded(cube, radar, cells)
+        cube = noisy(cube, radar, rng)
         cube, over = digitized(cube, radar.impairments, wave.complex_sampling)
         clipped += over
         slow.append(_range_cells(cube, radar, cells))
     time, rate, power, gain = _transformed(np.concatenate(slow, axis=1), radar, length)
     # The range window spreads an echo over neighbouring cells, whose powers add up to this times its own.
     spread = wave.n_samples * _range_gain(radar)
-    noise = radar.noise_power / wave.n_samples * gain * len(cells) if radar.noise else 0.0
+    noise = _noise(radar, gain * len(cells))
     return Spectrogram(
         time=time,
         rate=rate,
         power=power / spread,
         ranges=(float(cells[0] * wave.range_resolution), float(cells[-1] * wave.range_resolution)),
         resolution=0.5 * C0 / wave.middle / (length * wave.repetition),
-        noise=noise * (1.0 if wave.complex_sampling else 2.0),
+        noise=noise,
         error_db=float(db(error / signal)) if signal > 0.0 else float("-inf"),
         tracings=count,
         seed=seed,
-        warnings=(*too_coarse(parts, radar), *_clipping(clipped, radar), *_left_out(scene)),
+        warnings=(*_coarse(spoilt, radar, length, spread, noise), *_clipping(clipped, radar), *_left_out(scene)),
     )
+
+
+def _check_memory(duration: float, samples: int, radar: Radar) -> None:
+    """Raise ValueError if so many samples of slow time, over a duration [s], take more memory than is allowed."""
+    # Those that a coarse converter rounds are held once more, and its errors too.
+    if (need := _BYTES * samples * (3 if spoils(radar) else 1)) > allowed_memory():
+        raise ValueError(f"duration = {duration:g} s takes {need / 1e9:.0f} GB of memory: fewer ranges take less")
+
+
+def _rounded(cube: Cube, radar: Radar, cells: NDArray[np.int64]) -> list[Samples]:
+    """Return what a coarse converter rounds of samples without noise, and its errors, as one array (2, antenna, chirp,
+    cell); nothing of others."""
+    rounding = rounding_of(cube.samples, radar)
+    if rounding is None:
+        return []
+    return [np.stack([_range_cells(Cube(x, 0.0), radar, cells) for x in (rounding.signal, rounding.error)])]
+
+
+def _noise(radar: Radar, gain: float) -> float:
+    """Return the thermal noise [W] of cells that hold such a share of that of a sample, over all samples of a ramp."""
+    if not radar.noise:
+        return 0.0
+    return radar.noise_power / radar.waveform.n_samples * gain * (1.0 if radar.waveform.complex_sampling else 2.0)
+
+
+def _coarse(spoilt: list[Samples], radar: Radar, length: int, spread: float, noise: float) -> list[str]:
+    """Return a line on the converter's steps. Args: spoilt, signals and errors of rounding (2, antenna, chirp, cell) of
+    all parts; the rest as `_transformed` and `Spectrogram` have it."""
+    if not spoilt:
+        return []
+    signal, error = np.concatenate(spoilt, axis=2)
+    plain, rounded, alone = (_transformed(x, radar, length)[2] / spread for x in (signal, signal + error, error))
+    return coarse_picture(plain, rounded, alone, noise, radar)
 
 
 def _clipping(clipped: int, radar: Radar) -> list[str]:
@@ -155,6 +189,8 @@ def _chirps(scene: Scene, duration: float, resolution: float) -> tuple[int, int]
     SceneError for a target that fluctuates, which only `simulate` draws."""
     if scene.radar.rx_position is not None:
         raise ValueError("a spectrogram is of receivers beside the transmitter: radar.rx_position is elsewhere")
+    if scene.radar.rx_polarization == "both":
+        raise ValueError('a spectrogram is of receivers of one polarisation: radar.rx_polarization = "both" has two')
     if len(scene.radar.tx_elements) > 1:
         raise ValueError("a spectrogram is of one transmitter: radar.tx_elements has several")
     if scene.radar.waveform.stagger:

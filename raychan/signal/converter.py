@@ -12,6 +12,12 @@ from raychan.records import Cube
 from raychan.units import undb, watt
 
 Samples = NDArray[np.complexfloating[Any, Any]]
+Floats = NDArray[np.float64]
+
+_DITHERED = 0.7
+"""Of a step: the noise of I or of Q from which on its mean error of rounding is nothing: -94 dB of the noise."""
+_STILL = 1.0 / 512.0  # of a step: noise that hardly dithers (-27 dB of the error of rounding lies beside a level's end)
+_TABLE = 4096  # places within a step at which the mean error is summed; it is linear in between
 
 
 def digitized(cube: Cube, impairments: Impairments, complex_sampling: bool = True) -> tuple[Cube, int]:
@@ -19,17 +25,22 @@ def digitized(cube: Cube, impairments: Impairments, complex_sampling: bool = Tru
 
     The cube's noise power stays that of the thermal noise. Without any of these impairments it is the cube given.
     """
-    samples: Samples = cube.samples
-    if not impairments.iq_balanced:
-        samples = imbalanced(samples, impairments.iq_gain_db, impairments.iq_phase_deg)
-    if impairments.dc_offset_dbm is not None:
-        samples = samples + offset(impairments, complex_sampling)
+    samples = before_rounding(cube.samples, impairments, complex_sampling)
     clipped = 0
     if impairments.converter is not None:
         samples, clipped = quantized(samples, impairments.converter, complex_sampling)
     if samples is cube.samples:
         return cube, 0
     return Cube(samples=samples.astype(np.complex64), noise_power=cube.noise_power), clipped
+
+
+def before_rounding(samples: Samples, impairments: Impairments, complex_sampling: bool = True) -> Samples:
+    """Return what of samples reaches the converter: with I/Q imbalance and DC offset."""
+    if not impairments.iq_balanced:
+        samples = imbalanced(samples, impairments.iq_gain_db, impairments.iq_phase_deg)
+    if impairments.dc_offset_dbm is not None:
+        samples = samples + offset(impairments, complex_sampling)
+    return samples
 
 
 def offset(impairments: Impairments, complex_sampling: bool = True) -> complex:
@@ -95,3 +106,43 @@ def quantized(samples: Samples, converter: Converter, complex_sampling: bool = T
     over = (parts < -half - 0.5) | (parts > half - 0.5)
     clipped = int((over.any(axis=0) if complex_sampling else over[0]).sum())
     return np.asarray(step * (codes[0] + 1j * codes[1])), clipped
+
+
+def dithered(converter: Converter, noise: float) -> bool:
+    """Return whether noise of a power [W] in I, or in Q, leaves no mean error of rounding."""
+    return noise >= (_DITHERED * converter.step) ** 2
+
+
+def rounding_error(samples: Samples, impairments: Impairments, noise: float, complex_sampling: bool = True) -> Samples:
+    """Return the mean error, over the thermal noise, of a converter that rounds samples: its spurs.
+
+    Args: samples without thermal noise as they reach the converter; noise [W] of a complex sample, before I/Q
+    imbalance. The rest of the error is white; clipping is left out.
+    """
+    converter, wider = impairments.converter, float(undb(impairments.iq_gain_db))
+    if converter is None:
+        return np.zeros_like(samples)
+    error = np.zeros(samples.shape, np.complex64)
+    error.real = _mean_error(samples.real, converter, 0.5 * noise)
+    if complex_sampling:
+        error.imag = _mean_error(samples.imag, converter, 0.5 * noise * wider)
+    return error
+
+
+def _mean_error(values: NDArray[Any], converter: Converter, noise: float) -> Floats:
+    """Return the mean error of rounding values (...) in Gaussian noise [W] of rms s steps d: the sum over k of
+    (-1)^k d / (pi k) exp(-2 (pi k s)^2) sin(2 pi k x / d).
+
+    Source: Widrow, Kollar, Quantization Noise, Cambridge, 2008 (the characteristic function of the noise smooths the
+    saw tooth of the error).
+    """
+    step, spread = converter.step, float(np.sqrt(noise)) / converter.step
+    if dithered(converter, noise):
+        return np.zeros(values.shape)
+    at = values.astype(np.float64) / step
+    if spread < _STILL:
+        return np.asarray(step * (np.rint(at) - at))
+    k, places = np.arange(1, 2 + int(1.0 / spread)), np.linspace(0.0, 1.0, _TABLE + 1)
+    weights = (-1.0) ** k / (np.pi * k) * np.exp(-2.0 * (np.pi * k * spread) ** 2)
+    table = sum(w * np.sin(2.0 * np.pi * n * places) for n, w in zip(k.tolist(), weights.tolist(), strict=True))
+    return np.asarray(step * np.interp(at - np.floor(at), places, np.asarray(table)))

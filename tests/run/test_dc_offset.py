@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import raychan as rc
 from raychan.cli import invoke
+from raychan.run.receiver_losses import near_field_losses
 from raychan.units import dbm
 
 DBM, WAVE = -75.0, {"bandwidth_mhz": 50.0, "chirp_us": 40.0, "chirps": 32, "samples": 64}  # cells of 3 m
@@ -54,3 +56,28 @@ def test_explain_names_it(tmp_path, capsys):
     rc.save_result(rc.simulate(scene(60.0)), tmp_path)
     assert invoke(["explain", str(tmp_path), "--detection", "1"]) == 0
     assert "no path explains this cell: dc offset" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("iq", [True, False])
+@pytest.mark.parametrize("senders", [2, 3, 4])
+def test_doppler_division_holds_it_in_the_slot_of_one_transmitter(senders, iq):
+    places = [[0.0, 4.0 * k, 0.0] for k in range(senders)]
+    given = {"elements_mm": ARRAY["elements_mm"], "tx_elements_mm": places, "multiplexing": "ddm"}
+    result = rc.simulate(scene(60.0, wave=WAVE | {"chirps": 60, "iq": iq}, **given))
+    row = [why.label for why in result.provenance].index("dc")
+    found, slot = result.detections, 2.0 * result.scene.radar.waveform.unambiguous_rate / (senders + 1)
+    level = DBM - 20.0 * np.log10(senders) + (0.0 if iq else 6.02)
+    assert dbm(found.power[row]) == pytest.approx(level, abs=0.15)
+    assert found.rate[row] / slot == pytest.approx(round(found.rate[row] / slot), abs=0.01)
+
+
+@pytest.mark.parametrize("radar", [{}, {"multiplexing": "tdm"}])
+def test_a_constant_is_not_near_an_array(radar):
+    wide = {"elements_mm": [[0.0, 2.0 * k, 0.0] for k in range(8)]}
+    if radar:
+        wide["tx_elements_mm"] = [[0.0, 0.0, 0.0], [0.0, 16.0, 0.0]]
+    result = rc.simulate(scene(10.0, offset=-95.0, wave=WAVE | {"bandwidth_mhz": 300.0}, **wide, **radar))
+    assert "dc" in [why.label for why in result.provenance]
+    # As a wave it is: from so near a beam loses 2 and 7 dB.
+    assert near_field_losses(result.detections, result.scene.radar).max() > 1.0
+    assert not [x for x in result.warnings if "near field" in x or "ranges that differ" in x]

@@ -85,15 +85,31 @@ def test_staggered_ramps_are_refused_in_words():
 
 
 def test_a_converter_too_coarse_is_said_as_a_run_says_it():
-    coarse = rc.Impairments(converter=rc.Converter(3, -30.0), dc_offset_dbm=-60.0)
-    lines = [
-        [w for w in found.warnings if w.startswith("the converter's step of -42.0 dBm is more than 1.25 times")]
-        for found in (rc.spectrogram(scene(impairments=coarse), 0.1), rc.simulate(scene(impairments=coarse)))
-    ]
-    assert [len(x) for x in lines] == [1, 1] and lines[0] == lines[1]
-    assert "dBm, the DC offset aside: " in lines[0][0]
+    coarse = rc.Impairments(converter=rc.Converter(3, -30.0))
+    for found in (rc.spectrogram(scene(impairments=coarse), 0.1), rc.simulate(scene(impairments=coarse))):
+        (line,) = [w for w in found.warnings if w.startswith("the converter's step of -42.0 dBm is coarse")]
+        assert "rounding takes 3 dB or more off echoes of up to " in line
     fine = rc.Impairments(converter=rc.Converter(16, -40.0))
     assert not [w for w in rc.spectrogram(scene(impairments=fine), 0.1).warnings if "step of" in w]
+
+
+@pytest.mark.parametrize("real", [False, True])
+@pytest.mark.parametrize("over, step, part", [
+    (20.0, 0.0, ""), (20.0, 6.0, ""), (30.0, 8.0, ""), (20.0, 12.0, "makes marks of up to "),
+    (0.0, 8.0, "changes levels by up to "), (-5.0, 18.0, "takes 3 dB or more off echoes of up to "),
+])  # fmt: skip
+def test_a_spectrogram_tells_steps_that_make_marks_or_change_levels(over, step, part, real):
+    wave = rc.Waveform(77e9, 300e6, 20e-6, 100e-6, n_chirps=64, n_samples=64, complex_sampling=not real)
+    noise = db(1.380649e-23 * 290.0 * 10.0**1.5 * 64 / 20e-6) + 30.0
+    level = over + noise - 30.0 - db(0.0158489 * 4.0 * (C0 / 77.15e9) ** 2 / ((4.0 * np.pi) ** 3 * 1e4))
+    target = rc.Body(
+        name="t", shape="sphere", params={"radius": 0.01}, position=(10.0, 0.0, 0.5), velocity=(1.0, 0.0, 0.0),
+        rcs_dbsm=float(level),
+    )  # fmt: skip
+    converter = rc.Converter(9, float(noise + step + 20.0 * np.log10(2.0**8)))
+    radar = rc.Radar(wave, power=0.0158489, impairments=rc.Impairments(converter=converter))
+    said = " ".join(rc.spectrogram(rc.Scene([target], radar=radar), 0.1, ranges=(6.0, 14.0)).warnings)
+    assert part in said and bool(part) == bool(said)
 
 
 @pytest.mark.parametrize("more", [0, 1, 2, 5, 9, 13])
@@ -111,6 +127,17 @@ def test_a_duration_of_hardly_more_than_a_stretch_gives_a_stretch(more):
 def test_a_receiver_elsewhere_is_refused_for_what_it_is():
     with pytest.raises(ValueError, match=r"receivers beside the transmitter: radar\.rx_position is elsewhere"):
         rc.spectrogram(scene(rx_position=(0.0, 5.0, 0.5)), 0.1)
+
+
+def test_receivers_of_both_polarisations_are_refused_for_what_they_are(tmp_path, capsys):
+    given = scene(rx_polarization="both")
+    with pytest.raises(ValueError, match=r'receivers of one polarisation: radar\.rx_polarization = "both" has two'):
+        rc.spectrogram(given, 0.1)
+    (tmp_path / "s.toml").write_text(given.to_toml(), encoding="utf-8")
+    assert invoke(["spectrogram", str(tmp_path / "s.toml"), "--seconds", "0.1", "--out", str(tmp_path / "o")]) == 2
+    said = capsys.readouterr().err
+    assert "of receivers of one polarisation" in said and "retrace" not in said
+    assert not (tmp_path / "o").exists()
 
 
 def test_the_command_gives_one_stretch_and_refuses_a_receiver_elsewhere_by_its_exit_code(tmp_path, capsys):
