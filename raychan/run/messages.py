@@ -183,8 +183,8 @@ def two_ways(reasons: Sequence[Explanation], radar: Radar | None) -> list[str]:
         return []
     is_one = rows.sum() == 1
     return [
-        f"{share_of(rows)} {'leaves' if is_one else 'leave'} in one direction and {'returns' if is_one else 'return'} from "
-        f"another ({numbers(rows)}), over several surfaces: to several transmitters that is no plane wave, so one "
+        f"{share_of(rows)} {'leaves' if is_one else 'leave'} in one direction and {'returns' if is_one else 'return'} "
+        f"from another ({numbers(rows)}), over several surfaces: to several transmitters that is no plane wave, so one "
         "echo may show several times, and directions, and rates that are found by them, may be wrong"
     ]
 
