@@ -57,7 +57,7 @@ _UNEXPLAINED = 0.1  # of a cell's power: cells whose paths bring less are noise
 _COARSEST_DB = 1.0
 """Tolerance from which on first launches bring as many paths: of boxes and balls 69, 42, 32 and 32 thousand at 0.05,
 0.2, 1 and 3 dB."""
-_TOLD = 2  # steps after which `model.speckle` asks which of the levels still open displaced bodies move
+_TOLD = 2  # steps after which `model.speckle` asks which levels still open displaced bodies move; others not measured
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of samples that only tell levels
 
 

@@ -11,9 +11,10 @@ from raychan.radar.radar import Radar
 from raychan.run.result import Explanation
 from raychan.units import C0
 
-# rad: by how much the phase of the outermost transmitter may turn between both directions. Of 600 echoes of both ways
-# (2 or 3 transmitters, 3 to 5 receivers) none of 146 below half of this was split, folded or misplaced, 1 of 78 up to
-# this, 5 of 40 up to twice as much, 15 of 36 beyond; of 300 cross-polar ones, whose two ways differ in sign, all.
+# rad: by how much the phase of the outermost transmitter may turn between both directions. Of 300 echoes of both ways
+# (2 or 3 transmitters, 3 to 5 receivers) none of 146 below two thirds of this was split, folded or misplaced, 1 of 78
+# up to this, 5 of 40 up to a third more, 15 of 36 beyond; of 300 cross-polar ones, whose two ways differ in sign, all
+# (no command).
 _TURN = 0.15 * math.pi
 _CROSSED = 0.1  # of both fields: what of a transmitter's own polarisation a receiver of the other one hears, at most
 _PARALLEL = 1e-3  # rad: of cross-polar echoes
