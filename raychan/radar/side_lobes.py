@@ -18,7 +18,7 @@ _FINE = 16  # points per resolution cell
 _COARSE = 2  # the same of two axes: a side lobe between points is up to 0.9 dB higher; 4 take four times as long
 _WIDEST = 64  # resolution cells within which every window of many samples has its first null
 # Samples of an axis: bounds by resolution cells are those of 1536 x 1536 samples, at most 0.2 dB lower and 1.7 dB
-# higher up to a quarter of these, 7 dB at half of them (rect, Hamming, Taylor; others, below -130 dB, differ by more; no
+# higher up to a quarter of these, 7 dB at half of them (rect, Hamming, Taylor; others differ more, below -130 dB; no
 # command). A frame of 2048 x 2048 took 9.6 of 18.8 s for twelve envelopes.
 _MOST = 512
 _AS_HIGH = 0.5  # of the highest peak of a smeared echo: a map cell between two peaks may make such a one the higher
