@@ -35,6 +35,7 @@ MARKS = {
     "sidelobe": ("v", "#80d8ff"),
     "dc": ("D", "#b9f6ca"),
     "image": ("P", "#ea80fc"),
+    "interference": ("*", "#ffab40"),
 }
 """Marker and colour of a detection by its label, chosen to stand out on the map."""
 

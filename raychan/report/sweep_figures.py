@@ -9,14 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.report.canvas import PALETTE, figure, save, style, verbatim
-from raychan.run.result import CLUTTER, DC, DIRECT, IMAGE, MULTIPATH, SIDELOBE
+from raychan.run.result import CLUTTER, DC, DIRECT, IMAGE, INTERFERENCE, MULTIPATH, SIDELOBE
 from raychan.study.sweep import Sweep
 from raychan.study.visibility import DIFFRACTED, WAYS
 
 Floats = NDArray[np.float64]
 
 _LOOK = {DIRECT: ("o", PALETTE[0]), MULTIPATH: ("^", PALETTE[2]), DIFFRACTED: ("s", PALETTE[5])}
-_ELSE = {CLUTTER: ("X", PALETTE[7]), SIDELOBE: ("v", PALETTE[3]), DC: ("D", PALETTE[9]), IMAGE: ("P", PALETTE[8])}
+_ELSE = {
+    CLUTTER: ("X", PALETTE[7]), SIDELOBE: ("v", PALETTE[3]), DC: ("D", PALETTE[9]), IMAGE: ("P", PALETTE[8]),
+    INTERFERENCE: ("*", PALETTE[6]),
+}  # fmt: skip
 _DEEPEST_DB = 40.0  # levels this far below the threshold are not drawn
 _GREY = "#d9d9d9"
 

@@ -16,9 +16,12 @@ from raychan.poses import angles
 from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
 from raychan.run.directions import beam_to, wave_in_beam
+from raychan.run.interferers import Sent, interference
 from raychan.run.labels import Chains, chains, explain_cell, peaks_with_levels, response_of, waves_in
-from raychan.run.own_signals import named, own_signals
+from raychan.run.no_echoes import named, no_echoes_of
 from raychan.run.result import Contribution, Explanation, Result
+from raychan.world.geometry import geometry_of
+from raychan.world.scene import Scene
 
 _VERBS = ("", "reflect", "pass", "scatter", "point", "diffract", "diffuse")  # by InteractionType
 _SAME = 0.1  # resolution cells: a range and speed typed by hand do not tell closer places apart; not measured
@@ -142,10 +145,18 @@ def _of_cell(result: Result, place: tuple[int, int]) -> CellExplanation:
     why = explain_cell(result.paths, known, response, result.receiver, *at, seen, error)
     scene = result.scene
     if scene is not None:
-        own = own_signals(result.cube, result.rdmap, result.error.power, scene.radar, scene.processing)
-        why = named(why, place, own)
+        parts = result.cube, result.rdmap, result.error.power, scene.radar, scene.processing
+        why = named(why, place, no_echoes_of(*parts, _interference(result, scene)))
     antennas = len(result.rdmap.spectrum)
     return CellExplanation(**_held(why), paths=_paths_at(result, *at, known), antennas=antennas)
+
+
+def _interference(result: Result, scene: Scene) -> Sent:
+    """Return what interferers send, which no result holds."""
+    if not scene.interferers:
+        return {}
+    then = scene.at(result.traced_at)
+    return interference(then, geometry_of(then, scene.model.tolerance_db, result.traced_at), result.seed)
 
 
 def _held(why: Explanation) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,21 +21,21 @@ from raychan.units import C0
 from raychan.world.geometry import Geometry
 from raychan.world.scene import Scene
 
+Sent = Mapping[str, NDArray[np.complex128]]
+"""What interferers, by name, add to the samples (a, c, s) [sqrt(W)]."""
+
 _BOUNCES = 1  # mirrors on the way: each further one loses several dB against the direct way; not measured
 
 
-def interference(scene: Scene, geometry: Geometry, seed: int) -> NDArray[np.complex128] | None:
-    """Return what the interferers of a scene add to the samples (a, c, s) [sqrt(W)], each with phases of the stream of
-    its name; None if there are none."""
-    if not scene.interferers:
-        return None
-    rngs = (stream(seed, Stage.INTERFERENCE, one.name) for one in scene.interferers)
-    return np.asarray(
-        sum(
-            burst(scene.radar, one, interferer_paths(scene, geometry, one), rng)
-            for one, rng in zip(scene.interferers, rngs, strict=True)
+def interference(scene: Scene, geometry: Geometry, seed: int) -> Sent:
+    """Return what each interferer of a scene, by name, adds to the samples (a, c, s) [sqrt(W)], with phases of the
+    stream of its name."""
+    return {
+        one.name: burst(
+            scene.radar, one, interferer_paths(scene, geometry, one), stream(seed, Stage.INTERFERENCE, one.name)
         )
-    )
+        for one in scene.interferers
+    }
 
 
 def never_heard(scene: Scene) -> list[str]:

@@ -14,7 +14,7 @@ from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
 from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
-from raychan.run.result import DC, IMAGE, SIDELOBE, ExplainedDetections, Explanation, Result
+from raychan.run.result import DC, IMAGE, INTERFERENCE, SIDELOBE, ExplainedDetections, Explanation, Result
 from raychan.run.two_ways import apart
 
 _NAMED = 5  # detections that a line names by their numbers
@@ -145,12 +145,17 @@ _NO_ECHOES = {
         ("is an I/Q image of a stronger echo", "are I/Q images of stronger echoes"),
         "images are at minus the range and rate of their echoes (radar.impairments.iq_gain_db, iq_phase_deg)",
     ),
+    INTERFERENCE: (
+        ("is what another radar sends", "are what other radars send"),
+        "ramps like the radar's own look like an echo, others lift the noise (interferers)",
+    ),
 }
 """What a detection of a label is, and detections are; and why something is shown there."""
 
 
 def no_echoes(reasons: Sequence[Explanation]) -> list[str]:
-    """Return a line each if detections are side lobes of echoes elsewhere, or what the receiver itself makes."""
+    """Return a line each if detections are side lobes of echoes elsewhere, what the receiver itself makes or what other
+    radars send."""
     said = []
     for label, ((one, more), why) in _NO_ECHOES.items():
         rows = np.array([reason.label == label for reason in reasons], bool)

@@ -19,10 +19,11 @@ from raychan.run.ledger import Entry
 if TYPE_CHECKING:
     from raychan.world.scene import Scene
 
-LABELS = DIRECT, MULTIPATH, CLUTTER, SIDELOBE, DC, IMAGE = "direct", "multipath", "clutter", "sidelobe", "dc", "image"
-"""Of detections: what their leading chain of bodies is; of DC, the receiver's offset, and of IMAGE, its I/Q image of an
-echo, there is none."""
-_OWN = {DC: "dc offset", IMAGE: "I/Q image"}
+LABELS = DIRECT, MULTIPATH, CLUTTER, SIDELOBE, DC, IMAGE, INTERFERENCE = (
+    "direct", "multipath", "clutter", "sidelobe", "dc", "image", "interference",
+)  # fmt: skip
+"""Of detections: what their leading chain of bodies is; of DC, the receiver's offset, of IMAGE, its I/Q image of an
+echo, and of INTERFERENCE, what another radar sends, there is none."""
 LINE_OF_SIGHT = "line of sight"
 """Names the way straight from a transmitter to a receiver elsewhere, which meets no body."""
 
@@ -92,6 +93,8 @@ class Explanation:
     """Unit direction in which the strongest path of the leading chain leaves, world axes; zeros where unknown."""
     arrival: tuple[float, ...] = (0.0, 0.0, 0.0)
     """Unit direction that it returns from."""
+    source: str = "noise"
+    """What made a cell that no path explains: 'noise', 'dc offset', 'I/Q image' or an interferer's name."""
 
     @property
     def converged(self) -> bool:
@@ -100,10 +103,10 @@ class Explanation:
 
     @property
     def bodies(self) -> str:
-        """Chain of the leading contribution, 'line of sight' if it meets none; if no path explains the cell, 'noise',
-        'dc offset' or 'I/Q image'."""
+        """Chain of the leading contribution, 'line of sight' if it meets none; `source` if no path explains the
+        cell."""
         if not self.contributions:
-            return _OWN.get(self.label, "noise")
+            return self.source
         return " > ".join(self.contributions[0].chain) or LINE_OF_SIGHT
 
 

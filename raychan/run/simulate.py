@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,12 +14,12 @@ from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDoppler
 from raychan.run.clock import Clock, Progress
 from raychan.run.directions import beam_to
-from raychan.run.interferers import interference, never_heard
+from raychan.run.interferers import Sent, interference, never_heard
 from raychan.run.labels import Chains, chains, provenance
 from raychan.run.launch_messages import overrun
 from raychan.run.ledger import Entry
 from raychan.run.messages import counts, told
-from raychan.run.own_signals import all_named, own_signals
+from raychan.run.no_echoes import NoEcho, all_named, no_echoes_of
 from raychan.run.path_stream import Launched
 from raychan.run.preview import preview_error, preview_ledger
 from raychan.run.rate_spread import claimed, launch_share, motion, without
@@ -71,9 +72,10 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
         then = scene.at(channel.geometry.facets.since)
         quiet, launched = realized(then, channel.geometry, channel.model, channel.quiet, channel.launched, seed)
         noise = radar.noise_power if radar.noise else 0.0
+        others = interference(then, channel.geometry, seed)
         pdp, (cube, heard, rounding) = run_pair(
             lambda: profile_of(launched.response, radar.waveform, noise, settings.range_window),
-            lambda: _received(then, channel, launched, quiet, seed),
+            lambda: _received(then, channel, launched, quiet, seed, others),
         )
     names = background(channel.geometry.facets)
     with clock.stage("detect"):
@@ -87,7 +89,8 @@ def result_of(scene: Scene, channel: Channel, seed: int, clock: Clock) -> Result
     windows = settings.range_window, settings.rate_window
     receiver = Receiver(radar.channel_waveform, *windows, radar.power, radar.ego_speed, names)
     with clock.stage("explain"):
-        reasons, left_out = _explained(then, channel, cube, (rdmap, detections, error), receiver, by_chain)
+        no_echo = no_echoes_of(cube, rdmap, error.power, radar, settings, others)
+        reasons, left_out = _explained(then, channel, (rdmap, detections, error), receiver, by_chain, no_echo)
     known = ExplainedDetections.of(detections, reasons)
     tolerance = channel.model.tolerance_db
     return Result(
@@ -132,15 +135,21 @@ def _remaining(channel: Channel, found: ExplainedDetections, radar: Radar) -> li
 
 
 def _received(
-    scene: Scene, channel: Channel, launched: Launched, quiet: Cube, seed: int
+    scene: Scene,
+    channel: Channel,
+    launched: Launched,
+    quiet: Cube,
+    seed: int,
+    others: Sent,
 ) -> tuple[Cube, list[str], Rounding | None]:
-    """Return what the receiver records of noise-free samples, what a user should know of it, and its rounding."""
+    """Return what the receiver records of noise-free samples and what `others` send, what a user should know of it, and
+    its rounding."""
     turned = channel.turned
     paths = without(launched.paths, turned.turns) if turned else launched.paths
-    others = interference(scene, channel.geometry, seed)
     # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
     clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
-    cube, said, rounding = received(quiet, paths, scene.radar, seed, others, clean)
+    sent = np.sum([*others.values()], axis=0) if others else None
+    cube, said, rounding = received(quiet, paths, scene.radar, seed, sent, clean)
     return cube, said + notes(scene.radar, launched.whole, turned is not None) + never_heard(scene), rounding
 
 
@@ -153,7 +162,12 @@ def _detected(scene: Scene, channel: Channel, cube: Cube) -> Detected:
 
 
 def _explained(
-    scene: Scene, channel: Channel, cube: Cube, detected: Detected, receiver: Receiver, by_chain: Chains | None
+    scene: Scene,
+    channel: Channel,
+    detected: Detected,
+    receiver: Receiver,
+    by_chain: Chains | None,
+    no_echo: Sequence[NoEcho],
 ) -> tuple[tuple[Explanation, ...], dict[str, Entry]]:
     """Return where each detection came from, and the ledger of what the run left out."""
     radar, settings, turned = scene.radar, scene.processing, channel.turned
@@ -164,9 +178,8 @@ def _explained(
     def explained() -> tuple[Explanation, ...]:
         return provenance(paths, rdmap, found, receiver, error.power, beam_to(radar, found, paths), by_chain)
 
-    own = own_signals(cube, rdmap, error.power, radar, settings)
     if model.mode == PREVIEW:
-        return all_named(explained(), found, own), preview_ledger(channel.geometry, radar, model)
+        return all_named(explained(), found, no_echo), preview_ledger(channel.geometry, radar, model)
     reasons, left_out = run_pair(
         explained,
         lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
@@ -176,7 +189,7 @@ def _explained(
         left_out[WIDE] = before_wide_arrays(paths, turned.turns, radar, settings, weakest)
         brought = quiet_map(turned.turning, radar, settings)
         reasons = claimed(reasons, paths, turned.turns, brought, error.power, found, receiver)
-    return all_named(reasons, found, own), left_out
+    return all_named(reasons, found, no_echo), left_out
 
 
 def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:

@@ -175,7 +175,15 @@ def test_csv_and_summary_say_what_the_record_holds(made, tmp_path):
     assert ",true,false,8.99" in first  # mid frame it has come nearer
     assert first.endswith(",multipath,truck.tail > walker > truck.tail")
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["labels"] == {"direct": 1, "multipath": 1, "clutter": 0, "sidelobe": 0, "dc": 0, "image": 0}
+    assert summary["labels"] == {
+        "direct": 1,
+        "multipath": 1,
+        "clutter": 0,
+        "sidelobe": 0,
+        "dc": 0,
+        "image": 0,
+        "interference": 0,
+    }
     assert summary["left_out"] == {"diffraction": {"level_db": "unknown", "kind": "none", "how": ""}}
 
 
