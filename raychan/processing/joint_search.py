@@ -24,6 +24,7 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 _SETS, _UNFINISHED = 32, 256
 _PAIRS = 1 << 18  # of beams tried: all of a line of 30 wavelengths, else those of the strongest beams (not measured)
 _SAME = 0.5  # beam widths: sets whose waves are all nearer are one (not measured)
+_BATCH = 1 << 21  # beams times sets times waves at once, 32 MB
 _ROUNDS = 20  # of refining a set by turns (not measured)
 _STILL = 1e-5  # beam widths: a wave that moves less has arrived
 _BETTER = 1e-9  # of the power: less is rounding
@@ -80,12 +81,15 @@ def _on_grid(data: Complexes, aperture: Aperture, count: int) -> tuple[Floats, F
 def _gains(data: Complexes, steering: Complexes, seen: Complexes, bases: Complexes) -> Floats:
     """Return what beams (b, a), which see (b, n) of snapshots (n, a), explain beside each of bases (s, k, a)."""
     sets, count, size = bases.shape
-    shared = (steering.conj() @ bases.reshape(-1, size).T).reshape(-1, sets, count)
-    alone = size - squared(shared).sum(axis=2)
-    power = np.zeros(alone.shape)
-    for snapshot, wave in zip(data, seen.T, strict=True):
-        power += squared(wave[:, None] - (shared * (bases.conj() @ snapshot)).sum(axis=2))
-    return np.where(alone > ALONE * size, power / np.maximum(alone, ALONE), 0.0).T
+    gains, batch = np.empty((sets, len(steering))), max(1, _BATCH // (sets * count))
+    for some in (slice(i, i + batch) for i in range(0, len(steering), batch)):
+        shared = (steering[some].conj() @ bases.reshape(-1, size).T).reshape(-1, sets, count)
+        alone = size - squared(shared).sum(axis=2)
+        power = np.zeros(alone.shape)
+        for snapshot, wave in zip(data, seen[some].T, strict=True):
+            power += squared(wave[:, None] - (shared * (bases.conj() @ snapshot)).sum(axis=2))
+        gains[:, some] = np.where(alone > ALONE * size, power / np.maximum(alone, ALONE), 0.0).T
+    return gains
 
 
 def _longer(aperture: Aperture, beams: Floats, sets: Floats, values: Floats, kept: int) -> tuple[Floats, Floats]:
@@ -93,15 +97,19 @@ def _longer(aperture: Aperture, beams: Floats, sets: Floats, values: Floats, kep
     (r, b) with one more of beams (b, 2)."""
     found: list[Floats] = []
     most: list[float] = []
-    while len(found) < kept and values.max(initial=0.0) > 0.0:
-        row, column = np.unravel_index(int(values.argmax()), values.shape)
-        most.append(float(values[row, column]))
+    # The best beam of each set is found again only where some of its beams were taken away.
+    columns, tops = values.argmax(axis=1), values.max(axis=1)
+    while len(found) < kept and tops.max(initial=0.0) > 0.0:
+        row = int(tops.argmax())
+        column = columns[row]
+        most.append(float(tops[row]))
         found.append(np.concatenate([sets[row], beams[column, None]]))
         near = aperture.apart(sets[:, :, None], found[-1]) < _SAME
         # Found again are those that lack one wave of it, with a beam near to that.
         for lacked, wave in enumerate(found[-1]):
-            same = np.asarray(np.delete(near, lacked, axis=2).any(axis=2)).all(axis=1)
+            same = np.flatnonzero(np.asarray(np.delete(near, lacked, axis=2).any(axis=2)).all(axis=1))
             values[np.ix_(same, aperture.apart(beams, wave) < _SAME)] = 0.0
+            columns[same], tops[same] = values[same].argmax(axis=1), values[same].max(axis=1)
     return np.array(found).reshape(-1, sets.shape[1] + 1, 2), np.array(most)
 
 
