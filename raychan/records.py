@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from raychan.columns import Record, column
 from raychan.kinds import *  # noqa: F403
 from raychan.reprs import Plotted
+from raychan.trajectories import Trajectories
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -124,26 +125,6 @@ class DiffractedRoutes(Record):
 
 
 @dataclass(frozen=True)
-class Trajectories(Record):
-    """Where paths went; a row a trajectory, d slots a chain. Float32 but for specular paths (`ExactTrajectories`)."""
-
-    departure: Vectors = column("w 3", np.float32, doc="unit direction of departure, world axes")
-    arrival: Floats = column("w 3", doc="unit direction towards which the receiver looks, world axes")
-    body: NDArray[np.int16] = column("w d", np.int16)
-    part: NDArray[np.int16] = column("w d", np.int16)
-    kind: NDArray[np.int8] = column("w d", np.int8)
-    vertices: Vectors = column("w d 3", np.float32, unit="m", doc="unused slots repeat the receiver")
-
-
-@dataclass(frozen=True)
-class ExactTrajectories(Trajectories):
-    """Trajectories in double precision."""
-
-    departure: Floats = column("w 3", doc="unit direction of departure, world axes")
-    vertices: Floats = column("w d 3", unit="m", doc="unused slots repeat the receiver")
-
-
-@dataclass(frozen=True)
 class PropagationPaths(Record):
     """What all paths have, simulated or specular; a row a path, d the most interactions.
 
@@ -206,6 +187,17 @@ class PropagationPaths(Record):
         return self.trajectories.kind[self.trajectory]
 
     @property
+    def drift(self) -> Vectors:
+        """Velocities (n, 2, 3) [m/s] of the waves' sources relative to transmitter and receiver; no ends (n, 0, 3)
+        where no element stands off the phase centres."""
+        return self.trajectories.drift[self.trajectory]
+
+    @property
+    def instant(self) -> Floats:
+        """Instants (n,) [s] of vertices and directions, from the frame's start."""
+        return self.trajectories.instant[self.trajectory]
+
+    @property
     def vertices(self) -> Vectors:
         """Vertices (n, d + 2, 3) [m], tx to rx, over the centre of footprints, not corners; unused slots repeat rx."""
         inner = self.trajectories.vertices[self.trajectory]
@@ -225,9 +217,11 @@ class Paths(PropagationPaths):
     @classmethod
     def of(cls, **columns: object) -> Paths:
         """Return paths of columns of which each has a row a path, those of `Trajectories` among them."""
-        held: dict[str, Any] = {f.name: columns.pop(f.name) for f in fields(Trajectories)}
+        names = [f.name for f in fields(Trajectories) if f.name in columns]
+        held: dict[str, Any] = {name: columns.pop(name) for name in names}
         rows: dict[str, Any] = {"aside": np.zeros((np.asarray(columns["length"]).size, 0, 3), np.float32)} | columns
-        return cls(trajectory=np.arange(len(rows["length"]), dtype=np.int32), trajectories=Trajectories(**held), **rows)
+        each = np.arange(len(rows["length"]), dtype=np.int32)
+        return cls(trajectory=each, trajectories=Trajectories.of(**held), **rows)
 
 
 @dataclass(frozen=True)

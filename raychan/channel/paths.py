@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.corner_rays import departures
+from raychan.channel.drifts import drifts
 from raychan.channel.edge_diffraction import diffracted_paths
 from raychan.channel.ends import RadarEnds, at_start, ends_of, paths_record, rx_fields, swept_by
 from raychan.channel.footprint_paths import over_three, several
@@ -20,7 +21,8 @@ from raychan.channel.rates import rates
 from raychan.channel.transfer import corner_gains
 from raychan.parallel import parallel_for
 from raychan.radar.dual_paths import columns_of
-from raychan.records import DiffractedRoutes, Facets, Paths, Routes, Trajectories
+from raychan.records import DiffractedRoutes, Facets, Paths, Routes
+from raychan.trajectories import Trajectories
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -60,16 +62,18 @@ def paths_of(
         length=length,
         **received,
         length_rate=np.concatenate([2.0 * rate[whole], parts.rate]),
+        drift=drifts(routes, facets, radar, own.tx_velocity, own.rx_velocity),
         trajectory=np.concatenate([whole, parts.route]).astype(np.int32),
         aside=np.concatenate([np.zeros((len(whole), *parts.place.shape[1:]), np.float32), parts.place]),
     )
 
 
-def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDArray[Any]) -> Paths:
+def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, drift: Floats, **columns: NDArray[Any]) -> Paths:
     """Return the record of paths over routes for a radar that receives.
 
-    Args: columns of the paths: length, amplitude, cross where the radar has cross-polarised receivers, length_rate,
-    trajectory, the number of each path's route, and aside, where some are of parts of footprints.
+    Args: drift (w, 2, 3) of each route (`channel.drifts`); columns of the paths: length, amplitude, cross where the
+    radar has cross-polarised receivers, length_rate, trajectory, the number of each path's route, and aside, where some
+    are of parts of footprints.
     """
     columns.setdefault("aside", np.zeros((len(columns["length"]), 0, 3), np.float32))
     away, look = departures(routes)
@@ -83,6 +87,8 @@ def over_routes(routes: Routes, facets: Facets, radar: RadarEnds, **columns: NDA
             part=np.where(routes.facet >= 0, part, -1).astype(np.int16),
             kind=routes.kind,
             vertices=routes.vertices.astype(np.float32),
+            drift=drift.astype(np.float32),
+            instant=np.full(len(routes.kind), facets.since),
         ),
         body_names=facets.body_names,
         part_names=facets.part_names,
@@ -178,10 +184,11 @@ def _joined(
     """Return the columns of some rows of several sets of trajectories as one set, as `_column` does; unused slots
     repeat the receiver rx (3,) [m]."""
     slots = max(p.kind.shape[1] for p in parts)
-    empty: dict[str, Any] = {"body": -1, "part": -1, "kind": 0, "vertices": rx}
+    empty: dict[str, Any] = {"body": -1, "part": -1, "kind": 0, "vertices": rx, "drift": 0.0}
+    wide = dict.fromkeys(empty, slots) | {"drift": max(p.drift.shape[1] for p in parts)}
     return {
         f.name: _column(
-            [getattr(p, f.name) for p in parts], rows, begin, copies, slots if f.name in empty else 0, empty.get(f.name)
+            [getattr(p, f.name) for p in parts], rows, begin, copies, wide.get(f.name, 0), empty.get(f.name)
         )
         for f in dataclasses.fields(Trajectories)
     }

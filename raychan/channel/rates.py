@@ -36,17 +36,22 @@ def _rates(  # type: ignore[no-untyped-def]
             last = j == d or kind[i, j] == 0
             y, w = vec(rx), vec(rx_velocity)
             if not last:
-                b = max(body[i, j], 0)
-                y = slot(vertices, i, j)
-                s, arm, u = row(spin, b), less(y, row(origin, b)), row(velocity, b)
-                w = (
-                    u[0] + s[1] * arm[2] - s[2] * arm[1],
-                    u[1] + s[2] * arm[0] - s[0] * arm[2],
-                    u[2] + s[0] * arm[1] - s[1] * arm[0],
-                )
+                y, w = slot(vertices, i, j), of_body(vertices, body, velocity, spin, origin, i, j)
             total += dot(less(w, v), heading(x, y))
             if last:
                 break
             x, v = y, w
         out[i] = 0.5 * total
     return out
+
+
+@njit(cache=True, nogil=True)
+def of_body(vertices, body, velocity, spin, origin, i, j):  # type: ignore[no-untyped-def]
+    """Return the velocity of the body at vertex j of route i."""
+    b = max(body[i, j], 0)
+    s, arm, u = row(spin, b), less(slot(vertices, i, j), row(origin, b)), row(velocity, b)
+    return (
+        u[0] + s[1] * arm[2] - s[2] * arm[1],
+        u[1] + s[2] * arm[0] - s[0] * arm[2],
+        u[2] + s[0] * arm[1] - s[1] * arm[0],
+    )

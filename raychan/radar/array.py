@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from raychan.radar.declared import check_type, finite, reals
-from raychan.radar.wave_kernels import lengthen
+from raychan.radar.wave_kernels import lengthen, quicken
 from raychan.scalars import is_one_of, meant, plain, shown
 
 Floats = NDArray[np.float64]
@@ -187,11 +187,15 @@ class Wavefronts:
     tx_radius: Floats
     """(n,) [m] from the transmitter."""
     bare: NDArray[np.bool_]
+    drift: Floats | None = None
+    """Velocities (n, 2, 3) [m/s] of the waves' sources relative to transmitter and receiver; None where they stand."""
+    instant: Floats | float = 0.0
+    """When the sources are there (n,) [s]."""
 
     def __getitem__(self, rows: Any) -> Wavefronts:
-        return Wavefronts(
-            self.arrival[rows], self.radius[rows], self.departure[rows], self.tx_radius[rows], self.bare[rows]
-        )
+        drift, instant = (None, 0.0) if self.drift is None else (self.drift[rows], np.asarray(self.instant)[rows])
+        ends = self.arrival[rows], self.radius[rows], self.departure[rows], self.tx_radius[rows]
+        return Wavefronts(*ends, self.bare[rows], drift, instant)
 
     def moved(self, rows: NDArray[np.int64], aside: Floats) -> Wavefronts:
         """Return the waves of which those in rows (r,) come from elsewhere: by `aside` (r, 2, 3) [m], seen from the
@@ -201,7 +205,7 @@ class Wavefronts:
             source = look[rows] * radius[rows, None] + aside[:, end]
             radius[rows] = np.linalg.norm(source, axis=1)
             look[rows] = source / np.maximum(radius[rows], 1e-300)[:, None]
-        return Wavefronts(looks[1], radii[1], looks[0], radii[0], self.bare)
+        return Wavefronts(looks[1], radii[1], looks[0], radii[0], self.bare, self.drift, self.instant)
 
     def between(self, tx: Floats, rx: Floats) -> tuple[Floats, Floats]:
         """Return how much longer (n,) [m] paths are between elements at tx and rx (3,) [m] off the phase centres, and
@@ -216,6 +220,34 @@ class Wavefronts:
                 longer[rows] = self[rows]._longer_bare(tx, rx)
                 factor[rows] = _spread(self.radius[rows], longer[rows])
         return longer, factor
+
+    def faster(self, tx: Floats, rx: Floats) -> Floats:
+        """Return by how much faster (n,) [m/s] paths grow between elements at tx and rx (3,) [m] off the phase
+        centres."""
+        out = np.zeros(len(self.radius))
+        if self.drift is not None:
+            if rx.any():
+                quicken(self.radius, self.arrival, np.ascontiguousarray(self.drift[:, 1]), rx, out)
+            if tx.any():
+                quicken(self.tx_radius, self.departure, np.ascontiguousarray(self.drift[:, 0]), tx, out)
+        return out
+
+    def fastest(self, tx: float, rx: float) -> float:
+        """Return a bound on `faster` [m/s] between elements at most tx and rx [m] off the phase centres."""
+        if self.drift is None or not len(self.radius):
+            return 0.0
+        most = np.zeros(len(self.radius))
+        for off, look, radius, drift in (
+            (tx, self.departure, self.tx_radius, self.drift[:, 0]),
+            (rx, self.arrival, self.radius, self.drift[:, 1]),
+        ):
+            # Directions turn by at most asin(off / radius), by any angle nearer than that.
+            sine = np.where(radius > off, off / np.maximum(radius, 1e-300), 1.0)
+            back = np.where(radius > off, 1.0 - np.sqrt(1.0 - sine**2), 2.0)
+            along = np.abs(np.einsum("ni,ni->n", drift, look))
+            across = np.sqrt(np.maximum(np.einsum("ni,ni->n", drift, drift) - along**2, 0.0))
+            most += across * sine + along * back
+        return float(most.max())
 
     def _longer_bare(self, tx: Floats, rx: Floats) -> Floats:
         """Return the same of paths over one mirror or none: the transmitter's image moves as the mirror shows it."""

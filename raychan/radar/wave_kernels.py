@@ -24,3 +24,20 @@ def lengthen(radius, look, offset, longer, factor):  # type: ignore[no-untyped-d
         longer[i] += more
         if radius[i] + more > 0.0:
             factor[i] *= radius[i] / (radius[i] + more)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def quicken(radius, look, drift, offset, faster):  # type: ignore[no-untyped-def]
+    """Add to `faster` (n,) [m/s] by how much faster the way to spherical waves' sources grows from `offset` (3,) [m]
+    than from 0. Args: as for `lengthen`; drift (n, 3) [m/s] of the sources."""
+    for i in range(len(radius)):
+        x, y, z = (
+            radius[i] * look[i, 0] - offset[0],
+            radius[i] * look[i, 1] - offset[1],
+            radius[i] * look[i, 2] - offset[2],
+        )
+        far = math.sqrt(x * x + y * y + z * z)
+        if far > 0.0:
+            faster[i] += drift[i, 0] * (x / far - look[i, 0])
+            faster[i] += drift[i, 1] * (y / far - look[i, 1])
+            faster[i] += drift[i, 2] * (z / far - look[i, 2])

@@ -20,7 +20,7 @@ from raychan.run.point_spread import PointSpread
 from raychan.run.receiver import aperture_of, check_cube, check_map, map_of, receivers
 from raychan.run.receiver_losses import range_spread
 from raychan.run.result import Receiver, Result
-from raychan.signal.baseband import fronts_of
+from raychan.signal.fronts import fronts_of
 from raychan.units import C0
 
 Floats = NDArray[np.float64]

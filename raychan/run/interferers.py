@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.channel.drifts import drifts
 from raychan.channel.ends import rx_fields
 from raychan.channel.paths import over_routes
 from raychan.channel.rates import rates
@@ -79,6 +80,7 @@ def interferer_paths(scene: Scene, geometry: Geometry, interferer: Interferer) -
         routes,
         facets,
         victim,
+        drifts(routes, facets, victim, np.asarray(sender.velocity), np.asarray(victim.rx_motion)),
         length=routes.length,
         length_rate=2.0 * rates(routes, facets, sender.velocity, victim.rx_motion),
         **dict(zip(("amplitude", "cross"), gains.T, strict=False)),

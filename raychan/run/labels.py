@@ -146,7 +146,7 @@ def _explained(
     away, back = (tuple(x[at].tolist()) for x in (way.departure, way.arrival))
     known_of = true.folded, true.range, true.rate
     made = Explanation(*place, cell.power, predicted, error_db, label, parts, *known_of, known.turns.off_db(summed))
-    return replace(made, departure=away, arrival=back)
+    return replace(made, departure=away, arrival=back, drift=tuple(way.drift[at].ravel().tolist()))
 
 
 def waves_in(

@@ -13,6 +13,7 @@ from raychan.processing.staggered import ResolvedMap
 from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
+from raychan.run.rates_apart import rates_apart
 from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
 from raychan.run.result import DC, IMAGE, INTERFERENCE, SIDELOBE, ExplainedDetections, Explanation, Result
 from raychan.run.two_ways import apart
@@ -101,8 +102,8 @@ def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
 
 
 def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Radar) -> list[str]:
-    """Return a line each if detections lose by spherical waves in a beam, by ranges that differ over the elements, or
-    by migration over range cells."""
+    """Return a line each if detections lose by spherical waves in a beam, by ranges or rates that differ over the
+    elements, or by migration over range cells."""
     said = []
     # The receiver's DC offset is no wave.
     wave = np.array([why.label != DC for why in reasons], bool)
@@ -114,13 +115,14 @@ def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Rada
             f"wavelength = {limit:.3g} m: beams are those of plane waves and read up to {loss.max():.1f} dB less of a "
             "spherical one"
         )
-    differ, loss = (wave * x for x in range_spread(found, radar))
-    if (wide := loss > _LOST_DB).any():
-        said.append(
-            f"{share_of(wide)} {'has' if wide.sum() == 1 else 'have'} ranges that differ over the elements "
-            f"({numbers(wide)}), by up to {differ.max():.1f} cells: beams add one cell of all and read up to "
-            f"{loss.max():.1f} dB less"
-        )
+    for what, spread in (("ranges", range_spread(found, radar)), ("rates", rates_apart(found, reasons, radar))):
+        differ, loss = (wave * x for x in spread)
+        if (wide := loss > _LOST_DB).any():
+            said.append(
+                f"{share_of(wide)} {'has' if wide.sum() == 1 else 'have'} {what} that differ over the elements "
+                f"({numbers(wide)}), by up to {differ.max():.1f} cells: beams add one cell of all and read up to "
+                f"{loss.max():.1f} dB less"
+            )
     moved, loss = migration(found.true_rate, radar)
     if (fast := loss > _LOST_DB).any():
         off = beside(moved[fast], radar)

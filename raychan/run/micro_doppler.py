@@ -174,7 +174,7 @@ class _Frame:
             now,
             routes,
             tuple(strengths(r, geometry.facets, now.radar, wave.middle) for r in routes),
-            tuple(PartFronts.of(r, geometry.facets) for r in routes),
+            tuple(PartFronts.of(r, geometry.facets, now.radar) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
         )
 
@@ -189,9 +189,11 @@ class _Frame:
         shape = (2, len(self.radar.elements), last - first + 1, wave.n_samples)
         out = np.zeros(shape, np.complex64)
         delay_rate = key.others.length_rate / C0 * (first - key.chirp) * self.step
+        way = key.others.trajectories
         late = key.others.replace(
             length=key.others.length + C0 * delay_rate,
             amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
+            trajectories=way.replace(instant=way.instant + (key.chirp - first) * self.step),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
         out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples
@@ -207,19 +209,29 @@ class _Frame:
                 amplitudes *= np.exp(2j * np.pi * wave.swept / C0 * lengths)
                 rows = out[0, :, start - first : start - first + count]
                 for sent in self.radar.transmissions:
-                    self.add_ramps(rows, start, sent, lengths, amplitudes, fronts)
+                    self.add_ramps(rows, (start, at - key.chirp), sent, lengths, amplitudes, fronts)
         return out
 
     def add_ramps(
-        self, out: Samples, start: int, sent: Transmission, lengths: Floats, amplitudes: Complexes, fronts: PartFronts
+        self,
+        out: Samples,
+        begin: tuple[int, Floats],
+        sent: Transmission,
+        lengths: Floats,
+        amplitudes: Complexes,
+        fronts: PartFronts,
     ) -> None:
-        """Add to samples (antenna, chirp, sample) from chirp number `start` on what one transmitter brings over parts
-        (chirp + 1, n, 3) of routes of these lengths [m]."""
-        wave, chirps = self.radar.waveform, slice(sent.since(start).first, None, sent.step)
+        """Add to samples (antenna, chirp, sample) what one transmitter brings over parts (chirp + 1, n, 3) of routes of
+        these lengths [m]. Args: begin, the number of the first chirp, and by how many chirps all come after the
+        keyframe (chirp + 1,)."""
+        (start, after), wave = begin, self.radar.waveform
+        chirps, late = slice(sent.since(start).first, None, sent.step), self.step * after[:, None, None]
         code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
         split = np.asarray((amplitudes[:, :, 1:] != 0.0).any(axis=(0, 2)))
         for layer, element in zip(out, self.radar.elements_world, strict=True):
             longer, factor = fronts.between(sent.offset, element, split)
+            if fronts.drifting:
+                longer = longer + late * fronts.faster(sent.offset, element, split)
             turn = np.sqrt(self.radar.power) * factor * np.exp(-2j * np.pi / wave.wavelength * longer)
             brought = self.ramps(lengths + longer, amplitudes * turn, chirps)
             layer[chirps] += brought if sent.turn == 0.0 else brought * code

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from raychan.processing.range_azimuth import RangeAzimuth
 from raychan.radar.dual_paths import DualPaths
-from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler, Trajectories
+from raychan.records import Cube, MapError, Paths, Profile, RangeDoppler
 from raychan.run.directions import angles_in
 from raychan.run.result import ExplainedDetections, Result
+from raychan.trajectories import Trajectories
 from raychan.units import C0, dbm
 
 CONVENTIONS = "CF-1.11"
@@ -52,6 +53,8 @@ _ADDED = {"elevation": np.nan, "ambiguous": False}
 """Columns that older files of format 3 do not have, and what stands for them."""
 _NOT_STORED = ("spare", "slots")
 """Of a map: what the detector alone asks for."""
+_OF_ARRAYS = ("aside", "drift", "instant")
+"""Columns of paths that ask where the elements of an array stand."""
 _BEAMS = "beams"
 """Group of the beams of an array's detections: beside these, so that a table of detections has a row each."""
 _UNITS = {"sqrt(W)": "V"}
@@ -122,7 +125,7 @@ def read_record(file: Path, group: str, kind: Any) -> Any:
             kind = DualPaths
         for f in columns(kind):
             name = _CALLED.get(f.name, f.name)
-            if name == "aside" and name not in data:
+            if name in _OF_ARRAYS and name not in data:
                 continue  # a radar without an array, or an older file
             if name not in data and issubclass(kind, Paths) and name in _FORMER:
                 former, factor = _FORMER[name]
@@ -173,7 +176,7 @@ def _write(group: Any, name: str, result: Result, packed: dict[str, Any]) -> Non
             continue
         value = record.trajectories.vertices[record.trajectory] if f.name == "vertices" else getattr(record, f.name)
         if "axes" in f.metadata:
-            if f.name == "beam" or (f.name == "aside" and not value.size):
+            if f.name == "beam" or (f.name in _OF_ARRAYS and not _held(record, f.name).size):
                 continue
             if f.name == "cell":  # a column each, so that a table of detections has a row each
                 for k, axis in enumerate(_CELL):
@@ -239,6 +242,12 @@ def _column(group: Any, name: str, f: dataclasses.Field[Any], value: Any, packed
             _variable(group, f"{f.name}_{part[:2]}", axes, half, said, packed)
     else:
         _variable(group, _CALLED.get(f.name, f.name), axes, value, about, packed)
+
+
+def _held(record: Paths, name: str) -> NDArray[Any]:
+    """Return what tells whether a column that asks where elements stand is written: where nothing drifts, no instant is
+    asked for."""
+    return np.asarray(getattr(record, "drift" if name == "instant" else name))
 
 
 def _fixed(column: str, size: str) -> str:

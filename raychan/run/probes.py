@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from raychan.radar.radar import Radar
 from raychan.records import Paths
-from raychan.signal.baseband import fronts_of, stand_apart
+from raychan.signal.baseband import stand_apart
+from raychan.signal.fronts import fronts_of
 from raychan.units import C0
 
 Floats = NDArray[np.float64]

@@ -93,6 +93,9 @@ class Explanation:
     """Unit direction in which the strongest path of the leading chain leaves, world axes; zeros where unknown."""
     arrival: tuple[float, ...] = (0.0, 0.0, 0.0)
     """Unit direction that it returns from."""
+    drift: tuple[float, ...] = ()
+    """Velocities [m/s] of its last scatterer's images relative to transmitter and receiver, three numbers each; none
+    where no element stands off the phase centres, or nothing moves."""
     source: str = "noise"
     """What made a cell that no path explains: 'noise', 'dc offset', 'I/Q image' or an interferer's name."""
 

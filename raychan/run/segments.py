@@ -3,7 +3,7 @@ error."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from raychan.channel.corner_places import corner_places
 from raychan.channel.corner_rays import departures
+from raychan.channel.drifts import drifts
 from raychan.radar.array import Wavefronts, wavefronts
+from raychan.radar.radar import Radar
 from raychan.records import SCATTER, Cube, DiffractedRoutes, Facets, Paths, Routes
 from raychan.units import C0
 from raychan.world.scene import Scene
@@ -66,12 +68,15 @@ class PartFronts:
     corners: Wavefronts
 
     @staticmethod
-    def of(routes: Routes, facets: Facets) -> PartFronts:
-        """Return the waves of routes; those without a footprint have the same at all corners."""
+    def of(routes: Routes, facets: Facets, radar: Radar) -> PartFronts:
+        """Return the waves of routes at a radar; those without a footprint have the same at all corners."""
         n = len(routes.kind)
         ends = (np.broadcast_to(x, (n, 1, 3)) for x in (routes.tx, routes.rx))
         stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
+        drift = drifts(routes, facets, radar, radar.velocity, radar.rx_motion)
         whole = wavefronts(stops, routes.scatter, *departures(routes), routes.length)
+        if drift.shape[1]:
+            whole = replace(whole, drift=drift, instant=np.zeros(n))
         rows = np.flatnonzero((routes.kind == SCATTER).any(axis=1))
         places = corner_places(routes, rows, facets)[0].reshape(-1, 2, 3).astype(float)
         parts = (3 * rows[:, None] + np.arange(3)).ravel()
@@ -81,10 +86,23 @@ class PartFronts:
         """Return how much longer (n, 3) [m] the parts are between elements at tx and rx (3,) [m] off the phase centres,
         and by which factor (n, 3) stronger, of routes of which some (n,) are `split` into their corners."""
         corners, whole = self.corners.between(tx, rx), self.whole.between(tx, rx)
-        longer, factor = (
-            np.where(split[:, None], x.reshape(-1, 3), y[:, None]) for x, y in zip(corners, whole, strict=True)
-        )
+        longer, factor = (_parts(x, y, split) for x, y in zip(corners, whole, strict=True))
         return longer, factor
+
+    @property
+    def drifting(self) -> bool:
+        """Whether rates differ from element to element."""
+        return self.whole.drift is not None
+
+    def faster(self, tx: Floats, rx: Floats, split: NDArray[np.bool_]) -> Floats:
+        """Return by how much faster (n, 3) [m/s] the parts grow between elements at tx and rx (3,) [m]; split as for
+        `between`."""
+        return _parts(self.corners.faster(tx, rx), self.whole.faster(tx, rx), split)
+
+
+def _parts(corners: Floats, whole: Floats, split: NDArray[np.bool_]) -> Floats:
+    """Return values (n, 3) of parts of routes: of corners (3 n,) of those that are split (n,), else of the whole."""
+    return np.where(split[:, None], corners.reshape(-1, 3), whole[:, None])
 
 
 @dataclass(frozen=True)

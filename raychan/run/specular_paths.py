@@ -13,10 +13,11 @@ from raychan.channel.rates import rates
 from raychan.channel.transfer import transfer
 from raychan.poses import theta_phi
 from raychan.radar.array import numbers
-from raychan.records import NONE, REFLECT, TRANSMIT, ExactTrajectories, Facets, Routes, SpecularPaths
+from raychan.records import NONE, REFLECT, TRANSMIT, Facets, Routes, SpecularPaths
 from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import Mirror
 from raychan.tracing.routes import Interactions, ray_routes
+from raychan.trajectories import ExactTrajectories
 from raychan.world.geometry import Geometry
 from raychan.world.limits import BOUNCES, PLACE, SPEED
 from raychan.world.point_in_body import Place, place_of
@@ -256,7 +257,7 @@ def specular_paths(
     deep = int(used.sum(axis=1).max(initial=0))
     part = facets.part[np.maximum(routes.facet, 0)] if len(facets.part) else routes.facet
     away, look = departures(routes)
-    trajectories = ExactTrajectories(
+    trajectories = ExactTrajectories.of(
         departure=away[order],
         arrival=look[order],
         body=np.where(used, routes.body[order], -1)[:, :deep],

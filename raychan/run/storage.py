@@ -247,7 +247,7 @@ def _plain(value: Any) -> Any:
 def _explanation(held: dict[str, Any]) -> Explanation:
     parts = tuple(Contribution(**(c | {"chain": tuple(c["chain"])})) for c in held["contributions"])
     numbers = {name: math.nan for name, value in held.items() if value is None}  # as JSON has it
-    ways: dict[str, Any] = {name: tuple(held[name]) for name in ("departure", "arrival") if name in held}
+    ways: dict[str, Any] = {name: tuple(held[name]) for name in ("departure", "arrival", "drift") if name in held}
     return Explanation(**(held | numbers | ways | {"contributions": parts}))
 
 

@@ -11,7 +11,7 @@ from raychan.radar.radar import Radar
 from raychan.records import Paths
 from raychan.run.ledger import NOTHING, Entry
 from raychan.run.mechanisms import peak
-from raychan.signal.baseband import fronts_of
+from raychan.signal.fronts import fronts_of
 from raychan.units import C0, db
 
 WIDE = "turning bodies before wide arrays"

@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.parallel import parallel_map
-from raychan.radar.array import Wavefronts, reach, wavefronts
+from raychan.radar.array import reach
 from raychan.radar.dual_paths import DualPaths, products
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform, Waveform
-from raychan.records import DIFFUSE, POINT, SCATTER, Cube, Paths
+from raychan.records import Cube, Paths
 from raychan.signal.dechirp import beat_sum
-from raychan.signal.keystone import Echoes, Keystone, keystones, middle
+from raychan.signal.echoes import Echoes
+from raychan.signal.fronts import fronts_of
+from raychan.signal.keystone import Keystone, keystones, middle
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -85,21 +87,6 @@ def stand_apart(radar: Radar) -> bool:
     return any(reach(radar))
 
 
-def fronts_of(paths: Paths) -> Wavefronts:
-    """Return the spherical waves of paths at both ends."""
-    met = paths.trajectories
-    at = (met.kind == SCATTER) | (met.kind == POINT) | (met.kind == DIFFUSE)
-    scatterer = np.where(at.any(axis=1), np.argmax(at, axis=1), -1)
-    ends = (np.broadcast_to(x, (len(at), 1, 3)) for x in (paths.tx, paths.rx))
-    stops = np.concatenate([next(ends), met.vertices, next(ends)], axis=1)
-    length = np.zeros(len(at))
-    length[paths.trajectory] = paths.length
-    fronts = wavefronts(stops, scatterer, np.asarray(met.departure, float), met.arrival, length)
-    every = fronts[paths.trajectory]
-    corners = np.flatnonzero(paths.aside.any(axis=(1, 2)))
-    return every.moved(corners, paths.aside[corners].astype(float)) if len(corners) else every
-
-
 def _fill(
     out: Samples, echoes: Echoes, pairs: list[tuple[Floats, Floats]], wave: Waveform, tolerance: float, method: str
 ) -> None:
@@ -110,20 +97,22 @@ def _fill(
     rate = echoes.delay_rate
     if isinstance(wave, OwnWaveform):
         for layer, pair in zip(out, pairs, strict=True):
-            later, amplitude = echoes.between(*pair)
+            later, faster, amplitude = echoes.between(*pair)
             turned = amplitude * np.exp(-2j * np.pi * wave.carrier * later)
-            layer[...] = wave.received(turned, echoes.delay + later, rate)
+            layer[...] = wave.received(turned, echoes.delay + later, rate + faster)
         return
     # The grid adds the carrier's phase over the time to the middle: its amplitudes are those of the start.
-    centred = replace(echoes, delay=echoes.delay + rate * middle(wave)[0])
-    reach = max(float(np.linalg.norm(rx)) for _, rx in pairs) + float(np.linalg.norm(pairs[0][0]))
-    grids = keystones(centred, wave, tolerance, reach / C0)
+    then = middle(wave)[0]
+    centred = replace(echoes, delay=echoes.delay + rate * then, begun=echoes.begun + then)
+    off = float(np.linalg.norm(pairs[0][0])), max(float(np.linalg.norm(rx)) for _, rx in pairs)
+    sway = 0.0 if echoes.fronts is None else echoes.fronts.fastest(*off)
+    grids = keystones(centred, wave, tolerance, sum(off) / C0, sway=sway / C0)
     cells = sum(grid.cells for grid, _ in grids) / (wave.n_chirps * wave.n_samples)
     if method == "direct" or (method == "auto" and len(rate) <= _FEW * cells):
         for layer, pair in zip(out, pairs, strict=True):
-            later, amplitude = echoes.between(*pair)
+            later, faster, amplitude = echoes.between(*pair)
             turned = amplitude * np.exp(-2j * np.pi * wave.carrier * later)
-            layer[...] = _direct(turned, echoes.delay + later, rate, wave)
+            layer[...] = _direct(turned, echoes.delay + later, rate + faster, wave)
     else:
         _add_fast(out, grids, pairs)
 

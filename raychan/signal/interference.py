@@ -20,7 +20,7 @@ from raychan.radar.interferer import Interferer
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import OwnWaveform, Waveform
 from raychan.records import Paths
-from raychan.signal.baseband import fronts_of
+from raychan.signal.fronts import fronts_of
 from raychan.units import C0
 
 Floats = NDArray[np.float64]
@@ -48,11 +48,11 @@ def burst(victim: Radar, interferer: Interferer, paths: Paths, rng: np.random.Ge
     here, rows = np.zeros(3), iter(out)
     for name in amplitudes_of(paths):
         for element in elements:
-            longer, factor = fronts.between(here, element)
-            later = longer / C0
+            (longer, factor), faster = fronts.between(here, element), fronts.faster(here, element)
+            later, growth = (longer - faster * fronts.instant) / C0, (paths.length_rate + faster) / C0
             size = np.sqrt(interferer.radar.power) * factor * getattr(paths, name)
             size = size * np.exp(-2j * np.pi * other.carrier * later)
-            _burst(size, paths.delay + later, paths.length_rate / C0, own, others, begin, begins, phases, next(rows))
+            _burst(size, paths.delay + later, growth, own, others, begin, begins, phases, next(rows))
     if not wave.complex_sampling:
         out.imag = 0.0
     return out

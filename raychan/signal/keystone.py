@@ -15,7 +15,6 @@ A, each term one more pair of transforms, cut where the tolerance allows.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -24,8 +23,8 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from raychan.parallel import parallel_for, parallel_map
-from raychan.radar.array import Wavefronts
 from raychan.radar.waveform import Waveform
+from raychan.signal.echoes import Echoes
 from raychan.signal.keystone_kernels import place_boxes, place_samples, place_sources
 from raychan.signal.nufft import (
     OVER,
@@ -40,7 +39,6 @@ from raychan.signal.nufft import (
     spread,
     wrap_margins,
 )
-from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -58,47 +56,6 @@ _MANY = 20_000  # echoes or samples from which on a second thread pays (not meas
 _CROWD = 64  # echoes in a box up to which they are summed in single precision: it errs by 3e-7 of their sum
 
 
-@dataclass(frozen=True)
-class Echoes:
-    """Echoes at one instant; rows (n,), delay [s]. `Keystone` takes them at the middle sample of a frame."""
-
-    delay: Floats
-    delay_rate: Floats
-    """Change of the delay per time, 2 v / c."""
-    amplitude: Complexes
-    fronts: Wavefronts | None = None
-    """The waves at both ends; None where all elements stand at the phase centres."""
-
-    def __getitem__(self, rows: Any) -> Echoes:
-        fronts = None if self.fronts is None else self.fronts[rows]
-        return Echoes(self.delay[rows], self.delay_rate[rows], self.amplitude[rows], fronts)
-
-    def in_order(self, order: Ints) -> Echoes:
-        """Return the echoes in another order, sorted by all threads."""
-        (delay, rate), amplitude = np.empty((2, len(order))), np.empty(len(order), np.complex128)
-
-        def some(at: slice) -> None:
-            rows = order[at]
-            delay[at], rate[at], amplitude[at] = self.delay[rows], self.delay_rate[rows], self.amplitude[rows]
-
-        parallel_for(len(order), some, _MANY)
-        return Echoes(delay, rate, amplitude, None if self.fronts is None else self.fronts[order])
-
-    def after(self, time: float, carrier: float) -> Echoes:
-        """Return the echoes a time [s] later, their amplitudes with the phase of the carrier [Hz] until then."""
-        if time == 0.0:
-            return self
-        grown = self.delay_rate * time
-        turned = self.amplitude * np.exp(-2j * np.pi * carrier * grown)
-        return Echoes(self.delay + grown, self.delay_rate, turned, self.fronts)
-
-    def between(self, tx: Floats, rx: Floats) -> tuple[Floats, Complexes]:
-        """Return by how much later (n,) [s] than at the phase centres they come between elements at tx and rx (3,) [m],
-        and their amplitudes (n,), less the phase of that."""
-        longer, factor = (np.zeros(len(self.delay)), 1.0) if self.fronts is None else self.fronts.between(tx, rx)
-        return longer / C0, self.amplitude * factor
-
-
 def middle(wave: Waveform) -> tuple[float, float, float]:
     """Return the time of the middle sample from the start of the frame and of its ramp, and the sample step [s]."""
     step = wave.chirp_duration / wave.n_samples
@@ -109,9 +66,10 @@ def middle(wave: Waveform) -> tuple[float, float, float]:
 class Keystone:
     """The grid of one set of echoes, and how samples are read off it; the same for all receivers."""
 
-    def __init__(self, echoes: Echoes, wave: Waveform, tolerance: float, reach: float) -> None:
-        """Size the grid. Args: echoes, one at least; tolerance relative to the sum of their |amplitude|; reach [s], the
-        most by which delays between two elements differ from those between the phase centres."""
+    def __init__(self, echoes: Echoes, wave: Waveform, tolerance: float, reach: float, sway: float = 0.0) -> None:
+        """Size the grid. Args: echoes, one at least; tolerance relative to the sum of their |amplitude|; reach [s] and
+        sway, the most by which delays, and delay rates, between two elements differ from those between the phase
+        centres."""
         self.then, self.t, self.step = middle(wave)
         self.wave, slope = wave, wave.slope
         chirps, samples = wave.n_chirps, wave.n_samples
@@ -124,13 +82,14 @@ class Keystone:
         self.stretch = slope / self.frequency
 
         off = echoes.delay - self.delay
-        fastest = max(map(abs, self.delay_rates))
+        fastest, farthest = max(map(abs, self.delay_rates)) + sway, float(np.abs(off).max())
         shift = echoes.delay_rate * (self.frequency - slope * off)
-        self.shift, span = _middle(shift, fastest * slope * reach)
+        self.shift, span = _middle(shift, fastest * slope * reach + sway * (self.frequency + slope * farthest))
         far, far_span = _middle(
-            echoes.delay_rate * off * (slope * self.stretch), fastest * reach * slope * self.stretch
+            echoes.delay_rate * off * (slope * self.stretch),
+            (fastest * reach + sway * farthest) * slope * self.stretch,
         )
-        late, late_span = _middle(-0.5 * slope * echoes.delay_rate**2, 0.0)
+        late, late_span = _middle(-0.5 * slope * echoes.delay_rate**2, slope * fastest * sway)
         t, m = (samples // 2) * self.step, (chirps // 2) * wave.repetition
         far_turn, late_turn = 2.0 * np.pi * far_span * (m + t) * t, 2.0 * np.pi * late_span * (m + t) ** 2
         small = 0.3 * tolerance
@@ -210,9 +169,9 @@ class Keystone:
 
         def gridded(part: slice) -> tuple[int, NDArray[Any]]:
             some = echoes[part]
-            later, amplitude = some.between(*elements)
+            later, faster, amplitude = some.between(*elements)
             (x, y), strength = np.empty((2, len(later))), np.empty((len(later), self.planes), self.sort)
-            waves = amplitude, some.delay, some.delay_rate, later
+            waves = amplitude, some.delay, some.delay_rate, later, faster
             place_sources(x, y, strength, *waves, ramp, grid, self.rest, self.terms)
             first, rows = rows_under(x, self.width)
             cells = np.zeros((self.planes, rows, self.columns + 2 * half), self.sort)
@@ -241,11 +200,11 @@ class Keystone:
 
 
 def keystones(
-    echoes: Echoes, wave: Waveform, tolerance: float, reach: float, room: int = ROOM
+    echoes: Echoes, wave: Waveform, tolerance: float, reach: float, room: int = ROOM, sway: float = 0.0
 ) -> list[tuple[Keystone, Echoes]]:
     """Return grids, each with its own echoes: one for all, or several where these cost less, as for echoes whose delays
     or rates differ much, or where one takes more than `room` [bytes]."""
-    grid = Keystone(echoes, wave, tolerance, reach)
+    grid = Keystone(echoes, wave, tolerance, reach, sway)
     large = 16 * grid.planes * grid.rows * grid.columns > room
     if not large and grid.turns <= 1.0:
         return [(grid, echoes)]
@@ -259,7 +218,7 @@ def keystones(
     below = values <= 0.5 * sum(limits)
     if below.all() or not below.any():
         return [(grid, echoes)]
-    parts = [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach, room)]
+    parts = [part for half in (below, ~below) for part in keystones(echoes[half], wave, tolerance, reach, room, sway)]
     # More terms of the series may cost less than reading every sample off one more grid.
     return parts if large or sum(part.work for part, _ in parts) < grid.work else [(grid, echoes)]
 

@@ -49,26 +49,26 @@ def place_boxes(box, delay, delay_rate, grid, size, across):  # type: ignore[no-
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def place_sources(x, y, strength, amplitude, delay, delay_rate, later, ramp, grid, rest, terms):  # type: ignore[no-untyped-def]
+def place_sources(x, y, strength, amplitude, delay, delay_rate, later, faster, ramp, grid, rest, terms):  # type: ignore[no-untyped-def]
     """Write where echoes (n,) lie on the grid, x (n,) rows of Doppler shift and y (n,) columns of beat frequency, and
     their strengths (n, p), one for each term of the series.
 
-    Args: delay [s] and delay_rate at the middle instant; later (n,) [s] is added to the delay; ramp carrier [Hz], slope
-    [Hz/s], then (middle instant), t (the same from its ramp's start), step [s]; grid middle delay, frequency, shift of
-    row zero, rows per Hz, middle row, columns a turn, margin; rest (2, 4): middle, 1 / half width, order and half width
-    of the small terms B and A; terms (j,): the last order of B's series that goes with each order of A's.
+    Args: delay [s] and delay_rate at the middle instant; later (n,) [s] and faster (n,) are added to them; ramp carrier
+    [Hz], slope [Hz/s], then (middle instant), t (the same from its ramp's start), step [s]; grid middle delay,
+    frequency, shift of row zero, rows per Hz, middle row, columns a turn, margin; rest (2, 4): middle, 1 / half width,
+    order and half width of the small terms B and A; terms (j,): the last order of B's series with each order of A's.
     """
     carrier, slope, then, t, step = ramp
     middle, frequency, shift_0, dense, row_0, columns, margin = grid
     for i in range(delay.size):
-        tau, b = delay[i] + later[i], delay_rate[i]
+        tau, b = delay[i] + later[i], delay_rate[i] + faster[i]
         off = tau - middle
         shift = b * (frequency - slope * off)
         x[i] = (shift - shift_0) * dense + row_0
         turn = (slope * tau + shift) * step
         turn -= math.floor(turn)
         y[i] = turn * columns + margin
-        cosine, sine = unit_phasor(carrier * (b * then + later[i]) + slope * tau * (t - 0.5 * tau))
+        cosine, sine = unit_phasor(carrier * (delay_rate[i] * then + later[i]) + slope * tau * (t - 0.5 * tau))
         size = amplitude[i] * complex(cosine, sine)
         far = (b * slope * off * slope / frequency - rest[0, 0]) * rest[0, 1]
         late = (-0.5 * slope * b * b - rest[1, 0]) * rest[1, 1]

@@ -13,6 +13,7 @@ STOREYS = (
     ("units", "scalars", "parallel", "blas", "compile"),
     ("poses", "reprs", "kinds", "vectors", "limits"),
     ("columns",),
+    ("trajectories",),
     ("records",),
     ("em", "geometry"),
     ("radar",),

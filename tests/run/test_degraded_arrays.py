@@ -15,7 +15,7 @@ from raychan.records import Cube
 from raychan.run.clutter import clutter_of
 from raychan.run.interferers import interference, interferer_paths
 from raychan.run.target_links import detector_of, target_links
-from raychan.signal.baseband import fronts_of
+from raychan.signal.fronts import fronts_of
 from raychan.signal.phase_error import faulty
 from raychan.units import C0, db
 from raychan.world.errors import SceneError
