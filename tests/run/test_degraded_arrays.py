@@ -102,7 +102,7 @@ def test_an_interferer_near_an_array_arrives_as_a_spherical_wave():
     place = np.array([1.5, 0.8, 0.5])
     victim = rc.Radar(WAVE, (0, 0, 0.5), elements=elements, noise=False)
     scene = rc.Scene([], radar=victim, interferers=[other(place)])
-    heard = interference(scene, geometry_of(scene), 0)
+    (heard,) = interference(scene, geometry_of(scene), 0).values()
     away = np.linalg.norm(place - (victim.position + elements), axis=1)
     # Ramps as the victim's own: the beat of a delay, at the middle of the ramp.
     t = np.arange(128) * WAVE.chirp_duration / 128
