@@ -57,6 +57,28 @@ def nearest_boresight(aperture: Aperture, cosines: Floats) -> Floats:
     return plane.nearest_boresight(cosines) if plane.exact else cosines
 
 
+def nearer(aperture: Aperture, direction: Floats) -> Floats:
+    """Return the directions (k, 2) nearer to boresight than one (2,), the nearest first, that look like it to an array
+    nearly in a plane, but not quite: which of them it is only noise may leave open."""
+    if aperture.flat or not any(aperture.scans) or (plane := plane_of(aperture)).exact:
+        return np.zeros((0, 2))
+    twin, at = plane.alike(direction[None], np.concatenate([np.zeros((1, 2)), plane.own.lobes.at]))
+    twin = twin[(at**2).sum(axis=-1) < 1.0].reshape(-1, 3)
+    own = np.sqrt(max(1.0 - float(direction @ direction), 0.0))
+    twin = twin[twin[:, 0] > own + SAME_EDGE]
+    twin = twin[np.argsort(-twin[:, 0], kind="stable"), 1:]
+    near = _lost(aperture, np.broadcast_to(direction, twin.shape), twin) < HALF
+    return np.asarray(twin[near & (_angle(direction[None], twin) > 0.5 * beam(aperture))])
+
+
+def alike(aperture: Aperture) -> int:
+    """Return how many directions at most, ahead or not, look quite like each."""
+    if aperture.flat or not any(aperture.scans):
+        return 1 + len(aperture.skewed)
+    plane = plane_of(aperture)
+    return 2 * (1 + int((plane.own.lobes.lost <= ALIKE).sum())) if plane.exact else 1
+
+
 def neighbours(aperture: Aperture, at: Floats) -> Ints:
     """Return the directions (g, k) beside each (g, 2) of `Aperture.spread`, itself among them."""
     look = looks(at)
@@ -98,14 +120,14 @@ def _of_tilted(aperture: Aperture, plane: Plane, cosines: Floats, snr: Floats) -
         twin /= np.maximum(np.linalg.norm(twin, axis=-1, keepdims=True), 1e-9)
         edge = twin @ plane.axes[1:].T
         near = (np.abs(edge - at[:, :, None]) / plane.own.beamwidth < 0.5).all(axis=-1)
-        own = (twin * looks(cosines[some])[:, None, None]).sum(axis=-1) >= np.cos(0.5 * _beam(aperture))
+        own = (twin * looks(cosines[some])[:, None, None]).sum(axis=-1) >= np.cos(0.5 * beam(aperture))
         close = inside & _alike(lost, snr[some][:, None])[..., None] & ~own
         out[some] |= close.any(axis=(1, 2))
         i, k, side = np.nonzero(near & ~inside & (snr[some] < _UNKNOWN)[:, None, None])
         other, i = twin[i, k, side, 1:], some[i]
         other, least = _climbed(aperture, cosines[i], other)
         close = least * snr[i] < 0.5 * _SIGMAS**2
-        out[i[close & (_angle(cosines[i], other) > 0.5 * _beam(aperture))]] = True
+        out[i[close & (_angle(cosines[i], other) > 0.5 * beam(aperture))]] = True
     return out | _beside_plane(aperture, plane, cosines, snr)
 
 
@@ -118,8 +140,8 @@ def _beside_plane(aperture: Aperture, plane: Plane, cosines: Floats, snr: Floats
     at *= np.maximum(1.0 - moved, 0.0)[:, None]
     off, ahead = np.sqrt(np.maximum(1.0 - (at**2).sum(axis=1), 0.0)), at @ plane.axes[1:, 0]
     seen = ahead > off * abs(plane.axes[0, 0])
-    own = _angle(cosines, plane.mirrored(cosines)[0]) <= 0.5 * _beam(aperture)
-    return np.asarray(own & seen & (2.0 * np.arcsin(off) > 0.5 * _beam(aperture)))
+    own = _angle(cosines, plane.mirrored(cosines)[0]) <= 0.5 * beam(aperture)
+    return np.asarray(own & seen & (2.0 * np.arcsin(off) > 0.5 * beam(aperture)))
 
 
 def _of_deep(aperture: Aperture, plane: Plane, cosines: Floats, snr: Floats) -> Bools:
@@ -137,7 +159,7 @@ def _of_deep(aperture: Aperture, plane: Plane, cosines: Floats, snr: Floats) -> 
         twin, lost = _climbed(aperture, cosines[i], start)
         inside = (twin**2).sum(axis=1) < 1.0 - SAME_EDGE
         close = np.where(inside, _alike(lost, snr[i]), (lost <= ALIKE) | (lost * snr[i] < 0.5 * _SIGMAS**2))
-        out[i[close & (_angle(cosines[i], twin) > 0.5 * _beam(aperture))]] = True
+        out[i[close & (_angle(cosines[i], twin) > 0.5 * beam(aperture))]] = True
     return out
 
 
@@ -152,7 +174,7 @@ def _lost(aperture: Aperture, one: Floats, other: Floats) -> Floats:
     return np.asarray(1.0 - wave.real**2 - wave.imag**2)
 
 
-def _beam(aperture: Aperture) -> float:
+def beam(aperture: Aperture) -> float:
     """Return the beam width [rad] of the whole extent, deep or wide."""
     inverse = np.divide(1.0, aperture.beamwidth, out=np.zeros(2), where=np.array(aperture.scans))
     return 1.0 / float(np.linalg.norm([aperture.depth, *inverse]))
@@ -166,7 +188,7 @@ def _angle(one: Floats, other: Floats) -> Floats:
 def _climbed(aperture: Aperture, one: Floats, other: Floats) -> tuple[Floats, Floats]:
     """Return the visible cosines (p, 2) next to others where beams lose least of waves from `one`, and what share."""
     least = _lost(aperture, one, other)
-    step = _beam(aperture) / _PER_BEAM
+    step = beam(aperture) / _PER_BEAM
     for _ in range(_SHRINKS):
         for axis in np.flatnonzero(aperture.scans):
             for way in (-step, step):
