@@ -119,7 +119,10 @@ class CellEchoes:
 
     def unsure(self, aperture: Aperture) -> NDArray[np.bool_]:
         """Return which directions (k,) may be those of sums of waves not told apart: wrong by a part of a beam width
-        before uniform lines and rectangles, by more where side lobes are high."""
+        before uniform lines and rectangles, by more where side lobes are high; or of as many unknowns as there are
+        data, which other sets of waves fit as well."""
+        if len(self.power) * (2 + sum(aperture.scans)) >= 2 * self.weights.shape[1]:
+            return np.ones(len(self.power), bool)
         share = _UNTOLD_EVEN if aperture.uniform else _UNTOLD
         return np.asarray((self.rest > share * self.power) & (not self.explained))
 

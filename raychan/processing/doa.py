@@ -16,9 +16,9 @@ from raychan.processing.esprit import esprit
 from raychan.processing.joint_search import joint
 from raychan.processing.monopulse import monopulse
 from raychan.processing.source_number import source_number
-from raychan.processing.spectra import BEAMS_PER_BEAM, Bartlett, beams_of, capon, music, peaks
-from raychan.processing.twins import ambiguous, nearest_boresight
-from raychan.radar.aperture import Aperture
+from raychan.processing.spectra import BEAMS_PER_BEAM, Bartlett, beams_of, capon, climb, music, peaks, squared
+from raychan.processing.twins import ambiguous, nearer, nearest_boresight
+from raychan.radar.aperture import ALIKE, Aperture
 from raychan.radar.declared import check_type, reals
 from raychan.scalars import is_one_of, meant, shown
 
@@ -30,6 +30,13 @@ _ROUNDS = 200  # of refining several echoes by turns: two a beam width apart nee
 _STILL = 1e-5  # beam widths: an echo that moves less has arrived
 _ROUNDING = 16.0  # times the rounding of a value: amplitudes below, relative to the strongest, are none (not measured)
 _LARGEST = 1e150  # sqrt(W): its square is a power that a float holds
+_EVEN = 1.0
+"""Times the noise: beams whose powers differ by less leave open which is the echo's. Of 600 lone echoes before lines
+and squares that elements stand off by up to 0.1 wavelengths 519 are right with 1, 475 with 12, 530 with 0, which gives
+of equal ones any."""
+_FEW = 4
+"""Elements to an echo: side lobes of smaller rectangles are high, too. Of 40 threes before 3 x 3, a beam width or more
+apart, 3 are wrong without, none with."""
 _COUNTING = 0.5  # rows of a sub-array over the array's for counting echoes in few snapshots: MDL needs more of them
 
 
@@ -109,8 +116,26 @@ def _counted(data: Complexes, aperture: Aperture, criterion: str, smoothing: flo
 
 def estimate(data: Complexes, aperture: Aperture, method: str, count: int, made: Covariance | None = None) -> Floats:
     """Return the cosines (k, 2) of at most `count` echoes in snapshots (n, a), by a method of METHODS; of directions
-    alike about the plane of a tilted array those nearest boresight."""
-    return nearest_boresight(aperture, _sought(data, aperture, method, count, made))
+    alike to an array in a plane, or alike but for the noise to one nearly in a plane, those nearest boresight."""
+    found = nearest_boresight(aperture, _sought(data, aperture, method, count, made))
+    for k in range(len(found)):
+        # Those of flat arrays, and of arrays in a tilted plane, are given so already.
+        if len(near := nearer(aperture, found[k])):
+            others = np.delete(found, k, axis=0)
+            rest = data - amplitudes(data, aperture, others) @ aperture.steering(others)
+            found[k] = _untold(rest, aperture, found[k], near, len(found))
+    return found
+
+
+def _untold(data: Complexes, aperture: Aperture, one: Floats, near: Floats, count: int) -> Floats:
+    """Return, of cosines (2,) of one of `count` echoes and others (k, 2), nearest boresight first, the first whose beam
+    sees no less of snapshots (n, a) than noise may take."""
+    power = Bartlett(data)
+    at, seen = climb(power, aperture, near, aperture.grid(BEAMS_PER_BEAM))
+    own, size = float(power(aperture.steering(one[None]))[0]), data.shape[1]
+    noise = max(float(squared(data).mean()) - own, 0.0) / max(size - count, 1)
+    good = np.flatnonzero(own - seen < max(ALIKE * own, _EVEN / len(data) * noise))
+    return np.asarray(at[good[0]] if len(good) else one)
 
 
 def _sought(data: Complexes, aperture: Aperture, method: str, count: int, made: Covariance | None) -> Floats:
@@ -148,6 +173,7 @@ def by_turns(data: Complexes, aperture: Aperture, count: int) -> Floats:
         found = np.concatenate([found, peaks(Bartlett(rest), aperture, 1, BEAMS_PER_BEAM)])
         if k > 0:
             refine_beams(found, held, beams, _ROUNDS, _STILL * width)
-    if count > 1 and aperture.table is None:
+    few = all(aperture.scans) and len(aperture.elements) <= _FEW * count
+    if count > 1 and (few or aperture.table is None):
         found = joint(data, aperture, found)
     return aperture.canonical(found)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing.climb_kernels import ALONE
-from raychan.processing.spectra import PER_BEAM, Beside, climb, peaks, squared
+from raychan.processing.spectra import PER_BEAM, Beside, between, climb, peaks, squared
 from raychan.radar.aperture import Aperture
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ def joint(data: Complexes, aperture: Aperture, start: Floats) -> Floats:
     total = float(squared(data).sum())
     best, most = start, explained(data, aperture, start)
     sets, values = _on_grid(data, aperture, len(start))
-    slack = 2.0 * _between(aperture) * total
+    slack = 2.0 * between(aperture, PER_BEAM) * total
     for at, value in zip(sets, values, strict=True):
         if value + slack > most + _BETTER * total:
             at = _refined(data, aperture, at)
@@ -111,12 +111,6 @@ def _longer(aperture: Aperture, beams: Floats, sets: Floats, values: Floats, kep
             values[np.ix_(same, aperture.apart(beams, wave) < _SAME)] = 0.0
             columns[same], tops[same] = values[same].argmax(axis=1), values[same].max(axis=1)
     return np.array(found).reshape(-1, sets.shape[1] + 1, 2), np.array(most)
-
-
-def _between(aperture: Aperture) -> float:
-    """Return the share of a wave's power that the nearest beam of the grid may lose."""
-    step = np.where(np.isfinite(aperture.beamwidth), 0.5 / PER_BEAM * aperture.beamwidth, 0.0)
-    return 1.0 - float(np.abs(np.exp(2j * np.pi / aperture.wavelength * aperture.elements[:, 1:] @ step).mean()) ** 2)
 
 
 def _refined(data: Complexes, aperture: Aperture, at: Floats) -> Floats:

@@ -6,9 +6,8 @@ are found on a grid and then between the points by parabolas.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +15,24 @@ from scipy.ndimage import maximum_filter
 
 from raychan.processing.climb_kernels import ALONE, Beams, climb_beams, snapshots_for
 from raychan.processing.covariance import Covariance
-from raychan.processing.twins import nearest_boresight, neighbours
+from raychan.processing.twins import alike, beam, nearest_boresight, neighbours
 from raychan.radar.aperture import Aperture, Grid
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
-Form = Callable[[Complexes], Floats]
-"""From steering vectors (n, a) to values (n,): greater is better."""
+
+
+class Form(Protocol):
+    """From steering vectors (n, a) to values (n,): greater is better."""
+
+    @property
+    def none(self) -> float:
+        """Value of a direction from which no wave comes."""
+
+    def __call__(self, steering: Complexes) -> Floats:
+        """Return the values (n,)."""
+
 
 PER_BEAM = 8
 """Grid points per beam width: maxima of MUSIC nearer than two points are one (not measured)."""
@@ -33,6 +43,7 @@ _FEW_LOADING = 1e-2  # the same for fewer than 2 p snapshots (Reed, Mallett and 
 # are chance: echoes 20 dB weaker than the strongest are lost (not measured)
 _ONE = 0.02  # beam widths: twins, refined each by itself, are nearer (1/128 of a step, then a parabola)
 _ON = 0.1  # of _ONE: the nearest twins lie on each other (not measured)
+_STARTS = 64  # of climbs for each maximum sought, at most (not measured)
 _BATCH = 1 << 21  # steering values at once, 32 MB
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
 _WIDEST = 0.25  # cosine: the longest first step along the ridge of an array that is all but a line (not measured)
@@ -43,6 +54,7 @@ class Bartlett:
     """The power of a beam [W] over snapshots (n, a): |a^H x|^2 / a^2 (Van Trees 2002, section 6.7)."""
 
     snapshots: Complexes
+    none: ClassVar[float] = 0.0
 
     def __call__(self, steering: Complexes) -> Floats:
         """Return the power (n,) of beams of steering vectors (n, a)."""
@@ -55,6 +67,7 @@ class Beside:
 
     snapshots: Complexes
     basis: Complexes
+    none: ClassVar[float] = 0.0
 
     def __call__(self, steering: Complexes) -> Floats:
         """Return the power (n,) that waves of steering vectors (n, a) explain; 0 where others leave too little."""
@@ -63,34 +76,49 @@ class Beside:
         return np.where(alone > ALONE * steering.shape[1], power / np.maximum(alone, 1e-300), 0.0)
 
 
+@dataclass(frozen=True, eq=False)
+class Capon:
+    """Minus the inverse of the power that Capon's beam lets through (Capon 1969): -a^H R^-1 a [1/W]."""
+
+    inverse: Complexes
+    none: float
+
+    def __call__(self, steering: Complexes) -> Floats:
+        """Return the values (n,) of steering vectors (n, a)."""
+        return np.asarray(-np.einsum("ni,ij,nj->n", steering.conj(), self.inverse, steering, optimize=True).real)
+
+
+@dataclass(frozen=True, eq=False)
+class Music:
+    """Minus the share of the steering vector outside of a signal subspace (a, k) (Schmidt 1986, eq. 6)."""
+
+    signal: Complexes
+    none: ClassVar[float] = -1.0
+
+    def __call__(self, steering: Complexes) -> Floats:
+        """Return the values (n,) of steering vectors (n, a)."""
+        # As 1 less the share in the signal subspace a source's own value would be rounding: the projection is taken.
+        rest = steering - (steering @ self.signal.conj()) @ self.signal.T
+        return np.asarray(-(rest.real**2 + rest.imag**2).sum(axis=1) / steering.shape[1])
+
+
 def squared(wave: Complexes) -> Floats:
     """Return the power of complex values."""
     return np.asarray(wave.real**2 + wave.imag**2)
 
 
-def capon(found: Covariance) -> Form:
-    """Return minus the inverse of the power that Capon's beam lets through (Capon 1969): -a^H R^-1 a [1/W]."""
+def capon(found: Covariance) -> Capon:
+    """Return Capon's spectrum of a covariance, loaded so that it has an inverse."""
     size = len(found.matrix)
     share = _LOADING if found.snapshots >= 2 * size else _FEW_LOADING
     load = share * float(np.trace(found.matrix).real) / size
     inverse = np.linalg.inv(found.matrix + max(load, 1e-300) * np.eye(size))
-
-    def value(steering: Complexes) -> Floats:
-        return np.asarray(-np.einsum("ni,ij,nj->n", steering.conj(), inverse, steering, optimize=True).real)
-
-    return value
+    return Capon(inverse, -size * float(np.linalg.norm(inverse, 2)))
 
 
-def music(found: Covariance, sources: int) -> Form:
-    """Return minus the share of the steering vector in the noise subspace (Schmidt 1986, eq. 6): 0 at a source."""
-    signal = found.eigen[1][:, :sources]
-
-    def value(steering: Complexes) -> Floats:
-        # As 1 less the share in the signal subspace a source's own value would be rounding: the projection is taken.
-        rest = steering - (steering @ signal.conj()) @ signal.T
-        return np.asarray(-(rest.real**2 + rest.imag**2).sum(axis=1) / steering.shape[1])
-
-    return value
+def music(found: Covariance, sources: int) -> Music:
+    """Return the spectrum of MUSIC of a covariance and so many sources."""
+    return Music(found.eigen[1][:, :sources])
 
 
 def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) -> Floats:
@@ -105,13 +133,36 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     modes = ["wrap" if wrap else "constant" for wrap in grid.wraps]
     top = (values >= maximum_filter(values, size=3, mode=modes, cval=-np.inf)) & np.isfinite(values)
     m, n = np.nonzero(top)
-    # A maximum between points may be the greater one; each shows as often as its twins are visible.
-    order = np.argsort(-values[m, n], kind="stable")[: 2 * count * (1 + len(aperture.skewed))]
-    start = np.stack([grid.u[m[order]], grid.w[n[order]]], axis=1)
+    start = np.stack([grid.u[m], grid.w[n]], axis=1)[_promising(values[m, n], form, aperture, count, per_beam)]
     found, heights = climb(form, aperture, start, grid)
     found = aperture.canonical(found[np.argsort(-heights, kind="stable")])
-    # Along an oblique ridge points of the grid are greater than their neighbours, and climb to one maximum.
-    return found[:count] if aperture.table is not None else _once(found, aperture, count)
+    # Along an oblique ridge points of the grid are greater than their neighbours, and climb to one maximum; so do
+    # directions that look alike to a tilted array.
+    return found[:count] if aperture.table is not None else _once(nearest_boresight(aperture, found), aperture, count)
+
+
+def _promising(values: Floats, form: Form, aperture: Aperture, count: int, per_beam: int) -> Ints:
+    """Return which maxima among points of a search, by their values, may have beside them the `count` greatest."""
+    order = np.argsort(-values, kind="stable")
+    # Each shows as often as its twins are visible; of one echo any of these will do.
+    few = 2 * count * (alike(aperture) if count > 1 or aperture.flat else 1)
+    if aperture.table is not None or len(order) <= few:  # side lobes of lines and rectangles are far lower
+        return order[:few]
+    least = form.none + (1.0 - between(aperture, per_beam)) * (values[order[count - 1]] - form.none)
+    return order[: max(few, min(int((values >= least).sum()), _STARTS * count))]
+
+
+def between(aperture: Aperture, per_beam: int) -> float:
+    """Return the share of a wave's power that the nearest point of a search may lose, `per_beam` to a beam width."""
+    if aperture.deep:
+        around = aperture.elements - aperture.elements.mean(axis=0)
+        step = beam(aperture) / per_beam * np.sqrt(0.5 if all(aperture.scans) else 0.25)
+        off = step * np.linalg.eigh(around.T @ around)[1].T[-1:]
+    else:
+        step = np.where(np.isfinite(aperture.beamwidth), 0.5 / per_beam * aperture.beamwidth, 0.0)
+        off = np.array([[0.0, step[0], step[1]], [0.0, step[0], -step[1]]])
+    wave = np.exp(2j * np.pi / aperture.wavelength * aperture.elements @ off.T).mean(axis=0)
+    return 1.0 - float(squared(wave).min())
 
 
 def _once(found: Floats, aperture: Aperture, count: int) -> Floats:
@@ -135,9 +186,8 @@ def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Fl
     batch = max(1, _BATCH // len(aperture.elements))
     values = np.concatenate([form(aperture.steering(at[i : i + batch])) for i in range(0, len(at), batch)])
     top = np.flatnonzero(values >= values[neighbours(aperture, at)].max(axis=1))
-    start = at[top[np.argsort(-values[top], kind="stable")[: 2 * count]]]
+    start = at[top[_promising(values[top], form, aperture, count, per_beam)]]
     found, heights = climb(form, aperture, start, aperture.grid(per_beam))
-    # A maximum and its mirror image about the plane of a tilted array are one.
     return _once(nearest_boresight(aperture, found[np.argsort(-heights, kind="stable")]), aperture, count)
 
 

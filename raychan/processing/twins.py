@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from raychan.processing.staggered import CLEAR
+from raychan.processing.tilted import Plane, looks, plane_of
 from raychan.radar.aperture import ALIKE, SAME_EDGE, Aperture
 from raychan.radar.lobes import HALF
-from raychan.radar.measured import SAME
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -26,6 +26,7 @@ Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _UNKNOWN = 1e300  # an SNR at which no noise leaves anything open
 _SIGMAS = 3.5  # of a cosine: an echo is pushed farther over an end in 0.02 % of cases (one side of a Gaussian)
+_LITTLE = 1e-3  # of a cosine: a step by which the bend of a beam is told (not measured)
 _PER_BEAM = 4  # directions tried per beam width of arrays with depth
 _NEAR = 0.3  # of the power: a twin between the directions tried shows that much (cos^4(pi/8) of HALF, and a margin)
 _SHRINKS = 8  # rounds of refining, each over half the distance: to 1/512 of a beam width, 4e-5 of the power
@@ -41,33 +42,46 @@ def ambiguous(aperture: Aperture, cosines: Floats, snr: Floats | None = None) ->
     snr = np.full(len(cosines), _UNKNOWN) if snr is None else np.asarray(snr, np.float64)
     if not len(cosines):
         return np.zeros(0, bool)
-    return _of_flat(aperture, cosines, snr) if aperture.flat else _of_deep(aperture, cosines, snr)
+    if aperture.flat or not any(aperture.scans):
+        return _of_flat(aperture, cosines, snr)
+    plane = plane_of(aperture)
+    return _of_tilted(aperture, plane, cosines, snr) if plane.exact else _of_deep(aperture, plane, cosines, snr)
 
 
 def nearest_boresight(aperture: Aperture, cosines: Floats) -> Floats:
-    """Return, of directions (n, 2) and their mirror images about the plane of an array that lies in one, those nearest
-    boresight."""
+    """Return, of directions (n, 2) and all those ahead that look quite like them to an array in a tilted plane, those
+    nearest boresight."""
     if aperture.flat or not any(aperture.scans):
         return cosines
-    image, ahead, off = _mirrored(aperture, cosines)
-    nearer = ahead & ((image**2).sum(axis=1) < (cosines**2).sum(axis=1) - SAME_EDGE)
-    return np.where(nearer[:, None] & (off <= SAME), image, cosines)
+    plane = plane_of(aperture)
+    return plane.nearest_boresight(cosines) if plane.exact else cosines
 
 
-def _mirrored(aperture: Aperture, cosines: Floats) -> tuple[Floats, Bools, float]:
-    """Return the mirror images (n, 2) of directions about the plane that fits the elements best, which of them are
-    ahead, and how far elements stand off that plane [wavelengths]; of one angle, in the plane in which it is taken."""
-    axes = np.array([0, *(1 + np.flatnonzero(aperture.scans))])
-    places = (aperture.elements - aperture.elements.mean(axis=0))[:, axes] / aperture.wavelength
-    normal = np.linalg.eigh(places.T @ places)[1][:, 0]
-    look = np.column_stack([np.sqrt(np.maximum(1.0 - (cosines**2).sum(axis=1), 0.0)), cosines])
-    look[:, axes] -= 2.0 * np.outer(look[:, axes] @ normal, normal)
-    return look[:, 1:], look[:, 0] > 0.0, float(np.ptp(places @ normal))
+def nearer(aperture: Aperture, direction: Floats) -> Floats:
+    """Return the directions (k, 2) nearer to boresight than one (2,), the nearest first, that look like it to an array
+    nearly in a plane, but not quite: which of them it is only noise may leave open."""
+    if aperture.flat or not any(aperture.scans) or (plane := plane_of(aperture)).exact:
+        return np.zeros((0, 2))
+    twin, at = plane.alike(direction[None], np.concatenate([np.zeros((1, 2)), plane.own.lobes.at]))
+    twin = twin[(at**2).sum(axis=-1) < 1.0].reshape(-1, 3)
+    own = np.sqrt(max(1.0 - float(direction @ direction), 0.0))
+    twin = twin[twin[:, 0] > own + SAME_EDGE]
+    twin = twin[np.argsort(-twin[:, 0], kind="stable"), 1:]
+    near = _lost(aperture, np.broadcast_to(direction, twin.shape), twin) < HALF
+    return np.asarray(twin[near & (_angle(direction[None], twin) > 0.5 * beam(aperture))])
+
+
+def alike(aperture: Aperture) -> int:
+    """Return how many directions at most, ahead or not, look quite like each."""
+    if aperture.flat or not any(aperture.scans):
+        return 1 + len(aperture.skewed)
+    plane = plane_of(aperture)
+    return 2 * (1 + int((plane.own.lobes.lost <= ALIKE).sum())) if plane.exact else 1
 
 
 def neighbours(aperture: Aperture, at: Floats) -> Ints:
     """Return the directions (g, k) beside each (g, 2) of `Aperture.spread`, itself among them."""
-    look = np.column_stack([np.sqrt(np.maximum(1.0 - (at**2).sum(axis=1), 0.0)), at])
+    look = looks(at)
     return np.asarray(cKDTree(look).query(look, min(len(at), 3**2 if all(aperture.scans) else 3))[1], np.int64)
 
 
@@ -94,7 +108,43 @@ def _within_lobes(aperture: Aperture, cosines: Floats, snr: Floats) -> Bools:
     return out
 
 
-def _of_deep(aperture: Aperture, cosines: Floats, snr: Floats) -> Bools:
+def _of_tilted(aperture: Aperture, plane: Plane, cosines: Floats, snr: Floats) -> Bools:
+    """Return the same of an array in a tilted plane, to which directions on both sides of it look alike."""
+    known, out = plane.own.lobes, np.zeros(len(cosines), bool)
+    lobes, lost = np.concatenate([np.zeros((1, 2)), known.at]), np.concatenate([[0.0], known.lost])
+    for some in np.array_split(np.arange(len(cosines)), -(-len(cosines) * len(lobes) // _BATCH)):
+        twin, at = plane.alike(cosines[some], lobes)
+        inside = ((at**2).sum(axis=-1) < 1.0 + SAME_EDGE)[..., None] & (twin[..., 0] > -SAME_EDGE)
+        # What lies behind, or beyond all waves, noise may push over the nearest end of what is visible.
+        twin[..., 0] = np.maximum(twin[..., 0], 0.0)
+        twin /= np.maximum(np.linalg.norm(twin, axis=-1, keepdims=True), 1e-9)
+        edge = twin @ plane.axes[1:].T
+        near = (np.abs(edge - at[:, :, None]) / plane.own.beamwidth < 0.5).all(axis=-1)
+        own = (twin * looks(cosines[some])[:, None, None]).sum(axis=-1) >= np.cos(0.5 * beam(aperture))
+        close = inside & _alike(lost, snr[some][:, None])[..., None] & ~own
+        out[some] |= close.any(axis=(1, 2))
+        i, k, side = np.nonzero(near & ~inside & (snr[some] < _UNKNOWN)[:, None, None])
+        other, i = twin[i, k, side, 1:], some[i]
+        other, least = _climbed(aperture, cosines[i], other)
+        close = least * snr[i] < 0.5 * _SIGMAS**2
+        out[i[close & (_angle(cosines[i], other) > 0.5 * beam(aperture))]] = True
+    return out | _beside_plane(aperture, plane, cosines, snr)
+
+
+def _beside_plane(aperture: Aperture, plane: Plane, cosines: Floats, snr: Floats) -> Bools:
+    """Return which directions (n, 2) noise may have moved towards the plane of a tilted array from ones that have
+    images half a beam width away."""
+    at = plane.along(cosines)
+    bend = _lost(plane.own, at, (1.0 - _LITTLE) * at) / _LITTLE**2
+    moved = _SIGMAS * np.sqrt(0.5 / np.maximum(snr * bend, 1e-9))
+    at *= np.maximum(1.0 - moved, 0.0)[:, None]
+    off, ahead = np.sqrt(np.maximum(1.0 - (at**2).sum(axis=1), 0.0)), at @ plane.axes[1:, 0]
+    seen = ahead > off * abs(plane.axes[0, 0])
+    own = _angle(cosines, plane.mirrored(cosines)[0]) <= 0.5 * beam(aperture)
+    return np.asarray(own & seen & (2.0 * np.arcsin(off) > 0.5 * beam(aperture)))
+
+
+def _of_deep(aperture: Aperture, plane: Plane, cosines: Floats, snr: Floats) -> Bools:
     """Return the same of an array with depth, to which no two directions differ as others do: all are tried."""
     at, out = aperture.spread(_PER_BEAM), np.zeros(len(cosines), bool)
     beside, tried = neighbours(aperture, at), aperture.steering(at).conj() / len(aperture.elements)
@@ -104,12 +154,12 @@ def _of_deep(aperture: Aperture, cosines: Floats, snr: Floats) -> Bools:
         g, i = np.nonzero(power > _NEAR)
         top = power[g, i] >= power[beside[g], i[:, None]].max(axis=1)
         g, i = g[top], some[i[top]]
-        image, ahead = _mirrored(aperture, cosines[some])[:2]
+        image, ahead = plane.mirrored(cosines[some])
         start, i = np.concatenate([at[g], image[ahead]]), np.concatenate([i, some[ahead]])
         twin, lost = _climbed(aperture, cosines[i], start)
         inside = (twin**2).sum(axis=1) < 1.0 - SAME_EDGE
         close = np.where(inside, _alike(lost, snr[i]), (lost <= ALIKE) | (lost * snr[i] < 0.5 * _SIGMAS**2))
-        out[i[close & (_angle(cosines[i], twin) > 0.5 * _beam(aperture))]] = True
+        out[i[close & (_angle(cosines[i], twin) > 0.5 * beam(aperture))]] = True
     return out
 
 
@@ -124,7 +174,7 @@ def _lost(aperture: Aperture, one: Floats, other: Floats) -> Floats:
     return np.asarray(1.0 - wave.real**2 - wave.imag**2)
 
 
-def _beam(aperture: Aperture) -> float:
+def beam(aperture: Aperture) -> float:
     """Return the beam width [rad] of the whole extent, deep or wide."""
     inverse = np.divide(1.0, aperture.beamwidth, out=np.zeros(2), where=np.array(aperture.scans))
     return 1.0 / float(np.linalg.norm([aperture.depth, *inverse]))
@@ -132,14 +182,13 @@ def _beam(aperture: Aperture) -> float:
 
 def _angle(one: Floats, other: Floats) -> Floats:
     """Return the angles (p,) [rad] between directions ahead, by their cosines (p, 2)."""
-    ahead = [np.sqrt(np.maximum(1.0 - (x**2).sum(axis=1), 0.0)) for x in (one, other)]
-    return np.asarray(np.arccos(np.clip((one * other).sum(axis=1) + ahead[0] * ahead[1], -1.0, 1.0)))
+    return np.asarray(np.arccos(np.clip((looks(one) * looks(other)).sum(axis=1), -1.0, 1.0)))
 
 
 def _climbed(aperture: Aperture, one: Floats, other: Floats) -> tuple[Floats, Floats]:
     """Return the visible cosines (p, 2) next to others where beams lose least of waves from `one`, and what share."""
     least = _lost(aperture, one, other)
-    step = _beam(aperture) / _PER_BEAM
+    step = beam(aperture) / _PER_BEAM
     for _ in range(_SHRINKS):
         for axis in np.flatnonzero(aperture.scans):
             for way in (-step, step):

@@ -103,10 +103,10 @@ class Aperture:
 
     @cached_property
     def wraps(self) -> tuple[bool, bool]:
-        """Whether directions repeat by grating lobes within what is visible, or at its edges, along y and z; where
-        the array is deep none is quite like another."""
+        """Whether directions repeat by grating lobes, at the edges too, along y and z: not where depth loses more."""
+        deep = (2.0 * np.pi / self.wavelength) ** 2 * float(self.elements[:, 0].var()) > ALIKE
         y, z = (
-            scanned and period <= 2.0 * (1.0 + _EDGE) and not self.deep
+            scanned and period <= 2.0 * (1.0 + _EDGE) and not deep
             for scanned, period in zip(self.scans, self.period, strict=True)
         )
         return bool(y), bool(z)

@@ -93,3 +93,18 @@ def test_two_like_echoes_in_a_cell_of_a_sparse_line_are_detected_where_they_are(
         found = detect(range_doppler(cube, SMALL), waveform=SMALL, elements=wavelength * elements)
         if Aperture(elements, 1.0).apart(*np.stack([at, 0.0 * at], axis=1)) > 1.1:
             np.testing.assert_allclose(np.sort(np.sin(found.azimuth)), at, atol=0.01)
+
+
+@pytest.mark.parametrize(("rows", "columns", "count"), [(3, 3, 3), (2, 4, 3), (2, 3, 2)])
+def test_no_waves_a_beam_width_apart_explain_more_before_small_rectangles_than_those_given(rows, columns, count):
+    elements = np.stack([np.zeros(rows * columns), *0.5 * np.indices((rows, columns)).reshape(2, -1)], axis=1)
+    aperture, size = Aperture(elements, 1.0), rows * columns
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        true = rng.uniform(-0.65, 0.65, (count, 2))
+        apart = aperture.apart(true[:, None], true[None])[np.triu_indices(count, 1)]
+        if apart.min() < 1.0:
+            continue
+        wave = np.exp(2j * np.pi * rng.random(count)) @ aperture.steering(true)
+        data = wave[None] + 0.01 * rng.standard_normal((1, size, 2)).view(complex)[..., 0]
+        assert explained(data, aperture, by_turns(data, aperture, count)) > explained(data, aperture, true) - 1e-3

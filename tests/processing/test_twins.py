@@ -124,3 +124,27 @@ def test_a_radar_with_shifted_rows_says_that_directions_are_ambiguous(multiplexi
     result = rc.simulate(rc.Scene([body], radar=radar))
     assert result.detections.ambiguous[0]
     assert any("ambiguous in direction" in x or "in rate and direction" in x for x in result.warnings)
+
+
+@pytest.mark.parametrize("spread", [0.003, 0.01, 0.03, 0.06])
+def test_depth_that_tells_a_direction_from_its_grating_lobe_tells_it(spread):
+    """Elements stand off a line of a wavelength's pitch, by too little to be sought as deep ones."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        elements = line(11, 0.8) + spread * rng.standard_normal((11, 3)) * [1.0, 0.0, 1.0]
+        aperture, true, snr = Aperture(elements, 1.0), cosines(rng.uniform(-1.2, 1.2)), 10.0**5
+        found = by_turns(aperture.steering(true) * np.sqrt(snr / 11.0) + noise(rng, 1, 11), aperture, 1)
+        right = abs(found[0, 0] - true[0, 0]) < 0.01
+        assert right or ambiguous(aperture, found, np.array([snr]))[0]
+
+
+@pytest.mark.parametrize("azimuth", [5.0, 20.0])
+def test_of_nearly_equal_ones_that_noise_leaves_open_the_nearest_to_boresight_is_given(azimuth):
+    near = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        elements = line(10, 1.0) + 0.002 * rng.standard_normal((10, 3)) * [1.0, 0.0, 0.0]
+        wave = Aperture(elements, 1.0).steering(cosines(np.radians(azimuth))) * np.sqrt(100.0)
+        found = rc.doa(wave + noise(rng, 1, 10), elements, 1.0, sources=1)
+        near += abs(found.azimuth[0] - np.radians(azimuth)) < 0.05
+    assert near >= 38
