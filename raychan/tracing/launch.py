@@ -21,8 +21,8 @@ from raychan.tracing.contributions import Contributions
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.legs import Leg, View
 from raychan.tracing.radiation import OBLIQUE, phases_of, radiating
-from raychan.tracing.subdivide import clipped, subdivide
-from raychan.tracing.tubes import CENTRE, MOST_BEND, Refinement, Tubes, launch_tubes, unit
+from raychan.tracing.subdivide import as_if_straight, clipped, subdivide
+from raychan.tracing.tubes import CENTRE, MOST_BEND, Refinement, Tubes, edge_middles, launch_tubes, unit
 from raychan.tracing.visibility import centre_visibility, tube_visibility
 from raychan.world.geometry import Geometry
 
@@ -81,7 +81,14 @@ def clip_where_gains_end(geometry: Geometry, leg: Leg, out: Leg, tubes: Tubes) -
     count = len(tubes)
     for end in [leg] if out is leg else [leg, out]:
         for normal in end.gain_ends:
-            tubes = clipped(geometry, leg, tubes, (tubes.points[:, :CENTRE] - end.image) @ normal)
+            height = (tubes.points[:, :CENTRE] - end.image) @ normal
+            across = (height.min(axis=1) < 0.0) & (height.max(axis=1) > 0.0)
+            rows = np.flatnonzero(across & geometry.curved[tubes.facet])
+            if len(rows):
+                # A corner that comes to lie behind the plane, and not on it, has no field at all.
+                middle, _ = edge_middles(geometry, leg, tubes.take(rows), True)
+                height[rows] = as_if_straight(height[rows], (middle - end.image) @ normal)
+            tubes = clipped(geometry, leg, tubes, height)
     if len(tubes) > count:
         # Parts have the strength of the whole, whose centre may lie behind.
         tubes.strength = leg.weight(tubes.points[:, CENTRE])

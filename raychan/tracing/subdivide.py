@@ -74,6 +74,25 @@ def clipped(geometry: Geometry, leg: Leg, tubes: Tubes, side: Floats) -> Tubes:
     return Tubes.join([tubes.take(~across), parts])
 
 
+def as_if_straight(side: Floats, middle: Floats) -> Floats:
+    """Return heights (n, 3) [m] at corners that, linear along edges, are zero where quadratic ones are.
+
+    Args: side (n, 3), not all of a row of one sign, and middle (n, 3) [m]: at the corners, and halfway to the next.
+    """
+    one = np.where((side > 0.0).sum(axis=1, keepdims=True) == 1, side > 0.0, side <= 0.0)
+    lone, row = one.argmax(axis=1), np.arange(len(side))
+    found, here = side.copy(), side[row, lone]
+    for other, between in (((lone + 1) % 3, lone), ((lone + 2) % 3, (lone + 2) % 3)):
+        there, mid = side[row, other], middle[row, between]
+        half, bend = 0.5 * (4.0 * mid - 3.0 * here - there), 2.0 * (here - 2.0 * mid + there)
+        # Between heights of opposite signs there is one zero. Neither formula of a root subtracts like numbers.
+        q = -(half + np.copysign(np.sqrt(np.maximum(half**2 - bend * here, 0.0)), half))
+        with np.errstate(all="ignore"):
+            zero = np.where((here / q > 0.0) & (here / q <= 1.0), here / q, q / bend)
+        found[row, other] = here * (1.0 - 1.0 / np.clip(zero, 1e-9, 1.0))
+    return found
+
+
 def subdivide(
     geometry: Geometry, leg: Leg, tubes: Tubes, rows: Rows, side: Floats, first: bool, jitter: float
 ) -> tuple[Tubes, Rows]:

@@ -54,3 +54,25 @@ def test_half_a_mirror_point_under_twice_the_gain_returns_what_a_whole_one_does(
     # What a preview prunes of one plane is less than what it states of any scene.
     off = abs(10.0 * np.log10(found.power[i] / whole.power[k]))
     assert off <= (found.error_db[i] + whole.error_db[k] if "mode" not in model else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("body", "radius", "carrier"), [("cylinder", 0.197, 24e9), ("sphere", 0.1, 77e9), ("sphere", 0.121, 24e9)]
+)
+def test_levels_of_curved_bodies_partly_behind_the_plane_are_within_what_is_stated(body, radius, carrier):
+    """Facets bulge over the straight lines between their corners: corners of cuts by these lay behind the plane, where
+    there is no field, or before it."""
+    wave = rc.Waveform(carrier=carrier, bandwidth=150e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
+    form = {"radius": radius, "max_sag": 3e-4} | ({"height": 1.0} if body == "cylinder" else {})
+    for ahead in (-0.2, 0.05, 0.35):
+        at = (ahead * radius, 1.4, 0.7 if body == "cylinder" else 1.2)
+        one = rc.Body("one", shape=body, params=form, position=at)
+        radar = rc.Radar(wave, (0, 0, 1.2), noise=False)
+        found, finer = (
+            rc.simulate(rc.Scene(bodies=[one], radar=radar, model={"tolerance_db": tolerance, "max_bounces": 1}))
+            for tolerance in (0.5, 0.02)
+        )
+        strongest = int(np.argmax(found.detections.snr))
+        cell = tuple(found.detections.cell[strongest])
+        off = abs(10.0 * np.log10(found.rdmap.power[cell] / finer.rdmap.power[cell]))
+        assert off <= found.detections.error_db[strongest]

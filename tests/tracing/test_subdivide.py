@@ -13,7 +13,7 @@ from raychan.tracing.history import History
 from raychan.tracing.legs import Leg
 from raychan.tracing.resolve_hits import IncidentTubes, LandedTubes, ReflectingFacets, tubes_at_hits
 from raychan.tracing.silhouette_crossings import longest_crossing, outlines_of
-from raychan.tracing.subdivide import bisect, edge_of_spread, subdivide
+from raychan.tracing.subdivide import as_if_straight, bisect, edge_of_spread, subdivide
 from raychan.tracing.tubes import Tubes
 from raychan.world.geometry import Geometry
 
@@ -70,6 +70,24 @@ def test_parts_have_the_area_of_the_whole_and_rays_of_its_source():
     known = side[parent].any(axis=1)
     assert known.any() and (~known).any()
     assert (at[known].min(axis=1) * at[known].max(axis=1)).min() > -1e-12
+
+
+def test_heights_taken_as_straight_are_zero_where_quadratic_ones_are():
+    rng = np.random.default_rng(4)
+    side = rng.choice([-1.0, 1.0], (N, 3)) * rng.uniform(1e-6, 1.0, (N, 3))
+    side[::7, 1] = 0.0
+    side = side[(side.min(axis=1) < 0.0) & (side.max(axis=1) > 0.0)]
+    middle = 0.5 * (side + np.roll(side, -1, axis=1)) + rng.normal(size=side.shape) * rng.choice([0.0, 0.3], (1, 3))
+    straight, tried = as_if_straight(side, middle), 0
+    for a in range(3):
+        b = (a + 1) % 3
+        rows = np.flatnonzero(straight[:, a] * straight[:, b] < 0.0)
+        tried += len(rows)
+        t = straight[rows, a] / (straight[rows, a] - straight[rows, b])
+        h = side[rows, a] * (1 - t) * (1 - 2 * t) + 4 * t * (1 - t) * middle[rows, a] + side[rows, b] * t * (2 * t - 1)
+        assert np.abs(h).max() < 1e-9
+    assert tried > N
+    assert ((straight > 0.0) == (side > 0.0)).all()
 
 
 def test_tubes_are_cut_where_their_rays_spread_most_off_a_curved_mirror():
