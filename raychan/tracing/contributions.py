@@ -224,7 +224,8 @@ class Contributions:
         size = np.maximum(whole, np.sqrt(np.bincount(cell, np.abs(each) ** 2, n)))
         if np.isfinite(self.rule.cell):
             # A window spreads each return over its neighbours.
-            size = np.maximum(size, np.maximum(np.append(size[1:], 0.0), np.append(0.0, size[:-1])))
+            beside = np.maximum(np.append(size[1:], 0.0), np.append(0.0, size[:-1]))
+            size = np.maximum(size, self.rule.beside * beside)
         self._level = np.maximum(size, np.pad(self._level, (0, n - len(self._level))))
         if not np.isfinite(self.rule.cell):
             self._level = self._level[:1]

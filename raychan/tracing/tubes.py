@@ -43,19 +43,18 @@ class Refinement:
     Fields: `wavenumber` [rad/m]; `phase` [rad] by which a tube may deviate from quadratic where its phase is
     stationary; `turn` [rad] by which its normal may; `floor` [1/m] scattered amplitude (unit field at 1 m) under which
     a tube is not subdivided, `specular` the same for what a curved surface reflects at a specular point; `relative` the
-    same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length; `max_edge`
-    [m] of first tubes, the share `near` of their distance from an end that they may reach, and the `widest` angle [rad]
-    under which an end may see their edges; `levels` of subdivision for
-    visibility and bounces;
-    `slots` of history; `layers` that a stretch may pass; `batch` of tubes launched at once, which bounds the memory
-    (few scenes have more on one leg; not measured); budgets of a launch: `max_tubes` that subdivision for phase
-    may make, `max_cuts` for visibility, `max_rays` (see `Contributions.affords`); `jitter` (0 to 0.5) moves cuts off
-    the middle, for a second lattice; `coarse`
-    not 1: tubes that bounced are cut only where one alone may bring so many times the floor, and a good part of
-    what is found there; `least` bisections of each first tube on a curved facet, and of all that bounce again, for a
-    launch to be finer where the one before was fine enough; `fan` [rad] by which curved facets may
-    spread the rays of a tube that bounces again (twice that after its first bounce), where `coarse` is not 1 of one
-    that matters: where it is not infinite and `coarse` is 1, tubes are cut by what they may bring where they land;
+    same for a hundred tubes, as a fraction of what was found within the same `cell` [m] of two-way length, or of the
+    share `beside` of that in the cells next to it; `max_edge` [m] of first tubes, the share `near` of their distance
+    from an end that they may reach, and the `widest` angle [rad] under which an end may see their edges; `levels` of
+    subdivision for visibility and bounces; `slots` of history; `layers` that a stretch may pass; `batch` of tubes
+    launched at once, which bounds the memory (few scenes have more on one leg; not measured); budgets of a launch:
+    `max_tubes` that subdivision for phase may make, `max_cuts` for visibility, `max_rays` (see
+    `Contributions.affords`); `jitter` (0 to 0.5) moves cuts off the middle, for a second lattice; `coarse` not 1: tubes
+    that bounced are cut only where one alone may bring so many times the floor, and a good part of what is found there;
+    `least` bisections of each first tube on a curved facet, and of all that bounce again, for a launch to be finer
+    where the one before was fine enough; `fan` [rad] by which curved facets may spread the rays of a tube that bounces
+    again (twice that after its first bounce), where `coarse` is not 1 of one that matters: where it is not infinite and
+    `coarse` is 1, tubes are cut by what they may bring where they land;
     `patch` least cosine between the normals of facets of one smooth patch for a tube to land on several of them, 1: on
     one only.
     """
@@ -67,6 +66,7 @@ class Refinement:
     specular: float = 0.0
     relative: float = 0.01
     cell: float = np.inf
+    beside: float = 1.0
     max_edge: float = 0.3
     near: float = NEAR
     widest: float = np.inf

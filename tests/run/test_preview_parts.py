@@ -94,3 +94,24 @@ def test_without_noise_so_many_tubes_are_clipped_at_once_at_most(monkeypatch):
         most.append(max(rows))
         rows.clear()
     assert most[0] > 1 and most[1] == 1
+
+
+@pytest.mark.parametrize(
+    ("carrier", "height", "at", "turned", "eye", "looks"),
+    [
+        (77e9, 3.195997, (-1.161852, 1.215377), -97.187257, 1.07248, 103.776705),
+        (24e9, 2.899668, (-1.326263, 1.578298), 19.865277, 0.515123, -162.685752),
+    ],
+)
+def test_the_luminaire_a_range_cell_beyond_its_near_pole_is_found_at_its_level(carrier, height, at, turned, eye, looks):
+    """The pole returns 26 dB more, of which little reaches so far beyond it."""
+    wave = rc.Waveform(carrier=carrier, bandwidth=300e6, chirp_duration=40e-6, n_chirps=32, n_samples=128)
+    form = {"height": height, "arm": 0.0}
+    post = rc.Body("post", shape="lamp_post", params=form, position=(*at, 0.0), yaw_deg=turned)
+    radar = rc.Radar(wave, position=(0.0, 0.0, eye), yaw_deg=looks, power=0.02)
+    models = {"max_bounces": 1, "mode": "preview"}, {"max_bounces": 1, "tolerance_db": 0.3}
+    seen, fine = (rc.simulate(rc.Scene(bodies=[post], radar=radar, model=model), seed=0) for model in models)
+    (mine,), (its,) = ([i for i, p in enumerate(r.provenance) if p.bodies.endswith("luminaire")] for r in (seen, fine))
+    assert fine.detections.snr[its] > 25.0
+    off = abs(10.0 * np.log10(seen.detections.power[mine] / fine.detections.power[its]))
+    assert off <= 3.0
