@@ -44,7 +44,7 @@ _LEVEL = 1e-4  # of the sum of all amplitudes: error of the samples
 # at floor 10 by 1.1 and 5.7 dB for 8 % less time of tracing, at relative 8 by 0.8 and 4 dB for 6 % (command not noted).
 _FLOOR = 6.7  # of the noise-equivalent amplitude: pruned tubes of a range cell add up to 0.3 of that
 _RELATIVE = 5.0  # of what is found in a range cell, for a hundred tubes: pruned ones add up to 0.15 of what is found
-# Of what is found in a range cell, for the cells next to it: what a Hann window leaves at 1.3 cells. With 1 luminaires
+# Of what is found in a range cell, for the cells next to it: what a Hann window leaves at 1.35 cells. With 1 luminaires
 # of 3 of 40 lone lamp posts 1.5 to 5 m away are lost, with 0.5 of 1, with 0.25 none, for 1.3 times the paths of such a
 # post and 0.3 to 1.7 % more rays of three bundled scenes; with 0.1 none, for 1.5 times the paths (no command).
 _BESIDE = 0.25

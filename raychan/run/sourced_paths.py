@@ -201,7 +201,8 @@ def raised(response: PointSpread, doubtful: Paths, cells: Floats, least: Floats)
         row = int(strongest[i, 0]) if strongest[i, 0] >= 0 else int(np.argmax(np.abs(doubtful.amplitude)))
         if not doubtful.amplitude[row]:
             continue
-        echo = scaled(_echo(response, doubtful, row, cells[i]), np.array([lack / doubtful.amplitude[row]]))
+        # As strong as the cell: sums leave out what is weak beside it, and what lacks may be.
+        echo = scaled(_echo(response, doubtful, row, cells[i]), np.array([cells[i, 2] / doubtful.amplitude[row]]))
         waves = _sums(response, echo, np.zeros(1, np.int64), 1, cells)[:, 0]
         if waves[i]:
             factor = lack * np.exp(1j * np.angle(found[i])) / waves[i]

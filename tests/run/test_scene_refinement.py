@@ -140,6 +140,18 @@ def test_doubtful_paths_bring_at_least_what_a_cell_may_be_wrong_by():
     more = raised(response, paths, strong, np.array([0.1]))
     assert np.abs(changes(response, more, np.full(len(more.trajectories.kind), -1), strong).sum()) == pytest.approx(0.1)
     assert len(raised(response, paths, strong, np.zeros(1)).length) == len(paths.length)
+    # What lacks is less than what sums leave out beside the cell.
+    more = raised(response, paths, strong, np.array([5e-4]))
+    brought = changes(response, more, np.full(len(more.trajectories.kind), -1), strong * [1.0, 1.0, 1e-3])
+    assert np.abs(brought).sum() == pytest.approx(5e-4, rel=0.02)
+
+
+def test_no_error_below_a_tenth_of_the_tolerance_is_stated_of_a_plate():
+    wave = rc.Waveform(carrier=24e9, bandwidth=150e6, chirp_duration=40e-6, n_chirps=16, n_samples=64)
+    plate = rc.Body("plate", shape="plate", params={"width": 0.8, "height": 0.48}, position=(2.3, 0.2, 0), yaw_deg=180)
+    radar = rc.Radar(wave, noise=False)
+    found = rc.simulate(rc.Scene(bodies=[plate], radar=radar, model={"max_bounces": 1, "tolerance_db": 0.1})).detections
+    assert 0.0095 < found.error_db[np.argmax(found.snr)] <= 0.1
 
 
 def test_a_source_counts_by_the_factor_of_the_cell_that_it_matters_most_to():
