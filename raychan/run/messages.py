@@ -13,8 +13,7 @@ from raychan.processing.staggered import ResolvedMap
 from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.ledger import SEEN, Entry
-from raychan.run.rates_apart import rates_apart
-from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, range_spread
+from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, spreads
 from raychan.run.result import DC, IMAGE, INTERFERENCE, SIDELOBE, ExplainedDetections, Explanation, Result
 from raychan.run.two_ways import apart
 
@@ -115,7 +114,7 @@ def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Rada
             f"wavelength = {limit:.3g} m: beams are those of plane waves and read up to {loss.max():.1f} dB less of a "
             "spherical one"
         )
-    for what, spread in (("ranges", range_spread(found, radar)), ("rates", rates_apart(found, reasons, radar))):
+    for what, spread in spreads(found, reasons, radar).items():
         differ, loss = (wave * x for x in spread)
         if (wide := loss > _LOST_DB).any():
             said.append(

@@ -1,7 +1,9 @@
 """What the receiver's processing loses of an echo and no error states: the wave is spherical where a beam takes it for
-plane, its ranges differ over the elements, and the echo moves over range cells while the frame lasts."""
+plane, its ranges or rates differ over the elements, and the echo moves over range cells while the frame lasts."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +15,15 @@ from raychan.radar.waveform import OwnWaveform
 from raychan.radar.windows import window
 from raychan.records import Detections
 from raychan.run.receiver import aperture_of
-from raychan.run.result import ExplainedDetections
+from raychan.run.result import ExplainedDetections, Explanation
 from raychan.units import C0, db
 
 Floats = NDArray[np.float64]
 
 _BEAMS = 33  # along each axis, over the directions from which an array sees a near echo (not measured)
 _ROUND = 0.9  # of a power: a peak that keeps more (0.46 dB, below what is told) is round, and not split
-_OFF = 0.05  # range cells between the places where the peak is sought: 0.01 dB of a Hann window's main lobe
-_CELL = 0.02  # range cells: step of the table of the window's response, whose error is below 1e-3 of an amplitude
+_OFF = 0.05  # cells between the places where the peak is sought: 0.01 dB of a Hann window's main lobe
+_CELL = 0.02  # cells: step of the table of the window's response, whose error is below 1e-3 of an amplitude
 _STEP = 0.5  # range cells of migration between tables of peaks: fewer, against an eighth of a cell of where peaks stand
 _TURN = 0.02  # rad: step of the table of what ramps keep, whose error is below 2e-5 of an amplitude
 
@@ -75,15 +77,49 @@ def range_spread(found: Detections, radar: Radar) -> tuple[Floats, Floats]:
         return none, none
     # An element nearer to the echo by x sees it x / 2 nearer, as only one of both ways is shorter.
     ahead = 0.5 * _look(found) @ (aperture.elements - aperture.elements.mean(axis=0)).T / wave.range_resolution
-    taper = window(radar.processing.range_window, wave.n_samples)
-    turn = 2.0 * np.pi * (np.arange(wave.n_samples) - 0.5 * (wave.n_samples - 1)) / wave.n_samples
-    table = np.arange(0.0, np.ptp(ahead, axis=1).max(initial=0.0) + _CELL, _CELL)
+    return _apart(ahead, window(radar.processing.range_window, wave.n_samples))
+
+
+def spreads(
+    found: ExplainedDetections, reasons: Sequence[Explanation], radar: Radar
+) -> dict[str, tuple[Floats, Floats]]:
+    """Return by how many cells ranges and rates of detections (n,) differ over the virtual elements, and what a beam
+    loses by each (n,) [dB]."""
+    return {"ranges": range_spread(found, radar), "rates": _rate_spread(found, reasons, radar)}
+
+
+def _rate_spread(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Radar) -> tuple[Floats, Floats]:
+    """Return by how many rate cells the rate of each detection (n,) differs over the virtual elements, as of what
+    crosses before them, and what a beam loses by it (n,) [dB], as `range_spread`."""
+    wave, n = radar.channel_waveform, len(reasons)
+    if radar.rx_position is not None or wave.n_chirps < 2 or not any(why.drift for why in reasons):
+        return np.zeros(n), np.zeros(n)
+    # A folded echo comes from where it stands.
+    away = np.where(np.isfinite(found.true_range), found.true_range, found.range)
+    drift = np.array([why.drift or (0.0,) * 6 for why in reasons]).reshape(n, 2, 3)
+    ends = (radar.tx_elements, [why.departure for why in reasons]), (radar.elements, [why.arrival for why in reasons])
+    rate = np.zeros((n, 1))
+    for end, (elements, looks) in enumerate(ends):
+        look = np.array(looks)
+        source = away[:, None, None] * look[:, None] - elements @ radar.axes.T
+        turned = source / np.maximum(np.linalg.norm(source, axis=2, keepdims=True), 1e-9) - look[:, None]
+        more = 0.5 * np.einsum("nek,nk->ne", turned, drift[:, end])
+        rate = (rate[:, :, None] + more[:, None]).reshape(n, -1)
+    return _apart(rate / wave.rate_resolution, window(radar.processing.rate_window, wave.n_chirps))
+
+
+def _apart(places: Floats, taper: Floats) -> tuple[Floats, Floats]:
+    """Return by how many cells places (n, e) [cells] of an echo at the elements differ (n,), and what the mean over
+    the elements of the response of a window (s,) loses in one cell, of the best (n,) [dB]."""
+    count = len(taper)
+    turn = 2.0 * np.pi * (np.arange(count) - 0.5 * (count - 1)) / count
+    table = np.arange(0.0, np.ptp(places, axis=1).max(initial=0.0) + _CELL, _CELL)
     response = np.cos(np.outer(table, turn)) @ taper / taper.sum()
-    held = np.zeros(len(ahead))
-    for i, x in enumerate(ahead):
+    held = np.zeros(len(places))
+    for i, x in enumerate(places):
         away = np.abs(x - np.arange(x.min(), x.max() + _OFF, _OFF)[:, None])
         held[i] = np.interp(away, table, response).mean(axis=1).max() ** 2
-    return np.ptp(ahead, axis=1), -db(np.maximum(held, 1e-30))
+    return np.ptp(places, axis=1), -db(np.maximum(held, 1e-30))
 
 
 def far_field_distance(radar: Radar) -> float:
