@@ -115,6 +115,24 @@ def test_a_crossing_target_has_at_each_element_the_rate_of_the_way_to_it():
         assert abs(share) > 1.0 - 1e-5
 
 
+def test_frames_traced_several_times_have_the_whole_way_to_each_element():
+    sizes = {"repetition": 50e-6, "n_chirps": 128, "n_samples": 32}
+    wave = rc.Waveform(carrier=77e9, bandwidth=300e6, chirp_duration=40e-6, **sizes)
+    radar = rc.Radar(wave, position=(0.0, 0.0, 0.0), elements=LINE, noise=False)
+    place, velocity = np.array([6.0, 0.5, 0.0]), np.array([0.0, 10.0, 0.0])
+    ball = {"name": "ball", "shape": "sphere", "params": {"radius": 0.005}, "rcs_dbsm": 0.0}
+    body = rc.Body(**ball, position=tuple(place), velocity=tuple(velocity))
+    samples = rc.simulate(rc.Scene(bodies=[body], radar=radar, model={"retrace": 9})).cube.samples
+    ramp = wave.chirp_duration / 32 * np.arange(32)
+    time = wave.repetition * np.arange(128)[:, None] + ramp
+    then, slope = place + velocity * time[..., None], wave.bandwidth / wave.chirp_duration
+    for row, element in zip(samples, radar.elements_world, strict=True):
+        delay = (np.linalg.norm(then, axis=2) + np.linalg.norm(then - element, axis=2)) / C0
+        beat = np.exp(-2j * np.pi * (wave.carrier * delay + slope * ramp * delay - 0.5 * slope * delay**2))
+        share = np.vdot(beat, row) / np.sqrt(np.vdot(beat, beat).real * np.vdot(row, row).real)
+        assert abs(share) > 1.0 - 1e-6
+
+
 def test_sources_over_moving_mirrors_drift_as_their_images_do():
     """A wall that comes nearer, a target that passes it: images at two instants."""
     radar = rc.Radar(SMALL, position=(0.0, 0.0, 1.0), velocity=(2.0, 0.5, 0.0), elements=LINE, noise=False)
