@@ -16,8 +16,8 @@ from raychan.geometry.triangles import edge_curvature, facet_edge
 from raychan.vectors import cross, dot, less, row
 
 _OUTSIDE = -1e-9  # barycentric coordinate from which a point lies beyond an edge: rounding
-# Of the search for a foot point. A third one changes how far points lie off by at most 2e-4 of what is allowed where all
-# are within that: a sphere, a torus, a capsule, an ellipsoid of 80,000 to 180,000 facets at 0.05 and 0.5 dB.
+# Of the search for a foot point. A third one changes how far points lie off by at most 2e-4 of what is allowed, where
+# all are within that: a sphere, a torus, a capsule, an ellipsoid of 80,000 to 180,000 facets at 0.05 and 0.5 dB.
 _STEPS = 2
 _WALK = 400  # facets passed in search of a point's own; beyond, it is lost
 # Largest deviation anywhere on a facet over that of the points checked: 1.53 at most on spheres and tori of 20,000 to
